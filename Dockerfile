@@ -1,0 +1,27 @@
+# Copyright 2026 The Tissueform Authors.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+#
+#   docker build -t tissueform .
+#   docker run --rm -p 127.0.0.1:50051:50051 tissueform
+#
+# There is no login and no encryption yet: publish the port on loopback only, as above.
+
+FROM debian:12 AS builder
+COPY deploy /src/deploy
+WORKDIR /src
+RUN deploy/install_packages.sh build && rm -rf /var/lib/apt/lists/*
+COPY . .
+RUN deploy/build.sh release tissueform-server
+
+FROM debian:12-slim
+COPY deploy/install_packages.sh deploy/packages.txt /tmp/tissueform/deploy/
+RUN /tmp/tissueform/deploy/install_packages.sh run \
+    && rm -rf /tmp/tissueform /var/lib/apt/lists/* \
+    && useradd --system --no-create-home --shell /usr/sbin/nologin tissueform
+COPY --from=builder /src/build/release/bin/tissueform-server /usr/local/bin/
+USER tissueform
+EXPOSE 50051
+STOPSIGNAL SIGTERM
+# Whether the port answers; orchestrators ask the standard gRPC health service instead.
+HEALTHCHECK --interval=30s --timeout=3s CMD ["bash", "-c", "</dev/tcp/127.0.0.1/50051"]
+ENTRYPOINT ["tissueform-server"]

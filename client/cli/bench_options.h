@@ -1,0 +1,29 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "CLI/CLI.hpp"
+
+namespace tissueform {
+
+// The options that `tissueform bench` and the benchmark program behind it share.
+struct BenchOptions {
+  std::vector<int> meshes;  // 1 to 6, at least one
+  int repetitions = 5;
+  int threads = 1;
+  std::string json;  // empty: no file
+
+  BenchOptions();  // all meshes, all processors
+};
+
+// Declares them with their help. `options` outlives `app`'s parsing.
+void AddBenchOptions(CLI::App& app, BenchOptions* options);
+
+// The arguments that say what `options` says.
+std::vector<std::string> BenchArguments(const BenchOptions& options);
+
+}  // namespace tissueform

@@ -1,0 +1,22 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+
+#include "absl/status/statusor.h"
+
+namespace tissueform {
+
+// The program of that name in the folder of this one.
+std::string SiblingProgram(const std::string& name);
+
+// The plan of the demo: `chosen` unless empty, else the installed one
+// (../share/tissueform/demo/plan.json seen from this program), else the one in the source tree that
+// this program was built from.
+//
+// Errors: NotFound.
+absl::StatusOr<std::string> FindDemoPlan(const std::string& chosen);
+
+}  // namespace tissueform

@@ -1,0 +1,53 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/types/span.h"
+
+#include "client/cpp/tissueform_client.h"
+
+namespace tissueform {
+
+// A drag of all handles from rest to their poses and back, smoothly.
+struct DragOptions {
+  double seconds = 3;
+  double poses_per_second = 60;
+};
+
+// One frame that came back. Times are since the start of the drag.
+struct DragFrame {
+  uint64_t sequence = 0;
+  double sent_ms = 0;      // when its pose was sent
+  double received_ms = 0;  // when its positions were there
+  double solve_ms = 0;
+  int64_t coalesced_count = 0;
+
+  double latency_ms() const { return received_ms - sent_ms; }
+  // All that is not solving: both ways through the network, queues and conversions.
+  double overhead_ms() const { return latency_ms() - solve_ms; }
+};
+
+struct DragResult {
+  int64_t poses_sent = 0;
+  int64_t coalesced = 0;
+  std::vector<DragFrame> frames;  // in the order of arrival
+  std::string last_positions;     // of the last frame, as they came
+};
+
+// Streams the drag on `session`; all vertices come back. Stops early with Cancelled when
+// `interrupted` is set.
+absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& session,
+                                   absl::Span<const NamedPose> poses, const DragOptions& options,
+                                   const std::atomic<bool>& interrupted);
+
+// The pose at the part `amount` (0 rest, 1 `pose`) of its way.
+HandlePose PartOfPose(const HandlePose& pose, double amount);
+
+}  // namespace tissueform

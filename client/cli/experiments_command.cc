@@ -1,0 +1,95 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/experiments_command.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+#include "client/cli/stage_progress.h"
+#include "client/experiments/experiment.h"
+#include "client/rendering/virtual_display.h"
+#include "core/base/atomic_file.h"
+#include "core/base/parallel_for.h"
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+struct ExperimentsOptions {
+  std::string out;
+  std::vector<std::string> only;
+};
+
+std::vector<std::string> ExperimentNames() {
+  std::vector<std::string> names;
+  for (const Experiment& experiment : AllExperiments()) names.emplace_back(experiment.name);
+  return names;
+}
+
+std::string ExperimentList() {
+  std::string list = "Experiments:\n";
+  for (const Experiment& experiment : AllExperiments()) {
+    absl::StrAppend(&list, "  ", experiment.name, "  ", experiment.topic, "\n");
+  }
+  return list;
+}
+
+bool IsChosen(const ExperimentsOptions& options, const Experiment& experiment) {
+  return options.only.empty() ||
+         std::find(options.only.begin(), options.only.end(), experiment.name) != options.only.end();
+}
+
+absl::Status MakeFolder(const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("cannot make the folder ", folder, ": ", error.message()));
+  }
+  // Asked before minutes of work, by a file that goes again.
+  const std::string probe = folder + "/.tissueform-experiments";
+  TF_RETURN_IF_ERROR(WriteFileAtomically(probe, ""));
+  std::filesystem::remove(probe, error);
+  return absl::OkStatus();
+}
+
+absl::Status RunExperiments(const ExperimentsOptions& options) {
+  TF_RETURN_IF_ERROR(MakeFolder(options.out));
+  // Before any thread: it changes the environment.
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<VirtualDisplay> display, VirtualDisplay::Open());
+  const ExperimentOptions experiment_options{options.out, AvailableProcessors()};
+  for (const Experiment& experiment : AllExperiments()) {
+    if (!IsChosen(options, experiment)) continue;
+    const StageProgress progress(std::string(experiment.name));
+    TF_RETURN_IF_ERROR(experiment.run(experiment_options));
+    absl::PrintF("%s: %s -> %s\n", experiment.name, experiment.topic,
+                 experiment_options.Path(experiment.name) + "*");
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddExperimentsCommand(CLI::App& app, CommandWork* work) {
+  auto options = std::make_shared<ExperimentsOptions>();
+  CLI::App* command = app.add_subcommand(
+      "experiments", "compute the figures and the table of the method's paper again");
+  command->add_option("--out", options->out, "folder for pictures (.png) and numbers (.csv); made")
+      ->required();
+  command->add_option("--only", options->only, "only this experiment; may be given again")
+      ->check(CLI::IsMember(ExperimentNames()));
+  command->footer(absl::StrCat(ExperimentList(),
+                               "Example:\n"
+                               "  tissueform experiments --out figures --only fig1\n"
+                               "docs/experiments.md shows them beside what the paper says."));
+  command->callback([options, work] { *work = [options] { return RunExperiments(*options); }; });
+}
+
+}  // namespace tissueform

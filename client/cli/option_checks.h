@@ -1,0 +1,19 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "CLI/CLI.hpp"
+
+#include "core/planning/plan_io.h"
+
+namespace tissueform {
+
+// For options that name a mesh to be written: the ending must be .vtu, because that is what is
+// written.
+CLI::Validator VtuEnding();
+
+// Adds the flag --allow-outside to a command that reads a plan. `options` outlives the parsing.
+void AddAllowOutside(CLI::App* command, PlanReadOptions* options);
+
+}  // namespace tissueform

@@ -1,0 +1,13 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "client/cli/command.h"
+
+namespace tissueform {
+
+// `plan check PLAN.json`: reads a plan, puts it upon its mesh and says what it asks for.
+void AddPlanCommand(CLI::App& app, CommandWork* work);
+
+}  // namespace tissueform

@@ -1,0 +1,26 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nlohmann/json.hpp"
+
+#include "core/mesh/attribute.h"
+#include "core/mesh/mesh_defect.h"
+
+namespace tissueform {
+
+// What the reports on meshes of tets and on surfaces have in common.
+
+// "anatomy (int32), normal (float32 x 3)", or "none".
+std::string ArraysText(const std::vector<Attribute>& attributes);
+nlohmann::ordered_json ArraysJson(const std::vector<Attribute>& attributes);
+
+// One line a defect, or one that says that there is none.
+std::string DefectsText(const std::vector<MeshDefect>& defects);
+nlohmann::ordered_json DefectsJson(const std::vector<MeshDefect>& defects);
+
+}  // namespace tissueform

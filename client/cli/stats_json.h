@@ -1,0 +1,41 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+
+#include "absl/status/status.h"
+#include "nlohmann/json.hpp"
+
+#include "core/deformation/deformation_quality.h"
+#include "core/deformation/deformer.h"
+#include "core/planning/plan.h"
+
+namespace tissueform {
+
+// What STATS.json tells of one prediction.
+struct PredictionStats {
+  std::string model;     // as in the plan
+  std::string rotation;  // mode of the gradient field
+  Eigen::Index vertices = 0;
+  Eigen::Index tets = 0;
+  Eigen::Index fixed_vertices = 0;
+  Eigen::Index handle_vertices = 0;
+  Eigen::Index free_vertices = 0;
+  double read_seconds = 0;
+  PreparationSummary preparation;
+  SolveSummary solve;
+  DeformationQuality quality;
+};
+
+// The counts, model and mode of a problem; the rest is left for the caller to fill.
+PredictionStats StatsOf(const PlanProblem& problem);
+
+// Keys in the order in which docs/plan-format.md lists them; with version and notice.
+nlohmann::ordered_json StatsToJson(const PredictionStats& stats);
+
+// All or nothing, like WriteFileAtomically.
+absl::Status WriteStats(const std::string& path, const PredictionStats& stats);
+
+}  // namespace tissueform

@@ -1,0 +1,23 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+
+#include "nlohmann/json.hpp"
+
+#include "core/mesh/surface_validation.h"
+#include "core/mesh_io/triangle_mesh_io.h"
+
+namespace tissueform {
+
+// A report on a surface for people: counts, size, arrays, defects with their explanation, verdict.
+std::string SurfaceReportText(const std::string& path, const TriangleMeshFile& file,
+                              const SurfaceReport& report);
+
+// The same for programs.
+nlohmann::ordered_json SurfaceReportJson(const std::string& path, const TriangleMeshFile& file,
+                                         const SurfaceReport& report);
+
+}  // namespace tissueform

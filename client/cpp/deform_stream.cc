@@ -1,0 +1,102 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cpp/deform_stream.h"
+
+#include <utility>
+
+#include "client/cpp/client_status.h"
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+
+DeformStream::~DeformStream() {
+  if (call_ != nullptr && !finished_) {
+    Cancel();
+    Finish().IgnoreError();
+  }
+}
+
+absl::Status DeformStream::Start(v1::DeformService::Stub* stub, const std::string& session,
+                                 const Options& options) {
+  call_ = stub->Deform(&context_);
+  v1::DeformRequest request;
+  v1::DeformConfiguration* configuration = request.mutable_configuration();
+  configuration->set_session(session);
+  *configuration->mutable_vertices() = ToProto(options.vertices);
+  if (options.max_unacked.has_value()) {
+    configuration->set_max_unacked(*options.max_unacked);
+  }
+  v1::DeformResponse response;
+  if (!Send(request).ok() || !call_->Read(&response)) {
+    return Finish();
+  }
+  if (!response.has_started()) {
+    return absl::InternalError(
+        "the stream did not begin with `started`; the server speaks another version");
+  }
+  started_ = std::move(*response.mutable_started());
+  return absl::OkStatus();
+}
+
+absl::Status DeformStream::SendPoses(uint64_t sequence, absl::Span<const NamedPose> poses) {
+  v1::DeformRequest request;
+  request.mutable_pose()->set_sequence(sequence);
+  for (const NamedPose& pose : poses) {
+    *request.mutable_pose()->add_poses() = ToProto(pose);
+  }
+  return Send(request);
+}
+
+absl::Status DeformStream::Ack(const v1::DeformFrame& frame) {
+  v1::DeformRequest request;
+  request.mutable_ack()->set_sequence(frame.sequence());
+  request.mutable_ack()->set_refinement(frame.refinement());
+  return Send(request);
+}
+
+absl::Status DeformStream::Ack(uint64_t sequence) {
+  v1::DeformRequest request;
+  request.mutable_ack()->set_sequence(sequence);
+  return Send(request);
+}
+
+void DeformStream::CloseSending() {
+  MutexLock lock(send_mutex_);
+  if (!std::exchange(sending_closed_, true)) {
+    call_->WritesDone();
+  }
+}
+
+std::optional<v1::DeformFrame> DeformStream::Receive() {
+  v1::DeformResponse response;
+  while (call_->Read(&response)) {
+    if (response.has_frame()) {
+      return std::move(*response.mutable_frame());
+    }
+    if (response.has_notice() && response.notice().has_draining()) {
+      server_is_draining_ = true;
+    }
+  }
+  return std::nullopt;
+}
+
+void DeformStream::Cancel() { context_.TryCancel(); }
+
+absl::Status DeformStream::Finish() {
+  v1::DeformResponse dropped;
+  while (call_->Read(&dropped)) {
+  }
+  finished_ = true;
+  return FromGrpcStatus(call_->Finish());
+}
+
+absl::Status DeformStream::Send(const v1::DeformRequest& request) {
+  MutexLock lock(send_mutex_);
+  if (sending_closed_ || !call_->Write(request)) {
+    return absl::UnavailableError("the stream has ended");
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace tissueform

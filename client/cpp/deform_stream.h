@@ -1,0 +1,88 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/types/span.h"
+#include "grpcpp/client_context.h"
+#include "grpcpp/support/sync_stream.h"
+
+#include "client/cpp/client_messages.h"
+#include "core/base/mutex.h"
+#include "tissueform/v1/deform_service.grpc.pb.h"
+
+namespace tissueform {
+
+// A drag: poses up, frames down. Made by TissueformClient::OpenStream, which must outlive it.
+//
+// One thread may receive while others send and acknowledge. Every frame must be acknowledged, or
+// the server stops after max_unacked of them; a receiver that only wants the newest one
+// acknowledges as it reads.
+class DeformStream {
+ public:
+  struct Options {
+    AnswerVertices vertices;
+    std::optional<int> max_unacked;  // the server's default when left out
+  };
+
+  // Cancels the stream unless Finish was called.
+  ~DeformStream();
+
+  // What the server said when the stream began: number of vertices a frame, and which.
+  const v1::DeformStarted& started() const { return started_; }
+
+  // `sequence` must rise from call to call. An error means that the stream has ended; Finish says
+  // why.
+  absl::Status SendPoses(uint64_t sequence, absl::Span<const NamedPose> poses);
+  absl::Status Ack(const v1::DeformFrame& frame);
+  // All frames of that sequence.
+  absl::Status Ack(uint64_t sequence);
+  // No more poses will come: the server answers the newest one and ends the stream. Acks are no
+  // longer needed.
+  void CloseSending();
+
+  // Blocks until the next frame. Empty when the stream has ended; Finish says how. One thread.
+  std::optional<v1::DeformFrame> Receive();
+
+  // The server has said that it is about to end. Any thread.
+  bool server_is_draining() const { return server_is_draining_; }
+
+  // Ends the stream at once. Any thread, any time.
+  void Cancel();
+
+  // Receives and drops what is still to come and returns how the stream ended. Call it once, after
+  // CloseSending or Cancel, when no other thread uses the stream.
+  absl::Status Finish();
+
+ private:
+  friend class TissueformClient;
+  using Call = grpc::ClientReaderWriter<v1::DeformRequest, v1::DeformResponse>;
+
+  DeformStream() = default;
+
+  // Sends the configuration and waits for the answer.
+  absl::Status Start(v1::DeformService::Stub* stub, const std::string& session,
+                     const Options& options);
+  absl::Status Send(const v1::DeformRequest& request) ABSL_LOCKS_EXCLUDED(send_mutex_);
+
+  // Self-synchronised.
+  grpc::ClientContext context_;
+  std::atomic<bool> server_is_draining_ = false;
+
+  // Constant after Start.
+  v1::DeformStarted started_;
+  std::unique_ptr<Call> call_;
+
+  Mutex send_mutex_;
+  bool sending_closed_ ABSL_GUARDED_BY(send_mutex_) = false;
+  bool finished_ = false;
+};
+
+}  // namespace tissueform

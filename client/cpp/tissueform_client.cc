@@ -1,0 +1,188 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cpp/tissueform_client.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "grpcpp/create_channel.h"
+#include "grpcpp/security/credentials.h"
+
+#include "client/cpp/client_status.h"
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+// All vertices of a mesh of a million are 12 MB; gRPC's own limit is 4 MiB.
+constexpr int kMaxReceiveBytes = 256 << 20;
+constexpr size_t kChunkBytes = 512 << 10;
+constexpr int kKeepaliveMilliseconds = 30'000;
+
+std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address) {
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMilliseconds);
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+}
+
+// False when the call ended early; Finish says why.
+bool WriteChunks(const MeshPayloadView& payload,
+                 grpc::ClientWriter<v1::UploadMeshRequest>* writer) {
+  const int64_t total_bytes = payload.shape.TotalBytes();
+  int64_t offset = 0;
+  v1::UploadMeshRequest request;
+  for (const absl::string_view segment : payload.segments) {
+    for (size_t begin = 0; begin < segment.size(); begin += kChunkBytes) {
+      const absl::string_view data = segment.substr(begin, kChunkBytes);
+      v1::MeshChunk* chunk = request.mutable_chunk();
+      chunk->set_write_offset(offset);
+      chunk->set_data(data.data(), data.size());
+      offset += static_cast<int64_t>(data.size());
+      chunk->set_finish_write(offset == total_bytes);
+      if (!writer->Write(request)) {
+        return false;
+      }
+    }
+  }
+  return writer->WritesDone();
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<TissueformClient>> TissueformClient::Connect(
+    const std::string& address, const Options& options) {
+  if (address.find(':') == std::string::npos) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("\"", address, "\" has no port; give the server as HOST:PORT"));
+  }
+  const std::shared_ptr<grpc::Channel> channel = MakeChannel(address);
+  if (!channel->WaitForConnected(std::chrono::system_clock::now() + options.connect_deadline)) {
+    return absl::UnavailableError(absl::StrCat(
+        "no tissueform-server answers at ", address, " within ",
+        std::chrono::duration<double>(options.connect_deadline).count(),
+        " s; start one (tissueform-server --port PORT) or check address and firewall"));
+  }
+  return std::unique_ptr<TissueformClient>(new TissueformClient(channel, options));
+}
+
+TissueformClient::TissueformClient(const std::shared_ptr<grpc::Channel>& channel,
+                                   const Options& options)
+    : options_(options),
+      meshes_(v1::MeshService::NewStub(channel)),
+      sessions_(v1::SessionService::NewStub(channel)),
+      deform_(v1::DeformService::NewStub(channel)) {}
+
+void TissueformClient::SetDeadline(grpc::ClientContext* context) const {
+  context->set_deadline(std::chrono::system_clock::now() + options_.call_deadline);
+}
+
+absl::StatusOr<v1::Mesh> TissueformClient::UploadMesh(const TetMesh& mesh,
+                                                      const std::vector<CellArray>& cell_arrays) {
+  for (const CellArray& array : cell_arrays) {
+    if (array.values.size() != mesh.num_tets()) {
+      return absl::InvalidArgumentError(absl::StrCat("cell array \"", array.name, "\" has ",
+                                                     array.values.size(), " values for ",
+                                                     mesh.num_tets(), " tets"));
+    }
+  }
+  const MeshPayloadView payload = ViewMeshPayload(mesh.positions(), mesh.tets(), cell_arrays);
+  const std::string sha256 = payload.Sha256();
+  grpc::ClientContext context;
+  SetDeadline(&context);
+  v1::GetMeshRequest request;
+  request.set_name(absl::StrCat("meshes/", sha256));
+  v1::Mesh known;
+  const grpc::Status status = meshes_->GetMesh(&context, request, &known);
+  if (status.ok()) {
+    return known;
+  }
+  if (status.error_code() != grpc::StatusCode::NOT_FOUND) {
+    return FromGrpcStatus(status);
+  }
+  return SendMesh(payload, sha256);
+}
+
+absl::StatusOr<v1::Mesh> TissueformClient::SendMesh(const MeshPayloadView& payload,
+                                                    const std::string& sha256) {
+  grpc::ClientContext context;
+  SetDeadline(&context);
+  v1::UploadMeshResponse response;
+  const auto writer = meshes_->UploadMesh(&context, &response);
+  v1::UploadMeshRequest request;
+  v1::MeshHeader* header = request.mutable_header();
+  header->set_vertex_count(payload.shape.num_vertices);
+  header->set_tet_count(payload.shape.num_tets);
+  header->mutable_cell_arrays()->Add(payload.shape.cell_arrays.begin(),
+                                     payload.shape.cell_arrays.end());
+  header->set_total_bytes(payload.shape.TotalBytes());
+  header->set_sha256(sha256);
+  if (writer->Write(request)) {
+    WriteChunks(payload, writer.get());
+  }
+  TF_RETURN_IF_ERROR(FromGrpcStatus(writer->Finish()));
+  return std::move(*response.mutable_mesh());
+}
+
+absl::Status TissueformClient::DeleteMesh(const std::string& name) {
+  grpc::ClientContext context;
+  SetDeadline(&context);
+  v1::DeleteMeshRequest request;
+  request.set_name(name);
+  google::protobuf::Empty response;
+  return FromGrpcStatus(meshes_->DeleteMesh(&context, request, &response));
+}
+
+absl::StatusOr<v1::Session> TissueformClient::CreateSession(const SessionRequest& request) {
+  grpc::ClientContext context;
+  SetDeadline(&context);
+  v1::Session session;
+  TF_RETURN_IF_ERROR(
+      FromGrpcStatus(sessions_->CreateSession(&context, ToProto(request), &session)));
+  return session;
+}
+
+absl::StatusOr<v1::Session> TissueformClient::GetSession(const std::string& name) {
+  grpc::ClientContext context;
+  SetDeadline(&context);
+  v1::GetSessionRequest request;
+  request.set_name(name);
+  v1::Session session;
+  TF_RETURN_IF_ERROR(FromGrpcStatus(sessions_->GetSession(&context, request, &session)));
+  return session;
+}
+
+absl::Status TissueformClient::DeleteSession(const std::string& name) {
+  grpc::ClientContext context;
+  SetDeadline(&context);
+  v1::DeleteSessionRequest request;
+  request.set_name(name);
+  google::protobuf::Empty response;
+  return FromGrpcStatus(sessions_->DeleteSession(&context, request, &response));
+}
+
+absl::StatusOr<v1::DeformOnceResponse> TissueformClient::DeformOnce(
+    const std::string& session, absl::Span<const NamedPose> poses, const AnswerVertices& vertices) {
+  grpc::ClientContext context;
+  SetDeadline(&context);
+  v1::DeformOnceRequest request;
+  request.set_session(session);
+  for (const NamedPose& pose : poses) {
+    *request.add_poses() = ToProto(pose);
+  }
+  *request.mutable_vertices() = ToProto(vertices);
+  v1::DeformOnceResponse response;
+  TF_RETURN_IF_ERROR(FromGrpcStatus(deform_->DeformOnce(&context, request, &response)));
+  return response;
+}
+
+absl::StatusOr<std::unique_ptr<DeformStream>> TissueformClient::OpenStream(
+    const std::string& session, const DeformStream::Options& options) {
+  std::unique_ptr<DeformStream> stream(new DeformStream());
+  TF_RETURN_IF_ERROR(stream->Start(deform_.get(), session, options));
+  return stream;
+}
+
+}  // namespace tissueform

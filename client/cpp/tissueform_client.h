@@ -1,0 +1,74 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/types/span.h"
+#include "grpcpp/channel.h"
+
+#include "client/cpp/client_messages.h"
+#include "client/cpp/deform_stream.h"
+#include "core/mesh/tet_mesh.h"
+#include "core/mesh_payload/mesh_payload.h"
+#include "tissueform/v1/deform_service.grpc.pb.h"
+#include "tissueform/v1/mesh_service.grpc.pb.h"
+#include "tissueform/v1/session_service.grpc.pb.h"
+
+namespace tissueform {
+
+// A connection to a tissueform-server. Calls block; each has a deadline. Errors carry the server's
+// code and message (proto/tissueform/v1 says which), besides Unavailable and DeadlineExceeded.
+//
+// Thread-safe.
+class TissueformClient {
+ public:
+  struct Options {
+    std::chrono::milliseconds connect_deadline{5'000};
+    std::chrono::milliseconds call_deadline{600'000};
+  };
+
+  // `address` is HOST:PORT. Connects directly: proxies of the environment are not used.
+  //
+  // Errors: InvalidArgument (no port), Unavailable when nobody answers within the deadline.
+  static absl::StatusOr<std::unique_ptr<TissueformClient>> Connect(const std::string& address,
+                                                                   const Options& options);
+
+  // Uploads the mesh with its arrays, unless the server has it.
+  //
+  // Errors: InvalidArgument also when an array has not one value per tet.
+  absl::StatusOr<v1::Mesh> UploadMesh(const TetMesh& mesh,
+                                      const std::vector<CellArray>& cell_arrays);
+  absl::Status DeleteMesh(const std::string& name);
+
+  absl::StatusOr<v1::Session> CreateSession(const SessionRequest& request);
+  absl::StatusOr<v1::Session> GetSession(const std::string& name);
+  absl::Status DeleteSession(const std::string& name);
+
+  absl::StatusOr<v1::DeformOnceResponse> DeformOnce(const std::string& session,
+                                                    absl::Span<const NamedPose> poses,
+                                                    const AnswerVertices& vertices = {});
+
+  // The stream has no deadline.
+  absl::StatusOr<std::unique_ptr<DeformStream>> OpenStream(const std::string& session,
+                                                           const DeformStream::Options& options);
+
+ private:
+  TissueformClient(const std::shared_ptr<grpc::Channel>& channel, const Options& options);
+
+  void SetDeadline(grpc::ClientContext* context) const;
+  absl::StatusOr<v1::Mesh> SendMesh(const MeshPayloadView& payload, const std::string& sha256);
+
+  const Options options_;
+  const std::unique_ptr<v1::MeshService::Stub> meshes_;
+  const std::unique_ptr<v1::SessionService::Stub> sessions_;
+  const std::unique_ptr<v1::DeformService::Stub> deform_;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,35 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+
+namespace tissueform {
+
+// A table of text that becomes a file.
+class CsvTable {
+ public:
+  explicit CsvTable(std::vector<std::string> header);
+
+  // REQUIRES: as many cells as the header has.
+  void AddRow(std::vector<std::string> cells);
+
+  // RFC 4180 with line feeds: cells with a comma or a quotation mark are quoted.
+  std::string Csv() const;
+  // A table of GitHub's Markdown.
+  std::string Markdown() const;
+
+  absl::Status WriteCsv(const std::string& path) const;
+
+ private:
+  std::vector<std::vector<std::string>> rows_;  // the header first
+};
+
+// A number as a cell, with up to six digits that count.
+std::string Cell(double value);
+
+}  // namespace tissueform

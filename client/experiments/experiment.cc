@@ -1,0 +1,30 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/experiments/experiment.h"
+
+#include "client/experiments/blend_experiment.h"
+#include "client/experiments/block_pull_experiment.h"
+#include "client/experiments/guidance_experiment.h"
+#include "client/experiments/materials_experiment.h"
+#include "client/experiments/solver_times_experiment.h"
+#include "client/experiments/twist_experiment.h"
+#include "client/experiments/update_experiment.h"
+
+namespace tissueform {
+
+const std::vector<Experiment>& AllExperiments() {
+  static const auto* const kExperiments = new std::vector<Experiment>{
+      {"fig1", "volume against surface twist of 360 degrees", RunTwistExperiment},
+      {"fig2", "drag and push of a layered block, volume and surface", RunBlockPullExperiment},
+      {"fig3", "a bar's end moved but not turned: three ways to update gradients",
+       RunUpdateExperiment},
+      {"fig4", "steps and convergence of the linear and the cosine blend", RunBlendExperiment},
+      {"fig5", "two materials under a twist of 360 degrees", RunMaterialsExperiment},
+      {"fig6", "cotangent against uniform guidance on a graded bar", RunGuidanceExperiment},
+      {"table1", "times of the factorisation and of three solves", RunSolverTimesExperiment},
+  };
+  return *kExperiments;
+}
+
+}  // namespace tissueform

@@ -1,0 +1,65 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/base/types.h"
+
+namespace tissueform {
+
+// Red, green and blue in [0, 1].
+using Colour = Eigen::Vector3d;
+
+// Told apart in print and by most colour-blind readers.
+inline const Colour kTissueColour{0.93, 0.74, 0.62};
+inline const Colour kBlue{0.00, 0.35, 0.70};
+inline const Colour kOrange{0.84, 0.37, 0.00};
+inline const Colour kGreen{0.00, 0.55, 0.40};
+inline const Colour kGrey{0.55, 0.55, 0.55};
+
+// A triangle mesh as it is to be seen. Coloured by `vertex_values` where there are any, otherwise
+// by `triangle_colours`, otherwise by `colour`.
+struct SurfaceLayer {
+  Positions positions;        // #V by 3, mm
+  TriangleIndices triangles;  // #F by 3
+  Colour colour = kTissueColour;
+  std::vector<Colour> triangle_colours = {};  // #F or none
+  Eigen::VectorXd vertex_values = {};         // #V or none, in the range of the scene's colour bar
+  double opacity = 1;
+  bool edges = true;
+};
+
+// Arrows from `origins` (#A by 3, mm) along `directions` (#A by 3), as long as these are.
+struct ArrowLayer {
+  Positions origins;
+  Positions directions;
+  Colour colour = kBlue;
+  double thickness_mm = 0.1;  // of the shaft
+};
+
+// Blue for the low end, red for the high one, with a legend. No legend for an empty title.
+struct ColourBar {
+  std::string title;  // with the unit
+  double low = 0;
+  double high = 1;
+};
+
+// Where the observer stands, seen from the scene, and what is up. Parallel projection.
+struct View {
+  Eigen::Vector3d from{0, -1, 0};
+  Eigen::Vector3d up{0, 0, 1};
+};
+
+// One panel of a figure.
+struct Scene {
+  std::string title;
+  std::vector<SurfaceLayer> surfaces;
+  std::vector<ArrowLayer> arrows = {};
+  ColourBar colour_bar = {};
+  View view = {};
+};
+
+}  // namespace tissueform

@@ -1,0 +1,82 @@
+# Copyright 2026 The Tissueform Authors.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+#
+# One target a folder. Includes are written from the repository root.
+
+# tissueform_library(core_mesh SOURCES a.cc b.cc DEPS core_base absl::status)
+#
+# A static library tissueform_core_mesh with alias tissueform::core_mesh. DEPS are public; names
+# without :: are folders of this project.
+function(tissueform_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PRIVATE_DEPS" ${ARGN})
+  set(target tissueform_${name})
+  if(ARG_SOURCES)
+    add_library(${target} STATIC ${ARG_SOURCES})
+    set(scope PUBLIC)
+  else()
+    add_library(${target} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(tissueform::${name} ALIAS ${target})
+  target_include_directories(${target} ${scope} "${PROJECT_SOURCE_DIR}")
+  _tissueform_resolve(deps ${ARG_DEPS})
+  target_link_libraries(${target} ${scope} ${deps})
+  if(ARG_PRIVATE_DEPS)
+    _tissueform_resolve(private_deps ${ARG_PRIVATE_DEPS})
+    target_link_libraries(${target} PRIVATE ${private_deps})
+  endif()
+endfunction()
+
+# tissueform_binary(tissueform SOURCES main.cc DEPS client_cli)
+function(tissueform_binary name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  _tissueform_resolve(deps ${ARG_DEPS})
+  target_link_libraries(${name} PRIVATE ${deps})
+endfunction()
+
+# tissueform_test(core_mesh SOURCES tet_mesh_test.cc DEPS core_mesh LABELS server)
+#
+# One test program a folder, named core_mesh_test; ctest sees every test of it by itself. The target tests-server
+# builds the programs with the label "server".
+function(tissueform_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
+  set(target ${name}_test)
+  add_executable(${target} ${ARG_SOURCES})
+  _tissueform_resolve(deps ${ARG_DEPS})
+  target_link_libraries(${target} PRIVATE ${deps} GTest::gmock GTest::gtest_main)
+  target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
+  target_compile_definitions(${target} PRIVATE
+    TISSUEFORM_TEST_DATA_DIR="${PROJECT_SOURCE_DIR}/tests/data"
+    TISSUEFORM_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  # Scratch files lie in the build folder, so that two builds may run their tests at the same time.
+  set(scratch "${PROJECT_BINARY_DIR}/test_scratch")
+  file(MAKE_DIRECTORY "${scratch}")
+  set(properties TIMEOUT ${ARG_TIMEOUT} ENVIRONMENT "TEST_TMPDIR=${scratch}/")
+  if(ARG_LABELS)
+    list(APPEND properties LABELS "${ARG_LABELS}")
+  endif()
+  foreach(label IN LISTS ARG_LABELS)
+    if(NOT TARGET tests-${label})
+      add_custom_target(tests-${label})
+    endif()
+    add_dependencies(tests-${label} ${target})
+  endforeach()
+  gtest_discover_tests(${target} TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST
+                       DISCOVERY_TIMEOUT 60 PROPERTIES ${properties})
+endfunction()
+
+function(_tissueform_resolve out)
+  set(result)
+  foreach(dep IN LISTS ARGN)
+    if(dep MATCHES "^(core|proto|server|client|tests)_" AND NOT dep MATCHES "::")
+      list(APPEND result tissueform::${dep})
+    else()
+      list(APPEND result ${dep})
+    endif()
+  endforeach()
+  set(${out} ${result} PARENT_SCOPE)
+endfunction()

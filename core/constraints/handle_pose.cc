@@ -1,0 +1,56 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/constraints/handle_pose.h"
+
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include <Eigen/Geometry>
+
+namespace tissueform {
+namespace {
+
+absl::Status CheckFinite(const Eigen::Vector3d& vector, absl::string_view field) {
+  if (vector.allFinite()) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(
+      absl::StrCat("pose has a NaN or infinite ", field, "; give three finite numbers"));
+}
+
+}  // namespace
+
+Eigen::Matrix3d RotationMatrix(const Eigen::Vector3d& rotation_vector) {
+  const double angle = rotation_vector.norm();
+  if (angle == 0) {
+    return Eigen::Matrix3d::Identity();
+  }
+  return Eigen::AngleAxisd(angle, rotation_vector / angle).toRotationMatrix();
+}
+
+absl::Status CheckPose(const HandlePose& pose) {
+  if (auto status = CheckFinite(pose.rotation_vector, "rotation vector"); !status.ok()) {
+    return status;
+  }
+  if (auto status = CheckFinite(pose.pivot_mm, "pivot"); !status.ok()) {
+    return status;
+  }
+  if (auto status = CheckFinite(pose.translation_mm, "translation"); !status.ok()) {
+    return status;
+  }
+  if (!std::isfinite(pose.scale) || pose.scale <= 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("pose has scale ", pose.scale, "; it must be a positive number"));
+  }
+  return absl::OkStatus();
+}
+
+Eigen::Vector3d ApplyPose(const HandlePose& pose, const Eigen::Vector3d& position) {
+  return pose.pivot_mm +
+         pose.scale * (RotationMatrix(pose.rotation_vector) * (position - pose.pivot_mm)) +
+         pose.translation_mm;
+}
+
+}  // namespace tissueform

@@ -1,0 +1,76 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/types/span.h"
+
+#include "core/base/types.h"
+#include "core/constraints/handle_pose.h"
+
+namespace tissueform {
+
+// How an answer was found. Not reaching a tolerance is told here; it is not an error.
+struct SolveSummary {
+  int iterations = 1;  // linear solves
+  bool converged = true;
+  bool cancelled = false;  // stopped by DeformControl::on_progress
+  double residual = 0;     // relative residual of the last linear solve; 0 unless asked for
+  double solve_seconds = 0;
+  std::vector<double>
+      changes_mm;  // largest vertex change of each iteration; empty for direct models
+};
+
+struct Deformation {
+  Positions positions;  // #V by 3, mm
+  SolveSummary summary;
+};
+
+// How an answer is sought, for models that iterate.
+struct DeformControl {
+  // Start from where the last answer ended instead of from rest: for a stream of poses close to
+  // each other. Within the tolerance the answer is the same.
+  bool warm_start = false;
+  // Called with every answer but the last; returning false stops with that answer, marked as
+  // cancelled.
+  std::function<bool(const Deformation& so_far)> on_progress;
+};
+
+// What preparing a deformer took and what it holds.
+struct PreparationSummary {
+  double assemble_seconds = 0;
+  double analyse_seconds = 0;
+  double factorise_seconds = 0;
+  double prepare_seconds = 0;  // harmonic fields and whatever else a model makes ready
+  int64_t factor_bytes = 0;
+  int64_t bytes_held = 0;  // everything that the deformer holds
+  Eigen::Index negative_weights = 0;
+  double harmonic_min = 0;  // range of the harmonic fields; [0, 1] unless weights are negative
+  double harmonic_max = 1;
+};
+
+// A model of soft tissue, prepared for one mesh, one stiffness and one constraint set: there is no
+// unprepared state. A new pose never factorises again. One thread at a time.
+class Deformer {
+ public:
+  virtual ~Deformer() = default;
+
+  // `poses` has one entry per handle of the constraint set, in its order.
+  //
+  // Errors: InvalidArgument when the number of poses is wrong or a pose is not legal (see
+  // CheckPose).
+  virtual absl::StatusOr<Deformation> Deform(absl::Span<const HandlePose> poses,
+                                             const DeformControl& control) = 0;
+  absl::StatusOr<Deformation> Deform(absl::Span<const HandlePose> poses) {
+    return Deform(poses, DeformControl{});
+  }
+
+  virtual const PreparationSummary& preparation() const = 0;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,34 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/deformation/rotation_propagation.h"
+
+#include <algorithm>
+
+#include "core/base/parallel_for.h"
+
+namespace tissueform {
+
+void PropagateRotations(const CellField& harmonic, absl::Span<const HandlePose> poses, int threads,
+                        CellTransforms* transforms) {
+  constexpr Eigen::Index kCellGrain = 4096;
+  const bool identity = std::all_of(poses.begin(), poses.end(), [](const HandlePose& pose) {
+    return pose.rotation_vector.isZero(0) && pose.scale == 1.0;
+  });
+  transforms->resize(identity ? 0 : harmonic.rows(), 9);
+  ParallelFor(threads, transforms->rows(), kCellGrain, [&](Eigen::Index begin, Eigen::Index end) {
+    for (Eigen::Index c = begin; c < end; ++c) {
+      Eigen::Vector3d rotation_vector = Eigen::Vector3d::Zero();
+      double scale = 1.0;
+      for (size_t h = 0; h < poses.size(); ++h) {
+        const double u = harmonic(c, static_cast<Eigen::Index>(h));
+        rotation_vector += u * poses[h].rotation_vector;
+        scale += u * (poses[h].scale - 1.0);
+      }
+      Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(transforms->row(c).data()) =
+          scale * RotationMatrix(rotation_vector);
+    }
+  });
+}
+
+}  // namespace tissueform

@@ -1,0 +1,20 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/linear_solvers/cholmod_cholesky.h"
+#include "core/linear_solvers/eigen_cholesky.h"
+#include "core/linear_solvers/sparse_cholesky.h"
+
+namespace tissueform {
+
+std::unique_ptr<SparseCholesky> CreateSparseCholesky(CholeskyBackend backend) {
+  switch (backend) {
+    case CholeskyBackend::kCholmod:
+      return CreateCholmodCholesky();
+    case CholeskyBackend::kEigen:
+      break;
+  }
+  return CreateEigenCholesky();
+}
+
+}  // namespace tissueform

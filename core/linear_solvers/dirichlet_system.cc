@@ -1,0 +1,149 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/linear_solvers/dirichlet_system.h"
+
+#include <utility>
+
+#include "absl/memory/memory.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
+
+namespace tissueform {
+namespace {
+
+constexpr int32_t kNotInSystem = -1;
+
+absl::Status CheckPrescribed(const SparseMatrix& K, const std::vector<int32_t>& prescribed) {
+  int32_t previous = -1;
+  for (const int32_t index : prescribed) {
+    if (index <= previous || index >= K.rows()) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "prescribed unknown ", index, " is out of order or outside 0 to ", K.rows() - 1));
+    }
+    previous = index;
+  }
+  return absl::OkStatus();
+}
+
+enum class BlockPart { kWhole, kLowerTriangle };
+
+// The entries of K in the rows for which row_number is not kNotInSystem, in the given columns. Row
+// numbers rise with the rows.
+SparseMatrix ExtractBlock(const SparseMatrix& K, const std::vector<int32_t>& row_number,
+                          Eigen::Index num_rows, const std::vector<int32_t>& columns,
+                          BlockPart part) {
+  const auto is_in_block = [part](int32_t row, Eigen::Index column) {
+    return row != kNotInSystem && (part == BlockPart::kWhole || row >= column);
+  };
+  SparseMatrix block(num_rows, static_cast<Eigen::Index>(columns.size()));
+  Eigen::Index entries = 0;
+  for (Eigen::Index j = 0; j < block.cols(); ++j) {
+    for (SparseMatrix::InnerIterator entry(K, columns[j]); entry; ++entry) {
+      entries += is_in_block(row_number[entry.row()], j) ? 1 : 0;
+    }
+  }
+  block.reserve(entries);
+  for (Eigen::Index j = 0; j < block.cols(); ++j) {
+    block.startVec(j);
+    for (SparseMatrix::InnerIterator entry(K, columns[j]); entry; ++entry) {
+      if (const int32_t row = row_number[entry.row()]; is_in_block(row, j)) {
+        block.insertBack(row, j) = entry.value();
+      }
+    }
+  }
+  block.finalize();
+  return block;
+}
+
+int64_t BytesOf(const SparseMatrix& matrix) {
+  return matrix.nonZeros() * static_cast<int64_t>(sizeof(double) + sizeof(int32_t)) +
+         (matrix.outerSize() + 1) * static_cast<int64_t>(sizeof(int32_t));
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<DirichletSystem>> DirichletSystem::Create(
+    const SparseMatrix& K, const std::vector<int32_t>& prescribed, const Options& options) {
+  TF_RETURN_IF_ERROR(CheckPrescribed(K, prescribed));
+  auto system = absl::WrapUnique(new DirichletSystem());
+  system->size_ = K.rows();
+  system->prescribed_ = prescribed;
+
+  std::vector<bool> is_prescribed(K.rows(), false);
+  for (const int32_t index : prescribed) {
+    is_prescribed[index] = true;
+  }
+  std::vector<int32_t> free_number(K.rows(), kNotInSystem);
+  for (int32_t i = 0; i < K.rows(); ++i) {
+    const bool empty = K.outerIndexPtr()[i] == K.outerIndexPtr()[i + 1];
+    if (!is_prescribed[i] && !empty) {
+      free_number[i] = static_cast<int32_t>(system->free_.size());
+      system->free_.push_back(i);
+    }
+  }
+  system->free_free_ =
+      ExtractBlock(K, free_number, system->num_free(), system->free_, BlockPart::kLowerTriangle);
+  system->free_prescribed_ =
+      ExtractBlock(K, free_number, system->num_free(), prescribed, BlockPart::kWhole);
+  if (system->free_.empty()) {
+    return system;
+  }
+
+  system->cholesky_ = CreateSparseCholesky(options.backend);
+  Stopwatch stopwatch;
+  TF_RETURN_IF_ERROR(system->cholesky_->Analyze(system->free_free_));
+  system->factorization_.analyse_seconds = stopwatch.Restart();
+  system->factorization_.factor_bytes = system->cholesky_->factor_bytes();
+  if (options.admission) {
+    TF_RETURN_IF_ERROR(options.admission(system->factorization_.factor_bytes));
+  }
+  stopwatch.Restart();
+  TF_RETURN_IF_ERROR(system->cholesky_->Factorize(system->free_free_));
+  system->factorization_.factorise_seconds = stopwatch.Restart();
+  return system;
+}
+
+absl::StatusOr<Eigen::MatrixXd> DirichletSystem::Solve(const Eigen::MatrixXd& rhs,
+                                                       const Eigen::MatrixXd& values) {
+  Eigen::MatrixXd solution = Eigen::MatrixXd::Zero(size_, values.cols());
+  if (!free_.empty()) {
+    reduced_rhs_.noalias() = free_prescribed_ * values;
+    reduced_rhs_ = -reduced_rhs_;
+    if (rhs.rows() > 0) {
+      reduced_rhs_ += rhs(free_, Eigen::all);
+    }
+    TF_RETURN_IF_ERROR(cholesky_->Solve(reduced_rhs_, &reduced_solution_));
+    solution(free_, Eigen::all) = reduced_solution_;
+  }
+  solution(prescribed_, Eigen::all) = values;
+  return solution;
+}
+
+double DirichletSystem::RelativeResidual(const Eigen::MatrixXd& rhs,
+                                         const Eigen::MatrixXd& solution) const {
+  if (free_.empty()) {
+    return 0;
+  }
+  Eigen::MatrixXd right = -(free_prescribed_ * solution(prescribed_, Eigen::all));
+  if (rhs.rows() > 0) {
+    right += rhs(free_, Eigen::all);
+  }
+  const Eigen::MatrixXd free_solution = solution(free_, Eigen::all);
+  const Eigen::MatrixXd residual =
+      free_free_.selfadjointView<Eigen::Lower>() * free_solution - right;
+  const double norm = right.norm();
+  return norm > 0 ? residual.norm() / norm : residual.norm();
+}
+
+int64_t DirichletSystem::bytes_held() const {
+  const auto indices = static_cast<int64_t>(free_.size() + prescribed_.size());
+  const auto workspace = static_cast<int64_t>(reduced_rhs_.size() + reduced_solution_.size());
+  return factorization_.factor_bytes + BytesOf(free_free_) + BytesOf(free_prescribed_) +
+         indices * static_cast<int64_t>(sizeof(int32_t)) +
+         workspace * static_cast<int64_t>(sizeof(double));
+}
+
+}  // namespace tissueform

@@ -1,0 +1,82 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/base/types.h"
+#include "core/linear_solvers/sparse_cholesky.h"
+
+namespace tissueform {
+
+// Seconds that each stage of a preparation took, and what it holds.
+struct FactorizationSummary {
+  double analyse_seconds = 0;
+  double factorise_seconds = 0;
+  int64_t factor_bytes = 0;
+};
+
+// Called after the symbolic analysis with the bytes that the numeric factor will need and before
+// they are allocated. An error stops the preparation and is returned as it is: the place where a
+// memory budget says no.
+using FactorAdmission = std::function<absl::Status(int64_t factor_bytes)>;
+
+// K x = b with prescribed values at some unknowns (Liao et al. 2009, Eq. 7): rows and columns of
+// prescribed unknowns are eliminated, the free block is factorised once.
+//
+// One thread at a time.
+class DirichletSystem {
+ public:
+  struct Options {
+    CholeskyBackend backend = CholeskyBackend::kCholmod;
+    FactorAdmission admission;  // may be empty
+  };
+
+  // `K` is n by n, symmetric, both triangles stored. `prescribed` is rising and without repetition.
+  // Unknowns whose column of K is empty (vertices that no tet holds) are left out of the system and
+  // keep the value zero unless prescribed.
+  //
+  // Errors: InvalidArgument (index out of range), FailedPrecondition (free block not positive
+  // definite), ResourceExhausted, or what the admission says.
+  static absl::StatusOr<std::unique_ptr<DirichletSystem>> Create(
+      const SparseMatrix& K, const std::vector<int32_t>& prescribed, const Options& options);
+
+  // Solves for k right-hand sides in one pass. `rhs` is n by k (rows of prescribed unknowns are not
+  // read) or has no rows, which stands for zero; `values` is #prescribed by k, in the order of
+  // `prescribed`. Returns n by k.
+  absl::StatusOr<Eigen::MatrixXd> Solve(const Eigen::MatrixXd& rhs, const Eigen::MatrixXd& values);
+
+  // Relative residual ||A x - b|| / ||b|| of the free rows, over all columns; 0 when b is zero and
+  // x solves it.
+  double RelativeResidual(const Eigen::MatrixXd& rhs, const Eigen::MatrixXd& solution) const;
+
+  Eigen::Index num_free() const { return static_cast<Eigen::Index>(free_.size()); }
+  const std::vector<int32_t>& free() const { return free_; }
+  const FactorizationSummary& factorization() const { return factorization_; }
+  int64_t bytes_held() const;
+
+ private:
+  DirichletSystem() = default;
+
+  // Constant after Create.
+  Eigen::Index size_ = 0;
+  std::vector<int32_t> free_;        // rising
+  std::vector<int32_t> prescribed_;  // rising
+  SparseMatrix free_free_;           // #free by #free: the lower triangle of A
+  SparseMatrix free_prescribed_;     // #free by #prescribed
+  FactorizationSummary factorization_;
+
+  // Workspaces, reused between solves.
+  std::unique_ptr<SparseCholesky> cholesky_;
+  Eigen::MatrixXd reduced_rhs_;
+  Eigen::MatrixXd reduced_solution_;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,50 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/base/types.h"
+
+namespace tissueform {
+
+enum class CholeskyBackend {
+  kCholmod,  // supernodal with METIS ordering; the default
+  kEigen,    // Eigen::SimplicialLLT with AMD ordering; the independent second opinion
+};
+
+// Direct solver for A x = b with A sparse, symmetric and positive definite.
+//
+// The calls come in the order Analyze, Factorize, Solve; a later Factorize with the same sparsity
+// pattern reuses the analysis. One thread at a time (solving reuses a workspace).
+class SparseCholesky {
+ public:
+  virtual ~SparseCholesky() = default;
+
+  // Finds the fill-reducing ordering and the shape of the factor. Only the lower triangle of `A` is
+  // read. Errors: InvalidArgument (not square), ResourceExhausted (out of memory, or the factor is
+  // too large).
+  virtual absl::Status Analyze(const SparseMatrix& A) = 0;
+
+  // Bytes that the numeric factor will hold, or holds. Known once Analyze has succeeded, before
+  // anything of that size is allocated.
+  virtual int64_t factor_bytes() const = 0;
+
+  // Computes the numeric factor. REQUIRES: Analyze succeeded for the sparsity pattern of `A`.
+  // Errors: FailedPrecondition (not positive definite), ResourceExhausted (out of memory).
+  virtual absl::Status Factorize(const SparseMatrix& A) = 0;
+
+  // Solves for all columns of `rhs` (#rows by k) in one pass over the factor and writes `solution`
+  // (#rows by k, resized). REQUIRES: Factorize succeeded.
+  virtual absl::Status Solve(const Eigen::MatrixXd& rhs, Eigen::MatrixXd* solution) = 0;
+};
+
+// Never null.
+std::unique_ptr<SparseCholesky> CreateSparseCholesky(CholeskyBackend backend);
+
+}  // namespace tissueform

@@ -1,0 +1,100 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/mesh_io/cgal_surface_io.h"
+
+#include <array>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <sstream>
+#include <vector>
+
+#include <CGAL/IO/OBJ.h>
+#include <CGAL/IO/OFF.h>
+#include <CGAL/IO/PLY.h>
+#include <CGAL/IO/STL.h>
+#include <CGAL/Simple_cartesian.h>
+
+#include "core/base/status_macros.h"
+#include "core/mesh_io/isolated_read.h"
+#include "core/mesh_io/polygon_fan.h"
+
+namespace tissueform {
+namespace {
+
+using Point = CGAL::Simple_cartesian<double>::Point_3;
+
+// Without the zero bytes that ZBrush leaves at the end, which CGAL takes for an unknown line.
+std::string TextOf(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  text.resize(text.find_last_not_of('\0') + 1);
+  return text;
+}
+
+absl::StatusOr<RawMesh> ReadWithCgal(const CheckedMeshFile& file) {
+  std::istringstream stream(TextOf(file.path));
+  std::vector<Point> points;
+  std::vector<std::vector<int64_t>> polygons;
+  const bool read = file.format == MeshFormat::kObj ? CGAL::IO::read_OBJ(stream, points, polygons)
+                                                    : CGAL::IO::read_OFF(stream, points, polygons);
+  if (!read) {
+    return absl::InvalidArgumentError(
+        "it is damaged: a line is not as the format wants it, a number is missing or a face refers "
+        "to a vertex that is not there");
+  }
+  RawMesh mesh;
+  mesh.positions.resize(static_cast<Eigen::Index>(points.size()), 3);
+  for (size_t v = 0; v < points.size(); ++v) {
+    mesh.positions.row(static_cast<Eigen::Index>(v)) << points[v].x(), points[v].y(), points[v].z();
+  }
+  PolygonFan fan;
+  for (const std::vector<int64_t>& polygon : polygons) TF_RETURN_IF_ERROR(fan.Add(polygon));
+  mesh.cells = fan.Triangles();
+  mesh.split_polygons = fan.split_polygons();
+  return mesh;
+}
+
+struct Soup {
+  std::vector<Point> points;
+  std::vector<std::array<int32_t, 3>> triangles;
+};
+
+Soup ToSoup(const TriangleMesh& mesh) {
+  Soup soup;
+  for (const auto& p : mesh.positions().rowwise()) soup.points.emplace_back(p[0], p[1], p[2]);
+  for (const auto& t : mesh.triangles().rowwise()) soup.triangles.push_back({t[0], t[1], t[2]});
+  return soup;
+}
+
+bool WriteSoup(const Soup& soup, MeshFormat format, std::ostream& stream) {
+  const auto exactly =
+      CGAL::parameters::stream_precision(std::numeric_limits<double>::max_digits10);
+  switch (format) {
+    case MeshFormat::kObj:
+      return CGAL::IO::write_OBJ(stream, soup.points, soup.triangles, exactly);
+    case MeshFormat::kOff:
+      return CGAL::IO::write_OFF(stream, soup.points, soup.triangles, exactly);
+    case MeshFormat::kStl:
+      return CGAL::IO::write_STL(stream, soup.points, soup.triangles, exactly);
+    default:
+      return CGAL::IO::write_PLY(stream, soup.points, soup.triangles, exactly);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<RawMesh> ReadCgalSurface(const CheckedMeshFile& file, const MeshReadLimits& limits) {
+  return ReadIsolated(limits, [&file] { return ReadWithCgal(file); });
+}
+
+absl::StatusOr<std::string> SurfaceText(const TriangleMesh& mesh, MeshFormat format) {
+  std::ostringstream stream;
+  if (!WriteSoup(ToSoup(mesh), format, stream)) {
+    return absl::InternalError("CGAL cannot write the surface");
+  }
+  return stream.str();
+}
+
+}  // namespace tissueform

@@ -1,0 +1,86 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/mesh_io/gmsh_reader.h"
+
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+
+#include "core/base/status_macros.h"
+#include "core/mesh_io/gmsh_model.h"
+#include "core/mesh_io/isolated_read.h"
+#include "core/mesh_io/medit_check.h"
+#include "core/mesh_io/plain_names.h"
+
+namespace tissueform {
+namespace {
+
+std::string Slurp(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+// Cuts the next line off `text`, with its end.
+absl::string_view TakeLine(absl::string_view* text) {
+  const size_t end = text->find('\n');
+  const absl::string_view line = text->substr(0, end == text->npos ? end : end + 1);
+  text->remove_prefix(line.size());
+  return line;
+}
+
+// ASCII of version 2, whose elements are one a line, and without data that go by their numbers.
+bool CanRenumber(absl::string_view text) {
+  TakeLine(&text);
+  return absl::StartsWith(text, "2") && absl::StrContains(TakeLine(&text), " 0 ") &&
+         !absl::StrContains(text, "$ElementData");
+}
+
+// The text with the elements numbered from 1. Some programs (SOFA) give all the same number, and
+// Gmsh then keeps only one of them.
+std::string Renumber(absl::string_view text) {
+  std::string result;
+  int64_t number = -1;  // of the line in $Elements, whose line 0 is the count
+  while (!text.empty()) {
+    const absl::string_view line = TakeLine(&text);
+    if (absl::StartsWith(line, "$")) number = absl::StartsWith(line, "$Elements") ? 0 : -1;
+    const size_t rest = line.find_first_of(" \t");
+    if (number > 1 && rest != line.npos) {
+      absl::StrAppend(&result, number - 1, line.substr(rest));
+    } else {
+      result.append(line.data(), line.size());
+    }
+    number += number >= 0 ? 1 : 0;
+  }
+  return result;
+}
+
+absl::StatusOr<RawMesh> ReadUnderPlainName(const PlainNames& names, absl::string_view name,
+                                           bool is_medit, const MeshReadLimits& limits) {
+  const std::string path = names.Path(name);
+  return ReadIsolated(limits, [&] { return ReadGmshModel(path, is_medit); });
+}
+
+}  // namespace
+
+absl::StatusOr<RawMesh> ReadGmsh(const CheckedMeshFile& file, const MeshReadLimits& limits) {
+  TF_ASSIGN_OR_RETURN(const PlainNames names, PlainNames::Create());
+  if (file.format == MeshFormat::kMedit) {
+    TF_RETURN_IF_ERROR(CheckMeditLines(file.path));
+    TF_RETURN_IF_ERROR(names.Link(file.path, "a.mesh"));
+    return ReadUnderPlainName(names, "a.mesh", true, limits);
+  }
+  TF_RETURN_IF_ERROR(names.Link(file.path, "a.msh"));
+  absl::StatusOr<RawMesh> mesh = ReadUnderPlainName(names, "a.msh", false, limits);
+  if (!absl::IsFailedPrecondition(mesh.status())) return mesh;
+  const std::string text = Slurp(file.path);
+  if (!CanRenumber(text)) return absl::InvalidArgumentError(mesh.status().message());
+  TF_RETURN_IF_ERROR(names.Write("b.msh", Renumber(text)));
+  return ReadUnderPlainName(names, "b.msh", false, limits);
+}
+
+}  // namespace tissueform

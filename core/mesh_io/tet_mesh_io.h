@@ -1,0 +1,55 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/mesh/attribute.h"
+#include "core/mesh/tet_mesh.h"
+#include "core/mesh_io/mesh_read_limits.h"
+
+namespace tissueform {
+
+// A tet mesh as it lies in a file: the mesh and every numeric array with it.
+struct TetMeshFile {
+  TetMesh mesh;
+  std::vector<Attribute> point_data;  // #V tuples each
+  std::vector<Attribute> cell_data;   // #T tuples each
+  // Tets whose corners were swapped on reading: none or all. Not written.
+  Eigen::Index reoriented_tets = 0;
+};
+
+// The attribute of that name, or null.
+const Attribute* FindAttribute(const std::vector<Attribute>& attributes, const std::string& name);
+
+// Reads linear tetrahedra from .vtu (VTK XML), .vtk (legacy VTK), .msh (Gmsh 2.2, 4.1), .mesh
+// (MEDIT) or .node and .ele (TetGen; either of the pair); the ending, in any case, chooses the
+// format. docs/mesh-formats.md says what each keeps. When every tet is negative the file counts
+// corners the other way round: they are reoriented (see RepairOrientation) and reported. All
+// formats but .vtu are read in a child process, because their libraries do not bear damaged files.
+//
+// Errors name the file: NotFound (no such file), PermissionDenied, InvalidArgument (truncated,
+// another format behind the ending, a header that disagrees with its arrays, cells that are not
+// tets, an array of the wrong length), ResourceExhausted (over a limit). Never throws.
+absl::StatusOr<TetMeshFile> ReadTetMesh(const std::string& path, const MeshReadLimits& limits = {});
+
+// The files that ReadTetMesh reads for `path`: it and, for TetGen's pairs, the other one.
+std::vector<std::string> FilesOfTetMesh(const std::string& path);
+
+// Writes a .vtu with appended, zlib-compressed binary arrays. Positions are written as doubles. The
+// file carries the field "notice" with kNotMedicalDeviceNotice.
+//
+// Writes beside `path` and renames at the end: when anything fails an old file stays as it was and
+// no partial file is left.
+absl::Status WriteTetMesh(const std::string& path, const TetMeshFile& file);
+
+// Part of every exported result.
+inline constexpr char kNotMedicalDeviceNotice[] =
+    "Tissueform research software, not a medical device: not for diagnosis or treatment.";
+
+}  // namespace tissueform

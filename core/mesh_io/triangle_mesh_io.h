@@ -1,0 +1,44 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/mesh/attribute.h"
+#include "core/mesh/triangle_mesh.h"
+#include "core/mesh_io/mesh_read_limits.h"
+
+namespace tissueform {
+
+// A surface as it lies in a file: the triangles and every numeric array that the format has.
+struct TriangleMeshFile {
+  TriangleMesh mesh;
+  std::vector<Attribute> point_data;  // #V tuples each
+  std::vector<Attribute> cell_data;   // #F tuples each
+  // Faces of the file with more than three corners, each split into a fan. Not written.
+  int64_t split_polygons = 0;
+};
+
+// Whether the ending of `path` is that of a surface format, in any case.
+bool NamesSurface(const std::string& path);
+
+// Reads .vtp (with all arrays), .ply (with normals, colours, texture coordinates), .stl (corners at
+// exactly one place become one vertex), .obj or .off (places and faces); the ending, in any case,
+// chooses the format. Each is read in a child process.
+//
+// Errors: as ReadTetMesh (core/mesh_io/tet_mesh_io.h). Never throws.
+absl::StatusOr<TriangleMeshFile> ReadTriangleMesh(const std::string& path,
+                                                  const MeshReadLimits& limits = {});
+
+// Writes the format that the ending names: .vtp (with all arrays), or .stl .ply .obj .off as text,
+// for which `file` must have no arrays, because they would be lost (InvalidArgument). Coordinates
+// come back exactly, except from .stl, which VTK reads in single precision. All or nothing, as
+// WriteTetMesh.
+absl::Status WriteTriangleMesh(const std::string& path, const TriangleMeshFile& file);
+
+}  // namespace tissueform

@@ -1,0 +1,112 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/mesh_io/vtk_export.h"
+
+#include <cstring>
+#include <set>
+#include <vtkCellData.h>
+#include <vtkDataArray.h>
+#include <vtkDoubleArray.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkSmartPointer.h>
+#include <vtkStringArray.h>
+#include <vtkTypeTraits.h>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
+
+#include "core/base/status_macros.h"
+#include "core/mesh_io/attribute_name.h"
+#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh_io/vtk_error_scope.h"
+
+namespace tissueform {
+namespace {
+
+absl::Status CheckAttribute(const Attribute& attribute, Eigen::Index num_tuples) {
+  TF_RETURN_IF_ERROR(CheckAttributeName(attribute.name));
+  const size_t size =
+      std::visit([](const auto& values) { return values.size(); }, attribute.values);
+  if (attribute.components < 1 || size != static_cast<size_t>(attribute.components * num_tuples)) {
+    return absl::InvalidArgumentError(absl::StrCat("array \"", attribute.name, "\" holds ", size,
+                                                   " values, not ", attribute.components, " times ",
+                                                   num_tuples));
+  }
+  return absl::OkStatus();
+}
+
+// VTK 9.1 writes names as they are, although its reader undoes the escapes of XML.
+std::string EscapeForXml(const std::string& name) {
+  return absl::StrReplaceAll(name,
+                             {{"&", "&amp;"}, {"<", "&lt;"}, {">", "&gt;"}, {"\"", "&quot;"}});
+}
+
+vtkSmartPointer<vtkDataArray> ToVtk(const Attribute& attribute) {
+  return std::visit(
+      [&attribute](const auto& values) {
+        using Value = typename std::decay_t<decltype(values)>::value_type;
+        auto array = vtkSmartPointer<vtkDataArray>::Take(
+            vtkDataArray::CreateDataArray(vtkTypeTraits<Value>::VTK_TYPE_ID));
+        array->SetName(EscapeForXml(attribute.name).c_str());
+        array->SetNumberOfComponents(attribute.components);
+        array->SetNumberOfTuples(static_cast<vtkIdType>(values.size()) / attribute.components);
+        std::memcpy(array->GetVoidPointer(0), values.data(), values.size() * sizeof(Value));
+        return array;
+      },
+      attribute.values);
+}
+
+void AddNotice(vtkPointSet* data) {
+  vtkNew<vtkStringArray> notice;
+  notice->SetName("notice");
+  notice->InsertNextValue(kNotMedicalDeviceNotice);
+  data->GetFieldData()->AddArray(notice);
+}
+
+}  // namespace
+
+absl::Status CheckAttributes(const std::vector<Attribute>& attributes, Eigen::Index num_tuples) {
+  std::set<std::string> names;
+  for (const Attribute& attribute : attributes) {
+    TF_RETURN_IF_ERROR(CheckAttribute(attribute, num_tuples));
+    if (!names.insert(attribute.name).second) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("two arrays are named \"", attribute.name, "\""));
+    }
+  }
+  return absl::OkStatus();
+}
+
+void AddPointsAndArrays(const Positions& positions, const std::vector<Attribute>& point_data,
+                        const std::vector<Attribute>& cell_data, vtkPointSet* data) {
+  vtkNew<vtkDoubleArray> coordinates;
+  coordinates->SetNumberOfComponents(3);
+  coordinates->SetNumberOfTuples(positions.rows());
+  std::memcpy(coordinates->GetPointer(0), positions.data(),
+              static_cast<size_t>(positions.size()) * sizeof(double));
+  vtkNew<vtkPoints> points;
+  points->SetData(coordinates);
+  data->SetPoints(points);
+  for (const Attribute& attribute : point_data) data->GetPointData()->AddArray(ToVtk(attribute));
+  for (const Attribute& attribute : cell_data) data->GetCellData()->AddArray(ToVtk(attribute));
+  AddNotice(data);
+}
+
+absl::StatusOr<std::string> SerializeWith(vtkXMLWriter* writer, vtkPointSet* data) {
+  VtkErrorScope errors;
+  writer->SetInputData(data);
+  writer->SetDataModeToAppended();
+  writer->EncodeAppendedDataOff();
+  writer->SetCompressorTypeToZLib();
+  writer->WriteToOutputStringOn();
+  const int written = writer->Write();
+  if (written == 0 || writer->GetErrorCode() != 0 || !errors.first_error().empty()) {
+    return absl::InternalError(absl::StrCat("VTK's writer failed (", errors.first_error(), ")"));
+  }
+  return writer->GetOutputString();
+}
+
+}  // namespace tissueform

@@ -1,0 +1,90 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/constraints/constraint_set.h"
+#include "core/constraints/handle_pose.h"
+#include "core/deformation/create_deformer.h"
+#include "core/mesh/attribute.h"
+#include "core/mesh/tet_mesh.h"
+
+namespace tissueform {
+
+// The plan file, word for word (docs/plan-format.md): what is predicted. Nothing here depends on a
+// mesh yet; numbers are in the plan's own coordinate system.
+
+enum class CoordinateSystem { kLps, kRas };
+
+// One of the selectors of a plan: vertices by number, by the value of a point array, inside a
+// closed box, or the union of others.
+struct VertexSelector;
+struct SelectVertices {
+  std::vector<int64_t> vertices;
+};
+struct SelectByPointData {
+  std::string name;
+  double equals = 0;
+};
+struct SelectBox {
+  Eigen::Vector3d min_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d max_mm = Eigen::Vector3d::Zero();
+};
+struct SelectUnion {
+  std::vector<VertexSelector> of;
+};
+struct VertexSelector {
+  std::variant<SelectVertices, SelectByPointData, SelectBox, SelectUnion> choice;
+};
+
+// Young's modulus in Pa.
+struct UniformStiffness {
+  double pa = 0;
+};
+struct StiffnessFromCellData {
+  std::string name;
+};
+struct StiffnessByCellData {
+  std::string name;
+  std::vector<std::pair<int64_t, double>> pa_of_value;
+};
+using StiffnessChoice = std::variant<UniformStiffness, StiffnessFromCellData, StiffnessByCellData>;
+
+struct PlannedHandle {
+  std::string name;
+  VertexSelector region;
+  HandlePose pose;  // radians and mm, in the plan's coordinate system
+};
+
+struct Plan {
+  CoordinateSystem coordinate_system = CoordinateSystem::kLps;
+  std::string mesh_path;  // joined with the folder of the plan
+  StiffnessChoice stiffness;
+  double poisson_ratio = 0.45;
+  VertexSelector fixed;
+  std::vector<PlannedHandle> handles;
+  DeformationModel model = DeformationModel::kGradientField;
+  GradientFieldOptions gradient_field;  // what the plan says; the rest keeps its defaults
+};
+
+// A plan put upon its mesh: all that a deformer or a session needs. Everything is in LPS, whatever
+// the plan's own coordinate system was.
+struct PlanProblem {
+  std::shared_ptr<const TetMesh> mesh;
+  std::vector<Attribute> point_data;  // of the mesh file, kept for the result
+  std::vector<Attribute> cell_data;
+  CoordinateSystem written_in = CoordinateSystem::kLps;  // in which results are written back
+  Eigen::VectorXd stiffness;                             // #T, Pa
+  ConstraintSet constraints;
+  std::vector<HandlePose> poses;  // one per handle of `constraints`
+  DeformerOptions deformer;
+};
+
+}  // namespace tissueform

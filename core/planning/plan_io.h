@@ -1,0 +1,46 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "absl/status/statusor.h"
+
+#include "core/planning/plan.h"
+
+namespace tissueform {
+
+// Largest plan file that is read.
+inline constexpr size_t kMaxPlanBytes = size_t{16} << 20;
+
+struct PlanReadOptions {
+  // Whether the mesh may lie outside the plan's folder. A plan comes from elsewhere more often than
+  // not, and what it names ends up in results that go back there.
+  bool allow_outside = false;
+};
+
+// Reads and checks a plan file (version 1) against the published schema, docs/plan.schema.json,
+// which is built into the program.
+//
+// Errors: NotFound (no such file), InvalidArgument (not JSON, unknown key, wrong type, value out of
+// range; the message names the key as a JSON pointer), Unimplemented (a model that this version
+// does not have), PermissionDenied (the mesh, or the file that belongs to it, leaves the folder of
+// the plan through "..", an absolute path or a symbolic link).
+absl::StatusOr<Plan> ReadPlan(const std::string& path, const PlanReadOptions& options = {});
+
+// The same for a text; `folder` is what the mesh path is relative to and `name` stands for the file
+// in messages.
+absl::StatusOr<Plan> ParsePlan(std::string_view json, const std::string& folder,
+                               const std::string& name);
+
+// Puts a plan upon its mesh: reads and validates the mesh file, looks up stiffness, resolves
+// selectors, converts RAS to LPS.
+//
+// Errors: those of ReadTetMesh, CheckUsable and ConstraintSet::Create; InvalidArgument for a
+// missing array, a value without stiffness, stiffness <= 0, an empty selection (the message names
+// the handle or "fixed").
+absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan);
+
+}  // namespace tissueform

@@ -1,0 +1,126 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <filesystem>
+#include <numbers>
+#include <utility>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "nlohmann/json.hpp"
+
+#include "core/base/status_macros.h"
+#include "core/planning/json_text.h"
+#include "core/planning/model_names.h"
+#include "core/planning/plan_io.h"
+#include "core/planning/plan_schema.h"
+
+namespace tissueform {
+namespace {
+
+using Json = nlohmann::json;
+
+// What follows reads a text that has passed the schema: keys and types are as they must be.
+
+Eigen::Vector3d ToVector(const Json& json) {
+  return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
+}
+
+Eigen::Vector3d VectorOrZero(const Json& json, const char* key) {
+  return json.contains(key) ? ToVector(json.at(key)) : Eigen::Vector3d::Zero();
+}
+
+VertexSelector ToSelector(const Json& json) {
+  if (json.contains("vertices")) {
+    return {SelectVertices{json.at("vertices").get<std::vector<int64_t>>()}};
+  }
+  if (json.contains("point_data")) {
+    return {SelectByPointData{json.at("point_data"), json.at("equals")}};
+  }
+  if (json.contains("box_mm")) {
+    const Json& box = json.at("box_mm");
+    return {SelectBox{ToVector(box.at("min")), ToVector(box.at("max"))}};
+  }
+  SelectUnion parts;
+  for (const Json& part : json.at("union")) parts.of.push_back(ToSelector(part));
+  return {std::move(parts)};
+}
+
+absl::StatusOr<StiffnessChoice> ToStiffness(const Json& json) {
+  if (json.contains("uniform")) return UniformStiffness{json.at("uniform")};
+  if (json.contains("cell_data")) return StiffnessFromCellData{json.at("cell_data")};
+  StiffnessByCellData by_label{json.at("by_cell_data"), {}};
+  for (const auto& [label, pa] : json.at("values").items()) {
+    int64_t value = 0;
+    if (!absl::SimpleAtoi(label, &value)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("label ", label, " at /stiffness/values is larger than 64 bits hold"));
+    }
+    by_label.pa_of_value.emplace_back(value, pa.get<double>());
+  }
+  return by_label;
+}
+
+HandlePose ToPose(const Json& json) {
+  HandlePose pose;
+  pose.rotation_vector = VectorOrZero(json, "rotation_vector_deg") * (std::numbers::pi / 180.0);
+  pose.pivot_mm = VectorOrZero(json, "pivot_mm");
+  pose.translation_mm = VectorOrZero(json, "translation_mm");
+  pose.scale = json.value("scale", 1.0);
+  return pose;
+}
+
+PlannedHandle ToHandle(const Json& json) {
+  return {json.at("name"), ToSelector(json.at("region")),
+          ToPose(json.value("pose", Json::object()))};
+}
+
+absl::Status ReadModel(const Json& json, Plan* plan) {
+  TF_ASSIGN_OR_RETURN(plan->model, ModelFromName(json.value("model", "gradient_field")));
+  const Json settings = json.value("gradient_field", Json::object());
+  GradientFieldOptions& options = plan->gradient_field;
+  TF_ASSIGN_OR_RETURN(options.rotation,
+                      RotationModeFromName(settings.value("rotation", "propagated")));
+  TF_ASSIGN_OR_RETURN(options.guidance, GuidanceFromName(settings.value("guidance", "cotangent")));
+  TF_ASSIGN_OR_RETURN(options.blend, BlendFromName(settings.value("blend", "cosine")));
+  options.max_iterations = settings.value("max_iterations", options.max_iterations);
+  options.tolerance_mm = settings.value("tolerance_mm", options.tolerance_mm);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Plan> ToPlan(const Json& json, const std::string& folder) {
+  Plan plan;
+  plan.coordinate_system =
+      json.at("coordinate_system") == "RAS" ? CoordinateSystem::kRas : CoordinateSystem::kLps;
+  plan.mesh_path = (std::filesystem::path(folder) / json.at("mesh").get<std::string>())
+                       .lexically_normal()
+                       .string();
+  TF_ASSIGN_OR_RETURN(plan.stiffness, ToStiffness(json.at("stiffness")));
+  plan.poisson_ratio = json.value("poisson_ratio", 0.45);
+  plan.fixed = ToSelector(json.at("fixed"));
+  for (const Json& handle : json.at("handles")) plan.handles.push_back(ToHandle(handle));
+  TF_RETURN_IF_ERROR(ReadModel(json, &plan));
+  return plan;
+}
+
+absl::StatusOr<Plan> ParseUnnamed(const std::string& text, const std::string& folder) {
+  TF_ASSIGN_OR_RETURN(const Json json, ParseJsonStrictly(text));
+  TF_RETURN_IF_ERROR(CheckAgainstPlanSchema(json));
+  try {
+    return ToPlan(json, folder);
+  } catch (const std::exception& exception) {
+    return absl::InvalidArgumentError(absl::StrCat("cannot be read: ", exception.what()));
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<Plan> ParsePlan(std::string_view json, const std::string& folder,
+                               const std::string& name) {
+  absl::StatusOr<Plan> plan = ParseUnnamed(std::string(json), folder);
+  if (plan.ok()) return plan;
+  return absl::Status(plan.status().code(),
+                      absl::StrCat("plan ", name, ": ", plan.status().message()));
+}
+
+}  // namespace tissueform

@@ -1,0 +1,85 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "core/mesh/validation.h"
+#include "core/mesh_io/tet_mesh_io.h"
+#include "core/planning/coordinates.h"
+#include "core/planning/plan_io.h"
+#include "core/planning/selector.h"
+#include "core/planning/stiffness.h"
+
+namespace tissueform {
+namespace {
+
+absl::StatusOr<TetMeshFile> ReadUsableMesh(const std::string& path) {
+  TF_ASSIGN_OR_RETURN(TetMeshFile file, ReadTetMesh(path));
+  const absl::Status usable = CheckUsable(ValidateTetMesh(file.mesh));
+  if (usable.ok()) return file;
+  return absl::Status(usable.code(), absl::StrCat("mesh ", path, ": ", usable.message()));
+}
+
+absl::StatusOr<ConstraintSet> ResolveRegions(const Plan& plan, const TetMeshFile& file) {
+  const SelectionSource source{file.mesh.positions(), file.point_data};
+  TF_ASSIGN_OR_RETURN(std::vector<int32_t> fixed, ResolveSelector(plan.fixed, source, "fixed"));
+  std::vector<HandleRegion> handles;
+  for (const PlannedHandle& handle : plan.handles) {
+    TF_ASSIGN_OR_RETURN(
+        std::vector<int32_t> vertices,
+        ResolveSelector(handle.region, source, absl::StrCat("handle \"", handle.name, "\"")));
+    handles.push_back({handle.name, std::move(vertices)});
+  }
+  TF_ASSIGN_OR_RETURN(ConstraintSet constraints,
+                      ConstraintSet::Create(file.mesh, std::move(fixed), std::move(handles)));
+  TF_RETURN_IF_ERROR(
+      CheckEveryComponentConstrained(file.mesh.tets(), file.mesh.num_vertices(), constraints));
+  return constraints;
+}
+
+absl::StatusOr<std::vector<HandlePose>> ResolvePoses(const Plan& plan) {
+  std::vector<HandlePose> poses;
+  for (const PlannedHandle& handle : plan.handles) {
+    if (const absl::Status legal = CheckPose(handle.pose); !legal.ok()) {
+      return absl::Status(legal.code(),
+                          absl::StrCat("handle \"", handle.name, "\": ", legal.message()));
+    }
+    poses.push_back(SwapToOrFromLps(plan.coordinate_system, handle.pose));
+  }
+  return poses;
+}
+
+absl::StatusOr<std::shared_ptr<const TetMesh>> ToLps(CoordinateSystem system, const TetMesh& mesh) {
+  Positions positions = mesh.positions();
+  SwapToOrFromLps(system, &positions);
+  TF_ASSIGN_OR_RETURN(TetMesh in_lps, TetMesh::Create(std::move(positions), mesh.tets()));
+  return std::make_shared<const TetMesh>(std::move(in_lps));
+}
+
+}  // namespace
+
+absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan) {
+  TF_ASSIGN_OR_RETURN(TetMeshFile file, ReadUsableMesh(plan.mesh_path));
+  TF_ASSIGN_OR_RETURN(Eigen::VectorXd stiffness,
+                      ResolveStiffness(plan.stiffness, file.mesh.num_tets(), file.cell_data));
+  TF_ASSIGN_OR_RETURN(ConstraintSet constraints, ResolveRegions(plan, file));
+  TF_ASSIGN_OR_RETURN(std::vector<HandlePose> poses, ResolvePoses(plan));
+  TF_ASSIGN_OR_RETURN(std::shared_ptr<const TetMesh> mesh,
+                      ToLps(plan.coordinate_system, file.mesh));
+  DeformerOptions deformer;
+  deformer.model = plan.model;
+  deformer.gradient_field = plan.gradient_field;
+  return PlanProblem{.mesh = std::move(mesh),
+                     .point_data = std::move(file.point_data),
+                     .cell_data = std::move(file.cell_data),
+                     .written_in = plan.coordinate_system,
+                     .stiffness = std::move(stiffness),
+                     .constraints = std::move(constraints),
+                     .poses = std::move(poses),
+                     .deformer = std::move(deformer)};
+}
+
+}  // namespace tissueform

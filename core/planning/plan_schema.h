@@ -1,0 +1,18 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "absl/status/status.h"
+#include "nlohmann/json_fwd.hpp"
+
+namespace tissueform {
+
+// The published schema of plans, docs/plan.schema.json, as it was when the program was built.
+const nlohmann::json& PlanSchema();
+
+// InvalidArgument in one line when `plan` does not follow the schema: what is wrong, at which JSON
+// pointer, and what is allowed there.
+absl::Status CheckAgainstPlanSchema(const nlohmann::json& plan);
+
+}  // namespace tissueform

@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# Copyright 2026 The Tissueform Authors.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+#
+# From a fresh clone to a real mesh moving over the network: installs what is missing, builds, and runs
+# `tissueform demo`, which starts a server on loopback and drags a handle of the bundled tongue.
+#
+#   deploy/demo.sh [options of `tissueform demo`]
+#
+# TISSUEFORM_BUILD_DIR and JOBS: see deploy/build.sh.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+export TISSUEFORM_BUILD_DIR=${TISSUEFORM_BUILD_DIR:-$PWD/build/release}
+
+deploy/install_packages.sh build
+deploy/build.sh release tissueform tissueform-server
+exec "$TISSUEFORM_BUILD_DIR/bin/tissueform" demo "$@"

@@ -1,0 +1,76 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/rpc/deform_service.h"
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "core/base/status_macros.h"
+#include "core/deformation/deformation_quality.h"
+#include "server/rpc/deform_stream.h"
+#include "server/rpc/proto_conversion.h"
+
+namespace tissueform {
+namespace {
+
+// A DeformOnceRequest that has been checked.
+struct DeformOnceJob {
+  std::shared_ptr<Session> session;
+  std::vector<HandlePose> poses;
+  VertexChoice choice;
+};
+
+absl::StatusOr<DeformOnceJob> ReadRequest(const v1::DeformOnceRequest& request,
+                                          SessionRegistry* registry) {
+  DeformOnceJob job;
+  TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(request.session()));
+  TF_RETURN_IF_ERROR(CheckEncoding(request.encoding()));
+  TF_ASSIGN_OR_RETURN(job.session, registry->Find(id));
+  TF_ASSIGN_OR_RETURN(job.poses, ToPoses(request.poses(), job.session->constraints()));
+  TF_ASSIGN_OR_RETURN(job.choice, ToVertexChoice(request.vertices(), job.session->mesh()));
+  return job;
+}
+
+// On the session's strand.
+absl::Status Run(const DeformOnceJob& job, v1::DeformOnceResponse* response) {
+  TF_ASSIGN_OR_RETURN(const Deformation deformation,
+                      job.session->Deform(job.poses, DeformControl{}));
+  *response->mutable_summary() = ToProto(deformation.summary);
+  *response->mutable_quality() =
+      ToProto(MeasureDeformation(job.session->mesh().mesh, deformation.positions));
+  *response->mutable_positions() = EncodePositions(deformation.positions, job.choice);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* DeformService::DeformOnce(grpc::CallbackServerContext* context,
+                                                    const v1::DeformOnceRequest* request,
+                                                    v1::DeformOnceResponse* response) {
+  const CallScope scope("DeformService.DeformOnce", CallKind::kNewWork, gate_);
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  absl::StatusOr<DeformOnceJob> job = scope.admission().ok()
+                                          ? ReadRequest(*request, registry_)
+                                          : absl::StatusOr<DeformOnceJob>(scope.admission());
+  if (!job.ok()) {
+    reactor->Finish(scope.End(job.status()));
+    return reactor;
+  }
+  Strand& strand = job->session->strand();
+  strand.Post([reactor, response, scope, context, job = *std::move(job)] {
+    reactor->Finish(scope.End(context->IsCancelled()
+                                  ? absl::CancelledError("the client has cancelled the call")
+                                  : Run(job, response)));
+  });
+  return reactor;
+}
+
+grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* DeformService::Deform(
+    grpc::CallbackServerContext* /*context*/) {
+  return new DeformStreamReactor(CallScope("DeformService.Deform", CallKind::kNewWork, gate_),
+                                 limits_, registry_, streams_);
+}
+
+}  // namespace tissueform

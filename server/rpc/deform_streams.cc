@@ -1,0 +1,40 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/rpc/deform_streams.h"
+
+#include "absl/strings/str_cat.h"
+
+#include "server/rpc/deform_stream.h"
+
+namespace tissueform {
+
+absl::Status DeformStreams::Add(DeformStreamReactor* stream) {
+  MutexLock lock(mutex_);
+  if (streams_.size() >= static_cast<size_t>(max_streams_)) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("the server has ", max_streams_,
+                     " open streams, as many as it may; close one or raise --max-streams"));
+  }
+  streams_.insert(stream);
+  return absl::OkStatus();
+}
+
+void DeformStreams::Remove(DeformStreamReactor* stream) {
+  MutexLock lock(mutex_);
+  streams_.erase(stream);
+}
+
+void DeformStreams::NotifyDraining() {
+  MutexLock lock(mutex_);
+  for (DeformStreamReactor* stream : streams_) {
+    stream->NotifyDraining();
+  }
+}
+
+int DeformStreams::size() const {
+  MutexLock lock(mutex_);
+  return static_cast<int>(streams_.size());
+}
+
+}  // namespace tissueform

@@ -1,0 +1,38 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <set>
+
+#include "absl/status/status.h"
+
+#include "core/base/mutex.h"
+
+namespace tissueform {
+
+class DeformStreamReactor;
+
+// The open Deform streams of a server: bounds their number and tells them news.
+//
+// Thread-safe. Its lock comes before the lock of a stream.
+class DeformStreams {
+ public:
+  explicit DeformStreams(int max_streams) : max_streams_(max_streams) {}
+
+  // Errors: ResourceExhausted.
+  absl::Status Add(DeformStreamReactor* stream);
+  // REQUIRES: added.
+  void Remove(DeformStreamReactor* stream);
+
+  void NotifyDraining();
+  int size() const;
+
+ private:
+  const int max_streams_;
+
+  mutable Mutex mutex_;
+  std::set<DeformStreamReactor*> streams_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace tissueform

@@ -1,0 +1,59 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/rpc/mesh_service.h"
+
+#include "core/base/status_macros.h"
+#include "server/rpc/mesh_upload_stream.h"
+#include "server/rpc/proto_conversion.h"
+
+namespace tissueform {
+namespace {
+
+absl::Status NoSuchMesh() {
+  return absl::NotFoundError("the server does not have this mesh; upload it");
+}
+
+}  // namespace
+
+grpc::ServerReadReactor<v1::UploadMeshRequest>* MeshService::UploadMesh(
+    grpc::CallbackServerContext* /*context*/, v1::UploadMeshResponse* response) {
+  return new MeshUploadStream(CallScope("MeshService.UploadMesh", CallKind::kNewWork, gate_),
+                              catalog_, pool_, response);
+}
+
+grpc::ServerUnaryReactor* MeshService::GetMesh(grpc::CallbackServerContext* context,
+                                               const v1::GetMeshRequest* request,
+                                               v1::Mesh* response) {
+  const CallScope scope("MeshService.GetMesh", CallKind::kUpkeep, gate_);
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  reactor->Finish(
+      scope.End(scope.admission().ok() ? FindMesh(*request, response) : scope.admission()));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* MeshService::DeleteMesh(grpc::CallbackServerContext* context,
+                                                  const v1::DeleteMeshRequest* request,
+                                                  google::protobuf::Empty* /*response*/) {
+  const CallScope scope("MeshService.DeleteMesh", CallKind::kUpkeep, gate_);
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  reactor->Finish(scope.End(scope.admission().ok() ? RemoveMesh(*request) : scope.admission()));
+  return reactor;
+}
+
+absl::Status MeshService::FindMesh(const v1::GetMeshRequest& request, v1::Mesh* response) {
+  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request.name()));
+  const auto mesh = catalog_->Find(sha256);
+  if (mesh == nullptr) {
+    return NoSuchMesh();
+  }
+  *response = ToProto(*mesh);
+  return absl::OkStatus();
+}
+
+absl::Status MeshService::RemoveMesh(const v1::DeleteMeshRequest& request) {
+  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request.name()));
+  return catalog_->Remove(sha256) ? absl::OkStatus() : NoSuchMesh();
+}
+
+}  // namespace tissueform

@@ -1,0 +1,36 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "server/rpc/call_scope.h"
+#include "server/session/mesh_catalog.h"
+#include "server/session/worker_pool.h"
+#include "tissueform/v1/mesh_service.grpc.pb.h"
+
+namespace tissueform {
+
+// tissueform.v1.MeshService over a catalog. Stateless; all arguments must outlive it.
+class MeshService final : public v1::MeshService::CallbackService {
+ public:
+  MeshService(ServiceGate* gate, MeshCatalog* catalog, WorkerPool* pool)
+      : gate_(gate), catalog_(catalog), pool_(pool) {}
+
+  grpc::ServerReadReactor<v1::UploadMeshRequest>* UploadMesh(
+      grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) override;
+  grpc::ServerUnaryReactor* GetMesh(grpc::CallbackServerContext* context,
+                                    const v1::GetMeshRequest* request, v1::Mesh* response) override;
+  grpc::ServerUnaryReactor* DeleteMesh(grpc::CallbackServerContext* context,
+                                       const v1::DeleteMeshRequest* request,
+                                       google::protobuf::Empty* response) override;
+
+ private:
+  absl::Status FindMesh(const v1::GetMeshRequest& request, v1::Mesh* response);
+  absl::Status RemoveMesh(const v1::DeleteMeshRequest& request);
+
+  ServiceGate* const gate_;
+  MeshCatalog* const catalog_;
+  WorkerPool* const pool_;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,24 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "absl/status/statusor.h"
+
+#include "core/deformation/gradient_field_deformer.h"
+#include "server/session/limits.h"
+#include "tissueform/v1/session.pb.h"
+
+namespace tissueform {
+
+// Settings of the gradient field as the client asks for them; what belongs to the server keeps its
+// default.
+//
+// Errors: InvalidArgument for a value that this server does not know or a number over its limit.
+// Numbers that are out of range for the model are refused by the model.
+absl::StatusOr<GradientFieldOptions> ToGradientFieldOptions(
+    const v1::GradientFieldSettings& settings, const ServiceLimits& limits);
+
+v1::GradientFieldSettings ToProto(const GradientFieldOptions& options);
+
+}  // namespace tissueform

@@ -1,0 +1,116 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/rpc/session_service.h"
+
+#include <atomic>
+#include <memory>
+#include <utility>
+
+#include "core/base/status_macros.h"
+#include "server/rpc/proto_conversion.h"
+
+namespace tissueform {
+namespace {
+
+// One CreateSession call. Deletes itself when gRPC is done with it.
+class CreateSessionCall : public grpc::ServerUnaryReactor {
+ public:
+  CreateSessionCall(const CallScope& scope, SessionRegistry* registry, v1::Session* response)
+      : scope_(scope), registry_(registry), response_(response) {}
+
+  void Start(SessionSpec spec, const RequestKey& key) {
+    registry_->Create(std::move(spec), key, cancelled_,
+                      [this](absl::StatusOr<std::shared_ptr<Session>> result) {
+                        const absl::Status outcome = result.status();
+                        if (result.ok()) {
+                          session_ = *std::move(result);
+                          *response_ = ToProto(*session_);
+                        }
+                        End(outcome);
+                      });
+  }
+
+  void End(const absl::Status& outcome) { Finish(scope_.End(outcome)); }
+
+  void OnCancel() override { *cancelled_ = true; }
+
+  // A client that has cancelled never learns the name of its session: nobody would ever delete it.
+  void OnDone() override {
+    if (*cancelled_ && session_ != nullptr) {
+      registry_->Abandon(session_);
+    }
+    delete this;
+  }
+
+ private:
+  const CallScope scope_;
+  SessionRegistry* const registry_;
+  v1::Session* const response_;
+  const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
+  std::shared_ptr<Session> session_;  // written before Finish, read after it
+};
+
+}  // namespace
+
+grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext* /*context*/,
+                                                        const v1::CreateSessionRequest* request,
+                                                        v1::Session* response) {
+  const CallScope scope("SessionService.CreateSession", CallKind::kNewWork, gate_);
+  auto* call = new CreateSessionCall(scope, registry_, response);
+  absl::StatusOr<SessionSpec> spec = scope.admission().ok()
+                                         ? ReadRequest(*request)
+                                         : absl::StatusOr<SessionSpec>(scope.admission());
+  if (spec.ok()) {
+    call->Start(*std::move(spec), {request->request_id(), RequestFingerprint(*request)});
+  } else {
+    call->End(spec.status());
+  }
+  return call;
+}
+
+grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext* context,
+                                                     const v1::GetSessionRequest* request,
+                                                     v1::Session* response) {
+  const CallScope scope("SessionService.GetSession", CallKind::kUpkeep, gate_);
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  reactor->Finish(
+      scope.End(scope.admission().ok() ? FindSession(*request, response) : scope.admission()));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerContext* context,
+                                                        const v1::DeleteSessionRequest* request,
+                                                        google::protobuf::Empty* /*response*/) {
+  const CallScope scope("SessionService.DeleteSession", CallKind::kUpkeep, gate_);
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const absl::StatusOr<std::string> id = scope.admission().ok()
+                                             ? ParseSessionName(request->name())
+                                             : absl::StatusOr<std::string>(scope.admission());
+  if (!id.ok()) {
+    reactor->Finish(scope.End(id.status()));
+    return reactor;
+  }
+  registry_->Delete(
+      *id, [reactor, scope](const absl::Status& status) { reactor->Finish(scope.End(status)); });
+  return reactor;
+}
+
+absl::StatusOr<SessionSpec> SessionService::ReadRequest(const v1::CreateSessionRequest& request) {
+  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request.mesh()));
+  std::shared_ptr<const StoredMesh> mesh = catalog_->Find(sha256);
+  if (mesh == nullptr) {
+    return absl::NotFoundError("the server does not have the mesh of this request; upload it");
+  }
+  return ToSessionSpec(request, std::move(mesh), limits_);
+}
+
+absl::Status SessionService::FindSession(const v1::GetSessionRequest& request,
+                                         v1::Session* response) {
+  TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(request.name()));
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, registry_->Find(id));
+  *response = ToProto(*session);
+  return absl::OkStatus();
+}
+
+}  // namespace tissueform

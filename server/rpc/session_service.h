@@ -1,0 +1,41 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "server/rpc/call_scope.h"
+#include "server/session/limits.h"
+#include "server/session/mesh_catalog.h"
+#include "server/session/session_registry.h"
+#include "tissueform/v1/session_service.grpc.pb.h"
+
+namespace tissueform {
+
+// tissueform.v1.SessionService over a registry. Stateless; all pointers must outlive it.
+class SessionService final : public v1::SessionService::CallbackService {
+ public:
+  SessionService(ServiceGate* gate, const ServiceLimits& limits, MeshCatalog* catalog,
+                 SessionRegistry* registry)
+      : gate_(gate), limits_(limits), catalog_(catalog), registry_(registry) {}
+
+  grpc::ServerUnaryReactor* CreateSession(grpc::CallbackServerContext* context,
+                                          const v1::CreateSessionRequest* request,
+                                          v1::Session* response) override;
+  grpc::ServerUnaryReactor* GetSession(grpc::CallbackServerContext* context,
+                                       const v1::GetSessionRequest* request,
+                                       v1::Session* response) override;
+  grpc::ServerUnaryReactor* DeleteSession(grpc::CallbackServerContext* context,
+                                          const v1::DeleteSessionRequest* request,
+                                          google::protobuf::Empty* response) override;
+
+ private:
+  absl::StatusOr<SessionSpec> ReadRequest(const v1::CreateSessionRequest& request);
+  absl::Status FindSession(const v1::GetSessionRequest& request, v1::Session* response);
+
+  ServiceGate* const gate_;
+  const ServiceLimits limits_;
+  MeshCatalog* const catalog_;
+  SessionRegistry* const registry_;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,15 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "absl/status/status.h"
+#include "grpcpp/support/status.h"
+
+namespace tissueform {
+
+// The only place where a Status becomes a gRPC status. Codes are the same by definition; the
+// message is cut to a length that fits into HTTP/2 headers with certainty.
+grpc::Status ToGrpcStatus(const absl::Status& status);
+
+}  // namespace tissueform

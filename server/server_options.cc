@@ -1,0 +1,100 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/server_options.h"
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <thread>
+#include <unistd.h>
+
+namespace tissueform {
+namespace {
+
+constexpr int64_t kMebibyte = 1 << 20;
+constexpr int64_t kMaxMebibytes = int64_t{1} << 30;
+constexpr int64_t kMaxCount = std::numeric_limits<int32_t>::max();
+constexpr int64_t kMaxSeconds = int64_t{366} * 24 * 3600;
+
+// An option in a unit of its own (MiB, seconds) that ends up somewhere else.
+template <typename Setter>
+void AddNumber(CLI::App& app, const std::string& name, int64_t default_value, int64_t min,
+               int64_t max, const std::string& help, Setter set) {
+  app.add_option_function<int64_t>(name, set, help)
+      ->check(CLI::Range(min, max))
+      ->default_str(std::to_string(default_value))
+      ->type_name("INT");
+}
+
+template <typename Number>
+std::function<void(const int64_t&)> Into(Number* target) {
+  return [target](const int64_t& value) { *target = static_cast<Number>(value); };
+}
+
+std::function<void(const int64_t&)> MebibytesInto(int64_t* target) {
+  return [target](const int64_t& value) { *target = value * kMebibyte; };
+}
+
+std::function<void(const int64_t&)> SecondsInto(std::chrono::seconds* target) {
+  return [target](const int64_t& value) { *target = std::chrono::seconds(value); };
+}
+
+void AddLimits(CLI::App& app, ServerOptions* options) {
+  ServiceLimits& limits = options->limits;
+  AddNumber(app, "--memory-budget-mib", options->memory_budget_bytes / kMebibyte, 1, kMaxMebibytes,
+            "memory for meshes and sessions together; what does not fit is refused (default: half "
+            "of the machine's)",
+            MebibytesInto(&options->memory_budget_bytes));
+  AddNumber(app, "--max-vertices", limits.max_vertices, 4, kMaxCount, "vertices of one mesh",
+            Into(&limits.max_vertices));
+  AddNumber(app, "--max-tets", limits.max_tets, 1, kMaxCount / 4, "tets of one mesh",
+            Into(&limits.max_tets));
+  AddNumber(app, "--max-mesh-mib", limits.max_mesh_bytes / kMebibyte, 1, kMaxMebibytes,
+            "size of one mesh as it is sent", MebibytesInto(&limits.max_mesh_bytes));
+  AddNumber(app, "--max-sessions", limits.max_sessions, 1, kMaxCount,
+            "sessions held at the same time", Into(&limits.max_sessions));
+  AddNumber(app, "--max-streams", limits.max_streams, 1, kMaxCount,
+            "drags (Deform streams) open at the same time", Into(&limits.max_streams));
+  AddNumber(app, "--session-idle-ttl", limits.session_idle_ttl.count(), 0, kMaxSeconds,
+            "seconds after which an unused session or mesh may be removed when room is needed",
+            SecondsInto(&limits.session_idle_ttl));
+  AddNumber(app, "--max-calls-per-connection", options->max_calls_per_connection, 1, kMaxCount,
+            "calls open at the same time on one connection; more wait at the client",
+            Into(&options->max_calls_per_connection));
+}
+
+}  // namespace
+
+ServerOptions ServerOptions::Defaults() {
+  ServerOptions options;
+  options.memory_budget_bytes =
+      static_cast<int64_t>(sysconf(_SC_PHYS_PAGES)) * sysconf(_SC_PAGE_SIZE) / 2;
+  options.workers = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  return options;
+}
+
+void AddServerOptions(CLI::App& app, ServerOptions* options) {
+  app.set_config("--config", "", "file with any of these options, as `name = value` lines");
+  app.add_option("--host", options->host,
+                 "address to listen on; anything but loopback is open to the network: there is no "
+                 "login yet")
+      ->capture_default_str();
+  app.add_option("--port", options->port, "port to listen on; 0 takes a free one")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
+  app.add_option("--workers", options->workers,
+                 "threads that compute (default: one a core); sessions share them")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  AddLimits(app, options);
+  AddNumber(app, "--drain-seconds", options->drain_deadline.count(), 0, 3600,
+            "after SIGTERM or SIGINT, how long open calls may go on",
+            SecondsInto(&options->drain_deadline));
+  app.add_option("--log-level", options->log_level,
+                 "what is logged on stderr, without names or paths")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
+      ->capture_default_str();
+}
+
+}  // namespace tissueform

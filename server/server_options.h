@@ -1,0 +1,36 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include "CLI/CLI.hpp"
+
+#include "server/session/limits.h"
+
+namespace tissueform {
+
+// Everything that can be set about a server.
+struct ServerOptions {
+  std::string host = "127.0.0.1";
+  int port = 50051;  // 0: any free one
+  int64_t memory_budget_bytes = 0;
+  int workers = 1;
+  ServiceLimits limits;
+  int max_calls_per_connection = 128;
+  std::chrono::seconds drain_deadline{20};
+  std::string log_level = "info";
+
+  // Half of the machine's memory, one worker a core.
+  static ServerOptions Defaults();
+};
+
+// Adds one option a setting to `app`, with its default in the help; parsing writes into `options`,
+// which must outlive it. A config file in TOML or INI form with the same names may be given by
+// --config.
+void AddServerOptions(CLI::App& app, ServerOptions* options);
+
+}  // namespace tissueform

@@ -1,0 +1,30 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+namespace tissueform {
+
+// What the service accepts from outside. The first group can be changed on the command line of the
+// server.
+struct ServiceLimits {
+  int64_t max_vertices = 2'000'000;
+  int64_t max_tets = 12'000'000;
+  int64_t max_mesh_bytes = int64_t{1} << 30;
+  int max_sessions = 64;
+  int max_streams = 64;
+  std::chrono::seconds session_idle_ttl{1800};
+
+  int max_handles = 256;
+  int max_cell_arrays = 16;
+  int max_name_bytes = 128;  // of handles and cell arrays
+  int max_request_id_bytes = 64;
+  int64_t max_chunk_bytes = 1 << 20;
+  int max_unacked = 64;       // frames of a stream
+  int max_iterations = 1000;  // linear solves of one answer
+};
+
+}  // namespace tissueform

@@ -1,0 +1,88 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/session/memory_budget.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+std::string Mebibytes(int64_t bytes) {
+  return absl::StrFormat("%.1f MiB", static_cast<double>(bytes) / (1 << 20));
+}
+
+}  // namespace
+
+MemoryReservation::MemoryReservation(MemoryReservation&& other) noexcept
+    : budget_(std::exchange(other.budget_, nullptr)), bytes_(std::exchange(other.bytes_, 0)) {}
+
+MemoryReservation& MemoryReservation::operator=(MemoryReservation&& other) noexcept {
+  MemoryReservation taken(std::move(other));
+  std::swap(budget_, taken.budget_);
+  std::swap(bytes_, taken.bytes_);
+  return *this;
+}
+
+MemoryReservation::~MemoryReservation() {
+  if (budget_ != nullptr) {
+    budget_->GiveBack(bytes_);
+  }
+}
+
+absl::Status MemoryReservation::Resize(int64_t bytes, absl::string_view what) {
+  if (bytes > bytes_) {
+    TF_RETURN_IF_ERROR(budget_->Take(bytes - bytes_, what));
+  } else {
+    budget_->GiveBack(bytes_ - bytes);
+  }
+  bytes_ = bytes;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<MemoryReservation> MemoryBudget::Reserve(int64_t bytes, absl::string_view what) {
+  TF_RETURN_IF_ERROR(Take(bytes, what));
+  return MemoryReservation(this, bytes);
+}
+
+int64_t MemoryBudget::reserved_bytes() const {
+  MutexLock lock(mutex_);
+  return reserved_bytes_;
+}
+
+absl::Status MemoryBudget::Take(int64_t bytes, absl::string_view what) {
+  if (TryTake(bytes)) {
+    return absl::OkStatus();
+  }
+  if (reclaimer_) {
+    reclaimer_();
+    if (TryTake(bytes)) {
+      return absl::OkStatus();
+    }
+  }
+  return absl::ResourceExhaustedError(absl::StrCat(
+      "no room for the ", what, ": it needs ", Mebibytes(bytes), ", and ",
+      Mebibytes(reserved_bytes()), " of ", Mebibytes(limit_bytes_),
+      " are taken; delete sessions or meshes, or raise --memory-budget-mib of the server"));
+}
+
+bool MemoryBudget::TryTake(int64_t bytes) {
+  MutexLock lock(mutex_);
+  if (bytes > limit_bytes_ - reserved_bytes_) {
+    return false;
+  }
+  reserved_bytes_ += bytes;
+  return true;
+}
+
+void MemoryBudget::GiveBack(int64_t bytes) {
+  MutexLock lock(mutex_);
+  reserved_bytes_ -= bytes;
+}
+
+}  // namespace tissueform

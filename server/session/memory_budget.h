@@ -1,0 +1,83 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/base/mutex.h"
+
+namespace tissueform {
+
+class MemoryBudget;
+
+// Bytes promised to somebody before they are allocated; given back when it is destroyed. The budget
+// must outlive it. One thread at a time.
+class MemoryReservation {
+ public:
+  MemoryReservation() = default;
+  MemoryReservation(MemoryReservation&& other) noexcept;
+  MemoryReservation& operator=(MemoryReservation&& other) noexcept;
+  ~MemoryReservation();
+
+  int64_t bytes() const { return bytes_; }
+
+  // Changes the reservation to `bytes`. Less always succeeds; more fails like MemoryBudget::Reserve
+  // and leaves the reservation as it was. REQUIRES: made by MemoryBudget::Reserve.
+  absl::Status Resize(int64_t bytes, absl::string_view what);
+
+ private:
+  friend class MemoryBudget;
+
+  MemoryReservation(MemoryBudget* budget, int64_t bytes) : budget_(budget), bytes_(bytes) {}
+
+  MemoryBudget* budget_ = nullptr;
+  int64_t bytes_ = 0;
+};
+
+// How much memory meshes and sessions may hold together. What does not fit is refused before it is
+// allocated.
+//
+// Thread-safe. Its lock is held over nothing else.
+class MemoryBudget {
+ public:
+  // Asked, without a lock held, when a reservation does not fit: gives back what it can spare. The
+  // reservation is then tried once more.
+  using Reclaimer = std::function<void()>;
+
+  explicit MemoryBudget(int64_t limit_bytes) : limit_bytes_(limit_bytes) {}
+  MemoryBudget(const MemoryBudget&) = delete;
+  MemoryBudget& operator=(const MemoryBudget&) = delete;
+
+  // REQUIRES: called before the first reservation.
+  void set_reclaimer(Reclaimer reclaimer) { reclaimer_ = std::move(reclaimer); }
+
+  // `what` is said in the message ("mesh", "matrix factor").
+  //
+  // Errors: ResourceExhausted, with what is asked, what is taken and the limit.
+  absl::StatusOr<MemoryReservation> Reserve(int64_t bytes, absl::string_view what);
+
+  int64_t limit_bytes() const { return limit_bytes_; }
+  int64_t reserved_bytes() const;
+
+ private:
+  friend class MemoryReservation;
+
+  absl::Status Take(int64_t bytes, absl::string_view what);
+  bool TryTake(int64_t bytes);
+  void GiveBack(int64_t bytes);
+
+  // Constant once requests are served.
+  const int64_t limit_bytes_;
+  Reclaimer reclaimer_;
+
+  mutable Mutex mutex_;
+  int64_t reserved_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
+};
+
+}  // namespace tissueform

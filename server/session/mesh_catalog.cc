@@ -1,0 +1,219 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/session/mesh_catalog.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "core/mesh/tet_topology.h"
+#include "core/mesh/validation.h"
+#include "core/mesh_payload/sha256.h"
+
+namespace tissueform {
+namespace {
+
+// Upper bounds of what validation and the search for the skin hold at their peak, beside the mesh.
+constexpr int64_t kValidationBytesPerTet = 256;
+constexpr int64_t kValidationBytesPerVertex = 64;
+
+absl::Status CheckCount(int64_t count, int64_t max, absl::string_view field,
+                        absl::string_view option) {
+  if (count <= 0) {
+    return absl::InvalidArgumentError(absl::StrCat(field, " is ", count, "; it must be positive"));
+  }
+  if (count > max) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        field, " is ", count, ", and the server takes ", max, " at most; raise its ", option));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckCellArrayNames(const std::vector<std::string>& names,
+                                 const ServiceLimits& limits) {
+  if (names.size() > static_cast<size_t>(limits.max_cell_arrays)) {
+    return absl::InvalidArgumentError(absl::StrCat("mesh has ", names.size(), " cell arrays; send ",
+                                                   limits.max_cell_arrays, " at most"));
+  }
+  std::set<absl::string_view> seen;
+  for (const std::string& name : names) {
+    if (name.empty() || name.size() > static_cast<size_t>(limits.max_name_bytes)) {
+      return absl::InvalidArgumentError(absl::StrCat("name of cell array ", seen.size(), " has ",
+                                                     name.size(), " bytes; it needs 1 to ",
+                                                     limits.max_name_bytes));
+    }
+    if (!seen.insert(name).second) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("cell array \"", name, "\" is named twice; names must differ"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckAnnouncement(const MeshAnnouncement& mesh, const ServiceLimits& limits) {
+  const MeshPayloadShape& shape = mesh.shape;
+  TF_RETURN_IF_ERROR(
+      CheckCount(shape.num_vertices, limits.max_vertices, "vertex_count", "--max-vertices"));
+  TF_RETURN_IF_ERROR(CheckCount(shape.num_tets, limits.max_tets, "tet_count", "--max-tets"));
+  TF_RETURN_IF_ERROR(CheckCellArrayNames(shape.cell_arrays, limits));
+  if (mesh.total_bytes != shape.TotalBytes()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("total_bytes is ", mesh.total_bytes, ", but ", shape.num_vertices,
+                     " vertices, ", shape.num_tets, " tets and ", shape.cell_arrays.size(),
+                     " cell arrays make ", shape.TotalBytes(), " bytes; correct the header"));
+  }
+  TF_RETURN_IF_ERROR(
+      CheckCount(mesh.total_bytes, limits.max_mesh_bytes, "total_bytes", "--max-mesh-mib"));
+  if (!IsSha256Hex(mesh.sha256)) {
+    return absl::InvalidArgumentError("sha256 must be 64 lower-case hexadecimal digits");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckCellArraysFinite(const std::vector<CellArray>& arrays) {
+  for (const CellArray& array : arrays) {
+    for (Eigen::Index t = 0; t < array.values.size(); ++t) {
+      if (!std::isfinite(array.values[t])) {
+        return absl::InvalidArgumentError(absl::StrCat("cell array \"", array.name,
+                                                       "\" is not finite at tet ", t,
+                                                       "; replace NaN and infinite values"));
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+const CellArray* StoredMesh::FindCellArray(absl::string_view name) const {
+  const auto found = std::find_if(cell_arrays.begin(), cell_arrays.end(),
+                                  [name](const CellArray& array) { return array.name == name; });
+  return found == cell_arrays.end() ? nullptr : &*found;
+}
+
+MeshUpload::MeshUpload(MeshAnnouncement announcement, int64_t max_chunk_bytes,
+                       MemoryReservation reservation)
+    : announcement_(std::move(announcement)),
+      max_chunk_bytes_(max_chunk_bytes),
+      reservation_(std::move(reservation)),
+      payload_(announcement_.shape) {}
+
+absl::Status MeshUpload::Write(int64_t offset, absl::string_view data, bool finish) {
+  const auto size = static_cast<int64_t>(data.size());
+  if (finished_) {
+    return absl::InvalidArgumentError(
+        "chunk after finish_write; send nothing after the last chunk");
+  }
+  if (size > max_chunk_bytes_) {
+    return absl::InvalidArgumentError(absl::StrCat("chunk at ", offset, " has ", size,
+                                                   " bytes; send ", max_chunk_bytes_, " at most"));
+  }
+  if (offset != committed_bytes_) {
+    return absl::InvalidArgumentError(absl::StrCat("chunk begins at ", offset, ", but ",
+                                                   committed_bytes_,
+                                                   " bytes have come; send chunks without gaps"));
+  }
+  if (size > announcement_.total_bytes - committed_bytes_) {
+    return absl::InvalidArgumentError(absl::StrCat("chunk at ", offset, " with ", size,
+                                                   " bytes goes past the end of the ",
+                                                   announcement_.total_bytes, " declared bytes"));
+  }
+  payload_.Write(offset, data);
+  committed_bytes_ += size;
+  finished_ = finish;
+  if (finish && committed_bytes_ != announcement_.total_bytes) {
+    return absl::InvalidArgumentError(absl::StrCat("finish_write after ", committed_bytes_, " of ",
+                                                   announcement_.total_bytes,
+                                                   " declared bytes; send the rest"));
+  }
+  return absl::OkStatus();
+}
+
+MeshCatalog::MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget)
+    : limits_(limits), budget_(budget) {}
+
+absl::StatusOr<std::unique_ptr<MeshUpload>> MeshCatalog::StartUpload(
+    MeshAnnouncement announcement) {
+  TF_RETURN_IF_ERROR(CheckAnnouncement(announcement, limits_));
+  const int64_t bytes = announcement.total_bytes +
+                        kValidationBytesPerTet * announcement.shape.num_tets +
+                        kValidationBytesPerVertex * announcement.shape.num_vertices;
+  TF_ASSIGN_OR_RETURN(MemoryReservation reservation, budget_->Reserve(bytes, "mesh"));
+  return std::unique_ptr<MeshUpload>(
+      new MeshUpload(std::move(announcement), limits_.max_chunk_bytes, std::move(reservation)));
+}
+
+absl::StatusOr<std::shared_ptr<const StoredMesh>> MeshCatalog::Finish(
+    std::unique_ptr<MeshUpload> upload) {
+  const std::string& sha256 = upload->announcement_.sha256;
+  if (upload->payload_.View().Sha256() != sha256) {
+    return absl::DataLossError(
+        "the payload does not have the declared SHA-256: it was damaged on its way, or the digest "
+        "was "
+        "computed over something else (see MeshHeader.sha256); send it again");
+  }
+  TF_RETURN_IF_ERROR(CheckCellArraysFinite(upload->payload_.cell_arrays()));
+  TF_ASSIGN_OR_RETURN(TetMesh mesh, TetMesh::Create(std::move(upload->payload_.positions()),
+                                                    std::move(upload->payload_.tets())));
+  TF_RETURN_IF_ERROR(CheckUsable(ValidateTetMesh(mesh)));
+  std::vector<int32_t> skin = BoundaryVertices(mesh);
+  TF_RETURN_IF_ERROR(upload->reservation_.Resize(
+      upload->announcement_.total_bytes + static_cast<int64_t>(skin.size() * sizeof(int32_t)),
+      "mesh"));
+  auto stored = std::make_shared<const StoredMesh>(
+      StoredMesh{std::move(upload->reservation_), sha256, std::move(mesh),
+                 std::move(upload->payload_.cell_arrays()), std::move(skin)});
+
+  MutexLock lock(mutex_);
+  Entry& entry = meshes_[sha256];
+  if (entry.mesh == nullptr) {
+    entry.mesh = std::move(stored);
+  }
+  entry.last_used = std::chrono::steady_clock::now();
+  return entry.mesh;
+}
+
+std::shared_ptr<const StoredMesh> MeshCatalog::Find(const std::string& sha256) {
+  MutexLock lock(mutex_);
+  const auto found = meshes_.find(sha256);
+  if (found == meshes_.end()) {
+    return nullptr;
+  }
+  found->second.last_used = std::chrono::steady_clock::now();
+  return found->second.mesh;
+}
+
+bool MeshCatalog::Remove(const std::string& sha256) {
+  std::shared_ptr<const StoredMesh> removed;  // destroyed after the lock is released
+  MutexLock lock(mutex_);
+  const auto found = meshes_.find(sha256);
+  if (found == meshes_.end()) {
+    return false;
+  }
+  removed = std::move(found->second.mesh);
+  meshes_.erase(found);
+  return true;
+}
+
+int MeshCatalog::RemoveIdle() {
+  std::vector<std::shared_ptr<const StoredMesh>> removed;  // destroyed after the lock is released
+  MutexLock lock(mutex_);
+  const auto cutoff = std::chrono::steady_clock::now() - limits_.session_idle_ttl;
+  for (auto entry = meshes_.begin(); entry != meshes_.end();) {
+    // New users come through this map alone: with one reference nobody can gain another now.
+    if (entry->second.mesh.use_count() == 1 && entry->second.last_used <= cutoff) {
+      removed.push_back(std::move(entry->second.mesh));
+      entry = meshes_.erase(entry);
+    } else {
+      ++entry;
+    }
+  }
+  return static_cast<int>(removed.size());
+}
+
+}  // namespace tissueform

@@ -1,0 +1,101 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/types/span.h"
+
+#include "core/constraints/constraint_set.h"
+#include "core/constraints/handle_pose.h"
+#include "core/deformation/create_deformer.h"
+#include "core/deformation/deformer.h"
+#include "server/session/memory_budget.h"
+#include "server/session/mesh_catalog.h"
+#include "server/session/worker_pool.h"
+
+namespace tissueform {
+
+// What a session is made from.
+struct SessionSpec {
+  std::shared_ptr<const StoredMesh> mesh;
+  std::variant<double, std::string> stiffness;  // Pa for every tet, or the name of a cell array
+  std::vector<int32_t> fixed;
+  std::vector<HandleRegion> handles;
+  DeformationModel model = DeformationModel::kGradientField;
+  GradientFieldOptions gradient_field;  // as the client asks; the server fills in the rest
+};
+
+// Asked now and then during long work.
+using CancelledFunction = std::function<bool()>;
+
+// A mesh prepared for poses. Lives on its strand: Deform and Close run there and nowhere else;
+// everything else is constant and may be read from any thread.
+class Session {
+ public:
+  // Factorises: call it on a worker. `budget` and `pool` must outlive the session.
+  //
+  // Errors: InvalidArgument (regions, stiffness), FailedPrecondition (not positive definite),
+  // ResourceExhausted (no room), Cancelled.
+  static absl::StatusOr<std::shared_ptr<Session>> Create(std::string id, SessionSpec spec,
+                                                         MemoryBudget* budget, WorkerPool* pool,
+                                                         const CancelledFunction& cancelled);
+
+  const std::string& id() const { return id_; }
+  const StoredMesh& mesh() const { return *mesh_; }
+  const ConstraintSet& constraints() const { return constraints_; }
+  DeformationModel model() const { return model_; }
+  const GradientFieldOptions& gradient_field() const { return gradient_field_; }
+  const PreparationSummary& preparation() const { return preparation_; }
+  int64_t bytes_held() const { return bytes_held_; }
+
+  Strand& strand() { return strand_; }
+
+  // On the strand only. `poses` has one entry per handle, in the order of the constraints.
+  //
+  // Errors: InvalidArgument (a pose that is not legal), NotFound (the session was closed).
+  absl::StatusOr<Deformation> Deform(absl::Span<const HandlePose> poses,
+                                     const DeformControl& control);
+
+  // On the strand only. Gives the memory back; later calls of Deform fail.
+  void Close();
+
+  // Any thread. When somebody last did something with the session.
+  void Touch() { last_used_ = std::chrono::steady_clock::now(); }
+  std::chrono::steady_clock::time_point last_used() const { return last_used_; }
+
+ private:
+  Session(std::string id, SessionSpec spec, ConstraintSet constraints, WorkerPool* pool);
+
+  absl::Status Prepare(const Eigen::VectorXd& stiffness, MemoryBudget* budget,
+                       const CancelledFunction& cancelled);
+
+  // Constant after Create.
+  const std::string id_;
+  const std::shared_ptr<const StoredMesh> mesh_;
+  const ConstraintSet constraints_;
+  const DeformationModel model_;
+  const GradientFieldOptions gradient_field_;
+  PreparationSummary preparation_;
+  int64_t bytes_held_ = 0;
+
+  // Self-synchronised.
+  Strand strand_;
+  std::atomic<std::chrono::steady_clock::time_point> last_used_;
+
+  // The strand's.
+  MemoryReservation reservation_;
+  std::unique_ptr<Deformer> deformer_;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,228 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/session/session_registry.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "spdlog/spdlog.h"
+
+#include "server/session/random_id.h"
+
+namespace tissueform {
+namespace {
+
+absl::Status NoSuchSession(const std::string& id) {
+  return absl::NotFoundError(
+      absl::StrCat("no session \"sessions/", id,
+                   "\": it was deleted, or removed after being idle; create it again"));
+}
+
+absl::Status OtherRequest(const std::string& request_id) {
+  return absl::InvalidArgumentError(absl::StrCat(
+      "request_id \"", request_id, "\" was used for another request; choose a new one"));
+}
+
+}  // namespace
+
+SessionRegistry::SessionRegistry(const ServiceLimits& limits, MemoryBudget* budget,
+                                 WorkerPool* pool)
+    : limits_(limits), budget_(budget), pool_(pool) {}
+
+void SessionRegistry::Create(SessionSpec spec, const RequestKey& key, CancelFlag cancelled,
+                             const CreateCallback& done) {
+  Admission admission = Admit(key, Waiter{std::move(cancelled), done});
+  if (!admission.refusal.ok()) {
+    done(std::move(admission.refusal));
+    return;
+  }
+  if (admission.existing != nullptr) {
+    done(std::move(admission.existing));
+    return;
+  }
+  if (admission.started == nullptr) {
+    return;
+  }
+  pool_->Post([this, creation = std::move(admission.started), spec = std::move(spec)]() mutable {
+    const CancelledFunction all_cancelled = [this, &creation] { return AllCancelled(*creation); };
+    FinishCreation(creation, all_cancelled()
+                                 ? absl::CancelledError("the client has cancelled the call")
+                                 : Session::Create(RandomId(), std::move(spec), budget_, pool_,
+                                                   all_cancelled));
+  });
+}
+
+SessionRegistry::Admission SessionRegistry::Admit(const RequestKey& key, const Waiter& waiter) {
+  bool full = false;
+  {
+    MutexLock lock(mutex_);
+    full = Full();
+  }
+  if (full) {
+    RemoveIdle();
+  }
+  Admission admission;
+  MutexLock lock(mutex_);
+  if (!key.request_id.empty() && JoinEarlierRequest(key, waiter, &admission)) {
+    return admission;
+  }
+  if (Full()) {
+    admission.refusal = absl::ResourceExhaustedError(
+        absl::StrCat("the server holds ", limits_.max_sessions,
+                     " sessions, as many as it may; delete one or raise --max-sessions"));
+    return admission;
+  }
+  admission.started = std::make_shared<Creation>(Creation{key, {waiter}});
+  creations_.push_back(admission.started);
+  return admission;
+}
+
+bool SessionRegistry::JoinEarlierRequest(const RequestKey& key, const Waiter& waiter,
+                                         Admission* admission) {
+  if (const auto known = session_of_request_.find(key.request_id);
+      known != session_of_request_.end()) {
+    Entry& entry = sessions_.at(known->second);
+    if (entry.key.fingerprint != key.fingerprint) {
+      admission->refusal = OtherRequest(key.request_id);
+      return true;
+    }
+    ++entry.claims;
+    entry.session->Touch();
+    admission->existing = entry.session;
+    return true;
+  }
+  const auto creation = std::find_if(
+      creations_.begin(), creations_.end(),
+      [&key](const auto& candidate) { return candidate->key.request_id == key.request_id; });
+  if (creation == creations_.end()) {
+    return false;
+  }
+  if ((*creation)->key.fingerprint != key.fingerprint) {
+    admission->refusal = OtherRequest(key.request_id);
+  } else {
+    (*creation)->waiters.push_back(waiter);
+  }
+  return true;
+}
+
+bool SessionRegistry::Full() const {
+  return sessions_.size() + creations_.size() >= static_cast<size_t>(limits_.max_sessions);
+}
+
+bool SessionRegistry::AllCancelled(const Creation& creation) const {
+  MutexLock lock(mutex_);
+  return std::all_of(creation.waiters.begin(), creation.waiters.end(),
+                     [](const Waiter& waiter) { return waiter.cancelled->load(); });
+}
+
+void SessionRegistry::FinishCreation(const std::shared_ptr<Creation>& creation,
+                                     absl::StatusOr<std::shared_ptr<Session>> result) {
+  std::vector<Waiter> waiters;
+  {
+    MutexLock lock(mutex_);
+    creations_.erase(std::find(creations_.begin(), creations_.end(), creation));
+    waiters = std::move(creation->waiters);
+    if (result.ok()) {
+      const std::string& id = (*result)->id();
+      sessions_[id] = Entry{*result, creation->key, static_cast<int>(waiters.size())};
+      if (!creation->key.request_id.empty()) {
+        session_of_request_[creation->key.request_id] = id;
+      }
+    }
+  }
+  for (const Waiter& waiter : waiters) {
+    waiter.done(result);
+  }
+}
+
+void SessionRegistry::Abandon(const std::shared_ptr<Session>& session) {
+  {
+    MutexLock lock(mutex_);
+    const auto found = sessions_.find(session->id());
+    if (found == sessions_.end() || --found->second.claims > 0) {
+      return;
+    }
+    Take(session->id());
+  }
+  session->strand().Post([session] { session->Close(); });
+}
+
+absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string& id) {
+  MutexLock lock(mutex_);
+  const auto found = sessions_.find(id);
+  if (found == sessions_.end()) {
+    return NoSuchSession(id);
+  }
+  found->second.session->Touch();
+  return found->second.session;
+}
+
+void SessionRegistry::Delete(const std::string& id, std::function<void(absl::Status)> done) {
+  std::shared_ptr<Session> session;
+  {
+    MutexLock lock(mutex_);
+    session = Take(id);
+  }
+  if (session == nullptr) {
+    done(NoSuchSession(id));
+    return;
+  }
+  session->strand().Post([session, done = std::move(done)] {
+    session->Close();
+    done(absl::OkStatus());
+  });
+}
+
+int SessionRegistry::RemoveIdle() {
+  std::vector<std::shared_ptr<Session>> removed;
+  {
+    MutexLock lock(mutex_);
+    const auto cutoff = std::chrono::steady_clock::now() - limits_.session_idle_ttl;
+    std::vector<std::string> idle;
+    for (const auto& [id, entry] : sessions_) {
+      if (entry.session->last_used() <= cutoff) {
+        idle.push_back(id);
+      }
+    }
+    for (const std::string& id : idle) {
+      removed.push_back(Take(id));
+    }
+  }
+  const int count = static_cast<int>(removed.size());
+  if (count > 0) {
+    spdlog::info("removed {} sessions that were idle for more than {} s", count,
+                 limits_.session_idle_ttl.count());
+  }
+  for (std::shared_ptr<Session>& session : removed) {
+    // Usually the last reference, which frees the memory here and now. A silent stream may hold
+    // another one: then the strand does it.
+    if (session.use_count() > 1) {
+      Strand& strand = session->strand();
+      strand.Post([held = std::move(session)] { held->Close(); });
+    }
+    session.reset();
+  }
+  return count;
+}
+
+int SessionRegistry::size() const {
+  MutexLock lock(mutex_);
+  return static_cast<int>(sessions_.size());
+}
+
+std::shared_ptr<Session> SessionRegistry::Take(const std::string& id) {
+  const auto found = sessions_.find(id);
+  if (found == sessions_.end()) {
+    return nullptr;
+  }
+  if (!found->second.key.request_id.empty()) {
+    session_of_request_.erase(found->second.key.request_id);
+  }
+  std::shared_ptr<Session> session = std::move(found->second.session);
+  sessions_.erase(found);
+  return session;
+}
+
+}  // namespace tissueform

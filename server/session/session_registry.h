@@ -1,0 +1,109 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/base/mutex.h"
+#include "server/session/limits.h"
+#include "server/session/memory_budget.h"
+#include "server/session/session.h"
+#include "server/session/worker_pool.h"
+
+namespace tissueform {
+
+// What makes a creation idempotent.
+struct RequestKey {
+  std::string request_id;   // empty: every call makes a session of its own
+  std::string fingerprint;  // equal for equal requests
+};
+
+// The sessions of the server by their id.
+//
+// Thread-safe. Callbacks are called without a lock held, from the calling thread or from a worker.
+class SessionRegistry {
+ public:
+  using CancelFlag = std::shared_ptr<const std::atomic<bool>>;
+  using CreateCallback = std::function<void(absl::StatusOr<std::shared_ptr<Session>>)>;
+
+  // `budget` and `pool` must outlive the registry and all its sessions.
+  SessionRegistry(const ServiceLimits& limits, MemoryBudget* budget, WorkerPool* pool);
+
+  // Makes a session on a worker and calls `done` once. Calls with the same request id share one
+  // session; its making stops early when `cancelled` is set for all who wait for it.
+  //
+  // Every successful answer is a claim on the session, see Abandon.
+  //
+  // Errors: those of Session::Create; ResourceExhausted (too many sessions); InvalidArgument (the
+  // request id belongs to another request); Cancelled.
+  void Create(SessionSpec spec, const RequestKey& key, CancelFlag cancelled,
+              const CreateCallback& done);
+
+  // Takes back one claim of a caller who never saw the answer. The session ends with its last
+  // claim.
+  void Abandon(const std::shared_ptr<Session>& session);
+
+  // Errors: NotFound.
+  absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& id);
+
+  // Calls `done` when the memory of the session is free. Errors: NotFound.
+  void Delete(const std::string& id, std::function<void(absl::Status)> done);
+
+  // Ends the sessions that were idle for longer than the TTL. Returns how many.
+  int RemoveIdle();
+
+  int size() const;
+
+ private:
+  struct Waiter {
+    CancelFlag cancelled;
+    CreateCallback done;
+  };
+  // A session that is being made.
+  struct Creation {
+    RequestKey key;
+    std::vector<Waiter> waiters;  // guarded by the mutex of the registry
+  };
+  struct Entry {
+    std::shared_ptr<Session> session;
+    RequestKey key;
+    int claims = 0;
+  };
+  // What became of a call of Create when it arrived.
+  struct Admission {
+    absl::Status refusal;
+    std::shared_ptr<Session> existing;
+    std::shared_ptr<Creation> started;  // all three empty: joined a creation that is under way
+  };
+
+  Admission Admit(const RequestKey& key, const Waiter& waiter) ABSL_LOCKS_EXCLUDED(mutex_);
+  // False when no session and no creation has the request id.
+  bool JoinEarlierRequest(const RequestKey& key, const Waiter& waiter, Admission* admission)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool Full() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool AllCancelled(const Creation& creation) const ABSL_LOCKS_EXCLUDED(mutex_);
+  void FinishCreation(const std::shared_ptr<Creation>& creation,
+                      absl::StatusOr<std::shared_ptr<Session>> result) ABSL_LOCKS_EXCLUDED(mutex_);
+  std::shared_ptr<Session> Take(const std::string& id) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  // Constant.
+  const ServiceLimits limits_;
+  MemoryBudget* const budget_;
+  WorkerPool* const pool_;
+
+  mutable Mutex mutex_;
+  std::map<std::string, Entry> sessions_ ABSL_GUARDED_BY(mutex_);
+  std::map<std::string, std::string> session_of_request_ ABSL_GUARDED_BY(mutex_);
+  std::vector<std::shared_ptr<Creation>> creations_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace tissueform

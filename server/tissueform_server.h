@@ -1,0 +1,72 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "grpcpp/server.h"
+
+#include "server/rpc/call_scope.h"
+#include "server/rpc/deform_service.h"
+#include "server/rpc/deform_streams.h"
+#include "server/rpc/mesh_service.h"
+#include "server/rpc/session_service.h"
+#include "server/server_options.h"
+#include "server/session/memory_budget.h"
+#include "server/session/mesh_catalog.h"
+#include "server/session/session_registry.h"
+#include "server/session/worker_pool.h"
+
+namespace tissueform {
+
+// A running server: the only place where its objects are joined.
+class TissueformServer {
+ public:
+  // Listens when it returns. Several servers may live in one process.
+  //
+  // Errors: Unavailable, naming the address, when it cannot be listened on.
+  static absl::StatusOr<std::unique_ptr<TissueformServer>> Start(const ServerOptions& options);
+
+  // Cancels open calls, waits for them and ends.
+  ~TissueformServer();
+
+  // The port that is listened on, also when the options said 0.
+  int port() const { return port_; }
+
+  // Ends in good order: health turns to NOT_SERVING, streams are told, new work is refused with
+  // UNAVAILABLE; open calls may go on until the drain deadline and are then cancelled; the listener
+  // closes. Blocks until all calls have ended. One thread, once.
+  void Drain();
+
+  const MemoryBudget& memory_budget() const { return budget_; }
+  const SessionRegistry& sessions() const { return registry_; }
+  const DeformStreams& streams() const { return streams_; }
+
+ private:
+  explicit TissueformServer(const ServerOptions& options);
+
+  absl::Status Listen();
+  void Reclaim();
+
+  // Constant.
+  const ServerOptions options_;
+  int port_ = 0;
+
+  // Self-synchronised; each may use those before it. Destroyed from the last to the first: calls
+  // end, then jobs, then what they used.
+  ServiceGate gate_;
+  MemoryBudget budget_;
+  MeshCatalog catalog_;
+  std::unique_ptr<WorkerPool> pool_;
+  SessionRegistry registry_;
+  DeformStreams streams_;
+  MeshService mesh_service_;
+  SessionService session_service_;
+  DeformService deform_service_;
+  std::unique_ptr<grpc::Server> server_;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,97 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+// The benchmark program: ours against its peers in one process, in turns.
+
+#include <iostream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "CLI/CLI.hpp"
+#include "absl/status/statusor.h"
+
+#include "client/cli/bench_options.h"
+#include "client/cli/exit_code.h"
+#include "core/base/atomic_file.h"
+#include "core/base/status_macros.h"
+#include "core/linear_solvers/blas_threads.h"
+#include "tests/benchmarks/benchmark_report.h"
+#include "tests/benchmarks/deformation_benchmark.h"
+#include "tests/benchmarks/evaluation.h"
+#include "tests/benchmarks/linear_solver_benchmark.h"
+#include "tests/benchmarks/memory_measurement.h"
+
+namespace tissueform::benchmarks {
+namespace {
+
+// The rows of one bar. What it holds is given back when it returns.
+absl::StatusOr<std::vector<BenchmarkRow>> MeasureTimes(const TestBar& bar,
+                                                       const BenchOptions& options) {
+  TF_ASSIGN_OR_RETURN(const auto solvers,
+                      LinearSolverBenchmark::Create(bar, bar.number != kLargeBar));
+  TF_ASSIGN_OR_RETURN(const auto deformation,
+                      DeformationBenchmark::Create(bar, *solvers, options.threads));
+  std::vector<TimedWork> work = deformation->work();
+  work.insert(work.end(), solvers->work().begin(), solvers->work().end());
+  TF_ASSIGN_OR_RETURN(const PartSeconds medians, InterleavedMedians(work, options.repetitions));
+  std::vector<BenchmarkRow> rows = deformation->Rows(medians);
+  for (BenchmarkRow& row : solvers->Rows(medians)) {
+    rows.push_back(std::move(row));
+  }
+  for (BenchmarkRow& row : rows) {
+    row.mesh = bar.name;
+    row.vertices = bar.mesh.num_vertices();
+    row.tets = bar.mesh.num_tets();
+  }
+  return rows;
+}
+
+absl::Status MeasureBar(int number, const BenchOptions& options, BenchmarkReport* report) {
+  TF_ASSIGN_OR_RETURN(const TestBar bar, MakeTestBar(number));
+  TF_ASSIGN_OR_RETURN(const std::vector<BenchmarkRow> rows, MeasureTimes(bar, options));
+  for (const BenchmarkRow& row : rows) {
+    std::cout << RowText(row) << "\n";
+    report->rows.push_back(row);
+  }
+  TF_ASSIGN_OR_RETURN(MemoryUse memory, MeasureMemory(bar, options.threads));
+  std::cout << MemoryText(memory) << std::endl;
+  report->memory.push_back(std::move(memory));
+  return absl::OkStatus();
+}
+
+absl::Status Run(const BenchOptions& options) {
+  if (!options.json.empty()) {
+    TF_RETURN_IF_ERROR(CheckWritable(options.json));
+  }
+  SetBlasThreads(1);
+  BenchmarkReport report;
+  report.threads = options.threads;
+  report.repetitions = options.repetitions;
+  std::cout << CircumstancesText(report) << "\n\n" << RowsHeading() << std::endl;
+  for (const int number : options.meshes) {
+    TF_RETURN_IF_ERROR(MeasureBar(number, options, &report));
+  }
+  report.growth = GrowthExponents(report.rows);
+  report.targets = EvaluateTargets(report);
+  std::cout << ClosingText(report);
+  return options.json.empty() ? absl::OkStatus()
+                              : WriteFileAtomically(options.json, ReportJson(report));
+}
+
+}  // namespace
+}  // namespace tissueform::benchmarks
+
+int main(int argc, char** argv) {
+  CLI::App app("The program behind `tissueform bench`", "tissueform bench");
+  tissueform::BenchOptions options;
+  tissueform::AddBenchOptions(app, &options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return tissueform::ReportParseError(app, error, std::cout, std::cerr);
+  }
+  absl::Status outcome = tissueform::benchmarks::Run(options);
+  outcome.Update(tissueform::FlushOutput());
+  return tissueform::ReportOutcome(outcome, std::cerr);
+}

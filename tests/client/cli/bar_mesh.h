@@ -1,0 +1,13 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "core/mesh_io/tet_mesh_io.h"
+
+namespace tissueform::testing {
+
+// The mesh of tests/data/plans/bar, as its README describes it.
+TetMeshFile BarMeshOfPlan();
+
+}  // namespace tissueform::testing

@@ -1,0 +1,91 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <limits>
+
+#include "nlohmann/json.hpp"
+
+#include "core/mesh_io/tet_mesh_io.h"
+#include "tests/client/cli/bar_mesh.h"
+#include "tests/client/cli/run_tissueform.h"
+#include "tests/testing/meshes.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+class CompareTest : public CliTest {
+ protected:
+  // a.vtu is the bar; b.vtu the same with its fixed layer moved by (3, 4, 0).
+  void SetUp() override {
+    CliTest::SetUp();
+    TetMeshFile bar = BarMeshOfPlan();
+    ASSERT_THAT(WriteTetMesh(Path("a.vtu"), bar), IsOk());
+    Positions positions = bar.mesh.positions();
+    positions.topRows(25).rowwise() += Eigen::RowVector3d(3, 4, 0);
+    ASSERT_OK_AND_ASSIGN(bar.mesh, TetMesh::Create(positions, bar.mesh.tets()));
+    ASSERT_THAT(WriteTetMesh(Path("b.vtu"), bar), IsOk());
+  }
+};
+
+TEST_F(CompareTest, DistancesAreTakenOverallAndByRegion) {
+  const ProcessResult result = Run({"compare", "a.vtu", "b.vtu", "--by", "anatomy", "--json"});
+  ASSERT_THAT(result, Succeeds());
+  const nlohmann::json json = nlohmann::json::parse(result.out);
+  EXPECT_EQ(json["overall"]["vertices"], 325);
+  EXPECT_NEAR(json["overall"]["mean_mm"].get<double>(), 5.0 * 25 / 325, 1e-12);
+  EXPECT_NEAR(json["overall"]["max_mm"].get<double>(), 5, 1e-12);
+  EXPECT_EQ(json["overall"]["p50_mm"], 0);
+  EXPECT_EQ(json["regions"]["1"]["vertices"], 25);
+  EXPECT_NEAR(json["regions"]["1"]["p50_mm"].get<double>(), 5, 1e-12);
+  EXPECT_EQ(json["regions"]["2"]["max_mm"], 0);
+}
+
+TEST_F(CompareTest, TableHasOneRowForEachRegion) {
+  const ProcessResult result = Run({"compare", "a.vtu", "b.vtu", "--by", "anatomy"});
+  ASSERT_THAT(result, Succeeds());
+  for (const char* row : {"all ", "anatomy = 0", "anatomy = 1", "anatomy = 2"}) {
+    EXPECT_THAT(result.out, HasSubstr(row));
+  }
+}
+
+TEST_F(CompareTest, DifferenceFileHoldsTheDistances) {
+  ASSERT_THAT(Run({"compare", "a.vtu", "b.vtu", "--out", "difference.vtu"}), Succeeds());
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile file, ReadTetMesh(Path("difference.vtu")));
+  const Attribute* distance = FindAttribute(file.point_data, "distance_mm");
+  ASSERT_NE(distance, nullptr);
+  EXPECT_NEAR(ToDoubles(*distance).front(), 5, 1e-12);
+  EXPECT_EQ(ToDoubles(*distance).back(), 0);
+  EXPECT_NE(FindAttribute(file.point_data, "anatomy"), nullptr);
+}
+
+TEST_F(CompareTest, MeshesOfDifferentSizeCannotBeCompared) {
+  EXPECT_THAT(
+      Run({"compare", "a.vtu", TestDataPath("meshes/tet_sofa_tongue/volumetricTongue.vtu")}),
+      FailsWith(1, HasSubstr("2238")));
+}
+
+TEST_F(CompareTest, RegionsNeedAnArrayOfWholeNumbers) {
+  EXPECT_THAT(Run({"compare", "a.vtu", "b.vtu", "--by", "tissue"}),
+              FailsWith(1, HasSubstr("it has anatomy")));
+  TetMeshFile bar = BarMeshOfPlan();
+  bar.point_data[0].values = std::vector<double>(static_cast<size_t>(bar.mesh.num_vertices()), 0.5);
+  ASSERT_THAT(WriteTetMesh(Path("half.vtu"), bar), IsOk());
+  EXPECT_THAT(Run({"compare", "half.vtu", "b.vtu", "--by", "anatomy"}),
+              FailsWith(1, HasSubstr("labels are whole numbers")));
+}
+
+TEST_F(CompareTest, CoordinatesThatAreNotFiniteAreRefused) {
+  TetMeshFile bar = BarMeshOfPlan();
+  Positions positions = bar.mesh.positions();
+  positions(3, 2) = std::numeric_limits<double>::quiet_NaN();
+  ASSERT_OK_AND_ASSIGN(bar.mesh, TetMesh::Create(positions, bar.mesh.tets()));
+  ASSERT_THAT(WriteTetMesh(Path("nan.vtu"), bar), IsOk());
+  EXPECT_THAT(Run({"compare", "a.vtu", "nan.vtu"}),
+              FailsWith(1, HasSubstr("nan.vtu has coordinates")));
+}
+
+}  // namespace
+}  // namespace tissueform::testing

@@ -1,0 +1,30 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/experiments/csv_table.h"
+
+#include "gtest/gtest.h"
+
+namespace tissueform {
+namespace {
+
+TEST(CsvTableTest, CellsWithCommasAndQuotationMarksAreQuoted) {
+  CsvTable table({"case", "ratio"});
+  table.AddRow({"volume, drag", Cell(0.5)});
+  table.AddRow({"the \"surface\"", Cell(1)});
+  EXPECT_EQ(table.Csv(), "case,ratio\n\"volume, drag\",0.5\n\"the \"\"surface\"\"\",1\n");
+}
+
+TEST(CsvTableTest, MarkdownHasARuleBelowTheHeader) {
+  CsvTable table({"a", "b"});
+  table.AddRow({"1", "2"});
+  EXPECT_EQ(table.Markdown(), "| a | b |\n|---|---|\n| 1 | 2 |\n");
+}
+
+TEST(CsvTableTest, NumbersKeepSixDigits) {
+  EXPECT_EQ(Cell(0.123456789), "0.123457");
+  EXPECT_EQ(Cell(180), "180");
+}
+
+}  // namespace
+}  // namespace tissueform

@@ -1,0 +1,114 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/linear_solvers/sparse_cholesky.h"
+
+#include <random>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include <Eigen/Cholesky>
+
+#include "core/operators/laplacian.h"
+#include "tests/testing/meshes.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::IsOk;
+using testing::StatusIs;
+
+Eigen::MatrixXd RandomMatrix(Eigen::Index rows, Eigen::Index cols) {
+  std::mt19937 generator(5);
+  Eigen::MatrixXd matrix(rows, cols);
+  for (double& value : matrix.reshaped()) {
+    value = 2.0 * generator() / 4294967295.0 - 1.0;
+  }
+  return matrix;
+}
+
+// Laplacian of a bar plus a small multiple of the identity: positive definite.
+SparseMatrix PositiveDefinite(double shift = 0.01) {
+  const TetMesh bar = testing::Bar({4, 4, 8}, 1.0, 0.2);
+  SparseMatrix A = CotangentLaplacian(bar, Eigen::VectorXd::Ones(bar.num_tets()));
+  for (Eigen::Index i = 0; i < A.rows(); ++i) {
+    A.coeffRef(i, i) += shift;
+  }
+  return A;
+}
+
+class SparseCholeskyTest : public ::testing::TestWithParam<CholeskyBackend> {
+ protected:
+  const std::unique_ptr<SparseCholesky> cholesky_ = CreateSparseCholesky(GetParam());
+};
+
+TEST_P(SparseCholeskyTest, AgreesWithADenseFactorisation) {
+  const SparseMatrix A = PositiveDefinite();
+  const Eigen::MatrixXd rhs = RandomMatrix(A.rows(), 3);
+  ASSERT_THAT(cholesky_->Analyze(A), IsOk());
+  ASSERT_THAT(cholesky_->Factorize(A), IsOk());
+  Eigen::MatrixXd solution;
+  ASSERT_THAT(cholesky_->Solve(rhs, &solution), IsOk());
+  const Eigen::MatrixXd oracle = Eigen::LDLT<Eigen::MatrixXd>(Eigen::MatrixXd(A)).solve(rhs);
+  EXPECT_LT((solution - oracle).norm(), 1e-11 * oracle.norm());
+}
+
+TEST_P(SparseCholeskyTest, SolvesAgainWithAnotherNumberOfColumns) {
+  const SparseMatrix A = PositiveDefinite();
+  ASSERT_THAT(cholesky_->Analyze(A), IsOk());
+  ASSERT_THAT(cholesky_->Factorize(A), IsOk());
+  for (const Eigen::Index columns : {3, 1, 12, 3}) {
+    const Eigen::MatrixXd rhs = RandomMatrix(A.rows(), columns);
+    Eigen::MatrixXd solution;
+    ASSERT_THAT(cholesky_->Solve(rhs, &solution), IsOk());
+    ASSERT_EQ(solution.cols(), columns);
+    EXPECT_LT((A * solution - rhs).norm(), 1e-11 * rhs.norm());
+  }
+}
+
+TEST_P(SparseCholeskyTest, FactorisesNewValuesWithTheSameAnalysis) {
+  ASSERT_THAT(cholesky_->Analyze(PositiveDefinite()), IsOk());
+  for (const double shift : {0.01, 3.0}) {
+    const SparseMatrix A = PositiveDefinite(shift);
+    ASSERT_THAT(cholesky_->Factorize(A), IsOk());
+    const Eigen::MatrixXd rhs = RandomMatrix(A.rows(), 2);
+    Eigen::MatrixXd solution;
+    ASSERT_THAT(cholesky_->Solve(rhs, &solution), IsOk());
+    EXPECT_LT((A * solution - rhs).norm(), 1e-11 * rhs.norm());
+  }
+}
+
+TEST_P(SparseCholeskyTest, BytesAreKnownBeforeTheNumericFactorAndDoNotChange) {
+  const SparseMatrix A = PositiveDefinite();
+  ASSERT_THAT(cholesky_->Analyze(A), IsOk());
+  const int64_t predicted = cholesky_->factor_bytes();
+  ASSERT_THAT(cholesky_->Factorize(A), IsOk());
+  EXPECT_EQ(cholesky_->factor_bytes(), predicted);
+  // Not less than the lower triangle of A, not more than a dense triangle.
+  EXPECT_GT(predicted, A.nonZeros() / 2 * static_cast<int64_t>(sizeof(double)));
+  EXPECT_LT(predicted, 2 * A.rows() * A.rows() * static_cast<int64_t>(sizeof(double)));
+}
+
+TEST_P(SparseCholeskyTest, IndefiniteMatrixIsRefused) {
+  SparseMatrix A = PositiveDefinite();
+  A.coeffRef(17, 17) = -1;
+  ASSERT_THAT(cholesky_->Analyze(A), IsOk());
+  EXPECT_THAT(cholesky_->Factorize(A),
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("not positive definite")));
+}
+
+TEST_P(SparseCholeskyTest, RectangularMatrixIsRefused) {
+  EXPECT_THAT(cholesky_->Analyze(SparseMatrix(3, 4)),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("not square")));
+}
+
+INSTANTIATE_TEST_SUITE_P(Backends, SparseCholeskyTest,
+                         ::testing::Values(CholeskyBackend::kCholmod, CholeskyBackend::kEigen),
+                         [](const auto& test) {
+                           return test.param == CholeskyBackend::kCholmod ? "Cholmod" : "Eigen";
+                         });
+
+}  // namespace
+}  // namespace tissueform

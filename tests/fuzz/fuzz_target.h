@@ -1,0 +1,25 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace tissueform::fuzz {
+
+// A fuzz target takes any bytes. It ends the program (through a sanitizer, an assertion or
+// std::abort) when the code under test breaks a promise, and only then.
+
+// The text of a plan file (ParsePlan); what is accepted must keep the promises of the format.
+void FuzzPlan(const uint8_t* data, size_t size);
+
+// A mesh out of raw bytes, with any indices and any floating-point numbers (TetMesh::Create,
+// ValidateTetMesh, RepairOrientation, ValidateTriangleMesh of its boundary).
+void FuzzMeshValidation(const uint8_t* data, size_t size);
+
+// A shape and chunks of a payload (core/mesh_payload) as a server takes them from the network, and
+// the mesh that comes of them.
+void FuzzMeshPayload(const uint8_t* data, size_t size);
+
+}  // namespace tissueform::fuzz

@@ -1,0 +1,142 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <cstdlib>
+#include <future>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "grpcpp/create_channel.h"
+#include "grpcpp/generic/generic_stub.h"
+#include "grpcpp/support/byte_buffer.h"
+#include "gtest/gtest.h"
+
+#include "client/cli/server_process.h"
+#include "tests/integration/service_test.h"
+#include "tests/testing/status_matchers.h"
+
+// The real program: starts, tells its port, serves, drains.
+namespace tissueform::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::chrono::seconds kPatience{60};
+
+std::unique_ptr<ServerProcess> StartProgram(std::vector<std::string> arguments = {}) {
+  arguments.insert(arguments.end(), {"--port", "0", "--log-level", "warn"});
+  auto process = ServerProcess::Start(TISSUEFORM_SERVER_BINARY, arguments, kPatience);
+  EXPECT_THAT(process, IsOk());
+  return process.ok() ? *std::move(process) : nullptr;
+}
+
+// What the standard health service says, as bytes: HealthCheckResponse{status}.
+constexpr char kServing[] = "\x08\x01";
+constexpr char kNotServing[] = "\x08\x02";
+
+std::string Health(const std::string& address) {
+  grpc::GenericStub stub(grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
+  grpc::ClientContext context;
+  const grpc::Slice empty;
+  const grpc::ByteBuffer request(&empty, 1);
+  grpc::ByteBuffer response;
+  std::promise<grpc::Status> done;
+  stub.UnaryCall(&context, "/grpc.health.v1.Health/Check", grpc::StubOptions(), &request, &response,
+                 [&done](grpc::Status status) { done.set_value(std::move(status)); });
+  const grpc::Status status = done.get_future().get();
+  grpc::Slice bytes;
+  if (!status.ok() || !response.DumpToSingleSlice(&bytes).ok()) {
+    return status.error_message();
+  }
+  return {bytes.begin(), bytes.end()};
+}
+
+class ServerProgramTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    process_ = StartProgram();
+    ASSERT_NE(process_, nullptr);
+    auto client = TissueformClient::Connect(process_->address(), {});
+    ASSERT_THAT(client, IsOk());
+    client_ = *std::move(client);
+  }
+
+  std::string MakeSession() {
+    const auto mesh = client_->UploadMesh(problem_.mesh, problem_.CellArrays());
+    EXPECT_THAT(mesh, IsOk());
+    const auto session = client_->CreateSession(problem_.Request(mesh.ok() ? mesh->name() : ""));
+    EXPECT_THAT(session, IsOk());
+    return session.ok() ? session->name() : "";
+  }
+
+  const BarProblem problem_{21};
+  std::unique_ptr<ServerProcess> process_;
+  std::unique_ptr<TissueformClient> client_;
+};
+
+TEST_F(ServerProgramTest, EndsWithZeroWhenNobodyIsThere) {
+  process_->Terminate();
+  // Although an idle client stays connected.
+  EXPECT_EQ(process_->WaitForExit(std::chrono::seconds(4)), 0);
+}
+
+TEST_F(ServerProgramTest, AnOpenStreamFinishesItsFramesWhileTheServerDrains) {
+  auto stream = client_->OpenStream(MakeSession(), {});
+  ASSERT_THAT(stream, IsOk());
+  uint64_t sequence = 0;
+  const auto drag = [&] {
+    ASSERT_THAT((*stream)->SendPoses(++sequence, TopPose(SomePose(1))), IsOk());
+    const auto frame = (*stream)->Receive();
+    ASSERT_TRUE(frame.has_value());
+    EXPECT_EQ(frame->sequence(), sequence);
+    ASSERT_THAT((*stream)->Ack(sequence), IsOk());
+  };
+  drag();
+  EXPECT_EQ(Health(process_->address()), kServing);
+  process_->Terminate();
+  ASSERT_TRUE(Eventually([&] {
+    drag();
+    return (*stream)->server_is_draining() || ::testing::Test::HasFailure();
+  }));
+  EXPECT_THAT(client_->CreateSession({}),
+              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("draining")));
+  EXPECT_EQ(Health(process_->address()), kNotServing);
+  for (int i = 0; i < 50; ++i) {
+    drag();
+  }
+  EXPECT_FALSE(process_->WaitForExit(std::chrono::milliseconds(0)).has_value());
+  (*stream)->CloseSending();
+  EXPECT_FALSE((*stream)->Receive().has_value());
+  EXPECT_THAT((*stream)->Finish(), IsOk());
+  EXPECT_EQ(process_->WaitForExit(kPatience), 0);
+}
+
+TEST_F(ServerProgramTest, AStreamThatDoesNotEndIsCutAtTheDrainDeadline) {
+  process_ = StartProgram({"--drain-seconds", "0"});
+  auto client = TissueformClient::Connect(process_->address(), {});
+  ASSERT_THAT(client, IsOk());
+  client_ = *std::move(client);
+  auto stream = client_->OpenStream(MakeSession(), {});
+  ASSERT_THAT(stream, IsOk());
+  process_->Terminate();
+  EXPECT_FALSE((*stream)->Receive().has_value());
+  EXPECT_FALSE((*stream)->Finish().ok());
+  EXPECT_EQ(process_->WaitForExit(kPatience), 0);
+}
+
+TEST(ServerProgramStartTest, AProgramThatIsNotThereIsNamed) {
+  EXPECT_THAT(ServerProcess::Start("/nowhere/tissueform-server", {}, kPatience),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("/nowhere/tissueform-server")));
+}
+
+TEST(ServerProgramStartTest, WrongUseEndsWithTwo) {
+  const std::string command = std::string(TISSUEFORM_SERVER_BINARY) + " --port 99999 2>/dev/null";
+  const int status = std::system(command.c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 2);
+}
+
+}  // namespace
+}  // namespace tissueform::testing

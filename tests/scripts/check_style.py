@@ -1,0 +1,57 @@
+#!/usr/bin/env python3
+# Copyright 2026 The Tissueform Authors.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+"""Checks what no other tool does: the form of files.
+
+    tests/scripts/check_style.py
+
+Every source file begins with the two lines of copyright and licence (after a #! line); headers have `#pragma once`;
+no file holds a mark of unfinished work, a tab, a blank at the end of a line or more than 600 lines.
+"""
+
+import pathlib
+import re
+import sys
+
+FOLDERS = (".ci", "cmake", "client", "core", "deploy", "proto", "server", "tests")
+SUFFIXES = {".h", ".cc", ".py", ".sh", ".cmake", ".proto", ".toml"}
+MAX_LINES = 600
+COPYRIGHT = re.compile(r"(//|#) Copyright 20\d\d The Tissueform Authors\.")
+LICENCE = re.compile(r"(//|#) SPDX-License-Identifier: AGPL-3\.0-or-later")
+UNFINISHED = re.compile(r"\b(TO" r"DO|FIX" r"ME|X" r"XX)\b")
+
+
+def errors_of(name, text):
+    """(line, message) for every fault of one file."""
+    lines = text.splitlines()
+    start = 1 if lines and lines[0].startswith("#!") else 0
+    head = lines[start:start + 2]
+    if len(head) < 2 or not COPYRIGHT.fullmatch(head[0]) or not LICENCE.fullmatch(head[1]):
+        yield start + 1, "begin with the two lines of copyright and licence"
+    if name.endswith(".h") and "#pragma once" not in lines:
+        yield 1, "a header needs #pragma once"
+    if len(lines) > MAX_LINES:
+        yield len(lines), f"longer than {MAX_LINES} lines: cut it by topic"
+    for number, line in enumerate(lines, start=1):
+        if UNFINISHED.search(line):
+            yield number, "unfinished work belongs in an issue"
+        if "\t" in line or line != line.rstrip():
+            yield number, "a tab, or a blank at the end"
+
+
+def main():
+    root = pathlib.Path(__file__).resolve().parent.parent.parent
+    paths = sorted(p for folder in FOLDERS for p in (root / folder).rglob("*") if p.is_file())
+    count = 0
+    for path in paths:
+        name = path.relative_to(root).as_posix()
+        if name.startswith("tests/data/") or (path.suffix not in SUFFIXES and name != ".ci/run"):
+            continue
+        for number, message in errors_of(name, path.read_text(encoding="utf-8")):
+            print(f"{name}:{number}: {message}", file=sys.stderr)
+            count += 1
+    return 1 if count else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,54 @@
+#!/usr/bin/env bash
+# Copyright 2026 The Tissueform Authors.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+#
+# Builds and runs tests under sanitizers; ends with ctest's summary.
+#
+#   tests/scripts/run_sanitizers.sh asan [options of ctest]   AddressSanitizer, LeakSanitizer and
+#                                                            UndefinedBehaviorSanitizer, all tests
+#   tests/scripts/run_sanitizers.sh tsan [options of ctest]   ThreadSanitizer, tests with the label "server"
+#
+# TISSUEFORM_BUILD_DIR and JOBS: see deploy/build.sh.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+preset=${1:?usage: run_sanitizers.sh asan|tsan [options of ctest]}
+shift
+export TISSUEFORM_BUILD_DIR=${TISSUEFORM_BUILD_DIR:-$PWD/build/$preset}
+suppressions=$PWD/tests/testing
+
+# "suppressions=FILE" where there is such a file.
+with_suppressions() {
+  local file=$suppressions/$1
+  if [[ -f $file ]]; then
+    echo ":suppressions=$file"
+  fi
+}
+
+case $preset in
+  asan)
+    # Every allocation counts; exit code 1 of a leak fails the test.
+    ASAN_OPTIONS="detect_leaks=1:strict_string_checks=1:detect_stack_use_after_return=1"
+    UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1$(with_suppressions ubsan.supp)"
+    LSAN_OPTIONS="print_suppressions=0$(with_suppressions lsan.supp)"
+    export ASAN_OPTIONS UBSAN_OPTIONS LSAN_OPTIONS
+    targets=()
+    selection=()
+    ;;
+  tsan)
+    # Debian's libraries are not compiled for it: what they call (memcpy, delete) is not ours to judge.
+    TSAN_OPTIONS="halt_on_error=1:second_deadlock_stack=1:history_size=4:ignore_noninstrumented_modules=1"
+    TSAN_OPTIONS+=$(with_suppressions tsan.supp)
+    export TSAN_OPTIONS
+    targets=(tests-server)
+    selection=(--label-regex '^server$')
+    ;;
+  *)
+    echo "run_sanitizers.sh: asan or tsan, not '$preset'" >&2
+    exit 2
+    ;;
+esac
+
+deploy/build.sh "$preset" "${targets[@]}"
+exec ctest --test-dir "$TISSUEFORM_BUILD_DIR" --output-on-failure --no-tests=error \
+  --parallel "${JOBS:-$(nproc)}" "${selection[@]}" "$@"

@@ -1,0 +1,88 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "tests/server/rpc/fake_calls.h"
+
+namespace tissueform::testing {
+
+void FakeCallState::Bind(grpc::internal::ServerReactor* reactor) {
+  {
+    MutexLock lock(mutex_);
+    reactor_ = reactor;
+    if (cancelled_) {
+      ++reactions_under_way_;
+      pool_->Post([this, reactor] {
+        reactor->OnCancel();
+        Ended();
+      });
+    }
+  }
+  Ended();
+}
+
+void FakeCallState::React(WorkerPool::Job reaction) {
+  {
+    MutexLock lock(mutex_);
+    ++reactions_under_way_;
+  }
+  pool_->Post([this, reaction = std::move(reaction)] {
+    reaction();
+    Ended();
+  });
+}
+
+void FakeCallState::Finish(grpc::Status status) {
+  {
+    MutexLock lock(mutex_);
+    ++reactions_under_way_;
+    status_ = std::move(status);
+  }
+  // Not from here: the caller may hold locks of the reactor.
+  pool_->Post([this] { Ended(); });
+}
+
+void FakeCallState::Cancel() {
+  MutexLock lock(mutex_);
+  if (std::exchange(cancelled_, true) || done_ || reactor_ == nullptr ||
+      (status_.has_value() && reactions_under_way_ == 0)) {
+    return;
+  }
+  ++reactions_under_way_;
+  pool_->Post([this, reactor = reactor_] {
+    reactor->OnCancel();
+    Ended();
+  });
+}
+
+bool FakeCallState::cancelled() const {
+  MutexLock lock(mutex_);
+  return cancelled_;
+}
+
+std::optional<grpc::Status> FakeCallState::WaitUntilDone() {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  MutexLock lock(mutex_);
+  while (!done_) {
+    if (!changed_.WaitUntil(mutex_, deadline)) {
+      return std::nullopt;
+    }
+  }
+  return status_;
+}
+
+void FakeCallState::Ended() {
+  grpc::internal::ServerReactor* reactor = nullptr;
+  {
+    MutexLock lock(mutex_);
+    if (--reactions_under_way_ > 0 || !status_.has_value()) {
+      return;
+    }
+    reactor = reactor_;
+  }
+  reactor->OnDone();
+  MutexLock lock(mutex_);
+  done_ = true;
+  changed_.NotifyAll();
+}
+
+}  // namespace tissueform::testing

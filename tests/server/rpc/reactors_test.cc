@@ -1,0 +1,277 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <cstring>
+#include <future>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "server/rpc/deform_service.h"
+#include "server/rpc/mesh_service.h"
+#include "server/rpc/proto_conversion.h"
+#include "server/rpc/session_service.h"
+#include "tests/server/rpc/fake_calls.h"
+#include "tests/testing/meshes.h"
+#include "tests/testing/session_samples.h"
+#include "tests/testing/status_matchers.h"
+
+// The services without sockets: reactions come from a pool of threads that ThreadSanitizer sees
+// through.
+namespace tissueform::testing {
+namespace {
+
+using FakeStream = FakeBidiCall<v1::DeformRequest, v1::DeformResponse>;
+
+v1::DeformRequest Configuration(const std::string& session) {
+  v1::DeformRequest request;
+  request.mutable_configuration()->set_session(session);
+  return request;
+}
+
+// The pose number `sequence`: its z shift tells which one was answered.
+v1::DeformRequest Pose(uint64_t sequence) {
+  v1::DeformRequest request;
+  request.mutable_pose()->set_sequence(sequence);
+  v1::HandlePose* pose = request.mutable_pose()->add_poses();
+  pose->set_handle("top");
+  pose->mutable_translation_mm()->set_z(static_cast<double>(sequence) / 64);
+  return request;
+}
+
+v1::DeformRequest Ack(uint64_t sequence) {
+  v1::DeformRequest request;
+  request.mutable_ack()->set_sequence(sequence);
+  return request;
+}
+
+constexpr int kWorkers = 2;
+
+class ReactorsTest : public ::testing::Test {
+ protected:
+  ~ReactorsTest() override {
+    reactions_.reset();
+    workers_.reset();
+  }
+
+  std::string MakeSession() {
+    v1::CreateSessionRequest request = SessionRequestOf(*Store(sample_, &catalog_));
+    v1::Session session;
+    FakeUnaryCall call(reactions_.get());
+    BindCreateSession(&call, request, &session);
+    EXPECT_TRUE(call.WaitUntilDone()->ok());
+    return session.name();
+  }
+
+  // Workers wait until the call is bound: what happens before that meets at a lock inside gRPC,
+  // which ThreadSanitizer does not see.
+  void BindCreateSession(FakeUnaryCall* call, const v1::CreateSessionRequest& request,
+                         v1::Session* session) {
+    std::promise<void> bound;
+    const std::shared_future<void> is_bound = bound.get_future().share();
+    for (int worker = 0; worker < kWorkers; ++worker) {
+      workers_->Post([is_bound] { is_bound.wait(); });
+    }
+    call->Bind(session_service_.CreateSession(nullptr, &request, session));
+    bound.set_value();
+  }
+
+  static v1::CreateSessionRequest SessionRequestOf(const StoredMesh& mesh) {
+    const ConstraintSet ends = BarEnds(mesh.mesh);
+    v1::CreateSessionRequest request;
+    request.set_mesh(absl::StrCat("meshes/", mesh.sha256));
+    request.mutable_stiffness()->set_uniform_pa(1000);
+    request.mutable_fixed_vertices()->Add(ends.fixed().begin(), ends.fixed().end());
+    v1::Handle* handle = request.add_handles();
+    handle->set_name("top");
+    const std::vector<int32_t>& top = ends.handles()[0].vertices;
+    handle->mutable_vertices()->Add(top.begin(), top.end());
+    return request;
+  }
+
+  // The z coordinate of the last vertex, which belongs to the handle, says which pose was answered.
+  void ExpectAnswers(const v1::DeformFrame& frame) const {
+    const std::string& bytes = frame.positions();
+    ASSERT_EQ(bytes.size(), sample_.mesh.num_vertices() * 12);
+    float z = 0;
+    std::memcpy(&z, bytes.data() + bytes.size() - sizeof(z), sizeof(z));
+    const double rest = sample_.mesh.positions()(sample_.mesh.num_vertices() - 1, 2);
+    EXPECT_NEAR(z, rest + static_cast<double>(frame.sequence()) / 64, 1e-5);
+  }
+
+  const SampleMesh sample_{Bar({2, 2, 3})};
+  ServiceLimits limits_;
+  ServiceGate gate_;
+  MemoryBudget budget_{64 << 20};
+  MeshCatalog catalog_{limits_, &budget_};
+  std::unique_ptr<WorkerPool> workers_ = std::make_unique<WorkerPool>(kWorkers);
+  SessionRegistry registry_{limits_, &budget_, workers_.get()};
+  DeformStreams streams_{limits_.max_streams};
+  MeshService mesh_service_{&gate_, &catalog_, workers_.get()};
+  SessionService session_service_{&gate_, limits_, &catalog_, &registry_};
+  DeformService deform_service_{&gate_, limits_, &registry_, &streams_};
+  std::unique_ptr<WorkerPool> reactions_ = std::make_unique<WorkerPool>(4);
+};
+
+TEST_F(ReactorsTest, AStreamAnswersAndEnds) {
+  FakeStream stream(reactions_.get());
+  stream.Bind(deform_service_.Deform(nullptr));
+  stream.Send(Configuration(MakeSession()));
+  EXPECT_TRUE(stream.Receive()->has_started());
+  for (uint64_t sequence = 1; sequence <= 20; ++sequence) {
+    stream.Send(Pose(sequence));
+    const auto response = stream.Receive();
+    ASSERT_TRUE(response.has_value() && response->has_frame());
+    EXPECT_EQ(response->frame().sequence(), sequence);
+    ExpectAnswers(response->frame());
+    stream.Send(Ack(sequence));
+  }
+  stream.CloseSending();
+  EXPECT_FALSE(stream.Receive().has_value());
+  EXPECT_TRUE(stream.WaitUntilDone()->ok());
+  EXPECT_EQ(streams_.size(), 0);
+}
+
+TEST_F(ReactorsTest, StreamsSurviveWhateverTheClientDoes) {
+  const std::string session = MakeSession();
+  for (uint32_t seed = 1; seed <= 60; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    FakeStream stream(reactions_.get());
+    stream.Bind(deform_service_.Deform(nullptr));
+    stream.Send(Configuration(session));
+    ASSERT_TRUE(stream.Receive().has_value());
+    bool cancelled = false;
+    uint64_t last = 0;
+    for (int step = 0; step < 40 && !cancelled; ++step) {
+      switch (random() % 16) {
+        case 0:
+          cancelled = random() % 4 == 0;
+          break;
+        case 1:
+          streams_.NotifyDraining();
+          break;
+        default:
+          stream.Send(Pose(++last));
+      }
+    }
+    if (cancelled) {
+      stream.Cancel();
+    } else {
+      stream.CloseSending();
+    }
+    int64_t accounted = 0;
+    while (const auto response = stream.Receive()) {
+      if (response->has_frame()) {
+        accounted += 1 + response->frame().coalesced_count();
+        ExpectAnswers(response->frame());
+      }
+    }
+    const auto status = stream.WaitUntilDone();
+    ASSERT_TRUE(status.has_value()) << "the stream does not end";
+    EXPECT_EQ(status->ok(), !cancelled);
+    if (!cancelled) {
+      EXPECT_EQ(accounted, static_cast<int64_t>(last));
+    }
+  }
+  EXPECT_EQ(streams_.size(), 0);
+}
+
+TEST_F(ReactorsTest, AClientThatDoesNotReadGetsOneWriteAndOthersGoOn) {
+  const std::string session = MakeSession();
+  FakeStream stuck(reactions_.get());
+  stuck.Bind(deform_service_.Deform(nullptr));
+  stuck.Send(Configuration(session));
+  ASSERT_TRUE(stuck.Receive().has_value());
+  stuck.StopReading();
+  for (uint64_t sequence = 1; sequence <= 50; ++sequence) {
+    stuck.Send(Pose(sequence));
+  }
+  FakeStream other(reactions_.get());
+  other.Bind(deform_service_.Deform(nullptr));
+  other.Send(Configuration(session));
+  ASSERT_TRUE(other.Receive().has_value());
+  other.Send(Pose(1));
+  ASSERT_TRUE(other.Receive().has_value());
+  other.CloseSending();
+  EXPECT_TRUE(other.WaitUntilDone()->ok());
+  EXPECT_LE(stuck.writes_started(), 2) << "`started` and one frame";
+  stuck.Cancel();
+  EXPECT_EQ(stuck.WaitUntilDone()->error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_EQ(streams_.size(), 0);
+}
+
+TEST_F(ReactorsTest, UploadsSurviveCancellationAtAnyChunk) {
+  const MeshAnnouncement announcement = sample_.Announcement();
+  const std::string payload = sample_.Payload();
+  constexpr int64_t kChunk = 500;
+  const auto chunks = static_cast<int64_t>(payload.size()) / kChunk + 1;
+  for (int64_t cancel_at = 0; cancel_at <= chunks; ++cancel_at) {
+    v1::UploadMeshResponse response;
+    FakeReaderCall<v1::UploadMeshRequest> call(reactions_.get());
+    call.Bind(mesh_service_.UploadMesh(nullptr, &response));
+    v1::UploadMeshRequest request;
+    request.mutable_header()->set_vertex_count(announcement.shape.num_vertices);
+    request.mutable_header()->set_tet_count(announcement.shape.num_tets);
+    request.mutable_header()->add_cell_arrays("youngs_modulus_pa");
+    request.mutable_header()->set_total_bytes(announcement.total_bytes);
+    request.mutable_header()->set_sha256(announcement.sha256);
+    call.Send(request);
+    for (int64_t i = 0; i < chunks && i < cancel_at; ++i) {
+      request.mutable_chunk()->set_write_offset(i * kChunk);
+      request.mutable_chunk()->set_data(payload.substr(i * kChunk, kChunk));
+      request.mutable_chunk()->set_finish_write(i + 1 == chunks);
+      call.Send(request);
+    }
+    if (cancel_at < chunks) {
+      call.Cancel();
+      EXPECT_FALSE(call.WaitUntilDone()->ok());
+      EXPECT_EQ(budget_.reserved_bytes(), 0);
+    } else {
+      EXPECT_TRUE(call.WaitUntilDone()->ok());
+      EXPECT_EQ(response.committed_bytes(), announcement.total_bytes);
+    }
+  }
+}
+
+TEST_F(ReactorsTest, OnlyTheSessionsThatWereNotCancelledStay) {
+  constexpr int kCalls = 24;
+  const v1::CreateSessionRequest request = SessionRequestOf(*Store(sample_, &catalog_));
+  std::vector<v1::Session> sessions(kCalls);
+  std::vector<std::unique_ptr<FakeUnaryCall>> calls;
+  for (int i = 0; i < kCalls; ++i) {
+    calls.push_back(std::make_unique<FakeUnaryCall>(reactions_.get()));
+    BindCreateSession(calls[i].get(), request, &sessions[i]);
+    if (i % 3 == 0) {
+      calls[i]->Cancel();
+    }
+  }
+  for (int i = 0; i < kCalls; ++i) {
+    const auto status = calls[i]->WaitUntilDone();
+    ASSERT_TRUE(status.has_value());
+    if (i % 3 != 0) {
+      EXPECT_TRUE(status->ok()) << status->error_message();
+    }
+  }
+  // A cancelled call that ended before it heard of its cancellation was like any other.
+  const int expected = kCalls - kCalls / 3;
+  EXPECT_GE(registry_.size(), expected);
+  for (const v1::Session& session : sessions) {
+    const auto id = ParseSessionName(session.name());
+    if (id.ok() && registry_.Find(*id).ok()) {
+      std::promise<absl::Status> deleted;
+      registry_.Delete(*id,
+                       [&deleted](absl::Status status) { deleted.set_value(std::move(status)); });
+      EXPECT_TRUE(deleted.get_future().get().ok());
+    }
+  }
+  EXPECT_EQ(registry_.size(), 0) << "a session that nobody knows of";
+}
+
+}  // namespace
+}  // namespace tissueform::testing

@@ -1,0 +1,109 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/session/memory_budget.h"
+
+#include <atomic>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::tissueform::testing::IsOk;
+using ::tissueform::testing::StatusIs;
+
+constexpr int64_t kMebibyte = 1 << 20;
+
+TEST(MemoryBudgetTest, ReservationsAreGivenBackOnce) {
+  MemoryBudget budget(100);
+  {
+    ASSERT_OK_AND_ASSIGN(MemoryReservation first, budget.Reserve(60, "mesh"));
+    MemoryReservation moved = std::move(first);
+    EXPECT_EQ(moved.bytes(), 60);
+    EXPECT_EQ(budget.reserved_bytes(), 60);
+  }
+  EXPECT_EQ(budget.reserved_bytes(), 0);
+}
+
+TEST(MemoryBudgetTest, AssigningGivesBackTheOldReservation) {
+  MemoryBudget budget(100);
+  ASSERT_OK_AND_ASSIGN(MemoryReservation reservation, budget.Reserve(60, "mesh"));
+  reservation = MemoryReservation();
+  EXPECT_EQ(budget.reserved_bytes(), 0);
+}
+
+TEST(MemoryBudgetTest, TheLimitIsInclusive) {
+  MemoryBudget budget(100);
+  EXPECT_THAT(budget.Reserve(100, "mesh"), IsOk());
+  EXPECT_FALSE(budget.Reserve(101, "mesh").ok());
+  EXPECT_EQ(budget.reserved_bytes(), 0);
+}
+
+TEST(MemoryBudgetTest, RefusalTellsWhatIsAskedTakenAndAllowed) {
+  MemoryBudget budget(10 * kMebibyte);
+  ASSERT_OK_AND_ASSIGN(const MemoryReservation taken, budget.Reserve(4 * kMebibyte, "mesh"));
+  EXPECT_THAT(budget.Reserve(7 * kMebibyte, "matrix factor"),
+              StatusIs(absl::StatusCode::kResourceExhausted,
+                       AllOf(HasSubstr("matrix factor"), HasSubstr("7.0 MiB"), HasSubstr("4.0 MiB"),
+                             HasSubstr("10.0 MiB"))));
+}
+
+TEST(MemoryBudgetTest, ARefusedResizeKeepsTheReservation) {
+  MemoryBudget budget(100);
+  ASSERT_OK_AND_ASSIGN(MemoryReservation reservation, budget.Reserve(60, "session"));
+  EXPECT_FALSE(reservation.Resize(101, "factor").ok());
+  EXPECT_EQ(reservation.bytes(), 60);
+  EXPECT_THAT(reservation.Resize(100, "factor"), IsOk());
+  EXPECT_THAT(reservation.Resize(10, "factor"), IsOk());
+  EXPECT_EQ(budget.reserved_bytes(), 10);
+}
+
+TEST(MemoryBudgetTest, ReclaimingMakesRoomForOneMoreTry) {
+  MemoryBudget budget(100);
+  MemoryReservation idle;
+  int calls = 0;
+  budget.set_reclaimer([&] {
+    ++calls;
+    idle = MemoryReservation();
+  });
+  ASSERT_OK_AND_ASSIGN(idle, budget.Reserve(80, "idle"));
+  EXPECT_EQ(calls, 0);
+  ASSERT_OK_AND_ASSIGN(const MemoryReservation fresh, budget.Reserve(90, "fresh"));
+  EXPECT_EQ(calls, 1);
+  EXPECT_EQ(budget.reserved_bytes(), 90);
+}
+
+TEST(MemoryBudgetTest, ThreadsNeverTakeMoreThanThereIs) {
+  MemoryBudget budget(8);
+  std::atomic<bool> exceeded = false;
+  constexpr int kThreads = 4;
+  std::vector<std::thread> threads;
+  threads.reserve(kThreads);
+  for (int t = 0; t < kThreads; ++t) {
+    threads.emplace_back([&] {
+      for (int i = 0; i < 1000; ++i) {
+        const auto reservation = budget.Reserve(3, "test");
+        if (budget.reserved_bytes() > budget.limit_bytes()) {
+          exceeded = true;
+        }
+      }
+    });
+  }
+  for (std::thread& thread : threads) {
+    thread.join();
+  }
+  EXPECT_FALSE(exceeded);
+  EXPECT_EQ(budget.reserved_bytes(), 0);
+}
+
+}  // namespace
+}  // namespace tissueform

@@ -1,0 +1,241 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/session/session_registry.h"
+
+#include <atomic>
+#include <future>
+#include <memory>
+
+#include "absl/strings/match.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "tests/testing/meshes.h"
+#include "tests/testing/session_samples.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::HasSubstr;
+using ::tissueform::testing::Bar;
+using ::tissueform::testing::BarSpec;
+using ::tissueform::testing::IsOk;
+using ::tissueform::testing::SampleMesh;
+using ::tissueform::testing::StatusIs;
+using ::tissueform::testing::Store;
+
+using CreateResult = absl::StatusOr<std::shared_ptr<Session>>;
+
+// A server's inside without its network. One worker, so that a blocked worker holds everything.
+class SessionRegistryTest : public ::testing::Test {
+ protected:
+  SessionRegistryTest() { Restart({}); }
+  ~SessionRegistryTest() override { pool_.reset(); }
+
+  void Restart(const ServiceLimits& limits, int64_t budget_bytes = 64 << 20) {
+    pool_.reset();
+    registry_.reset();
+    bar_.reset();
+    catalog_.reset();
+    budget_ = std::make_unique<MemoryBudget>(budget_bytes);
+    catalog_ = std::make_unique<MeshCatalog>(limits, budget_.get());
+    pool_ = std::make_unique<WorkerPool>(1);
+    registry_ = std::make_unique<SessionRegistry>(limits, budget_.get(), pool_.get());
+    budget_->set_reclaimer([this] { registry_->RemoveIdle(); });
+    bar_ = Store(SampleMesh(Bar({2, 2, 3})), catalog_.get());
+    mesh_bytes_ = budget_->reserved_bytes();
+  }
+
+  std::future<CreateResult> Create(
+      const RequestKey& key = {},
+      SessionRegistry::CancelFlag cancelled = std::make_shared<std::atomic<bool>>()) {
+    auto promise = std::make_shared<std::promise<CreateResult>>();
+    registry_->Create(BarSpec(bar_), key, std::move(cancelled),
+                      [promise](CreateResult result) { promise->set_value(std::move(result)); });
+    return promise->get_future();
+  }
+
+  absl::Status Delete(const std::string& id) {
+    std::promise<absl::Status> done;
+    registry_->Delete(id, [&done](absl::Status status) { done.set_value(std::move(status)); });
+    return done.get_future().get();
+  }
+
+  // Runs what is queued at the moment.
+  void Drain() {
+    std::promise<void> reached;
+    pool_->Post([&reached] { reached.set_value(); });
+    reached.get_future().wait();
+  }
+
+  std::unique_ptr<MemoryBudget> budget_;
+  std::unique_ptr<MeshCatalog> catalog_;
+  std::unique_ptr<WorkerPool> pool_;
+  std::unique_ptr<SessionRegistry> registry_;
+  std::shared_ptr<const StoredMesh> bar_;
+  int64_t mesh_bytes_ = 0;
+};
+
+TEST_F(SessionRegistryTest, ReservesWhatTheSessionHoldsAndFreesItOnDelete) {
+  std::string id;
+  {
+    ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create().get());
+    id = session->id();
+    EXPECT_GT(session->bytes_held(), session->preparation().factor_bytes);
+    EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_ + session->bytes_held());
+    EXPECT_THAT(registry_->Find(id), IsOk());
+    // A holder does not keep the memory.
+    EXPECT_THAT(Delete(id), IsOk());
+    EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
+  }
+  EXPECT_THAT(registry_->Find(id), StatusIs(absl::StatusCode::kNotFound, HasSubstr(id)));
+  EXPECT_THAT(Delete(id), StatusIs(absl::StatusCode::kNotFound, HasSubstr(id)));
+}
+
+TEST_F(SessionRegistryTest, ADeletedSessionAnswersNoMorePoses) {
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create().get());
+  ASSERT_THAT(Delete(session->id()), IsOk());
+  std::promise<absl::Status> status;
+  session->strand().Post(
+      [&] { status.set_value(session->Deform({HandlePose{}}, DeformControl{}).status()); });
+  EXPECT_THAT(status.get_future().get(),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("delete")));
+}
+
+TEST_F(SessionRegistryTest, TheFactorIsRefusedBeforeItIsComputed) {
+  // Room for the estimate, but not for one more byte.
+  int64_t factor_bytes = 0;
+  {
+    // Gone before the budget that it takes from.
+    ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> probe, Create().get());
+    factor_bytes = probe->preparation().factor_bytes;
+    ASSERT_THAT(Delete(probe->id()), IsOk());
+  }
+  ASSERT_GT(factor_bytes, 0);
+  for (int64_t limit = mesh_bytes_;; limit += factor_bytes / 2) {
+    Restart({}, limit + (1 << 20));  // a MiB for the upload's own checks
+    const MemoryReservation rest =
+        *budget_->Reserve(budget_->limit_bytes() - limit, "rest of the machine");
+    const CreateResult result = Create().get();
+    if (result.ok()) break;
+    EXPECT_EQ(result.status().code(), absl::StatusCode::kResourceExhausted) << result.status();
+    EXPECT_EQ(budget_->reserved_bytes() - rest.bytes(), mesh_bytes_) << "something was left behind";
+    if (absl::StrContains(result.status().message(), "matrix factor")) return;
+  }
+  FAIL() << "no budget was refused for the factor";
+}
+
+TEST_F(SessionRegistryTest, TheSameRequestIdGivesTheSameSession) {
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first, Create({"id", "print"}).get());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> again, Create({"id", "print"}).get());
+  EXPECT_EQ(first, again);
+  EXPECT_THAT(Create({"id", "other"}).get(),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("request_id")));
+  ASSERT_THAT(Delete(first->id()), IsOk());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> fresh, Create({"id", "other"}).get());
+  EXPECT_NE(fresh, first);
+}
+
+TEST_F(SessionRegistryTest, RequestsWithoutIdGetSessionsOfTheirOwn) {
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first, Create().get());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> second, Create().get());
+  EXPECT_NE(first->id(), second->id());
+}
+
+TEST_F(SessionRegistryTest, ConcurrentCallsWithOneRequestIdShareTheWork) {
+  std::promise<void> go;
+  pool_->Post([&go] { go.get_future().wait(); });
+  std::future<CreateResult> first = Create({"id", "print"});
+  std::future<CreateResult> second = Create({"id", "print"});
+  std::future<CreateResult> other = Create({"id", "other"});
+  EXPECT_THAT(other.get(), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("request_id")));
+  go.set_value();
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> one, first.get());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> two, second.get());
+  EXPECT_EQ(one, two);
+  EXPECT_EQ(registry_->size(), 1);
+}
+
+TEST_F(SessionRegistryTest, ACancelledCreationLeavesNothingBehind) {
+  std::promise<void> go;
+  pool_->Post([&go] { go.get_future().wait(); });
+  const auto cancelled = std::make_shared<std::atomic<bool>>(false);
+  std::future<CreateResult> result = Create({}, cancelled);
+  *cancelled = true;
+  go.set_value();
+  EXPECT_THAT(result.get(), StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancel")));
+  Drain();
+  EXPECT_EQ(registry_->size(), 0);
+  EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
+}
+
+TEST_F(SessionRegistryTest, OneCancelledCallerDoesNotSpoilItForTheOther) {
+  std::promise<void> go;
+  pool_->Post([&go] { go.get_future().wait(); });
+  const auto cancelled = std::make_shared<std::atomic<bool>>(true);
+  std::future<CreateResult> gone = Create({"id", "print"}, cancelled);
+  std::future<CreateResult> stays = Create({"id", "print"});
+  go.set_value();
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, gone.get());
+  ASSERT_THAT(stays.get(), IsOk());
+  registry_->Abandon(session);  // what the cancelled call does at its end
+  EXPECT_THAT(registry_->Find(session->id()), IsOk());
+  registry_->Abandon(session);
+  EXPECT_THAT(registry_->Find(session->id()), StatusIs(absl::StatusCode::kNotFound, HasSubstr("")));
+  Drain();
+  EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
+}
+
+TEST_F(SessionRegistryTest, TooManySessionsAreRefused) {
+  ServiceLimits limits;
+  limits.max_sessions = 1;
+  Restart(limits);
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create().get());
+  EXPECT_THAT(Create().get(),
+              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("--max-sessions")));
+  ASSERT_THAT(Delete(session->id()), IsOk());
+  EXPECT_THAT(Create().get(), IsOk());
+}
+
+TEST_F(SessionRegistryTest, AnIdleSessionMakesRoomForANewOne) {
+  ServiceLimits limits;
+  limits.max_sessions = 1;
+  limits.session_idle_ttl = std::chrono::seconds(0);
+  Restart(limits);
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> held, Create().get());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> fresh, Create().get());
+  EXPECT_THAT(registry_->Find(held->id()),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("idle")));
+  Drain();
+  EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_ + fresh->bytes_held());
+}
+
+TEST_F(SessionRegistryTest, IdleSessionsMakeRoomWhenMemoryIsShort) {
+  ServiceLimits limits;
+  limits.session_idle_ttl = std::chrono::seconds(0);
+  Restart(limits);
+  std::string first_id;
+  {
+    ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first, Create().get());
+    first_id = first->id();
+  }
+  Drain();  // the worker has let go of it
+  const int64_t free_bytes = budget_->limit_bytes() - budget_->reserved_bytes();
+  ASSERT_OK_AND_ASSIGN(const MemoryReservation all,
+                       budget_->Reserve(free_bytes + 1, "all there is and one byte"));
+  EXPECT_FALSE(registry_->Find(first_id).ok());
+}
+
+TEST_F(SessionRegistryTest, SessionsWithinTheirTtlStay) {
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create().get());
+  EXPECT_EQ(registry_->RemoveIdle(), 0);
+  const int64_t free_bytes = budget_->limit_bytes() - budget_->reserved_bytes();
+  EXPECT_THAT(budget_->Reserve(free_bytes + 1, "mesh"),
+              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("mesh")));
+  EXPECT_THAT(registry_->Find(session->id()), IsOk());
+}
+
+}  // namespace
+}  // namespace tissueform
