@@ -3,6 +3,34 @@
 #
 # One target a folder. Includes are written from the repository root.
 
+# Precompiled headers: most of a compilation is reading Eigen, Abseil and GoogleTest again. Two of them serve all
+# targets; every target is compiled with the same options (-fPIC, executables too) so that they fit.
+option(TISSUEFORM_PRECOMPILED_HEADERS "Precompile the large headers" ON)
+
+function(_tissueform_precompiled name)
+  set(target tissueform_precompiled_${name})
+  add_library(${target} OBJECT "${PROJECT_SOURCE_DIR}/cmake/precompiled/none.cc")
+  target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
+  target_link_libraries(${target} PRIVATE Eigen3::Eigen absl::statusor absl::str_format Threads::Threads ${ARGN})
+  target_precompile_headers(${target} PRIVATE "${PROJECT_SOURCE_DIR}/cmake/precompiled/${name}.h")
+endfunction()
+
+# Called once, when the packages are found.
+function(tissueform_precompile_headers)
+  if(TISSUEFORM_PRECOMPILED_HEADERS)
+    _tissueform_precompiled(library)
+    if(BUILD_TESTING)
+      _tissueform_precompiled(test GTest::gmock)
+    endif()
+  endif()
+endfunction()
+
+function(_tissueform_use_precompiled target name)
+  if(TARGET tissueform_precompiled_${name})
+    target_precompile_headers(${target} REUSE_FROM tissueform_precompiled_${name})
+  endif()
+endfunction()
+
 # tissueform_library(core_mesh SOURCES a.cc b.cc DEPS core_base absl::status)
 #
 # A static library tissueform_core_mesh with alias tissueform::core_mesh. DEPS are public; names
@@ -12,6 +40,7 @@ function(tissueform_library name)
   set(target tissueform_${name})
   if(ARG_SOURCES)
     add_library(${target} STATIC ${ARG_SOURCES})
+    _tissueform_use_precompiled(${target} library)
     set(scope PUBLIC)
   else()
     add_library(${target} INTERFACE)
@@ -31,6 +60,7 @@ endfunction()
 function(tissueform_binary name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
+  _tissueform_use_precompiled(${name} library)
   _tissueform_resolve(deps ${ARG_DEPS})
   target_link_libraries(${name} PRIVATE ${deps})
 endfunction()
@@ -43,6 +73,7 @@ function(tissueform_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
   set(target ${name}_test)
   add_executable(${target} ${ARG_SOURCES})
+  _tissueform_use_precompiled(${target} test)
   _tissueform_resolve(deps ${ARG_DEPS})
   target_link_libraries(${target} PRIVATE ${deps} GTest::gmock GTest::gtest_main)
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")

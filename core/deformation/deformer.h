@@ -24,6 +24,11 @@ struct SolveSummary {
   double solve_seconds = 0;
   std::vector<double>
       changes_mm;  // largest vertex change of each iteration; empty for direct models
+  // Of the answer after each iteration, in nJ = Pa mm^3; empty for models that minimise none.
+  std::vector<double> energies_nj;
+  // Share of the poses' motion that was reached; below 1 when a model that loads in steps came no
+  // further.
+  double load = 1;
 };
 
 struct Deformation {

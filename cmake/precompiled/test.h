@@ -1,0 +1,10 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// As library.h, ahead of every file of the tests.
+
+#pragma once
+
+#include "cmake/precompiled/library.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"

@@ -1,0 +1,39 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/types.h"
+
+namespace tissueform {
+
+// A tall dense matrix in single precision, stored in panels of kPanelRows rows so that a product with
+// a few columns streams it once: the whole cost of a frame. Compiled for several instruction sets;
+// the one that fits the processor is chosen when the program starts.
+class PanelMatrix {
+ public:
+  static constexpr int kPanelRows = 16;
+
+  PanelMatrix(Eigen::Index rows, Eigen::Index cols);
+
+  void SetColumn(Eigen::Index column, const Eigen::Ref<const Eigen::VectorXd>& values);
+
+  // product = this * factors, #rows by factors.cols(), row-major. REQUIRES: factors has cols() rows and 1
+  // or 3 columns.
+  void Multiply(const Eigen::MatrixXf& factors, float* product) const;
+
+  Eigen::Index rows() const { return rows_; }
+  Eigen::Index cols() const { return cols_; }
+  int64_t bytes_held() const { return BytesNeeded(rows_, cols_); }
+  static int64_t BytesNeeded(Eigen::Index rows, Eigen::Index cols);
+
+ private:
+  Eigen::Index rows_;
+  Eigen::Index cols_;
+  std::vector<float> panels_;  // panel p, column c, row r of the panel: (p * cols + c) * kPanelRows + r
+};
+
+}  // namespace tissueform

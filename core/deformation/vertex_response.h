@@ -1,0 +1,45 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+
+#include "absl/types/span.h"
+
+#include "core/base/types.h"
+#include "core/constraints/handle_pose.h"
+
+namespace tissueform {
+
+// Positions of chosen vertices as they are sent to clients, #selected by 3, mm.
+using FloatPositions = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
+// Answers of a linear-in-its-columns model at chosen vertices without a back-substitution: a small
+// dense product of prepared columns with coefficients that depend on the poses only (the response
+// basis of the gradient field, the 12 columns a handle of linear elasticity). Single precision.
+// One thread at a time.
+class VertexResponse {
+ public:
+  virtual ~VertexResponse() = default;
+
+  // Bound, in mm, of how far any chosen vertex may lie from the model's direct answer to these
+  // poses: truncation and single precision together. Cheap: does not depend on the number of
+  // vertices.
+  //
+  // REQUIRES: one legal pose per handle.
+  virtual double ErrorBoundMm(absl::Span<const HandlePose> poses) = 0;
+
+  // Whether the bound is within the tolerance that was asked for, and the poses within the prepared
+  // range. Otherwise use the direct solve.
+  virtual bool Covers(absl::Span<const HandlePose> poses) = 0;
+
+  // Writes the positions of the chosen vertices in their order, resized.
+  virtual void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) = 0;
+
+  virtual Eigen::Index num_vertices() const = 0;
+  virtual int num_terms() const = 0;  // columns of the product, all handles together
+  virtual int64_t bytes_held() const = 0;
+};
+
+}  // namespace tissueform
