@@ -1,0 +1,40 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+#include "core/constraints/constraint_set.h"
+#include "core/constraints/handle_pose.h"
+#include "core/mesh/tet_mesh.h"
+
+namespace tissueform {
+
+// A block of soft tissue of 80 x 60 x 20 mm on bone: from below muscle (10 mm, 30 kPa), fat
+// (7.5 mm, 3 kPa) and skin (2.5 mm, 100 kPa). The bottom is bone: fixed, but for a patch of
+// 26.7 x 20 mm in its middle, the handle "patch", which is the piece of bone that is moved. The
+// sides and the top are free.
+struct LayeredBlock {
+  TetMesh mesh;
+  Eigen::VectorXd stiffness;  // Pa, #T
+  ConstraintSet constraints;
+};
+
+// Cells along x, y and z: 20,736 tets.
+inline constexpr std::array<int, 3> kLayeredBlockCells = {24, 18, 8};
+
+// Layers and patch are met exactly when the cells are multiples of 3, 3 and 8; otherwise a cell
+// belongs to the layer of its middle and the patch is what of it there is.
+//
+// Errors: InvalidArgument when no vertex lies in the patch or none of the bottom outside it.
+absl::StatusOr<LayeredBlock> MakeLayeredBlock(const std::array<int, 3>& cells = kLayeredBlockCells);
+
+// The patch moved by 5 mm along x, and by 5 mm up into the tissue.
+HandlePose MoveAlong();
+HandlePose MoveUp();
+
+}  // namespace tissueform
