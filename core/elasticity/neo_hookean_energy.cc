@@ -122,8 +122,9 @@ void NeoHookeanEnergy::GatherLoads(Positions* gradient) const {
   });
 }
 
-int64_t NeoHookeanEnergy::bytes_held() const {
-  return static_cast<int64_t>(loads_.size() * sizeof(double) + blocks_.size() * sizeof(Value));
+int64_t NeoHookeanEnergy::BytesNeeded(Eigen::Index num_tets) {
+  return num_tets * static_cast<int64_t>(9 * sizeof(double)) +
+         (num_tets / kTetGrain + 1) * static_cast<int64_t>(sizeof(Value));
 }
 
 }  // namespace tissueform

@@ -38,7 +38,8 @@ class NeoHookeanEnergy {
   // inverted.
   Value Evaluate(const Positions& displacements, Positions* gradient);
 
-  int64_t bytes_held() const;
+  // What the energy of so many tets holds.
+  static int64_t BytesNeeded(Eigen::Index num_tets);
 
  private:
   // Energies and volumes of a run of tets, which the same blocks sum up whatever the threads.
