@@ -114,8 +114,10 @@ Colour ColourOf(size_t index) {
 
 // Error over the number of cells across, a curve for each Poisson's ratio.
 Chart BendingChart(const std::vector<LockingRow>& rows) {
-  Chart chart{"bar in pure bending, against the exact solution", "cells across",
-              "mean error, % of the largest displacement"};
+  Chart chart;
+  chart.title = "bar in pure bending, against the exact solution";
+  chart.x_title = "cells across";
+  chart.y_title = "mean error, % of the largest displacement";
   chart.logarithmic_y = true;
   for (size_t first = 0; first < rows.size(); first += kBendingCells.size()) {
     Curve curve;
@@ -132,8 +134,10 @@ Chart BendingChart(const std::vector<LockingRow>& rows) {
 
 // Error over Poisson's ratio, a curve for each mesh.
 Chart BlockChart(const std::vector<LockingRow>& rows) {
-  Chart chart{"layered block, 5 mm up, against " + MeshName(kFinestBlock) + " cells",
-              "Poisson's ratio", "mean distance, mm"};
+  Chart chart;
+  chart.title = "layered block, 5 mm up, against " + MeshName(kFinestBlock) + " cells";
+  chart.x_title = "Poisson's ratio";
+  chart.y_title = "mean distance, mm";
   for (size_t mesh = 0; mesh < kBlocks.size(); ++mesh) {
     Curve curve;
     curve.name = MeshName(kBlocks[mesh]) + " cells";
