@@ -5,24 +5,7 @@
 
 #include <vector>
 
-#include "absl/strings/str_cat.h"
-
 namespace tissueform {
-
-absl::Status CheckPoses(const ConstraintSet& constraints, absl::Span<const HandlePose> poses) {
-  if (poses.size() != constraints.handles().size()) {
-    return absl::InvalidArgumentError(absl::StrCat("got ", poses.size(), " poses for ",
-                                                   constraints.handles().size(),
-                                                   " handles; give one pose for each handle"));
-  }
-  for (size_t h = 0; h < poses.size(); ++h) {
-    if (const absl::Status status = CheckPose(poses[h]); !status.ok()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("handle \"", constraints.handles()[h].name, "\": ", status.message()));
-    }
-  }
-  return absl::OkStatus();
-}
 
 Positions ConstrainedPositions(const Eigen::Ref<const Positions>& rest,
                                const ConstraintSet& constraints,

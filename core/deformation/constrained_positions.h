@@ -3,7 +3,6 @@
 
 #pragma once
 
-#include "absl/status/status.h"
 #include "absl/types/span.h"
 
 #include "core/base/types.h"
@@ -11,10 +10,6 @@
 #include "core/constraints/handle_pose.h"
 
 namespace tissueform {
-
-// InvalidArgument when there is not one pose for each handle, or when one is not legal (CheckPose);
-// the message names the handle.
-absl::Status CheckPoses(const ConstraintSet& constraints, absl::Span<const HandlePose> poses);
 
 // Where the poses put the constrained vertices, #constrained by 3: fixed ones stay, those of a
 // handle go with its pose. `rest` is #V by 3.

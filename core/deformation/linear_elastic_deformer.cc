@@ -8,6 +8,7 @@
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/deformation/constrained_positions.h"
+#include "core/deformation/deformation_checks.h"
 
 namespace tissueform {
 namespace {

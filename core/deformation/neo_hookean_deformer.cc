@@ -14,6 +14,7 @@
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/deformation/constrained_positions.h"
+#include "core/deformation/deformation_checks.h"
 #include "core/deformation/equilibrium_search.h"
 #include "core/deformation/load_path.h"
 #include "core/elasticity/neo_hookean_energy.h"
