@@ -53,7 +53,8 @@ struct PreparationSummary {
   double factorise_seconds = 0;
   double prepare_seconds = 0;  // harmonic fields and whatever else a model makes ready
   int64_t factor_bytes = 0;
-  int64_t bytes_held = 0;  // everything that the deformer holds
+  int64_t bytes_held = 0;  // everything that the deformer needs, shared parts included
+  int64_t own_bytes = 0;   // of it what it holds beside the shared preparation
   Eigen::Index negative_weights = 0;
   double harmonic_min = 0;  // range of the harmonic fields; [0, 1] unless weights are negative
   double harmonic_max = 1;

@@ -23,9 +23,9 @@ struct ElasticSystemOptions {
   int threads = 1;
 };
 
-// The stiffness matrix of linear elasticity with the constrained vertices eliminated and factorised,
-// and the responses of the free vertices to 12 affine motions of every handle: what the linear model
-// answers with, and what preconditions the non-linear one. One thread at a time.
+// The stiffness matrix of linear elasticity with the constrained vertices eliminated and
+// factorised, and the responses of the free vertices to 12 affine motions of every handle: what the
+// linear model answers with, and what preconditions the non-linear one. One thread at a time.
 //
 // Unknowns are interleaved: 3 v + axis.
 class ElasticSystem {
@@ -61,6 +61,8 @@ class ElasticSystem {
     return system_->Solve(forces, values);
   }
 
+  // For iterations on the free unknowns; its factor stays as it is.
+  DirichletSystem& system() { return *system_; }
   const DirichletSystem& system() const { return *system_; }
   double condition_estimate() const { return condition_estimate_; }
   double assemble_seconds() const { return assemble_seconds_; }
@@ -69,6 +71,9 @@ class ElasticSystem {
 
  private:
   ElasticSystem() = default;
+
+  absl::Status PrepareResponses(const TetMesh& mesh, const ConstraintSet& constraints,
+                                const FactorAdmission& admission);
 
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   Eigen::MatrixXd response_columns_;

@@ -11,11 +11,11 @@
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/deformation/anderson_acceleration.h"
+#include "core/deformation/deformation_checks.h"
+#include "core/deformation/handle_targets.h"
 #include "core/deformation/harmonic_fields.h"
 #include "core/deformation/poisson_reconstruction.h"
 #include "core/deformation/rotation_propagation.h"
-#include "core/mesh/tet_quality.h"
-#include "core/mesh/validation.h"
 #include "core/operators/edge_laplacian.h"
 #include "core/operators/laplacian.h"
 #include "core/operators/piecewise_linear_elements.h"
@@ -23,94 +23,53 @@
 namespace tissueform {
 namespace {
 
-absl::Status CheckPoses(const ConstraintSet& constraints, absl::Span<const HandlePose> poses) {
-  if (poses.size() != constraints.handles().size()) {
-    return absl::InvalidArgumentError(absl::StrCat("got ", poses.size(), " poses for ",
-                                                   constraints.handles().size(),
-                                                   " handles; give one pose for each handle"));
-  }
-  for (size_t h = 0; h < poses.size(); ++h) {
-    if (const absl::Status status = CheckPose(poses[h]); !status.ok()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("handle \"", constraints.handles()[h].name, "\": ", status.message()));
-    }
-  }
-  return absl::OkStatus();
-}
-
-absl::Status CheckOptions(const GradientFieldOptions& options) {
-  if (options.max_iterations < 1) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("max_iterations is ", options.max_iterations, "; it must be at least 1"));
-  }
-  if (!std::isfinite(options.tolerance_mm) || options.tolerance_mm <= 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("tolerance_mm is ", options.tolerance_mm, "; it must be a positive number"));
-  }
-  return absl::OkStatus();
-}
-
-absl::Status CheckStiffness(Eigen::Index num_cells, const Eigen::VectorXd& stiffness,
-                            absl::string_view cell_name) {
-  if (stiffness.size() != num_cells) {
-    return absl::InvalidArgumentError(absl::StrCat("stiffness has ", stiffness.size(),
-                                                   " values for ", num_cells, " ", cell_name,
-                                                   "s; give one for each ", cell_name));
-  }
-  for (Eigen::Index c = 0; c < stiffness.size(); ++c) {
-    if (!std::isfinite(stiffness[c]) || stiffness[c] <= 0) {
-      return absl::InvalidArgumentError(absl::StrCat("stiffness of ", cell_name, " ", c, " is ",
-                                                     stiffness[c],
-                                                     " Pa; it must be a positive number"));
-    }
-  }
-  return absl::OkStatus();
-}
-
-// Once they are in the weights of the cells nothing needs them.
-PiecewiseLinearElements WithoutMeasures(PiecewiseLinearElements elements) {
-  elements.measures.resize(0);
-  return elements;
-}
+// What a deformer reads and shares with others: of a mesh preparation, or of a surface.
+struct SharedParts {
+  std::shared_ptr<const void> owner;
+  const PiecewiseLinearElements& elements;
+  const VertexCells& vertex_cells;
+  const Eigen::VectorXd& stiffness;
+  const ConstraintSet& constraints;
+  PreparedLaplacian* laplacian;
+  int64_t bytes;
+};
 
 class GradientFieldDeformer : public Deformer {
  public:
-  GradientFieldDeformer(PiecewiseLinearElements elements, const Eigen::VectorXd& stiffness,
-                        ConstraintSet constraints, GradientFieldOptions options)
-      : cell_weights_(stiffness.cwiseProduct(elements.measures)),
-        elements_(WithoutMeasures(std::move(elements))),
-        vertex_cells_(elements_.cells, elements_.num_vertices()),
-        constraints_(std::move(constraints)),
+  GradientFieldDeformer(SharedParts parts, GradientFieldOptions options)
+      : parts_(std::move(parts)),
+        elements_(parts_.elements),
+        laplacian_(parts_.laplacian->system.get()),
         options_(std::move(options)) {}
 
-  absl::Status Prepare(const SparseMatrix& L, double assemble_seconds) {
-    preparation_.assemble_seconds = assemble_seconds;
-    preparation_.negative_weights = CountNegativeWeights(L);
-    TF_ASSIGN_OR_RETURN(laplacian_,
-                        DirichletSystem::Create(L, constraints_.constrained(),
-                                                {options_.backend, options_.admission}));
-    AddFactorization(laplacian_->factorization());
+  absl::Status Prepare() {
+    preparation_.assemble_seconds = parts_.laplacian->assemble_seconds;
+    preparation_.negative_weights = parts_.laplacian->negative_weights;
+    const FactorizationSummary& factorization = laplacian_->factorization();
+    preparation_.analyse_seconds = factorization.analyse_seconds;
+    preparation_.factorise_seconds = factorization.factorise_seconds;
+    preparation_.factor_bytes = factorization.factor_bytes;
     TF_RETURN_IF_ERROR(PrepareHarmonicFields());
-    preparation_.bytes_held = laplacian_->bytes_held() + vertex_cells_.bytes_held() +
-                              DoublesHeld() * static_cast<int64_t>(sizeof(double));
+    preparation_.own_bytes = DoublesHeld() * static_cast<int64_t>(sizeof(double));
+    preparation_.bytes_held = parts_.bytes + preparation_.own_bytes;
     return absl::OkStatus();
   }
 
   absl::StatusOr<Deformation> Deform(absl::Span<const HandlePose> poses,
                                      const DeformControl& control) override {
-    TF_RETURN_IF_ERROR(CheckPoses(constraints_, poses));
+    TF_RETURN_IF_ERROR(CheckPoses(parts_.constraints, poses));
     const Stopwatch stopwatch;
-    const Target target = MakeTarget(poses);
+    const HandleTargets target = MakeHandleTargets(parts_.constraints, elements_.rest, poses);
     if (options_.rotation != RotationMode::kNone) {
-      PropagateRotations(harmonic_, poses, options_.threads, &propagated_);
+      PropagateRotations(elements_, harmonic(), poses, options_.threads, &propagated_);
     }
     if (options_.rotation == RotationMode::kEstimated) {
       return Iterate(target, control, stopwatch);
     }
-    TransformsToCornerLoads(elements_, cell_weights_, options_.threads, &propagated_);
+    TransformsToCornerLoads(elements_, parts_.stiffness, options_.threads, &propagated_);
     TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd displacements, Reconstruct(propagated_, target));
     Deformation deformation;
-    deformation.positions = ToPositions(displacements, target);
+    deformation.positions = ToPositions(parts_.constraints, elements_.rest, displacements, target);
     deformation.summary.solve_seconds = stopwatch.Seconds();
     deformation.summary.residual = last_residual_;
     return deformation;
@@ -119,21 +78,13 @@ class GradientFieldDeformer : public Deformer {
   const PreparationSummary& preparation() const override { return preparation_; }
 
  private:
-  // Where the constrained vertices go, #constrained by 3.
-  struct Target {
-    Positions positions;
-    Positions displacements;
-  };
-
-  void AddFactorization(const FactorizationSummary& factorization) {
-    preparation_.analyse_seconds += factorization.analyse_seconds;
-    preparation_.factorise_seconds += factorization.factorise_seconds;
-    preparation_.factor_bytes += factorization.factor_bytes;
+  // The preparation's, or our own ones.
+  const Eigen::MatrixXd& harmonic() const {
+    return uniform_harmonic_.size() > 0 ? uniform_harmonic_ : parts_.laplacian->harmonic;
   }
 
   int64_t DoublesHeld() const {
-    return elements_.normals.size() + cell_weights_.size() + harmonic_.size() +
-           blend_weights_.size() + TransformDoubles();
+    return uniform_harmonic_.size() + blend_weights_.size() + TransformDoubles();
   }
 
   // What the transforms of poses will hold, at most.
@@ -146,53 +97,32 @@ class GradientFieldDeformer : public Deformer {
   }
 
   absl::Status PrepareHarmonicFields() {
-    Stopwatch stopwatch;
-    Eigen::MatrixXd fields;
-    if (options_.guidance == Guidance::kCotangent) {
-      TF_ASSIGN_OR_RETURN(fields, ComputeHarmonicFields(constraints_, laplacian_.get()));
-    } else {
+    const Stopwatch stopwatch;
+    if (options_.guidance == Guidance::kUniform) {
       // Its factor is given back as soon as the fields are known.
       TF_ASSIGN_OR_RETURN(
           const auto uniform,
           DirichletSystem::Create(
               UniformLaplacian(elements_.cells, elements_.num_vertices(), options_.threads),
-              constraints_.constrained(), {options_.backend, options_.admission}));
-      TF_ASSIGN_OR_RETURN(fields, ComputeHarmonicFields(constraints_, uniform.get()));
+              parts_.constraints.constrained(), {options_.backend, options_.admission}));
+      TF_ASSIGN_OR_RETURN(uniform_harmonic_,
+                          ComputeHarmonicFields(parts_.constraints, uniform.get()));
     }
-    preparation_.harmonic_min = fields.minCoeff();
-    preparation_.harmonic_max = fields.maxCoeff();
-    harmonic_ = SampleAtBarycentres(elements_.cells, fields);
+    preparation_.harmonic_min = harmonic().minCoeff();
+    preparation_.harmonic_max = harmonic().maxCoeff();
     if (options_.rotation == RotationMode::kEstimated) {
-      blend_weights_ = BlendWeights(harmonic_, options_.blend);
+      blend_weights_ =
+          BlendWeights(SampleAtBarycentres(elements_.cells, harmonic()), options_.blend);
     }
-    preparation_.prepare_seconds = stopwatch.Seconds();
+    preparation_.prepare_seconds = parts_.laplacian->harmonic_seconds + stopwatch.Seconds();
     return absl::OkStatus();
   }
 
-  Target MakeTarget(absl::Span<const HandlePose> poses) const {
-    const std::vector<int32_t>& vertices = constraints_.constrained();
-    std::vector<Eigen::Matrix3d> linear_parts;
-    for (const HandlePose& pose : poses) {
-      linear_parts.push_back(pose.scale * RotationMatrix(pose.rotation_vector));
-    }
-    Target target{elements_.rest(vertices, Eigen::all), {}};
-    for (Eigen::Index c = 0; c < target.positions.rows(); ++c) {
-      const int handle = constraints_.region_of_constrained()[c];
-      if (handle != ConstraintSet::kFixed) {
-        const HandlePose& pose = poses[handle];
-        const Eigen::Vector3d position = target.positions.row(c);
-        target.positions.row(c) =
-            pose.pivot_mm + linear_parts[handle] * (position - pose.pivot_mm) + pose.translation_mm;
-      }
-    }
-    target.displacements = target.positions - elements_.rest(vertices, Eigen::all);
-    return target;
-  }
-
   // One linear solve: displacements, #V by 3, under the loads of turned cells (empty: not turned).
-  absl::StatusOr<Eigen::MatrixXd> Reconstruct(const CornerLoads& loads, const Target& target) {
+  absl::StatusOr<Eigen::MatrixXd> Reconstruct(const CornerLoads& loads,
+                                              const HandleTargets& target) {
     const Eigen::MatrixXd rhs =
-        GatherCornerLoads(vertex_cells_, elements_.num_vertices(), loads, options_.threads);
+        GatherCornerLoads(parts_.vertex_cells, elements_.num_vertices(), loads, options_.threads);
     TF_ASSIGN_OR_RETURN(Eigen::MatrixXd displacements,
                         laplacian_->Solve(rhs, target.displacements));
     if (options_.compute_residual) {
@@ -201,19 +131,12 @@ class GradientFieldDeformer : public Deformer {
     return displacements;
   }
 
-  Positions ToPositions(const Eigen::MatrixXd& displacements, const Target& target) const {
-    Positions positions = elements_.rest + displacements;
-    // Exactly where the pose puts them, not up to the rounding of adding and taking away.
-    positions(constraints_.constrained(), Eigen::all) = target.positions;
-    return positions;
-  }
-
   // Fixed-point iteration of the `estimated` mode: estimate rotations, blend, reconstruct.
-  absl::StatusOr<Deformation> Iterate(const Target& target, const DeformControl& control,
+  absl::StatusOr<Deformation> Iterate(const HandleTargets& target, const DeformControl& control,
                                       const Stopwatch& stopwatch) {
     if (!control.warm_start || last_loads_.rows() == 0) {
       last_loads_ = propagated_;
-      TransformsToCornerLoads(elements_, cell_weights_, options_.threads, &last_loads_);
+      TransformsToCornerLoads(elements_, parts_.stiffness, options_.threads, &last_loads_);
     }
     AndersonAcceleration acceleration(options_.acceleration_depth);
     TF_ASSIGN_OR_RETURN(Eigen::MatrixXd iterate, Reconstruct(last_loads_, target));
@@ -226,7 +149,8 @@ class GradientFieldDeformer : public Deformer {
       summary.residual = last_residual_;
       const bool last = summary.converged || summary.iterations >= options_.max_iterations;
       if (last || control.on_progress) {
-        deformation.positions = ToPositions(displacements, target);
+        deformation.positions =
+            ToPositions(parts_.constraints, elements_.rest, displacements, target);
       }
       summary.cancelled = !last && control.on_progress && !control.on_progress(deformation);
     };
@@ -235,7 +159,7 @@ class GradientFieldDeformer : public Deformer {
            summary.iterations < options_.max_iterations) {
       EstimateRotations(elements_, elements_.rest + iterate, blend_weights_, propagated_,
                         options_.threads, &last_loads_);
-      TransformsToCornerLoads(elements_, cell_weights_, options_.threads, &last_loads_);
+      TransformsToCornerLoads(elements_, parts_.stiffness, options_.threads, &last_loads_);
       TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd image, Reconstruct(last_loads_, target));
       ++summary.iterations;
       summary.changes_mm.push_back((image - iterate).rowwise().norm().maxCoeff());
@@ -247,17 +171,14 @@ class GradientFieldDeformer : public Deformer {
   }
 
   // Constant after Prepare.
-  const Eigen::VectorXd cell_weights_;  // stiffness times volume or area
-  const PiecewiseLinearElements elements_;
-  const VertexCells vertex_cells_;
-  const ConstraintSet constraints_;
+  const SharedParts parts_;
+  const PiecewiseLinearElements& elements_;
+  DirichletSystem* const laplacian_;  // holds workspaces
   const GradientFieldOptions options_;
-  CellField harmonic_;             // #C by #handles
-  Eigen::VectorXd blend_weights_;  // #C; empty unless rotations are estimated
+  Eigen::MatrixXd uniform_harmonic_;  // #V by #handles; empty unless guidance is uniform
+  Eigen::VectorXd blend_weights_;     // #C; empty unless rotations are estimated
   PreparationSummary preparation_;
 
-  // Holds workspaces.
-  std::unique_ptr<DirichletSystem> laplacian_;
   double last_residual_ = 0;
   // Of the last poses; their loads once a mode that does not iterate has them. No rows in mode
   // kNone.
@@ -277,40 +198,80 @@ absl::Status CheckAreas(const PiecewiseLinearElements& elements) {
   return absl::OkStatus();
 }
 
+// What a mesh preparation is to tets.
+struct PreparedSurface {
+  PreparedSurface(const TriangleMesh& mesh, Eigen::VectorXd surface_stiffness,
+                  ConstraintSet constraint_set, int threads)
+      : elements(ElementsOf(mesh, threads)),
+        vertex_cells(elements.cells, elements.num_vertices()),
+        stiffness(std::move(surface_stiffness)),
+        constraints(std::move(constraint_set)) {}
+
+  int64_t bytes_held() const {
+    const Eigen::Index doubles =
+        stiffness.size() + elements.measures.size() + elements.normals.size();
+    return laplacian->bytes_held() + vertex_cells.bytes_held() +
+           doubles * static_cast<int64_t>(sizeof(double));
+  }
+
+  PiecewiseLinearElements elements;
+  VertexCells vertex_cells;
+  Eigen::VectorXd stiffness;
+  ConstraintSet constraints;
+  std::unique_ptr<PreparedLaplacian> laplacian;
+};
+
+absl::StatusOr<std::unique_ptr<Deformer>> CreateFromParts(SharedParts parts,
+                                                          const GradientFieldOptions& options) {
+  auto deformer = std::make_unique<GradientFieldDeformer>(std::move(parts), options);
+  TF_RETURN_IF_ERROR(deformer->Prepare());
+  return deformer;
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Deformer>> CreateGradientFieldDeformer(
     const TetMesh& mesh, const Eigen::VectorXd& stiffness, const ConstraintSet& constraints,
     const GradientFieldOptions& options) {
-  TF_RETURN_IF_ERROR(CheckOptions(options));
-  TF_RETURN_IF_ERROR(CheckUsable(ValidateTetMesh(mesh)));
-  TF_RETURN_IF_ERROR(CheckStiffness(mesh.num_tets(), stiffness, "tet"));
-  TF_RETURN_IF_ERROR(CheckEveryComponentConstrained(mesh.tets(), mesh.num_vertices(), constraints));
-  const Stopwatch stopwatch;
-  auto deformer =
-      std::make_unique<GradientFieldDeformer>(ElementsOf(mesh), stiffness, constraints, options);
-  const SparseMatrix L = CotangentLaplacian(mesh, stiffness, options.threads);
-  const double assemble_seconds = stopwatch.Seconds();
-  TF_RETURN_IF_ERROR(deformer->Prepare(L, assemble_seconds));
-  return deformer;
+  TF_RETURN_IF_ERROR(CheckIteration(options.max_iterations, options.tolerance_mm));
+  PreparationOptions preparation_options;
+  preparation_options.backend = options.backend;
+  preparation_options.admission = options.admission;
+  preparation_options.threads = options.threads;
+  TF_ASSIGN_OR_RETURN(auto preparation, MeshPreparation::Create(mesh, stiffness, constraints,
+                                                                std::move(preparation_options)));
+  return CreateGradientFieldDeformer(std::move(preparation), options);
+}
+
+absl::StatusOr<std::unique_ptr<Deformer>> CreateGradientFieldDeformer(
+    std::shared_ptr<MeshPreparation> preparation, const GradientFieldOptions& options) {
+  TF_RETURN_IF_ERROR(CheckIteration(options.max_iterations, options.tolerance_mm));
+  TF_ASSIGN_OR_RETURN(PreparedLaplacian * laplacian, preparation->Laplacian());
+  const MeshPreparation& shared = *preparation;
+  return CreateFromParts(
+      {std::move(preparation), shared.elements(), shared.vertex_cells(), shared.stiffness(),
+       shared.constraints(), laplacian, shared.laplacian_bytes()},
+      options);
 }
 
 absl::StatusOr<std::unique_ptr<Deformer>> CreateSurfaceGradientFieldDeformer(
     const TriangleMesh& mesh, const Eigen::VectorXd& stiffness, const ConstraintSet& constraints,
     const GradientFieldOptions& options) {
-  TF_RETURN_IF_ERROR(CheckOptions(options));
+  TF_RETURN_IF_ERROR(CheckIteration(options.max_iterations, options.tolerance_mm));
   TF_RETURN_IF_ERROR(CheckStiffness(mesh.num_triangles(), stiffness, "triangle"));
   TF_RETURN_IF_ERROR(
       CheckEveryComponentConstrained(mesh.triangles(), mesh.num_vertices(), constraints));
   const Stopwatch stopwatch;
-  PiecewiseLinearElements elements = ElementsOf(mesh, options.threads);
-  TF_RETURN_IF_ERROR(CheckAreas(elements));
-  auto deformer =
-      std::make_unique<GradientFieldDeformer>(std::move(elements), stiffness, constraints, options);
+  auto surface = std::make_shared<PreparedSurface>(mesh, stiffness, constraints, options.threads);
+  TF_RETURN_IF_ERROR(CheckAreas(surface->elements));
   const SparseMatrix L = CotangentLaplacian(mesh, stiffness, options.threads);
   const double assemble_seconds = stopwatch.Seconds();
-  TF_RETURN_IF_ERROR(deformer->Prepare(L, assemble_seconds));
-  return deformer;
+  TF_ASSIGN_OR_RETURN(surface->laplacian,
+                      PrepareLaplacian(L, constraints, {options.backend, options.admission}));
+  surface->laplacian->assemble_seconds = assemble_seconds;
+  return CreateFromParts({surface, surface->elements, surface->vertex_cells, surface->stiffness,
+                          surface->constraints, surface->laplacian.get(), surface->bytes_held()},
+                         options);
 }
 
 }  // namespace tissueform

@@ -9,6 +9,7 @@
 
 #include "core/constraints/constraint_set.h"
 #include "core/deformation/deformer.h"
+#include "core/deformation/mesh_preparation.h"
 #include "core/deformation/rotation_estimation.h"
 #include "core/linear_solvers/dirichlet_system.h"
 #include "core/mesh/tet_mesh.h"
@@ -61,6 +62,12 @@ struct GradientFieldOptions {
 absl::StatusOr<std::unique_ptr<Deformer>> CreateGradientFieldDeformer(
     const TetMesh& mesh, const Eigen::VectorXd& stiffness, const ConstraintSet& constraints,
     const GradientFieldOptions& options);
+
+// The same, sharing the operators, the factor and the harmonic fields of a preparation with other
+// models. `options.backend`, `admission` and `threads` are those of the preparation; only the
+// second factor of uniform guidance asks options.admission.
+absl::StatusOr<std::unique_ptr<Deformer>> CreateGradientFieldDeformer(
+    std::shared_ptr<MeshPreparation> preparation, const GradientFieldOptions& options);
 
 // The same on a surface with the cotangent weights of Eq. 13: what the source compares volumes with
 // (Figs. 1b, 2e to h, 5c). The surface may be open; triangles without area are refused.

@@ -27,4 +27,15 @@ using CellField = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::R
 CellField SampleAtBarycentres(const Eigen::Ref<const CellIndices>& cells,
                               const Eigen::MatrixXd& at_vertices);
 
+// The same for one cell and one column: cheaper than keeping all of them.
+inline double MeanOverCorners(const Eigen::Map<const CellIndices>& cells,
+                              const Eigen::Ref<const Eigen::VectorXd>& at_vertices,
+                              Eigen::Index cell) {
+  double sum = 0;
+  for (Eigen::Index corner = 0; corner < cells.cols(); ++corner) {
+    sum += at_vertices[cells(cell, corner)];
+  }
+  return sum / static_cast<double>(cells.cols());
+}
+
 }  // namespace tissueform

@@ -34,7 +34,16 @@ struct PreparedLaplacian {
   double assemble_seconds = 0;
   double harmonic_seconds = 0;
   Eigen::Index negative_weights = 0;
+
+  int64_t bytes_held() const;
 };
+
+// Factorises L and computes the harmonic fields; assemble_seconds is left to the caller, who made
+// L. Errors: FailedPrecondition (not positive definite), ResourceExhausted, or what the admission
+// says.
+absl::StatusOr<std::unique_ptr<PreparedLaplacian>> PrepareLaplacian(
+    const SparseMatrix& L, const ConstraintSet& constraints,
+    const DirichletSystem::Options& options);
 
 // What the models on one mesh, one stiffness and one constraint set share: operators, orderings and
 // factors. Each is made when a model first asks for it and never again, so switching the model does
@@ -67,6 +76,8 @@ class MeshPreparation {
 
   // Everything made so far; the mesh is not counted.
   int64_t bytes_held() const;
+  // Of it what the models on the Laplacian need: all but the elastic system.
+  int64_t laplacian_bytes() const;
 
  private:
   MeshPreparation(const TetMesh& mesh, Eigen::VectorXd stiffness, ConstraintSet constraints,

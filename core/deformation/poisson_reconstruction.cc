@@ -12,7 +12,7 @@ constexpr Eigen::Index kCellGrain = 4096;
 constexpr Eigen::Index kVertexGrain = 1024;
 
 template <int kCorners>
-void ConvertCells(const PiecewiseLinearElements& elements, const Eigen::VectorXd& weights,
+void ConvertCells(const PiecewiseLinearElements& elements, const Eigen::VectorXd& stiffness,
                   int threads, CellTransforms* transforms) {
   ParallelFor(threads, transforms->rows(), kCellGrain, [&](Eigen::Index begin, Eigen::Index end) {
     for (Eigen::Index c = begin; c < end; ++c) {
@@ -22,7 +22,7 @@ void ConvertCells(const PiecewiseLinearElements& elements, const Eigen::VectorXd
       Eigen::Map<Eigen::Matrix3d> loads(row);
       loads.setZero();
       loads.leftCols<kCorners - 1>().noalias() =
-          weights[c] * turn * HatGradients<kCorners>(elements, c);
+          stiffness[c] * turn * HatGradientIntegrals<kCorners>(elements, c);
     }
   });
 }
@@ -30,12 +30,12 @@ void ConvertCells(const PiecewiseLinearElements& elements, const Eigen::VectorXd
 }  // namespace
 
 void TransformsToCornerLoads(const PiecewiseLinearElements& elements,
-                             const Eigen::VectorXd& weights, int threads,
+                             const Eigen::VectorXd& stiffness, int threads,
                              CellTransforms* transforms) {
   if (elements.corners() == 4) {
-    ConvertCells<4>(elements, weights, threads, transforms);
+    ConvertCells<4>(elements, stiffness, threads, transforms);
   } else {
-    ConvertCells<3>(elements, weights, threads, transforms);
+    ConvertCells<3>(elements, stiffness, threads, transforms);
   }
 }
 

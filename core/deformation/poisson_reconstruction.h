@@ -14,8 +14,9 @@ namespace tissueform {
 // displacements: with x' = v + d and L v = G^T M' grad v,
 //   L d = G^T M' ((P - I) grad v),   so   b_i = sum over cells c holding i of w_c (P_c - I) grad
 //   phi_i
-// with w_c = stiffness(c) |c|. Same solution as the source's equation, but an identity pose gives
-// exactly the rest shape and digits are not lost to the coordinates' own size.
+// with w_c = stiffness(c) |c|, |c| the volume of a tet or the area of a triangle. Same solution as
+// the source's equation, but an identity pose gives exactly the rest shape and digits are not lost
+// to the coordinates' own size.
 //
 // Found in two steps, cells first: a vertex then reads three numbers of a cell, not its whole
 // transform.
@@ -26,9 +27,9 @@ namespace tissueform {
 using CornerLoads = CellTransforms;
 
 // Makes corner loads of the transforms P, #C rows or none, which stands for the identity and for no
-// load. `weights` is #C.
+// load. `stiffness` is #C.
 void TransformsToCornerLoads(const PiecewiseLinearElements& elements,
-                             const Eigen::VectorXd& weights, int threads,
+                             const Eigen::VectorXd& stiffness, int threads,
                              CellTransforms* transforms);
 
 // b, #V by 3, or no rows, which stands for zero. Gathered vertex by vertex, so the result does not

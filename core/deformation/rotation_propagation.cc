@@ -6,22 +6,25 @@
 #include <algorithm>
 
 #include "core/base/parallel_for.h"
+#include "core/deformation/harmonic_fields.h"
 
 namespace tissueform {
 
-void PropagateRotations(const CellField& harmonic, absl::Span<const HandlePose> poses, int threads,
+void PropagateRotations(const PiecewiseLinearElements& elements, const Eigen::MatrixXd& harmonic,
+                        absl::Span<const HandlePose> poses, int threads,
                         CellTransforms* transforms) {
   constexpr Eigen::Index kCellGrain = 4096;
   const bool identity = std::all_of(poses.begin(), poses.end(), [](const HandlePose& pose) {
     return pose.rotation_vector.isZero(0) && pose.scale == 1.0;
   });
-  transforms->resize(identity ? 0 : harmonic.rows(), 9);
+  transforms->resize(identity ? 0 : elements.num_cells(), 9);
   ParallelFor(threads, transforms->rows(), kCellGrain, [&](Eigen::Index begin, Eigen::Index end) {
     for (Eigen::Index c = begin; c < end; ++c) {
       Eigen::Vector3d rotation_vector = Eigen::Vector3d::Zero();
       double scale = 1.0;
       for (size_t h = 0; h < poses.size(); ++h) {
-        const double u = harmonic(c, static_cast<Eigen::Index>(h));
+        const double u =
+            MeanOverCorners(elements.cells, harmonic.col(static_cast<Eigen::Index>(h)), c);
         rotation_vector += u * poses[h].rotation_vector;
         scale += u * (poses[h].scale - 1.0);
       }

@@ -7,7 +7,7 @@
 
 #include "core/base/types.h"
 #include "core/constraints/handle_pose.h"
-#include "core/deformation/harmonic_fields.h"
+#include "core/operators/piecewise_linear_elements.h"
 
 namespace tissueform {
 
@@ -17,11 +17,13 @@ using CellTransforms = Eigen::Matrix<double, Eigen::Dynamic, 9, Eigen::RowMajor>
 // The rotation field that the handles' poses spread over the cells (Liao et al. 2009, section 3.2,
 // for several handles):
 //   P_c = (1 + sum_h u_h (s_h - 1)) * exp([sum_h u_h w_h])
-// with u_h the harmonic field of handle h at the barycentre (`harmonic`, #C by #handles), w_h its
-// rotation vector and s_h its scale. Pivots and translations play no part: P turns gradients.
-// `transforms` is resized to #C rows, or to none, which stands for the identity, when no pose turns
-// or scales. It may be used again and again, which saves mapping fresh memory for every pose.
-void PropagateRotations(const CellField& harmonic, absl::Span<const HandlePose> poses, int threads,
+// with u_h the harmonic field of handle h at the barycentre (the mean of `harmonic`, #V by
+// #handles, over the corners), w_h its rotation vector and s_h its scale. Pivots and translations
+// play no part: P turns gradients. `transforms` is resized to #C rows, or to none, which stands for
+// the identity, when no pose turns or scales. It may be used again and again, which saves mapping
+// fresh memory for every pose.
+void PropagateRotations(const PiecewiseLinearElements& elements, const Eigen::MatrixXd& harmonic,
+                        absl::Span<const HandlePose> poses, int threads,
                         CellTransforms* transforms);
 
 }  // namespace tissueform

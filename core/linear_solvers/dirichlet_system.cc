@@ -3,6 +3,7 @@
 
 #include "core/linear_solvers/dirichlet_system.h"
 
+#include <random>
 #include <utility>
 
 #include "absl/memory/memory.h"
@@ -56,6 +57,16 @@ SparseMatrix ExtractBlock(const SparseMatrix& K, const std::vector<int32_t>& row
   }
   block.finalize();
   return block;
+}
+
+// The same at every call; without a pattern that an eigenvector could be orthogonal to.
+Eigen::MatrixXd RandomUnitVector(Eigen::Index size) {
+  std::mt19937 generator(1);
+  Eigen::MatrixXd vector(size, 1);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    vector(i) = static_cast<double>(generator()) / std::mt19937::max() - 0.5;
+  }
+  return vector.normalized();
 }
 
 int64_t BytesOf(const SparseMatrix& matrix) {
@@ -120,6 +131,28 @@ absl::StatusOr<Eigen::MatrixXd> DirichletSystem::Solve(const Eigen::MatrixXd& rh
   }
   solution(prescribed_, Eigen::all) = values;
   return solution;
+}
+
+absl::StatusOr<double> DirichletSystem::EstimateCondition(int iterations) {
+  if (free_.empty()) {
+    return 1.0;
+  }
+  double largest = 0;
+  double largest_of_inverse = 0;
+  Eigen::MatrixXd x = RandomUnitVector(num_free());
+  Eigen::MatrixXd image;
+  for (int i = 0; i < iterations; ++i) {
+    image.noalias() = free_free_.selfadjointView<Eigen::Lower>() * x;
+    largest = image.norm();
+    x = image / largest;
+  }
+  x = RandomUnitVector(num_free());
+  for (int i = 0; i < iterations; ++i) {
+    TF_RETURN_IF_ERROR(cholesky_->Solve(x, &image));
+    largest_of_inverse = image.norm();
+    x = image / largest_of_inverse;
+  }
+  return largest * largest_of_inverse;
 }
 
 double DirichletSystem::RelativeResidual(const Eigen::MatrixXd& rhs,

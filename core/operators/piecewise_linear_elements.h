@@ -66,4 +66,31 @@ inline Eigen::Matrix<double, 3, kCorners - 1> HatGradients(const PiecewiseLinear
   return gradients;
 }
 
+// The same gradients times the measure of the cell: their integrals over it. In mm^2 for tets (a
+// third of the inward area vector of the opposite face), in mm for triangles. No division.
+//
+// REQUIRES: the elements have kCorners corners.
+template <int kCorners>
+inline Eigen::Matrix<double, 3, kCorners - 1> HatGradientIntegrals(
+    const PiecewiseLinearElements& elements, Eigen::Index cell) {
+  static_assert(kCorners == 3 || kCorners == 4);
+  const int32_t* corners = elements.cells.data() + kCorners * cell;
+  const auto vertex = [&elements, corners](int corner) {
+    return Eigen::Map<const Eigen::Vector3d>(elements.rest.data() +
+                                             3 * Eigen::Index{corners[corner]});
+  };
+  const Eigen::Vector3d e1 = vertex(1) - vertex(0);
+  const Eigen::Vector3d e2 = vertex(2) - vertex(0);
+  Eigen::Matrix<double, 3, kCorners - 1> integrals;
+  if constexpr (kCorners == 4) {
+    const Eigen::Vector3d e3 = vertex(3) - vertex(0);
+    integrals << e2.cross(e3), e3.cross(e1), e1.cross(e2);
+    return integrals / 6.0;
+  } else {
+    const Eigen::Vector3d normal = elements.normals.row(cell);
+    integrals << normal.cross(-e2), normal.cross(e1);
+    return integrals / 2.0;
+  }
+}
+
 }  // namespace tissueform

@@ -118,7 +118,7 @@ absl::StatusOr<PartSeconds> DeformationBenchmark::Assemble() {
 absl::StatusOr<PartSeconds> DeformationBenchmark::Iterate() {
   Stopwatch stopwatch;
   EstimateRotations(elements_, deformed_, blend_weights_, CellTransforms(), threads_, &transforms_);
-  TransformsToCornerLoads(elements_, elements_.measures, threads_, &transforms_);
+  TransformsToCornerLoads(elements_, bar_.stiffness, threads_, &transforms_);
   const Eigen::MatrixXd rhs =
       GatherCornerLoads(vertex_cells_, elements_.num_vertices(), transforms_, threads_);
   const double local_seconds = stopwatch.Restart();

@@ -1,0 +1,129 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/deformation/elastic_system.h"
+
+#include "absl/memory/memory.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
+#include "core/elasticity/elastic_stiffness.h"
+#include "core/elasticity/material.h"
+#include "core/mesh/vertex_cells.h"
+#include "core/operators/piecewise_linear_elements.h"
+
+namespace tissueform {
+namespace {
+
+// Enough to tell the condition number to a factor of two or so; each step costs a
+// back-substitution.
+constexpr int kConditionIterations = 8;
+
+// The three unknowns of every constrained vertex, rising.
+std::vector<int32_t> ConstrainedUnknowns(const ConstraintSet& constraints) {
+  std::vector<int32_t> unknowns;
+  unknowns.reserve(3 * constraints.constrained().size());
+  for (const int32_t vertex : constraints.constrained()) {
+    for (int axis = 0; axis < 3; ++axis) {
+      unknowns.push_back(3 * vertex + axis);
+    }
+  }
+  return unknowns;
+}
+
+absl::Status CheckCondition(double condition, double poisson_ratio) {
+  if (condition <= ElasticSystem::kLargestCondition) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(absl::StrCat(
+      "elastic system is too ill-conditioned for a reliable answer (condition estimate ", condition,
+      ", limit ", ElasticSystem::kLargestCondition, ") with Poisson's ratio ", poisson_ratio,
+      "; take a ratio further below 0.5, or a narrower range of stiffness"));
+}
+
+// Prescribed displacements of the 12 affine motions of a handle, 3 #constrained by 12.
+Eigen::MatrixXd AffineMotions(const TetMesh& mesh, const ConstraintSet& constraints, int handle,
+                              const Eigen::Vector3d& origin) {
+  const auto& vertices = constraints.constrained();
+  Eigen::MatrixXd values = Eigen::MatrixXd::Zero(3 * static_cast<Eigen::Index>(vertices.size()),
+                                                 ElasticSystem::kColumnsPerHandle);
+  for (size_t c = 0; c < vertices.size(); ++c) {
+    if (constraints.region_of_constrained()[c] == handle) {
+      Eigen::RowVector4d x;
+      x << mesh.positions().row(vertices[c]) - origin.transpose(), 1.0;
+      for (int axis = 0; axis < 3; ++axis) {
+        values.block<1, 4>(3 * static_cast<Eigen::Index>(c) + axis, 4 * axis) = x;
+      }
+    }
+  }
+  return values;
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
+    const TetMesh& mesh, const Eigen::VectorXd& stiffness, const ConstraintSet& constraints,
+    const ElasticSystemOptions& options) {
+  TF_RETURN_IF_ERROR(CheckPoissonRatio(options.poisson_ratio));
+  auto elastic = absl::WrapUnique(new ElasticSystem());
+  elastic->origin_ =
+      0.5 * (mesh.positions().colwise().minCoeff() + mesh.positions().colwise().maxCoeff());
+  Stopwatch stopwatch;
+  {
+    const PiecewiseLinearElements elements = ElementsOf(mesh);
+    const VertexCells vertex_cells(elements.cells, elements.num_vertices());
+    const SparseMatrix K =
+        ElasticStiffness(elements, vertex_cells, stiffness, options.poisson_ratio, options.threads);
+    elastic->assemble_seconds_ = stopwatch.Seconds();
+    TF_ASSIGN_OR_RETURN(elastic->system_,
+                        DirichletSystem::Create(K, ConstrainedUnknowns(constraints),
+                                                {options.backend, options.admission}));
+  }
+  TF_ASSIGN_OR_RETURN(elastic->condition_estimate_,
+                      elastic->system_->EstimateCondition(kConditionIterations));
+  TF_RETURN_IF_ERROR(CheckCondition(elastic->condition_estimate_, options.poisson_ratio));
+  stopwatch.Restart();
+  TF_RETURN_IF_ERROR(elastic->PrepareResponses(mesh, constraints, options.admission));
+  elastic->response_seconds_ = stopwatch.Seconds();
+  return elastic;
+}
+
+absl::Status ElasticSystem::PrepareResponses(const TetMesh& mesh, const ConstraintSet& constraints,
+                                             const FactorAdmission& admission) {
+  const Eigen::Index rows = 3 * mesh.num_vertices();
+  const auto handles = static_cast<int>(constraints.handles().size());
+  if (admission) {
+    TF_RETURN_IF_ERROR(
+        admission(rows * kColumnsPerHandle * handles * static_cast<int64_t>(sizeof(double))));
+  }
+  response_columns_.resize(rows, Eigen::Index{kColumnsPerHandle} * handles);
+  for (int h = 0; h < handles; ++h) {
+    TF_ASSIGN_OR_RETURN(
+        response_columns_.middleCols(Eigen::Index{kColumnsPerHandle} * h, kColumnsPerHandle),
+        system_->Solve({}, AffineMotions(mesh, constraints, h, origin_)));
+  }
+  return absl::OkStatus();
+}
+
+Eigen::VectorXd ElasticSystem::Coefficients(absl::Span<const HandlePose> poses) const {
+  Eigen::VectorXd coefficients(kColumnsPerHandle * static_cast<Eigen::Index>(poses.size()));
+  for (size_t h = 0; h < poses.size(); ++h) {
+    const HandlePose& pose = poses[h];
+    const Eigen::Matrix3d change =
+        pose.scale * RotationMatrix(pose.rotation_vector) - Eigen::Matrix3d::Identity();
+    const Eigen::Vector3d shift = change * (origin_ - pose.pivot_mm) + pose.translation_mm;
+    for (int axis = 0; axis < 3; ++axis) {
+      coefficients.segment<4>(kColumnsPerHandle * static_cast<Eigen::Index>(h) + 4 * axis)
+          << change.row(axis).transpose(),
+          shift[axis];
+    }
+  }
+  return coefficients;
+}
+
+int64_t ElasticSystem::bytes_held() const {
+  return system_->bytes_held() + response_columns_.size() * static_cast<int64_t>(sizeof(double));
+}
+
+}  // namespace tissueform

@@ -1,0 +1,30 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "absl/types/span.h"
+
+#include "core/base/types.h"
+#include "core/constraints/constraint_set.h"
+#include "core/constraints/handle_pose.h"
+
+namespace tissueform {
+
+// Where the constrained vertices go, #constrained by 3, in the order of constraints.constrained().
+struct HandleTargets {
+  Positions positions;
+  Positions displacements;  // against rest; zero to the bit for handles with an identity pose
+};
+
+// REQUIRES: one legal pose per handle; `rest` is #V by 3.
+HandleTargets MakeHandleTargets(const ConstraintSet& constraints,
+                                const Eigen::Ref<const Positions>& rest,
+                                absl::Span<const HandlePose> poses);
+
+// rest + displacements, with constrained vertices exactly where their poses put them, not up to the
+// rounding of adding and taking away.
+Positions ToPositions(const ConstraintSet& constraints, const Eigen::Ref<const Positions>& rest,
+                      const Eigen::MatrixXd& displacements, const HandleTargets& targets);
+
+}  // namespace tissueform

@@ -1,0 +1,42 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/deformation/lbfgs_history.h"
+
+#include <utility>
+#include <vector>
+
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+
+void LbfgsHistory::Add(Eigen::VectorXd step, Eigen::VectorXd gradient_change) {
+  constexpr double kSmallestCosine = 1e-10;
+  const double curvature = step.dot(gradient_change);
+  if (length_ == 0 || !(curvature > kSmallestCosine * step.norm() * gradient_change.norm())) {
+    return;
+  }
+  if (pairs_.size() == length_) {
+    pairs_.pop_front();
+  }
+  pairs_.push_back({std::move(step), std::move(gradient_change), 1.0 / curvature});
+}
+
+absl::StatusOr<Eigen::VectorXd> LbfgsHistory::Apply(const Eigen::VectorXd& gradient,
+                                                    const InitialInverse& initial_inverse) const {
+  Eigen::VectorXd direction = gradient;
+  std::vector<double> weights(pairs_.size());
+  for (size_t p = pairs_.size(); p-- > 0;) {
+    weights[p] = pairs_[p].inverse_curvature * pairs_[p].step.dot(direction);
+    direction -= weights[p] * pairs_[p].gradient_change;
+  }
+  TF_ASSIGN_OR_RETURN(direction, initial_inverse(direction));
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    const double weight =
+        weights[p] - pairs_[p].inverse_curvature * pairs_[p].gradient_change.dot(direction);
+    direction += weight * pairs_[p].step;
+  }
+  return direction;
+}
+
+}  // namespace tissueform

@@ -1,0 +1,88 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/deformation/mesh_preparation.h"
+
+#include <utility>
+
+#include "absl/memory/memory.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
+#include "core/deformation/deformation_checks.h"
+#include "core/deformation/harmonic_fields.h"
+#include "core/mesh/validation.h"
+#include "core/operators/edge_laplacian.h"
+#include "core/operators/laplacian.h"
+
+namespace tissueform {
+namespace {
+
+absl::Status CheckPoissonRatio(double poisson_ratio) {
+  if (!(poisson_ratio >= 0 && poisson_ratio < 0.5)) {
+    return absl::InvalidArgumentError(absl::StrCat("Poisson's ratio is ", poisson_ratio,
+                                                   "; it must be at least 0 and below 0.5"));
+  }
+  return absl::OkStatus();
+}
+
+int64_t BytesOf(const Eigen::MatrixXd& matrix) {
+  return matrix.size() * static_cast<int64_t>(sizeof(double));
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<PreparedLaplacian>> PrepareLaplacian(
+    const SparseMatrix& L, const ConstraintSet& constraints,
+    const DirichletSystem::Options& options) {
+  auto laplacian = std::make_unique<PreparedLaplacian>();
+  laplacian->negative_weights = CountNegativeWeights(L);
+  TF_ASSIGN_OR_RETURN(laplacian->system,
+                      DirichletSystem::Create(L, constraints.constrained(), options));
+  const Stopwatch stopwatch;
+  TF_ASSIGN_OR_RETURN(laplacian->harmonic,
+                      ComputeHarmonicFields(constraints, laplacian->system.get()));
+  laplacian->harmonic_seconds = stopwatch.Seconds();
+  return laplacian;
+}
+
+int64_t PreparedLaplacian::bytes_held() const { return system->bytes_held() + BytesOf(harmonic); }
+
+absl::StatusOr<std::shared_ptr<MeshPreparation>> MeshPreparation::Create(
+    const TetMesh& mesh, const Eigen::VectorXd& stiffness, const ConstraintSet& constraints,
+    PreparationOptions options) {
+  TF_RETURN_IF_ERROR(CheckPoissonRatio(options.poisson_ratio));
+  TF_RETURN_IF_ERROR(CheckUsable(ValidateTetMesh(mesh)));
+  TF_RETURN_IF_ERROR(CheckStiffness(mesh.num_tets(), stiffness, "tet"));
+  TF_RETURN_IF_ERROR(CheckEveryComponentConstrained(mesh.tets(), mesh.num_vertices(), constraints));
+  return absl::WrapUnique(new MeshPreparation(mesh, stiffness, constraints, std::move(options)));
+}
+
+MeshPreparation::MeshPreparation(const TetMesh& mesh, Eigen::VectorXd stiffness,
+                                 ConstraintSet constraints, PreparationOptions options)
+    : mesh_(mesh),
+      stiffness_(std::move(stiffness)),
+      constraints_(std::move(constraints)),
+      options_(std::move(options)),
+      elements_(ElementsOf(mesh)),
+      vertex_cells_(elements_.cells, elements_.num_vertices()) {}
+
+absl::StatusOr<PreparedLaplacian*> MeshPreparation::Laplacian() {
+  if (laplacian_ == nullptr) {
+    const Stopwatch stopwatch;
+    const SparseMatrix L = CotangentLaplacian(mesh_, stiffness_, options_.threads);
+    const double assemble_seconds = stopwatch.Seconds();
+    TF_ASSIGN_OR_RETURN(laplacian_,
+                        PrepareLaplacian(L, constraints_, {options_.backend, options_.admission}));
+    laplacian_->assemble_seconds = assemble_seconds;
+  }
+  return laplacian_.get();
+}
+
+int64_t MeshPreparation::laplacian_bytes() const {
+  return vertex_cells_.bytes_held() + BytesOf(stiffness_) + BytesOf(elements_.measures) +
+         (laplacian_ != nullptr ? laplacian_->bytes_held() : 0);
+}
+
+}  // namespace tissueform

@@ -1,0 +1,269 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/deformation/neo_hookean_deformer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
+#include "core/deformation/constrained_positions.h"
+#include "core/deformation/deformation_checks.h"
+#include "core/deformation/equilibrium_search.h"
+#include "core/deformation/load_path.h"
+#include "core/elasticity/neo_hookean_energy.h"
+
+namespace tissueform {
+namespace {
+
+// The furthest that a handle turns in one load step.
+constexpr double kLargestTurn = std::numbers::pi / 6;
+// Load steps shorter than this are not tried.
+constexpr double kSmallestLoadStep = 1.0 / 512;
+// Residual at which a load step is left for the next one.
+constexpr double kStepTolerance = 0.02;
+// Strain whose forces are added to those that the residual is measured by.
+constexpr double kSmallStrain = 1e-6;
+
+absl::Status CheckOptions(const NeoHookeanOptions& options) {
+  if (options.max_iterations < 1) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("max_iterations is ", options.max_iterations, "; it must be at least 1"));
+  }
+  if (!std::isfinite(options.tolerance) || options.tolerance <= 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("tolerance is ", options.tolerance, "; it must be a positive number"));
+  }
+  if (options.history < 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("history is ", options.history, "; it must not be negative"));
+  }
+  return absl::OkStatus();
+}
+
+// Forces, in Pa mm^2, of a strain of kSmallStrain in every tet: E |t|^(2/3) each.
+double ForceUnit(const MeshPreparation& preparation) {
+  return kSmallStrain *
+         (preparation.stiffness().array() * preparation.elements().measures.array().pow(2.0 / 3.0))
+             .matrix()
+             .norm();
+}
+
+// How far every vertex goes along with each handle, #V by #handles: the mean of what the linear
+// model answers to unit translations, within [0, 1]. One on the handle, zero on the other
+// constrained ones.
+Eigen::MatrixXd HandleShares(const ElasticSystem& elastic, Eigen::Index num_vertices) {
+  const Eigen::MatrixXd& columns = elastic.response_columns();
+  Eigen::MatrixXd shares(num_vertices, columns.cols() / ElasticSystem::kColumnsPerHandle);
+  for (Eigen::Index h = 0; h < shares.cols(); ++h) {
+    for (Eigen::Index v = 0; v < num_vertices; ++v) {
+      double sum = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        sum += columns(3 * v + axis, ElasticSystem::kColumnsPerHandle * h + 4 * axis + 3);
+      }
+      shares(v, h) = std::clamp(sum / 3.0, 0.0, 1.0);
+    }
+  }
+  return shares;
+}
+
+// What a deformer holds beside the preparation.
+int64_t BytesNeeded(const MeshPreparation& preparation, const NeoHookeanOptions& options) {
+  const Eigen::Index num_vertices = preparation.mesh().num_vertices();
+  const auto handles = static_cast<int64_t>(preparation.constraints().handles().size());
+  return NeoHookeanEnergy::BytesNeeded(preparation.mesh().num_tets()) +
+         EquilibriumSearch::BytesNeeded(num_vertices, options.history) +
+         num_vertices * handles * static_cast<int64_t>(sizeof(double));
+}
+
+class NeoHookeanDeformer : public Deformer {
+ public:
+  NeoHookeanDeformer(std::shared_ptr<MeshPreparation> preparation, ElasticSystem* elastic,
+                     const NeoHookeanOptions& options)
+      : preparation_(std::move(preparation)),
+        elastic_(*elastic),
+        options_(options),
+        shares_(HandleShares(*elastic, rest().rows())),
+        energy_(preparation_->elements(), preparation_->vertex_cells(), preparation_->stiffness(),
+                preparation_->options().poisson_ratio, preparation_->options().threads),
+        search_(&energy_, &elastic->system(), ForceUnit(*preparation_), options.history) {
+    const FactorizationSummary& factorization = elastic_.system().factorization();
+    summary_.assemble_seconds = elastic_.assemble_seconds();
+    summary_.analyse_seconds = factorization.analyse_seconds;
+    summary_.factorise_seconds = factorization.factorise_seconds;
+    summary_.prepare_seconds = elastic_.response_seconds();
+    summary_.factor_bytes = factorization.factor_bytes;
+    summary_.bytes_held = preparation_->bytes_held() + BytesNeeded(*preparation_, options_);
+  }
+
+  absl::StatusOr<Deformation> Deform(absl::Span<const HandlePose> poses,
+                                     const DeformControl& control) override {
+    TF_RETURN_IF_ERROR(CheckPoses(preparation_->constraints(), poses));
+    if (control.warm_start && !last_poses_.empty()) {
+      TF_ASSIGN_OR_RETURN(Deformation deformation,
+                          Walk(LoadPath(last_poses_, poses), Begin::kWhereItIs, control));
+      if (deformation.summary.load == 1.0 || deformation.summary.cancelled) {
+        return deformation;
+      }
+    }
+    return Walk(LoadPath(poses), Begin::kAtRest, control);
+  }
+
+  const PreparationSummary& preparation() const override { return summary_; }
+
+ private:
+  enum class Begin { kAtRest, kWhereItIs };
+
+  // What one answer needs beside the state of the search.
+  struct Run {
+    const LoadPath& path;
+    const DeformControl& control;
+    Stopwatch stopwatch;
+    Deformation deformation;
+
+    SolveSummary& summary() { return deformation.summary; }
+  };
+
+  const Positions& rest() const { return preparation_->mesh().positions(); }
+
+  // Follows the path as far as it goes and remembers the end for the next warm start.
+  absl::StatusOr<Deformation> Walk(const LoadPath& path, Begin begin,
+                                   const DeformControl& control) {
+    Run run{path, control, {}, {}};
+    run.summary().iterations = 0;
+    run.summary().load = 0;
+    run.summary().converged = false;
+    last_poses_.clear();
+    double step = std::min(1.0, kLargestTurn / std::max(path.LargestTurn(), kLargestTurn));
+    if (begin == Begin::kAtRest && !(step == 1.0 && StartFromLinear(&run))) {
+      search_.Start(Positions::Zero(rest().rows(), 3));
+    }
+    if (run.summary().load == 1.0) {
+      TF_RETURN_IF_ERROR(Relax(&run));
+    }
+    while (run.summary().load < 1.0 && step >= kSmallestLoadStep && MayGoOn(&run)) {
+      if (!Advance(step, &run)) {
+        step *= 0.5;
+        continue;
+      }
+      TF_RETURN_IF_ERROR(Relax(&run));
+    }
+    Finish(&run);
+    return std::move(run.deformation);
+  }
+
+  // False when the linear answer to the whole load inverts tets.
+  bool StartFromLinear(Run* run) {
+    const std::vector<HandlePose> poses = run->path.PosesAt(1.0);
+    const Eigen::VectorXd linear = elastic_.response_columns() * elastic_.Coefficients(poses);
+    Positions displacements = Eigen::Map<const Positions>(linear.data(), rest().rows(), 3);
+    SetConstrained(poses, &displacements);
+    if (!search_.Start(std::move(displacements))) {
+      return false;
+    }
+    run->summary().load = 1.0;
+    return true;
+  }
+
+  // Carries the state on by a load step; false when that inverts tets.
+  bool Advance(double step, Run* run) {
+    const double begin = run->summary().load;
+    const double remaining = 1.0 - begin;
+    // No crumb is left for the end.
+    const double end = remaining < 1.01 * step ? 1.0 : begin + step;
+    const Positions positions = rest() + search_.displacements();
+    Positions displacements = run->path.Carry(positions, shares_, begin, end) - rest();
+    SetConstrained(run->path.PosesAt(end), &displacements);
+    if (!search_.Start(std::move(displacements))) {
+      return false;
+    }
+    run->summary().load = end;
+    return true;
+  }
+
+  void SetConstrained(const std::vector<HandlePose>& poses, Positions* displacements) const {
+    const auto& constrained = preparation_->constraints().constrained();
+    (*displacements)(constrained, Eigen::all) =
+        ConstrainedPositions(rest(), preparation_->constraints(), poses) -
+        rest()(constrained, Eigen::all);
+  }
+
+  bool MayGoOn(Run* run) const {
+    return !run->summary().cancelled && run->summary().iterations < options_.max_iterations;
+  }
+
+  // Towards the equilibrium at the load reached.
+  absl::Status Relax(Run* run) {
+    SolveSummary& summary = run->summary();
+    const double tolerance = summary.load == 1.0 ? options_.tolerance : kStepTolerance;
+    while (search_.residual() > tolerance && MayGoOn(run) && Report(run)) {
+      TF_ASSIGN_OR_RETURN(const double change, search_.Step());
+      ++summary.iterations;
+      summary.changes_mm.push_back(change);
+      summary.energies_nj.push_back(search_.value().energy_nj);
+      if (change == 0) {
+        break;
+      }
+    }
+    summary.converged = summary.load == 1.0 && search_.residual() <= options_.tolerance;
+    return absl::OkStatus();
+  }
+
+  // False when the caller wants to hear no more.
+  bool Report(Run* run) const {
+    if (run->control.on_progress) {
+      Describe(run);
+      run->summary().cancelled = !run->control.on_progress(run->deformation);
+    }
+    return !run->summary().cancelled;
+  }
+
+  // Writes the state of the search into the answer.
+  void Describe(Run* run) const {
+    const ConstraintSet& constraints = preparation_->constraints();
+    run->summary().residual = search_.residual();
+    run->summary().solve_seconds = run->stopwatch.Seconds();
+    run->deformation.positions = rest() + search_.displacements();
+    run->deformation.positions(constraints.constrained(), Eigen::all) =
+        ConstrainedPositions(rest(), constraints, run->path.PosesAt(run->summary().load));
+  }
+
+  void Finish(Run* run) {
+    Describe(run);
+    if (run->summary().load == 1.0) {
+      last_poses_ = run->path.PosesAt(1.0);
+    }
+  }
+
+  // Constant after the constructor.
+  const std::shared_ptr<MeshPreparation> preparation_;  // owns elastic_
+  ElasticSystem& elastic_;
+  const NeoHookeanOptions options_;
+  const Eigen::MatrixXd shares_;  // #V by #handles
+  PreparationSummary summary_;
+
+  // The state of the last answer; its poses when it had reached them, else none.
+  NeoHookeanEnergy energy_;
+  EquilibriumSearch search_;
+  std::vector<HandlePose> last_poses_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Deformer>> CreateNeoHookeanDeformer(
+    std::shared_ptr<MeshPreparation> preparation, const NeoHookeanOptions& options) {
+  TF_RETURN_IF_ERROR(CheckOptions(options));
+  TF_ASSIGN_OR_RETURN(ElasticSystem * elastic, preparation->Elastic());
+  if (const FactorAdmission& admission = preparation->options().admission) {
+    TF_RETURN_IF_ERROR(admission(BytesNeeded(*preparation, options)));
+  }
+  return std::make_unique<NeoHookeanDeformer>(std::move(preparation), elastic, options);
+}
+
+}  // namespace tissueform

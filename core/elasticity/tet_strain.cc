@@ -1,0 +1,69 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/elasticity/tet_strain.h"
+
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+#include "core/base/parallel_for.h"
+#include "core/elasticity/material.h"
+
+namespace tissueform {
+namespace {
+
+constexpr Eigen::Index kTetGrain = 4096;
+
+// sum over corners of d_a g_a^T with d = x - v: keeps the digits of small displacements.
+Eigen::Matrix3d DisplacementGradient(const PiecewiseLinearElements& elements,
+                                     const Positions& positions, Eigen::Index tet) {
+  const auto displacement = [&](int corner) -> Eigen::Vector3d {
+    const int32_t vertex = elements.cells(tet, corner);
+    return positions.row(vertex) - elements.rest.row(vertex);
+  };
+  const Eigen::Vector3d origin = displacement(0);
+  Eigen::Matrix3d edges;
+  edges << displacement(1) - origin, displacement(2) - origin, displacement(3) - origin;
+  return edges * HatGradients<4>(elements, tet).transpose();
+}
+
+}  // namespace
+
+Eigen::Matrix3d TetDeformationGradient(const PiecewiseLinearElements& elements,
+                                       const Positions& positions, Eigen::Index tet) {
+  return Eigen::Matrix3d::Identity() + DisplacementGradient(elements, positions, tet);
+}
+
+PrincipalValues PrincipalGreenStrains(const PiecewiseLinearElements& elements,
+                                      const Positions& positions, int threads) {
+  PrincipalValues strains(elements.num_cells(), 3);
+  ParallelFor(threads, elements.num_cells(), kTetGrain, [&](Eigen::Index begin, Eigen::Index end) {
+    for (Eigen::Index t = begin; t < end; ++t) {
+      const Eigen::Matrix3d H = DisplacementGradient(elements, positions, t);
+      const Eigen::Matrix3d strain = 0.5 * (H + H.transpose() + H.transpose() * H);
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(strain, Eigen::EigenvaluesOnly);
+      strains.row(t) = solver.eigenvalues().reverse();
+    }
+  });
+  return strains;
+}
+
+Eigen::VectorXd LinearVonMisesStress(const PiecewiseLinearElements& elements,
+                                     const Positions& positions, const Eigen::VectorXd& stiffness,
+                                     double poisson_ratio, int threads) {
+  // The spherical part of the stress plays no part: 2 mu dev(e) is the deviator.
+  const double unit_shear = ModuliOf(1.0, poisson_ratio).shear;
+  Eigen::VectorXd stress(elements.num_cells());
+  ParallelFor(threads, elements.num_cells(), kTetGrain, [&](Eigen::Index begin, Eigen::Index end) {
+    for (Eigen::Index t = begin; t < end; ++t) {
+      const Eigen::Matrix3d H = DisplacementGradient(elements, positions, t);
+      Eigen::Matrix3d deviator = 0.5 * (H + H.transpose());
+      deviator.diagonal().array() -= H.trace() / 3.0;
+      stress[t] = 2.0 * unit_shear * stiffness[t] * std::sqrt(1.5) * deviator.norm();
+    }
+  });
+  return stress;
+}
+
+}  // namespace tissueform
