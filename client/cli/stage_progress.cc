@@ -3,33 +3,56 @@
 
 #include "client/cli/stage_progress.h"
 
-#include <chrono>
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
 #include <cstdio>
+#include <signal.h>
+#include <unistd.h>
 #include <utility>
 
 #include "absl/strings/str_format.h"
-
-#include "core/base/stopwatch.h"
+#include <sys/time.h>
 
 namespace tissueform {
+namespace {
 
-StageProgress::StageProgress(std::string stage)
-    : stage_(std::move(stage)), watcher_([this](const std::stop_token& stop) { Watch(stop); }) {}
+// What the signal handler writes, on whatever thread it runs: never freed. Zero bytes between stages.
+char announcement[256];
+std::atomic<size_t> announcement_bytes = 0;
+std::atomic<bool> announced = false;
+static_assert(std::atomic<size_t>::is_always_lock_free, "read in a signal handler");
 
-StageProgress::~StageProgress() {
-  watcher_.request_stop();
-  watcher_.join();
+void Announce(int /*signal*/) {
+  const int saved_errno = errno;
+  if (const size_t bytes = announcement_bytes; bytes > 0) {
+    announced = write(STDERR_FILENO, announcement, bytes) > 0;
+  }
+  errno = saved_errno;
 }
 
-void StageProgress::Watch(const std::stop_token& stop) {
-  const Stopwatch stopwatch;
-  const auto never = [] { return false; };
-  std::unique_lock lock(mutex_);
-  ended_.wait_for(lock, stop, std::chrono::seconds(1), never);
-  if (stop.stop_requested()) return;
-  absl::FPrintF(stderr, "%s ...\n", stage_);
-  ended_.wait(lock, stop, never);
-  absl::FPrintF(stderr, "%s: %.1f s\n", stage_, stopwatch.Seconds());
+void SetTimer(int seconds) {
+  const itimerval once{.it_interval = {}, .it_value = {seconds, 0}};
+  setitimer(ITIMER_REAL, &once, nullptr);
+}
+
+}  // namespace
+
+StageProgress::StageProgress(std::string stage) : stage_(std::move(stage)) {
+  announced = false;
+  const int bytes = absl::SNPrintF(announcement, sizeof(announcement), "%s ...\n", stage_);
+  announcement_bytes = std::min(static_cast<size_t>(bytes), sizeof(announcement) - 1);
+  struct sigaction action {};
+  action.sa_handler = Announce;
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGALRM, &action, nullptr);
+  SetTimer(1);
+}
+
+StageProgress::~StageProgress() {
+  SetTimer(0);
+  announcement_bytes = 0;
+  if (announced) absl::FPrintF(stderr, "%s: %.1f s\n", stage_, stopwatch_.Seconds());
 }
 
 }  // namespace tissueform

@@ -3,15 +3,17 @@
 
 #pragma once
 
-#include <condition_variable>
-#include <mutex>
 #include <string>
-#include <thread>
+
+#include "core/base/stopwatch.h"
 
 namespace tissueform {
 
 // Tells on stderr that a stage is at work when it takes longer than a second, and how long it took
-// when it ends. Short stages say nothing.
+// when it ends. Short stages say nothing. One at a time.
+//
+// Uses the process's interval timer (SIGALRM), not a thread: reading a mesh forks, and a thread that
+// holds a lock of the allocator at that moment would leave the child waiting for it for ever.
 class StageProgress {
  public:
   explicit StageProgress(std::string stage);
@@ -20,12 +22,8 @@ class StageProgress {
   StageProgress& operator=(const StageProgress&) = delete;
 
  private:
-  void Watch(const std::stop_token& stop);
-
   const std::string stage_;
-  std::mutex mutex_;  // for the wait only
-  std::condition_variable_any ended_;
-  std::jthread watcher_;  // last: it uses the others
+  const Stopwatch stopwatch_;
 };
 
 }  // namespace tissueform

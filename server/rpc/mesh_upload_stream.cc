@@ -70,12 +70,15 @@ absl::Status MeshUploadStream::TakeHeader() {
 void MeshUploadStream::CheckOnWorker() {
   pool_->Post([this] {
     const int64_t committed_bytes = upload_->committed_bytes();
-    const auto stored = catalog_->Finish(std::move(upload_));
+    auto stored = catalog_->Finish(std::move(upload_));
+    const absl::Status outcome = stored.status();
     if (stored.ok()) {
       *response_->mutable_mesh() = ToProto(**stored);
       response_->set_committed_bytes(committed_bytes);
+      // Before the client has its answer: a mesh that it deletes at once is free at once.
+      stored->reset();
     }
-    End(stored.status());
+    End(outcome);
   });
 }
 

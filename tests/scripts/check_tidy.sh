@@ -25,11 +25,31 @@ else
   mapfile -t sources < <(git ls-files -- '*.cc')
 fi
 
-# The commands in the file are GCC's: clang does not know all of its warnings.
-if ! printf '%s\0' "${sources[@]}" | xargs -0 -n 1 -P "$jobs" \
-  clang-tidy -p "$build_dir" --quiet \
-  --extra-arg=-Wno-unknown-warning-option \
-  --extra-arg=-Wthread-safety --extra-arg=-Werror=thread-safety 2>/dev/null; then
+# Findings in our files, whether included or not. The commands are GCC's: clang does not know all of its warnings.
+tidy() {
+  clang-tidy -p "$build_dir/tidy" --quiet --header-filter='/(core|server|client|tests)/.*\.(h|cc)$' \
+    --extra-arg=-Wno-unknown-warning-option \
+    --extra-arg=-Wthread-safety --extra-arg=-Werror=thread-safety "$@" 2>/dev/null
+}
+
+# Several files at once, as tidy_batches.py has put them together; one by one when something is found, since what is
+# found may be that they do not go together.
+check_batch() {
+  local batch=$1 file outcome=0
+  shift
+  if tidy "$batch" > "$batch.log"; then
+    return
+  fi
+  for file in "$@"; do
+    tidy "$file" || outcome=1
+  done
+  return "$outcome"
+}
+export build_dir
+export -f tidy check_batch
+
+if ! tests/scripts/tidy_batches.py "$build_dir" "${sources[@]}" | tr '\t' ' ' |
+  xargs -d '\n' -I '{}' -P "$jobs" bash -c 'check_batch {}'; then
   echo "check_tidy.sh: findings above; one file again: tests/scripts/check_tidy.sh FILE.cc" >&2
   exit 1
 fi

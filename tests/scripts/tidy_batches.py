@@ -1,0 +1,140 @@
+#!/usr/bin/env python3
+# Copyright 2026 The Tissueform Authors.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+"""Puts source files together for clang-tidy, which spends nearly all of its time on the headers that they share.
+
+  tests/scripts/tidy_batches.py BUILD_DIR [FILE.cc]...
+
+Writes into BUILD_DIR/tidy files batch_N.cc that include some source files each, and a compile_commands.json with those
+and with all source files by themselves. Prints a line for each batch: its file, a tab, the source files.
+
+Files come together when their commands give no macro two values and when, as far as the first words of their lines
+tell, they name nothing the same: names of unnamed namespaces must not meet. A batch that does not compile all the same
+is the caller's to take apart.
+"""
+
+import json
+import pathlib
+import re
+import shlex
+import sys
+
+MOST_FILES = 10
+
+# Names that a line at the left margin declares: tests, types, aliases, functions and constants.
+DECLARATIONS = [
+    re.compile(r"^(?:TYPED_)?TEST(?:_F|_P)?\((\w+),\s*(\w+)\)"),
+    re.compile(r"^INSTANTIATE_\w+\((\w+),\s*(\w+)"),
+    re.compile(r"^(?:struct|class|enum class|enum|union)\s+(\w+)"),
+    re.compile(r"^using\s+(\w+)\s*="),
+    re.compile(r"^#define\s+(\w+)"),
+    re.compile(r"^(?!#|//|\s|TEST|TYPED_TEST|INSTANTIATE|using|namespace|template)[\w:<>,&*\s\[\]]*?\b(\w+)\s*(?:\(|=|\{|\[|;)"),
+]
+
+
+def compile_command(entry):
+    """The arguments without input and output files, and without GCC's precompiled header."""
+    arguments = shlex.split(entry["command"])
+    kept = []
+    skip = 0
+    for position, argument in enumerate(arguments):
+        if skip:
+            skip -= 1
+        elif argument in ("-o", "-c"):
+            skip = 1
+        elif argument == "-include" and arguments[position + 1].endswith("cmake_pch.hxx"):
+            skip = 1
+        elif argument != "-Winvalid-pch":
+            kept.append(argument)
+    return kept
+
+
+def declared_names(path):
+    # Declarations that clang-format broke over lines count with their first word line only: hence "as far as".
+    names = set()
+    for line in path.read_text(encoding="utf-8").splitlines():
+        for pattern in DECLARATIONS:
+            if match := pattern.match(line):
+                names.add("_".join(match.groups()))
+                break
+    return names
+
+
+# Headers whose macros are everyday words (Status, None, Bool).
+LONERS = re.compile(r"^#include <X11/", re.MULTILINE)
+
+
+def macros(command):
+    return dict(argument[2:].partition("=")[::2] for argument in command if argument.startswith("-D"))
+
+
+class Batch:
+    def __init__(self, alone=False):
+        self.alone = alone
+        self.files = []
+        self.names = set()
+        self.macros = {}
+        self.command = []
+
+    def takes(self, names, command):
+        if self.alone:
+            return False
+        agree = all(self.macros.get(name, value) == value for name, value in macros(command).items())
+        return agree and len(self.files) < MOST_FILES and not names & self.names
+
+    def add(self, path, names, command):
+        self.files.append(path)
+        self.names |= names
+        self.macros |= macros(command)
+        # "-isystem FOLDER" is two words that stay together.
+        words = re.findall(r"-isystem\0[^\0]+|[^\0]+", "\0".join(command))
+        self.command += [word for word in words if word not in self.command]
+
+    def arguments(self):
+        return [argument for word in self.command for argument in word.split("\0")]
+
+
+def put_together(files):
+    """Batches; `files` are (path, command) pairs."""
+    batches = []
+    for path, command in files:
+        names = declared_names(path)
+        if LONERS.search(path.read_text(encoding="utf-8")):
+            batch = Batch(alone=True)
+        else:
+            batch = next((batch for batch in batches if batch.takes(names, command)), Batch())
+        if batch not in batches:
+            batches.append(batch)
+        batch.add(path, names, command)
+    return batches
+
+
+def main():
+    build = pathlib.Path(sys.argv[1]).resolve()
+    chosen = {pathlib.Path(name).resolve() for name in sys.argv[2:]}
+    entries = json.loads((build / "compile_commands.json").read_text(encoding="utf-8"))
+    commands = {pathlib.Path(entry["file"]).resolve(): compile_command(entry) for entry in entries}
+    folder = build / "tidy"
+    folder.mkdir(exist_ok=True)
+    database = []
+
+    def add(path, command):
+        database.append({"directory": str(build), "file": str(path), "arguments": [*command, "-c", str(path)]})
+
+    for path, command in commands.items():
+        add(path, command)
+    for path in chosen - commands.keys():  # the fuzzers' main program, which only clang builds: as its neighbours
+        commands[path] = next(command for other, command in commands.items() if other.parent == path.parent)
+        add(path, commands[path])
+    # In the order of their folders: neighbours include the same.
+    files = sorted((path, commands[path]) for path in chosen)
+    for number, batch in enumerate(put_together(files)):
+        path = folder / f"batch_{number}.cc"
+        path.write_text("".join(f'#include "{file}"\n' for file in batch.files), encoding="utf-8")
+        add(path, batch.arguments())
+        print(path, " ".join(str(file) for file in batch.files), sep="\t")
+    (folder / "compile_commands.json").write_text(json.dumps(database), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
