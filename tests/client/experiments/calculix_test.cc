@@ -16,8 +16,8 @@ namespace tissueform {
 namespace {
 
 using ::testing::HasSubstr;
-using ::testing::Not;
 using testing::IsOk;
+using ::testing::Not;
 using testing::ScopedEnvironment;
 
 class CalculixTest : public ::testing::Test {
