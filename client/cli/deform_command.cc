@@ -82,7 +82,7 @@ absl::Status RunDeform(const DeformOptions& options) {
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadChosenPlan(options));
   double read_seconds = 0;
   TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolveWithProgress(plan, &read_seconds));
-  problem.deformer.gradient_field.threads = options.threads;
+  problem.deformer.preparation.threads = options.threads;
   // On purpose one: more make a factorisation faster, but the last digits of the answer would
   // depend on how many there are (docs/performance.md).
   SetBlasThreads(1);

@@ -24,6 +24,20 @@ v1::RotationMode ToProto(RotationMode mode) {
   return v1::ROTATION_MODE_NONE;
 }
 
+v1::DeformationModel ToProto(DeformationModel model) {
+  switch (model) {
+    case DeformationModel::kGradientField:
+      break;
+    case DeformationModel::kArap:
+      return v1::DEFORMATION_MODEL_ARAP;
+    case DeformationModel::kLinearElastic:
+      return v1::DEFORMATION_MODEL_LINEAR_ELASTIC;
+    case DeformationModel::kNeoHookean:
+      return v1::DEFORMATION_MODEL_NEO_HOOKEAN;
+  }
+  return v1::DEFORMATION_MODEL_GRADIENT_FIELD;
+}
+
 v1::GradientFieldSettings ToProto(const GradientFieldOptions& options) {
   v1::GradientFieldSettings proto;
   proto.set_rotation_mode(ToProto(options.rotation));
@@ -46,6 +60,8 @@ absl::StatusOr<std::unique_ptr<PlanSession>> PlanSession::Create(TissueformClien
   request.stiffness = kStiffnessArray;
   request.fixed = problem.constraints.fixed();
   request.handles = problem.constraints.handles();
+  request.model = ToProto(problem.deformer.model);
+  request.poisson_ratio = problem.deformer.preparation.poisson_ratio;
   request.gradient_field = ToProto(problem.deformer.gradient_field);
   TF_ASSIGN_OR_RETURN(v1::Session description, client->CreateSession(request));
   return std::unique_ptr<PlanSession>(new PlanSession(client, std::move(description)));

@@ -11,7 +11,9 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "core/elasticity/tet_strain.h"
 #include "core/mesh_io/tet_mesh_io.h"
+#include "core/operators/piecewise_linear_elements.h"
 #include "core/planning/coordinates.h"
 
 namespace tissueform {
@@ -26,6 +28,30 @@ std::vector<Attribute> WithDisplacement(std::vector<Attribute> point_data, Attri
   std::erase_if(point_data, [](const Attribute& a) { return a.name == kDisplacementArray; });
   point_data.push_back(std::move(displacement));
   return point_data;
+}
+
+std::vector<double> ValuesOf(const PrincipalValues& values) {
+  return {values.data(), values.data() + values.size()};
+}
+
+// How each tet is stretched and, where the model knows it, what stress it bears.
+std::vector<Attribute> WithStrain(std::vector<Attribute> cell_data, const PlanProblem& problem,
+                                  const Positions& deformed) {
+  std::erase_if(cell_data, [](const Attribute& a) {
+    return a.name == kPrincipalStrainArray || a.name == kVonMisesStressArray;
+  });
+  const PiecewiseLinearElements elements = ElementsOf(*problem.mesh);
+  const PreparationOptions& preparation = problem.deformer.preparation;
+  cell_data.push_back(
+      {kPrincipalStrainArray, 3,
+       ValuesOf(PrincipalGreenStrains(elements, deformed, preparation.threads))});
+  if (problem.deformer.model == DeformationModel::kLinearElastic) {
+    const Eigen::VectorXd stress =
+        LinearVonMisesStress(elements, deformed, problem.stiffness, preparation.poisson_ratio,
+                             preparation.threads);
+    cell_data.push_back({kVonMisesStressArray, 1, std::vector<double>(stress.begin(), stress.end())});
+  }
+  return cell_data;
 }
 
 }  // namespace
@@ -48,7 +74,7 @@ absl::Status WriteResult(const std::string& path, const Plan& plan, const PlanPr
   return WriteTetMesh(
       path, {.mesh = std::move(mesh),
              .point_data = WithDisplacement(problem.point_data, DisplacementArray(displacement)),
-             .cell_data = problem.cell_data});
+             .cell_data = WithStrain(problem.cell_data, problem, deformed)});
 }
 
 }  // namespace tissueform

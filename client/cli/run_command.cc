@@ -50,6 +50,9 @@ void AddAnswer(const v1::DeformOnceResponse& answer, PredictionStats* stats) {
   stats->solve.residual = answer.summary().residual();
   stats->solve.changes_mm.assign(answer.summary().changes_mm().begin(),
                                  answer.summary().changes_mm().end());
+  stats->solve.energies_nj.assign(answer.summary().energies_nj().begin(),
+                                  answer.summary().energies_nj().end());
+  stats->solve.load = answer.summary().load();
   stats->solve.solve_seconds = answer.summary().solve_seconds();
   stats->quality.inverted_tets = answer.quality().inverted_tet_count();
   stats->quality.min_volume_ratio = answer.quality().min_volume_ratio();

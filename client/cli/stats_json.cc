@@ -47,6 +47,7 @@ PredictionStats StatsOf(const PlanProblem& problem) {
   PredictionStats stats;
   stats.model = ModelName(problem.deformer.model);
   stats.rotation = RotationModeName(problem.deformer.gradient_field.rotation);
+  stats.poisson_ratio = problem.deformer.preparation.poisson_ratio;
   stats.vertices = problem.mesh->num_vertices();
   stats.tets = problem.mesh->num_tets();
   const auto constrained = static_cast<Eigen::Index>(problem.constraints.constrained().size());
@@ -61,12 +62,15 @@ OrderedJson StatsToJson(const PredictionStats& stats) {
           {"version", kVersion},
           {"model", stats.model},
           {"rotation", stats.rotation},
+          {"poisson_ratio", stats.poisson_ratio},
           {"counts", CountsToJson(stats)},
           {"seconds", SecondsToJson(stats)},
           {"iterations", stats.solve.iterations},
           {"residual", stats.solve.residual},
           {"converged", stats.solve.converged},
           {"changes_mm", stats.solve.changes_mm},
+          {"energies_nj", stats.solve.energies_nj},
+          {"load", stats.solve.load},
           {"bytes_held", stats.preparation.bytes_held},
           {"quality", QualityToJson(stats)},
           {"notice", kNotMedicalDeviceNotice}};

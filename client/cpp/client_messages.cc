@@ -35,7 +35,8 @@ v1::CreateSessionRequest ToProto(const SessionRequest& request) {
     handle->set_name(region.name);
     handle->mutable_vertices()->Add(region.vertices.begin(), region.vertices.end());
   }
-  proto.set_model(v1::DEFORMATION_MODEL_GRADIENT_FIELD);
+  proto.set_model(request.model);
+  proto.set_poisson_ratio(request.poisson_ratio);
   *proto.mutable_gradient_field() = request.gradient_field;
   proto.set_request_id(request.request_id);
   return proto;

@@ -27,6 +27,8 @@ struct SessionRequest {
   std::variant<double, std::string> stiffness;  // Pa for every tet, or the name of a cell array
   std::vector<int32_t> fixed;
   std::vector<HandleRegion> handles;
+  v1::DeformationModel model = v1::DEFORMATION_MODEL_GRADIENT_FIELD;
+  double poisson_ratio = 0.45;  // of the elastic models
   v1::GradientFieldSettings gradient_field;
   std::string request_id;  // empty: repeating the call makes another session
 };

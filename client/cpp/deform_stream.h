@@ -30,6 +30,8 @@ class DeformStream {
   struct Options {
     AnswerVertices vertices;
     std::optional<int> max_unacked;  // the server's default when left out
+    v1::DeformationModel model = v1::DEFORMATION_MODEL_UNSPECIFIED;  // the session's own
+    std::optional<v1::PreparedAnswers> prepared;  // left out: every frame is solved directly
   };
 
   // Cancels the stream unless Finish was called.

@@ -51,9 +51,11 @@ class TissueformClient {
   absl::StatusOr<v1::Session> GetSession(const std::string& name);
   absl::Status DeleteSession(const std::string& name);
 
-  absl::StatusOr<v1::DeformOnceResponse> DeformOnce(const std::string& session,
-                                                    absl::Span<const NamedPose> poses,
-                                                    const AnswerVertices& vertices = {});
+  // `model` is the session's own when unspecified.
+  absl::StatusOr<v1::DeformOnceResponse> DeformOnce(
+      const std::string& session, absl::Span<const NamedPose> poses,
+      const AnswerVertices& vertices = {},
+      v1::DeformationModel model = v1::DEFORMATION_MODEL_UNSPECIFIED);
 
   // The stream has no deadline.
   absl::StatusOr<std::unique_ptr<DeformStream>> OpenStream(const std::string& session,

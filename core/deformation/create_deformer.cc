@@ -3,17 +3,45 @@
 
 #include "core/deformation/create_deformer.h"
 
+#include "core/base/status_macros.h"
+#include "core/deformation/linear_elastic_deformer.h"
+
 namespace tissueform {
+namespace {
+
+absl::StatusOr<std::unique_ptr<Deformer>> CreateGradientField(
+    const std::shared_ptr<MeshPreparation>& preparation, GradientFieldOptions options) {
+  options.backend = preparation->options().backend;
+  options.admission = preparation->options().admission;
+  options.threads = preparation->options().threads;
+  return CreateGradientFieldDeformer(preparation, options);
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Deformer>> CreateDeformer(
+    const std::shared_ptr<MeshPreparation>& preparation, const DeformerOptions& options) {
+  switch (options.model) {
+    case DeformationModel::kGradientField:
+      break;
+    case DeformationModel::kArap:
+      return CreateArapDeformer(preparation, options.arap);
+    case DeformationModel::kLinearElastic:
+      return CreateLinearElasticDeformer(preparation);
+    case DeformationModel::kNeoHookean:
+      return CreateNeoHookeanDeformer(preparation, options.neo_hookean);
+  }
+  return CreateGradientField(preparation, options.gradient_field);
+}
 
 absl::StatusOr<std::unique_ptr<Deformer>> CreateDeformer(const TetMesh& mesh,
                                                          const Eigen::VectorXd& stiffness,
                                                          const ConstraintSet& constraints,
                                                          const DeformerOptions& options) {
-  switch (options.model) {
-    case DeformationModel::kGradientField:
-      break;
-  }
-  return CreateGradientFieldDeformer(mesh, stiffness, constraints, options.gradient_field);
+  TF_ASSIGN_OR_RETURN(
+      const std::shared_ptr<MeshPreparation> preparation,
+      MeshPreparation::Create(mesh, stiffness, constraints, options.preparation));
+  return CreateDeformer(preparation, options);
 }
 
 }  // namespace tissueform

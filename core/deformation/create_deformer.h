@@ -8,24 +8,38 @@
 #include "absl/status/statusor.h"
 
 #include "core/constraints/constraint_set.h"
+#include "core/deformation/arap_deformer.h"
 #include "core/deformation/deformer.h"
 #include "core/deformation/gradient_field_deformer.h"
+#include "core/deformation/mesh_preparation.h"
+#include "core/deformation/neo_hookean_deformer.h"
 #include "core/mesh/tet_mesh.h"
 
 namespace tissueform {
 
-enum class DeformationModel { kGradientField };
+enum class DeformationModel { kGradientField, kArap, kLinearElastic, kNeoHookean };
 
 // The model and the options of every model in one place, so that plans, sessions and tests choose a
 // model in one way.
 struct DeformerOptions {
   DeformationModel model = DeformationModel::kGradientField;
-  GradientFieldOptions gradient_field;
+  PreparationOptions preparation;
+  GradientFieldOptions gradient_field;  // backend, admission and threads are the preparation's
+  ArapOptions arap;
+  NeoHookeanOptions neo_hookean;
 };
 
-// The one switch over models. `stiffness` is Young's modulus per tet in Pa, #T, positive.
+// The one switch over models. Models made from one preparation share what it holds;
+// `options.preparation` is not read.
 //
 // Errors: those of the model's own Create function.
+absl::StatusOr<std::unique_ptr<Deformer>> CreateDeformer(
+    const std::shared_ptr<MeshPreparation>& preparation, const DeformerOptions& options);
+
+// One model with a preparation of its own. `stiffness` is Young's modulus per tet in Pa, #T,
+// positive.
+//
+// Errors: also those of MeshPreparation::Create.
 absl::StatusOr<std::unique_ptr<Deformer>> CreateDeformer(const TetMesh& mesh,
                                                          const Eigen::VectorXd& stiffness,
                                                          const ConstraintSet& constraints,

@@ -41,16 +41,33 @@ absl::Status CheckStiffness(Eigen::Index num_cells, const Eigen::VectorXd& stiff
   return absl::OkStatus();
 }
 
-absl::Status CheckIteration(int max_iterations, double tolerance_mm) {
-  if (max_iterations < 1) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("max_iterations is ", max_iterations, "; it must be at least 1"));
-  }
+absl::Status CheckTolerance(double tolerance_mm) {
   if (!std::isfinite(tolerance_mm) || tolerance_mm <= 0) {
     return absl::InvalidArgumentError(
         absl::StrCat("tolerance_mm is ", tolerance_mm, "; it must be a positive number"));
   }
   return absl::OkStatus();
+}
+
+absl::Status CheckChosenVertices(const std::vector<int32_t>& vertices, Eigen::Index num_vertices) {
+  if (vertices.empty()) {
+    return absl::InvalidArgumentError("no vertices are chosen; name at least one");
+  }
+  for (const int32_t v : vertices) {
+    if (v < 0 || v >= num_vertices) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("chosen vertex ", v, " is outside 0 to ", num_vertices - 1));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckIteration(int max_iterations, double tolerance_mm) {
+  if (max_iterations < 1) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("max_iterations is ", max_iterations, "; it must be at least 1"));
+  }
+  return CheckTolerance(tolerance_mm);
 }
 
 }  // namespace tissueform

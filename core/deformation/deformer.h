@@ -29,6 +29,9 @@ struct SolveSummary {
   // Share of the poses' motion that was reached; below 1 when a model that loads in steps came no
   // further.
   double load = 1;
+  // Found by prepared answers (VertexResponse), and how far it may then lie from the direct one.
+  bool prepared = false;
+  double error_bound_mm = 0;
 };
 
 struct Deformation {

@@ -6,26 +6,18 @@
 #include <utility>
 
 #include "absl/memory/memory.h"
-#include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/deformation/deformation_checks.h"
 #include "core/deformation/harmonic_fields.h"
+#include "core/elasticity/material.h"
 #include "core/mesh/validation.h"
 #include "core/operators/edge_laplacian.h"
 #include "core/operators/laplacian.h"
 
 namespace tissueform {
 namespace {
-
-absl::Status CheckPoissonRatio(double poisson_ratio) {
-  if (!(poisson_ratio >= 0 && poisson_ratio < 0.5)) {
-    return absl::InvalidArgumentError(absl::StrCat("Poisson's ratio is ", poisson_ratio,
-                                                   "; it must be at least 0 and below 0.5"));
-  }
-  return absl::OkStatus();
-}
 
 int64_t BytesOf(const Eigen::MatrixXd& matrix) {
   return matrix.size() * static_cast<int64_t>(sizeof(double));

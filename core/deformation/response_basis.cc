@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "core/deformation/deformation_checks.h"
 #include "core/deformation/harmonic_fields.h"
 #include "core/deformation/panel_response.h"
 #include "core/deformation/rotation_expansion.h"
@@ -24,16 +25,13 @@ constexpr Eigen::Index kTermsPerPass = 6;
 constexpr int kGuardDegrees = 2;
 constexpr int kColumnsPerHandle = 4;
 // Measured over test meshes; see PlannedErrorMm.
-constexpr double kPlannedGain = 1.0;
+constexpr double kPlannedGain = 0.5;
 // Responses fall with the degree; this allows for those of the second guard degree, which are not
 // measured, not doing so.
 constexpr double kGainAllowance = 1.5;
 
 absl::Status CheckOptions(const ResponseBasisOptions& options) {
-  if (!std::isfinite(options.tolerance_mm) || options.tolerance_mm <= 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("tolerance_mm is ", options.tolerance_mm, "; it must be a positive number"));
-  }
+  TF_RETURN_IF_ERROR(CheckTolerance(options.tolerance_mm));
   if (!std::isfinite(options.max_rotation_rad) || options.max_rotation_rad <= 0) {
     return absl::InvalidArgumentError(absl::StrCat("max_rotation_rad is ", options.max_rotation_rad,
                                                    "; it must be a positive number"));
@@ -233,19 +231,6 @@ class ResponseBasis : public VertexResponse {
   Eigen::MatrixXd factors_;
 };
 
-absl::Status CheckVertices(const std::vector<int32_t>& vertices, Eigen::Index num_vertices) {
-  if (vertices.empty()) {
-    return absl::InvalidArgumentError("no vertices are chosen; name at least one");
-  }
-  for (const int32_t v : vertices) {
-    if (v < 0 || v >= num_vertices) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("chosen vertex ", v, " is outside 0 to ", num_vertices - 1));
-    }
-  }
-  return absl::OkStatus();
-}
-
 }  // namespace
 
 absl::StatusOr<ResponseBasisPlan> PlanResponseBasis(const MeshPreparation& preparation,
@@ -271,7 +256,7 @@ absl::StatusOr<ResponseBasisPlan> PlanResponseBasis(const MeshPreparation& prepa
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponseBasis(
     const std::shared_ptr<MeshPreparation>& preparation, const std::vector<int32_t>& vertices,
     const ResponseBasisOptions& options) {
-  TF_RETURN_IF_ERROR(CheckVertices(vertices, preparation->mesh().num_vertices()));
+  TF_RETURN_IF_ERROR(CheckChosenVertices(vertices, preparation->mesh().num_vertices()));
   TF_ASSIGN_OR_RETURN(
       const ResponseBasisPlan plan,
       PlanResponseBasis(*preparation, static_cast<Eigen::Index>(vertices.size()), options));

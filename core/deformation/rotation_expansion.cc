@@ -28,9 +28,11 @@ Blend BlendAt(absl::Span<const HandlePose> poses, const Eigen::VectorXd& u) {
   return blend;
 }
 
-// x^n / n!
-double PowerOverFactorial(double x, int n) {
-  return std::exp(n * std::log(x) - std::lgamma(n + 1));
+// Of turning by vectors in a ball of radius r, after polynomials of degree n.
+double Remainder(double r, int n) {
+  constexpr double kLebesgueAllowance = 16;
+  const double taylor = std::exp((n + 1) * std::log(r) - std::lgamma(n + 2));
+  return std::min(1.0, std::ldexp(kLebesgueAllowance, -n)) * taylor;
 }
 
 }  // namespace
@@ -82,8 +84,8 @@ double RotationExpansion::RemainderBound(absl::Span<const HandlePose> poses, int
   }
   const double dimension = static_cast<double>(k);
   const double radius = diameter * std::sqrt(dimension / (2 * dimension + 2));
-  return 0.5 * (largest_scale + smallest_scale) * PowerOverFactorial(radius, degree + 1) +
-         0.5 * (largest_scale - smallest_scale) * PowerOverFactorial(radius, degree);
+  return 0.5 * (largest_scale + smallest_scale) * Remainder(radius, degree) +
+         0.5 * (largest_scale - smallest_scale) * Remainder(radius, degree - 1);
 }
 
 int64_t RotationExpansion::bytes_held() const {

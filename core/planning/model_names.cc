@@ -4,7 +4,6 @@
 #include "core/planning/model_names.h"
 
 #include <array>
-#include <optional>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
@@ -12,18 +11,18 @@
 namespace tissueform {
 namespace {
 
-// A word of the plan format; without a value where this version cannot do it yet.
+// A word of the plan format.
 template <typename Value>
 struct Word {
   absl::string_view name;
-  std::optional<Value> value;
+  Value value;
 };
 
 constexpr std::array<Word<DeformationModel>, 4> kModels = {{
     {"gradient_field", DeformationModel::kGradientField},
-    {"arap", std::nullopt},
-    {"linear_elastic", std::nullopt},
-    {"neo_hookean", std::nullopt},
+    {"arap", DeformationModel::kArap},
+    {"linear_elastic", DeformationModel::kLinearElastic},
+    {"neo_hookean", DeformationModel::kNeoHookean},
 }};
 constexpr std::array<Word<RotationMode>, 3> kRotations = {{
     {"propagated", RotationMode::kPropagated},
@@ -41,11 +40,9 @@ constexpr std::array<Word<BlendMap>, 2> kBlends = {{
 }};
 
 template <typename Words>
-std::string Working(const Words& words) {
+std::string Names(const Words& words) {
   std::vector<std::string> names;
-  for (const auto& word : words) {
-    if (word.value.has_value()) names.push_back(absl::StrCat("\"", word.name, "\""));
-  }
+  for (const auto& word : words) names.push_back(absl::StrCat("\"", word.name, "\""));
   return absl::StrJoin(names, " or ");
 }
 
@@ -53,13 +50,10 @@ template <typename Value, size_t N>
 absl::StatusOr<Value> Find(const std::array<Word<Value>, N>& words, absl::string_view name,
                            absl::string_view key) {
   for (const Word<Value>& word : words) {
-    if (word.name != name) continue;
-    if (word.value.has_value()) return *word.value;
-    return absl::UnimplementedError(
-        absl::StrCat(key, " \"", name, "\" is not in this version; use ", Working(words)));
+    if (word.name == name) return word.value;
   }
   return absl::InvalidArgumentError(
-      absl::StrCat("there is no ", key, " \"", name, "\"; use ", Working(words)));
+      absl::StrCat("there is no ", key, " \"", name, "\"; use ", Names(words)));
 }
 
 template <typename Value, size_t N>

@@ -16,8 +16,7 @@ namespace tissueform {
 // The models that the plan format knows, by their names there, in its order.
 std::vector<std::string> KnownModelNames();
 
-// Errors: InvalidArgument for a name that the format does not know; Unimplemented, saying which
-// work, for one that this version does not have.
+// Errors: InvalidArgument for a name that the format does not know.
 absl::StatusOr<DeformationModel> ModelFromName(absl::string_view name);
 std::string ModelName(DeformationModel model);
 

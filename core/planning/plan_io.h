@@ -25,9 +25,8 @@ struct PlanReadOptions {
 // which is built into the program.
 //
 // Errors: NotFound (no such file), InvalidArgument (not JSON, unknown key, wrong type, value out of
-// range; the message names the key as a JSON pointer), Unimplemented (a model that this version
-// does not have), PermissionDenied (the mesh, or the file that belongs to it, leaves the folder of
-// the plan through "..", an absolute path or a symbolic link).
+// range; the message names the key as a JSON pointer), PermissionDenied (the mesh, or the file that
+// belongs to it, leaves the folder of the plan through "..", an absolute path or a symbolic link).
 absl::StatusOr<Plan> ReadPlan(const std::string& path, const PlanReadOptions& options = {});
 
 // The same for a text; `folder` is what the mesh path is relative to and `name` stands for the file

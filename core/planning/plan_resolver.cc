@@ -71,6 +71,7 @@ absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan) {
                       ToLps(plan.coordinate_system, file.mesh));
   DeformerOptions deformer;
   deformer.model = plan.model;
+  deformer.preparation.poisson_ratio = plan.poisson_ratio;
   deformer.gradient_field = plan.gradient_field;
   return PlanProblem{.mesh = std::move(mesh),
                      .point_data = std::move(file.point_data),

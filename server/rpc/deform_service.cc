@@ -10,6 +10,7 @@
 #include "core/base/status_macros.h"
 #include "core/deformation/deformation_quality.h"
 #include "server/rpc/deform_stream.h"
+#include "server/rpc/model_conversion.h"
 #include "server/rpc/proto_conversion.h"
 
 namespace tissueform {
@@ -18,6 +19,7 @@ namespace {
 // A DeformOnceRequest that has been checked.
 struct DeformOnceJob {
   std::shared_ptr<Session> session;
+  DeformationModel model = DeformationModel::kGradientField;
   std::vector<HandlePose> poses;
   VertexChoice choice;
 };
@@ -28,6 +30,7 @@ absl::StatusOr<DeformOnceJob> ReadRequest(const v1::DeformOnceRequest& request,
   TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(request.session()));
   TF_RETURN_IF_ERROR(CheckEncoding(request.encoding()));
   TF_ASSIGN_OR_RETURN(job.session, registry->Find(id));
+  TF_ASSIGN_OR_RETURN(job.model, ToModel(request.model(), job.session->model()));
   TF_ASSIGN_OR_RETURN(job.poses, ToPoses(request.poses(), job.session->constraints()));
   TF_ASSIGN_OR_RETURN(job.choice, ToVertexChoice(request.vertices(), job.session->mesh()));
   return job;
@@ -36,7 +39,7 @@ absl::StatusOr<DeformOnceJob> ReadRequest(const v1::DeformOnceRequest& request,
 // On the session's strand.
 absl::Status Run(const DeformOnceJob& job, v1::DeformOnceResponse* response) {
   TF_ASSIGN_OR_RETURN(const Deformation deformation,
-                      job.session->Deform(job.poses, DeformControl{}));
+                      job.session->Deform(job.model, job.poses, DeformControl{}));
   *response->mutable_summary() = ToProto(deformation.summary);
   *response->mutable_quality() =
       ToProto(MeasureDeformation(job.session->mesh().mesh, deformation.positions));

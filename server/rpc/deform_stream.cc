@@ -4,24 +4,39 @@
 #include "server/rpc/deform_stream.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "server/rpc/model_conversion.h"
 
 namespace tissueform {
 namespace {
 
 v1::DeformResponse MakeFrame(uint64_t sequence, int64_t coalesced_count,
-                             const Deformation& deformation, const VertexChoice& choice) {
+                             const SolveSummary& summary, std::string positions) {
   v1::DeformResponse response;
   v1::DeformFrame* frame = response.mutable_frame();
   frame->set_sequence(sequence);
   frame->set_coalesced_count(coalesced_count);
-  *frame->mutable_summary() = ToProto(deformation.summary);
-  *frame->mutable_positions() = EncodePositions(deformation.positions, choice);
+  *frame->mutable_summary() = ToProto(summary);
+  *frame->mutable_positions() = std::move(positions);
   return response;
+}
+
+absl::Status ReadPrepared(const v1::PreparedAnswers& settings, ResponseRequest* request) {
+  if (settings.has_tolerance_mm()) request->tolerance_mm = settings.tolerance_mm();
+  if (settings.has_max_rotation()) request->max_rotation_rad = settings.max_rotation();
+  for (const double number : {request->tolerance_mm, request->max_rotation_rad}) {
+    if (!std::isfinite(number) || number <= 0) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "prepared.tolerance_mm and max_rotation must be positive numbers, not ", number));
+    }
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -123,14 +138,69 @@ absl::Status DeformStreamReactor::TakeConfiguration(const v1::DeformConfiguratio
   }
   TF_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, registry_->Find(id));
   TF_ASSIGN_OR_RETURN(choice_, ToVertexChoice(configuration.vertices(), session->mesh()));
+  TF_RETURN_IF_ERROR(ReadAnswers(configuration, *session));
   session_ = std::move(session);
+  if (response_request_.has_value() || model_ != session_->model()) {
+    solving_ = true;
+    session_->strand().Post([this] { PrepareAnswers(); });
+  } else {
+    SendStarted(nullptr);
+  }
+  return absl::OkStatus();
+}
 
+absl::Status DeformStreamReactor::ReadAnswers(const v1::DeformConfiguration& configuration,
+                                              const Session& session) {
+  TF_ASSIGN_OR_RETURN(model_, ToModel(configuration.model(), session.model()));
+  if (!configuration.has_prepared()) return absl::OkStatus();
+  ResponseRequest request{.model = model_, .vertices = choice_.vertices};
+  TF_RETURN_IF_ERROR(ReadPrepared(configuration.prepared(), &request));
+  if (choice_.all) {
+    request.vertices.resize(session.mesh().mesh.num_vertices());
+    std::iota(request.vertices.begin(), request.vertices.end(), 0);
+  }
+  response_request_ = std::move(request);
+  return absl::OkStatus();
+}
+
+void DeformStreamReactor::SendStarted(const VertexResponse* response) {
   v1::DeformStarted* started = started_.emplace().mutable_started();
   started->set_max_unacked(static_cast<int32_t>(max_unacked_));
   started->set_vertex_count(choice_.all ? session_->mesh().mesh.num_vertices()
                                         : static_cast<int64_t>(choice_.vertices.size()));
   started->mutable_vertices()->Add(choice_.vertices.begin(), choice_.vertices.end());
-  return absl::OkStatus();
+  if (response != nullptr) {
+    started->set_prepared_terms(response->num_terms());
+    started->set_prepared_bytes(response->bytes_held());
+  }
+}
+
+void DeformStreamReactor::PrepareAnswers() {
+  std::shared_ptr<Session> session;
+  DeformationModel model = DeformationModel::kGradientField;
+  const ResponseRequest* request = nullptr;
+  {
+    MutexLock lock(mutex_);
+    session = session_;
+    model = model_;
+    request = response_request_.has_value() ? &*response_request_ : nullptr;
+  }
+  const CancelledFunction cancelled = [this] { return Ended(); };
+  absl::Status status = session->PrepareModel(model, cancelled);
+  const VertexResponse* response = nullptr;
+  if (status.ok() && request != nullptr) {
+    const absl::StatusOr<VertexResponse*> prepared = session->PrepareResponse(*request, cancelled);
+    status = prepared.status();
+    response = prepared.ok() ? *prepared : nullptr;
+  }
+  MutexLock lock(mutex_);
+  solving_ = false;
+  if (status.ok()) {
+    SendStarted(response);
+  } else {
+    End(status);
+  }
+  Advance();
 }
 
 absl::Status DeformStreamReactor::TakePose(const v1::PoseUpdate& update) {
@@ -217,40 +287,58 @@ bool DeformStreamReactor::MayFinish() const {
 void DeformStreamReactor::SolveNewest() {
   std::optional<PendingPose> pose;
   std::shared_ptr<Session> session;
-  const VertexChoice* choice = nullptr;
   {
     MutexLock lock(mutex_);
     if (!outcome_.has_value()) {
       pose = std::exchange(mailbox_, std::nullopt);
     }
     session = session_;
-    choice = &choice_;
   }
-  absl::Status status;
-  v1::DeformResponse response;
   bool given_up = false;
-  if (pose.has_value()) {
-    DeformControl control;
-    control.warm_start = true;
-    control.on_progress = [&](const Deformation& so_far) {
-      return ShowEarly(*pose, so_far, *choice);
-    };
-    const absl::StatusOr<Deformation> deformation = session->Deform(pose->poses, control);
-    status = deformation.status();
-    if (deformation.ok()) {
-      given_up = deformation->summary.cancelled;
-      response = MakeFrame(pose->sequence, pose->coalesced_count, *deformation, *choice);
-    }
-  }
+  absl::StatusOr<v1::DeformResponse> response = v1::DeformResponse();
+  if (pose.has_value()) response = Answer(*pose, session.get(), &given_up);
   MutexLock lock(mutex_);
   solving_ = false;
-  if (!status.ok()) {
-    End(status);
+  if (!response.ok()) {
+    End(response.status());
   } else if (pose.has_value() && !(given_up && CountFrames(pose->sequence) > 0)) {
     // An answer that was given up is still better than none for its pose.
-    Offer(std::move(response));
+    Offer(*std::move(response));
   }
   Advance();
+}
+
+absl::StatusOr<v1::DeformResponse> DeformStreamReactor::Answer(const PendingPose& pose,
+                                                               Session* session, bool* given_up) {
+  const VertexChoice* choice = nullptr;
+  const ResponseRequest* request = nullptr;
+  DeformationModel model = DeformationModel::kGradientField;
+  {
+    MutexLock lock(mutex_);
+    choice = &choice_;
+    request = response_request_.has_value() ? &*response_request_ : nullptr;
+    model = model_;
+  }
+  if (request != nullptr) {
+    TF_ASSIGN_OR_RETURN(const std::optional<PreparedAnswer> answer,
+                        session->Respond(*request, pose.poses));
+    if (answer.has_value()) {
+      return MakeFrame(pose.sequence, pose.coalesced_count, answer->summary,
+                       EncodePositions(answer->positions));
+    }
+  }
+  DeformControl control;
+  control.warm_start = true;
+  control.on_progress = [&](const Deformation& so_far) { return ShowEarly(pose, so_far, *choice); };
+  TF_ASSIGN_OR_RETURN(const Deformation deformation, session->Deform(model, pose.poses, control));
+  *given_up = deformation.summary.cancelled;
+  return MakeFrame(pose.sequence, pose.coalesced_count, deformation.summary,
+                   EncodePositions(deformation.positions, *choice));
+}
+
+bool DeformStreamReactor::Ended() {
+  MutexLock lock(mutex_);
+  return outcome_.has_value();
 }
 
 bool DeformStreamReactor::ShowEarly(const PendingPose& pose, const Deformation& so_far,
@@ -265,7 +353,8 @@ bool DeformStreamReactor::ShowEarly(const PendingPose& pose, const Deformation& 
       return true;
     }
   }
-  v1::DeformResponse response = MakeFrame(pose.sequence, pose.coalesced_count, so_far, choice);
+  v1::DeformResponse response = MakeFrame(pose.sequence, pose.coalesced_count, so_far.summary,
+                                          EncodePositions(so_far.positions, choice));
   response.mutable_frame()->set_refining(true);
   MutexLock lock(mutex_);
   if (!outcome_.has_value()) {

@@ -60,6 +60,9 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   absl::Status Take() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status TakeConfiguration(const v1::DeformConfiguration& configuration)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // How frames are answered. Errors: InvalidArgument.
+  absl::Status ReadAnswers(const v1::DeformConfiguration& configuration, const Session& session)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status TakePose(const v1::PoseUpdate& update) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status TakeAck(const v1::FrameAck& ack) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
@@ -71,6 +74,15 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   bool MaySolve() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool MayFinish() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
+  // The first message of the server; `response` is null without prepared answers.
+  void SendStarted(const VertexResponse* response) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  // On the session's strand: makes the model and the prepared answers of the stream.
+  void PrepareAnswers() ABSL_LOCKS_EXCLUDED(mutex_);
+  // On the session's strand: the frame that answers a pose, from prepared answers where they cover
+  // it. `given_up` when a newer pose came first.
+  absl::StatusOr<v1::DeformResponse> Answer(const PendingPose& pose, Session* session,
+                                            bool* given_up) ABSL_LOCKS_EXCLUDED(mutex_);
   // On the session's strand: answers the newest pose.
   void SolveNewest() ABSL_LOCKS_EXCLUDED(mutex_);
   // On the session's strand, from within a solve that iterates: shows `so_far` early where there is
@@ -78,6 +90,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   // ends.
   bool ShowEarly(const PendingPose& pose, const Deformation& so_far, const VertexChoice& choice)
       ABSL_LOCKS_EXCLUDED(mutex_);
+  bool Ended() ABSL_LOCKS_EXCLUDED(mutex_);
   // Hands over a frame for its write; it replaces an earlier answer to the same pose that still
   // waits.
   void Offer(v1::DeformResponse frame) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -97,7 +110,10 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
 
   Mutex mutex_;
   std::shared_ptr<Session> session_ ABSL_GUARDED_BY(mutex_);  // null before the configuration
-  VertexChoice choice_ ABSL_GUARDED_BY(mutex_);               // constant after the configuration
+  // Constant after the configuration.
+  VertexChoice choice_ ABSL_GUARDED_BY(mutex_);
+  DeformationModel model_ ABSL_GUARDED_BY(mutex_) = DeformationModel::kGradientField;
+  std::optional<ResponseRequest> response_request_ ABSL_GUARDED_BY(mutex_);
   size_t max_unacked_ ABSL_GUARDED_BY(mutex_) = 2;
   std::optional<uint64_t> last_sequence_ ABSL_GUARDED_BY(mutex_);
   std::optional<PendingPose> mailbox_ ABSL_GUARDED_BY(mutex_);

@@ -27,6 +27,38 @@ absl::StatusOr<RotationMode> ToRotationMode(v1::RotationMode mode) {
 
 }  // namespace
 
+absl::StatusOr<DeformationModel> ToModel(v1::DeformationModel model, DeformationModel otherwise) {
+  switch (model) {
+    case v1::DEFORMATION_MODEL_UNSPECIFIED:
+      return otherwise;
+    case v1::DEFORMATION_MODEL_GRADIENT_FIELD:
+      return DeformationModel::kGradientField;
+    case v1::DEFORMATION_MODEL_ARAP:
+      return DeformationModel::kArap;
+    case v1::DEFORMATION_MODEL_LINEAR_ELASTIC:
+      return DeformationModel::kLinearElastic;
+    case v1::DEFORMATION_MODEL_NEO_HOOKEAN:
+      return DeformationModel::kNeoHookean;
+    default:
+      return absl::InvalidArgumentError(
+          absl::StrCat("model ", model, " is not known to this server"));
+  }
+}
+
+v1::DeformationModel ToProto(DeformationModel model) {
+  switch (model) {
+    case DeformationModel::kGradientField:
+      break;
+    case DeformationModel::kArap:
+      return v1::DEFORMATION_MODEL_ARAP;
+    case DeformationModel::kLinearElastic:
+      return v1::DEFORMATION_MODEL_LINEAR_ELASTIC;
+    case DeformationModel::kNeoHookean:
+      return v1::DEFORMATION_MODEL_NEO_HOOKEAN;
+  }
+  return v1::DEFORMATION_MODEL_GRADIENT_FIELD;
+}
+
 absl::StatusOr<GradientFieldOptions> ToGradientFieldOptions(
     const v1::GradientFieldSettings& settings, const ServiceLimits& limits) {
   GradientFieldOptions options;

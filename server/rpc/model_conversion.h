@@ -5,11 +5,16 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/deformation/gradient_field_deformer.h"
+#include "core/deformation/create_deformer.h"
 #include "server/session/limits.h"
 #include "tissueform/v1/session.pb.h"
 
 namespace tissueform {
+
+// `otherwise` where the client leaves it open. Errors: InvalidArgument for a model that this server
+// does not know.
+absl::StatusOr<DeformationModel> ToModel(v1::DeformationModel model, DeformationModel otherwise);
+v1::DeformationModel ToProto(DeformationModel model);
 
 // Settings of the gradient field as the client asks for them; what belongs to the server keeps its
 // default.

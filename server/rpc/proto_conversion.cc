@@ -53,11 +53,9 @@ absl::Status ReadStiffness(const v1::Stiffness& stiffness, SessionSpec* spec) {
 
 absl::Status ReadModel(const v1::CreateSessionRequest& request, const ServiceLimits& limits,
                        SessionSpec* spec) {
-  if (request.model() != v1::DEFORMATION_MODEL_UNSPECIFIED &&
-      request.model() != v1::DEFORMATION_MODEL_GRADIENT_FIELD) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("model ", request.model(), " is not known to this server"));
-  }
+  TF_ASSIGN_OR_RETURN(spec->model, ToModel(request.model(), DeformationModel::kGradientField));
+  // Checked by the preparation.
+  if (request.has_poisson_ratio()) spec->poisson_ratio = request.poisson_ratio();
   TF_ASSIGN_OR_RETURN(spec->gradient_field,
                       ToGradientFieldOptions(request.gradient_field(), limits));
   return absl::OkStatus();
@@ -179,7 +177,8 @@ v1::Session ToProto(const Session& session) {
   v1::Session proto;
   proto.set_name(absl::StrCat(kSessionPrefix, session.id()));
   proto.set_mesh(absl::StrCat(kMeshPrefix, session.mesh().sha256));
-  proto.set_model(v1::DEFORMATION_MODEL_GRADIENT_FIELD);
+  proto.set_model(ToProto(session.model()));
+  proto.set_poisson_ratio(session.poisson_ratio());
   *proto.mutable_gradient_field() = ToProto(session.gradient_field());
   proto.set_vertex_count(session.mesh().mesh.num_vertices());
   proto.set_tet_count(session.mesh().mesh.num_tets());
@@ -277,10 +276,9 @@ absl::Status CheckEncoding(v1::PositionEncoding encoding) {
 }
 
 std::string EncodePositions(const Positions& positions, const VertexChoice& choice) {
-  using Float32Positions = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
   const Eigen::Index count =
       choice.all ? positions.rows() : static_cast<Eigen::Index>(choice.vertices.size());
-  Float32Positions encoded(count, 3);
+  FloatPositions encoded(count, 3);
   if (choice.all) {
     encoded = positions.cast<float>();
   } else {
@@ -288,7 +286,11 @@ std::string EncodePositions(const Positions& positions, const VertexChoice& choi
       encoded.row(i) = positions.row(choice.vertices[i]).cast<float>();
     }
   }
-  return {reinterpret_cast<const char*>(encoded.data()), encoded.size() * sizeof(float)};
+  return EncodePositions(encoded);
+}
+
+std::string EncodePositions(const FloatPositions& positions) {
+  return {reinterpret_cast<const char*>(positions.data()), positions.size() * sizeof(float)};
 }
 
 v1::SolveSummary ToProto(const SolveSummary& summary) {
@@ -299,6 +301,10 @@ v1::SolveSummary ToProto(const SolveSummary& summary) {
   proto.set_residual(summary.residual);
   proto.mutable_changes_mm()->Add(summary.changes_mm.begin(), summary.changes_mm.end());
   proto.set_cancelled(summary.cancelled);
+  proto.mutable_energies_nj()->Add(summary.energies_nj.begin(), summary.energies_nj.end());
+  proto.set_load(summary.load);
+  proto.set_prepared(summary.prepared);
+  proto.set_error_bound_mm(summary.error_bound_mm);
   return proto;
 }
 

@@ -15,6 +15,7 @@
 #include "core/constraints/handle_pose.h"
 #include "core/deformation/deformation_quality.h"
 #include "core/deformation/deformer.h"
+#include "core/deformation/vertex_response.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session.h"
@@ -63,6 +64,7 @@ absl::Status CheckEncoding(v1::PositionEncoding encoding);
 
 // POSITION_ENCODING_FLOAT32.
 std::string EncodePositions(const Positions& positions, const VertexChoice& choice);
+std::string EncodePositions(const FloatPositions& positions);
 
 v1::SolveSummary ToProto(const SolveSummary& summary);
 v1::DeformationQuality ToProto(const DeformationQuality& quality);

@@ -8,25 +8,10 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
 
 namespace tissueform {
 namespace {
-
-// Upper bound of what a deformer holds and needs for its preparation, the factor apart: gradient
-// and divergence (12 numbers a tet each, with indices), the system matrix and its parts (some 15
-// entries a row), harmonic fields at vertices and tets, and the workspaces of three right-hand
-// sides.
-int64_t EstimateBytesBesideFactor(int64_t num_vertices, int64_t num_tets, int64_t num_handles) {
-  constexpr int64_t kPerVertex = 1600;
-  constexpr int64_t kPerVertexAndHandle = 40;
-  constexpr int64_t kPerTet = 800;
-  constexpr int64_t kPerTetAndHandle = 32;
-  return num_vertices * (kPerVertex + kPerVertexAndHandle * num_handles) +
-         num_tets * (kPerTet + kPerTetAndHandle * num_handles);
-}
-
-// An answer and the messages that carry it: float64 once, float32 in up to three frames.
-constexpr int64_t kAnswerBytesPerVertex = 3 * (8 + 3 * 4);
 
 absl::StatusOr<Eigen::VectorXd> ResolveStiffness(const SessionSpec& spec) {
   if (const double* uniform = std::get_if<double>(&spec.stiffness)) {
@@ -48,6 +33,7 @@ Session::Session(std::string id, SessionSpec spec, ConstraintSet constraints, Wo
       mesh_(std::move(spec.mesh)),
       constraints_(std::move(constraints)),
       model_(spec.model),
+      poisson_ratio_(spec.poisson_ratio),
       gradient_field_(spec.gradient_field),
       strand_(pool),
       last_used_(std::chrono::steady_clock::now()) {}
@@ -67,45 +53,69 @@ absl::StatusOr<std::shared_ptr<Session>> Session::Create(std::string id, Session
 
 absl::Status Session::Prepare(const Eigen::VectorXd& stiffness, MemoryBudget* budget,
                               const CancelledFunction& cancelled) {
-  const TetMesh& mesh = mesh_->mesh;
-  const int64_t beside_factor = EstimateBytesBesideFactor(
-      mesh.num_vertices(), mesh.num_tets(), static_cast<int64_t>(constraints_.handles().size()));
-  TF_ASSIGN_OR_RETURN(reservation_, budget->Reserve(beside_factor, "session"));
-
   DeformerOptions options;
   options.model = model_;
+  options.preparation.poisson_ratio = poisson_ratio_;
   options.gradient_field = gradient_field_;
   // Told in every answer; a small part of a solve.
   options.gradient_field.compute_residual = true;
-  // Called for every factor; uniform guidance has a second one for a while.
-  options.gradient_field.admission = [this, reserved = beside_factor,
-                                      &cancelled](int64_t factor_bytes) mutable -> absl::Status {
-    if (cancelled()) {
-      return absl::CancelledError("the client has cancelled the call");
-    }
-    reserved += factor_bytes;
-    return reservation_.Resize(reserved, "matrix factor");
-  };
-  TF_ASSIGN_OR_RETURN(deformer_, CreateDeformer(mesh, stiffness, constraints_, options));
-  preparation_ = deformer_->preparation();
-  bytes_held_ = preparation_.bytes_held + kAnswerBytesPerVertex * mesh.num_vertices();
+  models_ = std::make_unique<SessionModels>(std::move(options), budget);
+  TF_RETURN_IF_ERROR(models_->Begin(mesh_->mesh, stiffness, constraints_));
+  TF_ASSIGN_OR_RETURN(const Deformer* deformer, models_->Prepare(model_, cancelled));
+  preparation_ = deformer->preparation();
+  bytes_held_ = models_->bytes_held();
   Touch();
-  return reservation_.Resize(bytes_held_, "session");
+  return absl::OkStatus();
 }
 
-absl::StatusOr<Deformation> Session::Deform(absl::Span<const HandlePose> poses,
+absl::Status Session::CheckOpen() const {
+  if (models_ != nullptr) return absl::OkStatus();
+  return absl::NotFoundError(
+      absl::StrCat("sessions/", id_, " has been deleted; create it again"));
+}
+
+absl::Status Session::PrepareModel(DeformationModel model, const CancelledFunction& cancelled) {
+  TF_RETURN_IF_ERROR(CheckOpen());
+  const absl::Status status = models_->Prepare(model, cancelled).status();
+  bytes_held_ = models_->bytes_held();
+  return status;
+}
+
+absl::StatusOr<VertexResponse*> Session::PrepareResponse(const ResponseRequest& request,
+                                                         const CancelledFunction& cancelled) {
+  TF_RETURN_IF_ERROR(CheckOpen());
+  absl::StatusOr<VertexResponse*> response = models_->PrepareResponse(request, cancelled);
+  bytes_held_ = models_->bytes_held();
+  return response;
+}
+
+absl::StatusOr<Deformation> Session::Deform(DeformationModel model,
+                                            absl::Span<const HandlePose> poses,
                                             const DeformControl& control) {
-  if (deformer_ == nullptr) {
-    return absl::NotFoundError(
-        absl::StrCat("sessions/", id_, " has been deleted; create it again"));
-  }
   Touch();
-  return deformer_->Deform(poses, control);
+  TF_RETURN_IF_ERROR(CheckOpen());
+  const absl::StatusOr<Deformer*> deformer = models_->Prepare(model, [] { return false; });
+  bytes_held_ = models_->bytes_held();
+  TF_RETURN_IF_ERROR(deformer.status());
+  return (*deformer)->Deform(poses, control);
 }
 
-void Session::Close() {
-  deformer_.reset();
-  reservation_ = MemoryReservation();
+absl::StatusOr<std::optional<PreparedAnswer>> Session::Respond(
+    const ResponseRequest& request, absl::Span<const HandlePose> poses) {
+  Touch();
+  const Stopwatch stopwatch;
+  TF_ASSIGN_OR_RETURN(VertexResponse* const response,
+                      PrepareResponse(request, [] { return false; }));
+  if (!response->Covers(poses)) return std::optional<PreparedAnswer>();
+  PreparedAnswer answer;
+  response->Evaluate(poses, &answer.positions);
+  answer.summary.iterations = 0;
+  answer.summary.prepared = true;
+  answer.summary.error_bound_mm = response->ErrorBoundMm(poses);
+  answer.summary.solve_seconds = stopwatch.Seconds();
+  return std::optional<PreparedAnswer>(std::move(answer));
 }
+
+void Session::Close() { models_.reset(); }
 
 }  // namespace tissueform

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -22,6 +23,7 @@
 #include "core/deformation/deformer.h"
 #include "server/session/memory_budget.h"
 #include "server/session/mesh_catalog.h"
+#include "server/session/session_models.h"
 #include "server/session/worker_pool.h"
 
 namespace tissueform {
@@ -33,13 +35,17 @@ struct SessionSpec {
   std::vector<int32_t> fixed;
   std::vector<HandleRegion> handles;
   DeformationModel model = DeformationModel::kGradientField;
+  double poisson_ratio = 0.45;          // of the elastic models
   GradientFieldOptions gradient_field;  // as the client asks; the server fills in the rest
 };
 
-// Asked now and then during long work.
-using CancelledFunction = std::function<bool()>;
+// An answer at chosen vertices from prepared columns.
+struct PreparedAnswer {
+  FloatPositions positions;
+  SolveSummary summary;
+};
 
-// A mesh prepared for poses. Lives on its strand: Deform and Close run there and nowhere else;
+// A mesh prepared for poses. Lives on its strand: what is marked so runs there and nowhere else;
 // everything else is constant and may be read from any thread.
 class Session {
  public:
@@ -55,17 +61,33 @@ class Session {
   const StoredMesh& mesh() const { return *mesh_; }
   const ConstraintSet& constraints() const { return constraints_; }
   DeformationModel model() const { return model_; }
+  double poisson_ratio() const { return poisson_ratio_; }
   const GradientFieldOptions& gradient_field() const { return gradient_field_; }
-  const PreparationSummary& preparation() const { return preparation_; }
+  const PreparationSummary& preparation() const { return preparation_; }  // of its own model
+  // Grows when another model or prepared answers are first asked for.
   int64_t bytes_held() const { return bytes_held_; }
 
   Strand& strand() { return strand_; }
 
+  // On the strand only. Makes another model than the session's own ready. What exists is shared and
+  // not factorised again.
+  //
+  // Errors: those of SessionModels::Prepare, NotFound (the session was closed).
+  absl::Status PrepareModel(DeformationModel model, const CancelledFunction& cancelled);
+  absl::StatusOr<VertexResponse*> PrepareResponse(const ResponseRequest& request,
+                                                  const CancelledFunction& cancelled);
+
   // On the strand only. `poses` has one entry per handle, in the order of the constraints.
   //
-  // Errors: InvalidArgument (a pose that is not legal), NotFound (the session was closed).
-  absl::StatusOr<Deformation> Deform(absl::Span<const HandlePose> poses,
+  // Errors: InvalidArgument (a pose that is not legal), NotFound (the session was closed), those of
+  // PrepareModel.
+  absl::StatusOr<Deformation> Deform(DeformationModel model, absl::Span<const HandlePose> poses,
                                      const DeformControl& control);
+
+  // On the strand only. The same from prepared answers; empty when they do not cover the poses: use
+  // Deform then.
+  absl::StatusOr<std::optional<PreparedAnswer>> Respond(const ResponseRequest& request,
+                                                        absl::Span<const HandlePose> poses);
 
   // On the strand only. Gives the memory back; later calls of Deform fail.
   void Close();
@@ -79,23 +101,24 @@ class Session {
 
   absl::Status Prepare(const Eigen::VectorXd& stiffness, MemoryBudget* budget,
                        const CancelledFunction& cancelled);
+  absl::Status CheckOpen() const;
 
   // Constant after Create.
   const std::string id_;
   const std::shared_ptr<const StoredMesh> mesh_;
   const ConstraintSet constraints_;
   const DeformationModel model_;
+  const double poisson_ratio_;
   const GradientFieldOptions gradient_field_;
   PreparationSummary preparation_;
-  int64_t bytes_held_ = 0;
 
   // Self-synchronised.
   Strand strand_;
+  std::atomic<int64_t> bytes_held_ = 0;
   std::atomic<std::chrono::steady_clock::time_point> last_used_;
 
   // The strand's.
-  MemoryReservation reservation_;
-  std::unique_ptr<Deformer> deformer_;
+  std::unique_ptr<SessionModels> models_;  // null once closed
 };
 
 }  // namespace tissueform

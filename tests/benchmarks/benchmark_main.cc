@@ -4,6 +4,7 @@
 // The benchmark program: ours against its peers in one process, in turns.
 
 #include <iostream>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,11 +20,30 @@
 #include "tests/benchmarks/benchmark_report.h"
 #include "tests/benchmarks/deformation_benchmark.h"
 #include "tests/benchmarks/evaluation.h"
+#include "tests/benchmarks/frame_benchmark.h"
 #include "tests/benchmarks/linear_solver_benchmark.h"
 #include "tests/benchmarks/memory_measurement.h"
 
 namespace tissueform::benchmarks {
 namespace {
+
+using FrameBenchmarkList = std::vector<std::unique_ptr<FrameBenchmark>>;
+
+// An elastic factor of the large bar would not fit into memory.
+absl::StatusOr<FrameBenchmarkList> FrameBenchmarks(const TestBar& bar, int threads) {
+  std::vector<FrameBenchmark::Kind> kinds = {FrameBenchmark::Kind::kBasis};
+  if (bar.number != kLargeBar) {
+    kinds.insert(kinds.end(),
+                 {FrameBenchmark::Kind::kBasisThreeHandles, FrameBenchmark::Kind::kElastic});
+  }
+  FrameBenchmarkList benchmarks;
+  for (const FrameBenchmark::Kind kind : kinds) {
+    TF_ASSIGN_OR_RETURN(std::unique_ptr<FrameBenchmark> benchmark,
+                        FrameBenchmark::Create(bar, kind, threads));
+    benchmarks.push_back(std::move(benchmark));
+  }
+  return benchmarks;
+}
 
 // The rows of one bar. What it holds is given back when it returns.
 absl::StatusOr<std::vector<BenchmarkRow>> MeasureTimes(const TestBar& bar,
@@ -32,12 +52,19 @@ absl::StatusOr<std::vector<BenchmarkRow>> MeasureTimes(const TestBar& bar,
                       LinearSolverBenchmark::Create(bar, bar.number != kLargeBar));
   TF_ASSIGN_OR_RETURN(const auto deformation,
                       DeformationBenchmark::Create(bar, *solvers, options.threads));
+  TF_ASSIGN_OR_RETURN(const auto frames, FrameBenchmarks(bar, options.threads));
   std::vector<TimedWork> work = deformation->work();
   work.insert(work.end(), solvers->work().begin(), solvers->work().end());
+  for (const auto& frame : frames) {
+    work.insert(work.end(), frame->work().begin(), frame->work().end());
+  }
   TF_ASSIGN_OR_RETURN(const PartSeconds medians, InterleavedMedians(work, options.repetitions));
   std::vector<BenchmarkRow> rows = deformation->Rows(medians);
   for (BenchmarkRow& row : solvers->Rows(medians)) {
     rows.push_back(std::move(row));
+  }
+  for (const auto& frame : frames) {
+    for (BenchmarkRow& row : frame->Rows(medians)) rows.push_back(std::move(row));
   }
   for (BenchmarkRow& row : rows) {
     row.mesh = bar.name;

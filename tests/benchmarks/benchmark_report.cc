@@ -95,14 +95,14 @@ std::string ReportJson(const BenchmarkReport& report) {
 }
 
 std::string RowsHeading() {
-  return absl::StrFormat("%-20s %-10s %8s %9s %11s  %-22s %11s %7s %8s", "work", "mesh", "vertices",
+  return absl::StrFormat("%-28s %-10s %8s %9s %11s  %-22s %11s %7s %8s", "work", "mesh", "vertices",
                          "tets", "ours [s]", "peer", "peer [s]", "ratio", "MiB");
 }
 
 std::string RowText(const BenchmarkRow& row) {
   const std::string solves = row.solves > 0 ? absl::StrCat("  ", row.solves, " solves") : "";
   const std::string mib = row.bytes > 0 ? absl::StrFormat("%.1f", Mib(row.bytes)) : "-";
-  return absl::StrFormat("%-20s %-10s %8d %9d %11.6f  %-22s %11s %7s %8s%s", row.work, row.mesh,
+  return absl::StrFormat("%-28s %-10s %8d %9d %11.7f  %-22s %11s %7s %8s%s", row.work, row.mesh,
                          row.vertices, row.tets, row.ours_seconds, row.peer,
                          OrDash(row.peer_seconds, 6), OrDash(row.Ratio(), 2), mib, solves);
 }
@@ -118,10 +118,10 @@ std::string MemoryText(const MemoryUse& memory) {
 std::string ClosingText(const BenchmarkReport& report) {
   std::string text;
   if (!report.growth.empty()) {
-    absl::StrAppend(&text, "\ngrowth: seconds ~ tets^exponent\n");
+    absl::StrAppend(&text, "\ngrowth: seconds ~ tets^exponent; frames: vertices of the answer^exponent\n");
   }
   for (const Growth& growth : report.growth) {
-    absl::StrAppend(&text, absl::StrFormat("  %-20s %5.2f\n", growth.work, growth.exponent));
+    absl::StrAppend(&text, absl::StrFormat("  %-28s %5.2f\n", growth.work, growth.exponent));
   }
   if (!report.targets.empty()) {
     absl::StrAppend(&text, "\ntargets\n");

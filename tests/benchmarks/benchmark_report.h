@@ -20,6 +20,7 @@ struct BenchmarkRow {
   std::string peer = "-";              // there is none
   std::optional<double> peer_seconds;  // empty: no peer, or one that would take too long here
   int64_t bytes = 0;                   // that our side holds for it; 0 where nothing is held
+  int64_t answer_vertices = 0;         // that the answer was asked for; 0: all
   int solves = 0;                      // linear solves of an answer that iterates, else 0
 
   // Above 1: we are faster.

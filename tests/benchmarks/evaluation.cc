@@ -44,6 +44,13 @@ class TargetList {
     return std::nullopt;
   }
 
+  std::optional<double> Bytes(absl::string_view work, int bar) const {
+    for (const BenchmarkRow& row : rows_) {
+      if (row.work == work && row.mesh == NameOf(bar)) return static_cast<double>(row.bytes);
+    }
+    return std::nullopt;
+  }
+
   // Peer's seconds over ours.
   std::optional<double> Ratio(absl::string_view work, int bar, absl::string_view peer) const {
     for (const BenchmarkRow& row : rows_) {
@@ -91,6 +98,28 @@ void AddTimes(int bar, TargetList* list) {
                 list->Ratio("solve 3", bar, "Eigen SimplicialLDLT"), 2);
 }
 
+// Frames from prepared answers.
+void AddFrames(TargetList* list) {
+  const std::string on = absl::StrCat(" on ", NameOf(kPaperBar));
+  for (const char* work : {"basis frame", "basis frame, 3 handles", "elastic frame"}) {
+    list->AtLeast(absl::StrCat("back-substitution / ", work, " >= 100", on),
+                  list->Ratio(work, kPaperBar, "back-substitution"), 100);
+  }
+  list->AtMost(absl::StrCat("basis preparation / factorise <= 3", on),
+               Quotient(list->Ours("basis preparation", kPaperBar),
+                        list->Ours("factorise", kPaperBar)),
+               3);
+  for (const char* handles : {"", ", 3 handles"}) {
+    const std::optional<double> share =
+        Quotient(list->Bytes(absl::StrCat("basis frame", handles), kPaperBar),
+                 list->Bytes(absl::StrCat("basis preparation", handles), kPaperBar));
+    list->AtLeast(absl::StrCat("bytes held / predicted >= 0.9", handles, on), share, 0.9);
+    list->AtMost(absl::StrCat("bytes held / predicted <= 1.1", handles, on), share, 1.1);
+  }
+  list->AtLeast(absl::StrCat("frames a second >= 60 on ", NameOf(kLargeBar)),
+                Inverse(list->Ours("basis frame", kLargeBar)), 60);
+}
+
 void AddMemory(const MemoryUse& use, TargetList* list) {
   // A process that has done nothing yet has its code and libraries in memory; these are no
   // session's.
@@ -108,12 +137,13 @@ void AddMemory(const MemoryUse& use, TargetList* list) {
 }  // namespace
 
 std::vector<Growth> GrowthExponents(const std::vector<BenchmarkRow>& rows) {
-  // log seconds by log tets, one entry a mesh, whatever the number of peers.
+  // log seconds by log tets, or log vertices that are answered; one entry a mesh, whatever the number of peers.
   std::vector<std::string> works;
   std::map<std::string, std::map<double, double>> points;
   for (const BenchmarkRow& row : rows) {
     if (points.find(row.work) == points.end()) works.push_back(row.work);
-    points[row.work][std::log(static_cast<double>(row.tets))] = std::log(row.ours_seconds);
+    const int64_t size = row.answer_vertices > 0 ? row.answer_vertices : row.tets;
+    points[row.work][std::log(static_cast<double>(size))] = std::log(row.ours_seconds);
   }
   std::vector<Growth> growth;
   for (const std::string& work : works) {
@@ -136,6 +166,7 @@ std::vector<Target> EvaluateTargets(const BenchmarkReport& report) {
   TargetList list(report.rows);
   AddTimes(kPaperBar, &list);
   AddTimes(kLargeBar, &list);
+  AddFrames(&list);
   list.AtMost("solves of an estimated answer <= 10, most of all bars", MostSolves(report.rows), 10);
   for (const MemoryUse& use : report.memory) {
     if (use.bar >= kPaperBar) AddMemory(use, &list);

@@ -31,9 +31,6 @@ auto IsRefused(const std::string& why) {
                   AllOf(HasSubstr("plan plan.json: "), HasSubstr(why), Not(HasSubstr("\n"))));
 }
 
-auto IsNotYet(const std::string& why) {
-  return StatusIs(absl::StatusCode::kUnimplemented, HasSubstr(why));
-}
 
 TEST(BadPlanTest, UnknownKeyIsNamedWithWhatIsAllowed) {
   EXPECT_THAT(Parse(PlanWith("/modle", "arap")),
@@ -161,13 +158,6 @@ TEST(BadPlanTest, LongValuesDoNotMakeLongLines) {
   const absl::StatusOr<Plan> plan = Parse(PlanWith("/unit", std::string(100000, 'm')));
   ASSERT_THAT(plan, IsRefused("/unit"));
   EXPECT_LT(plan.status().message().size(), 300U);
-}
-
-TEST(BadPlanTest, ModelsOfLaterVersionsSayWhatWorks) {
-  EXPECT_THAT(Parse(PlanWith("/model", "arap")),
-              IsNotYet("\"arap\" is not in this version; use \"gradient_field\""));
-  EXPECT_THAT(Parse(PlanWith("/model", "linear_elastic")), IsNotYet("linear_elastic"));
-  EXPECT_THAT(Parse(PlanWith("/model", "neo_hookean")), IsNotYet("neo_hookean"));
 }
 
 TEST(BadPlanTest, FileThatCannotBeReadIsNamed) {
