@@ -80,16 +80,6 @@ absl::Status CheckOutputs(const CompareOptions& options, const std::vector<std::
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::shared_ptr<MeshPreparation>> Prepare(const CompareOptions& options,
-                                                         const Plan& plan,
-                                                         const PlanProblem& problem) {
-  PreparationOptions preparation;
-  preparation.poisson_ratio = plan.poisson_ratio;
-  preparation.threads = options.threads;
-  return MeshPreparation::Create(*problem.mesh, problem.stiffness, problem.constraints,
-                                 std::move(preparation));
-}
-
 absl::StatusOr<ModelResult> RunModel(const std::string& name, const PlanProblem& problem,
                                      const std::shared_ptr<MeshPreparation>& preparation) {
   const StageProgress progress("predicting by " + name);
@@ -143,9 +133,11 @@ absl::StatusOr<ModelComparison> RunModels(const CompareOptions& options,
                                           const std::vector<std::string>& models) {
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.a, options.reading));
   TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan));
-  problem.deformer.gradient_field.threads = options.threads;
+  problem.deformer.preparation.threads = options.threads;
   SetBlasThreads(1);  // as deform does: the last digits would depend on their number
-  TF_ASSIGN_OR_RETURN(const auto preparation, Prepare(options, plan, problem));
+  TF_ASSIGN_OR_RETURN(const auto preparation,
+                      MeshPreparation::Create(*problem.mesh, problem.stiffness, problem.constraints,
+                                              problem.deformer.preparation));
   ModelComparison comparison{plan, std::move(problem), {}};
   for (const std::string& model : models) {
     TF_ASSIGN_OR_RETURN(ModelResult result, RunModel(model, comparison.problem, preparation));

@@ -53,7 +53,7 @@ Scene ModelScene(const AccuracyCase& problem, const BoundarySurface& skin, const
   layer.positions = skin.Pick(model.positions);
   layer.triangles = skin.mesh.triangles();
   layer.vertex_values = Distances(layer.positions, reference);
-  layer.colour = Colour(0.9, 0.9, 0.9);
+  layer.edges = false;
   Scene scene;
   scene.title = title;
   scene.surfaces = {std::move(layer)};
@@ -106,8 +106,7 @@ absl::Status DrawAccuracyCase(const AccuracyCase& problem, const AccuracyResult&
   const BoundarySurface skin = BoundaryOf(problem.mesh);
   const Positions& whole_reference = result.Reference(kColouredBy)->positions;
   const Positions reference = skin.Pick(whole_reference);
-  const ColourBar bar{"distance to CalculiX neo-Hookean, mm (red: this much or more)", 0,
-                      ColourRange(skin, result, reference)};
+  const ColourBar bar{"mm to CalculiX neo-Hookean", 0, ColourRange(skin, result, reference)};
   Figure figure(absl::StrFormat("%s; Poisson's ratio %g", problem.title, result.poisson_ratio));
   std::vector<Scene> row;
   for (const ModelVariant& variant : AllModelVariants()) {
@@ -117,8 +116,12 @@ absl::Status DrawAccuracyCase(const AccuracyCase& problem, const AccuracyResult&
                                              Distances(model.positions, whole_reference).mean()),
                              reference));
     row.back().colour_bar = bar;
-    if (&variant != &AllModelVariants().back()) row.back().colour_bar.title.clear();
-    if (row.size() == kPanelsInARow) figure.AddRow(kPanelHeight, std::exchange(row, {}));
+    // One legend a row, so that all rows have one scale.
+    if (row.size() < kPanelsInARow) {
+      row.back().colour_bar.title.clear();
+    } else {
+      figure.AddRow(kPanelHeight, std::exchange(row, {}));
+    }
   }
   return figure.WritePng(path);
 }

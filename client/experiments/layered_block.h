@@ -15,9 +15,11 @@
 namespace tissueform {
 
 // A block of soft tissue of 80 x 60 x 20 mm on bone: from below muscle (10 mm, 30 kPa), fat
-// (7.5 mm, 3 kPa) and skin (2.5 mm, 100 kPa). The bottom is bone: fixed, but for a patch of
-// 26.7 x 20 mm in its middle, the handle "patch", which is the piece of bone that is moved. The
-// sides and the top are free.
+// (7.5 mm, 3 kPa) and skin (2.5 mm, 100 kPa). The handle "patch" is the middle third of the bottom
+// in both directions (26.7 x 20 mm), the piece of bone that is moved; the bottom outside the middle
+// two thirds is fixed. Between them, where the bone was cut, the bottom is as free as the sides and
+// the top: were it fixed up to the patch, a patch that moves by more than a cell along would pass
+// through fixed vertices, and no answer would keep every tet positive.
 struct LayeredBlock {
   TetMesh mesh;
   Eigen::VectorXd stiffness;  // Pa, #T

@@ -3,6 +3,8 @@
 
 #include "client/experiments/layered_block.h"
 
+#include <algorithm>
+
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {
@@ -26,12 +28,19 @@ TEST(LayeredBlockTest, TissueChangesAtTheHeightsOfTheLayers) {
   }
 }
 
-TEST(LayeredBlockTest, WholeBottomAndNothingElseIsConstrained) {
+TEST(LayeredBlockTest, BottomIsFixedOutsideOfACutAroundThePatch) {
   for (const std::array<int, 3>& cells : {kLayeredBlockCells, {12, 9, 8}, {6, 6, 4}}) {
     ASSERT_OK_AND_ASSIGN(const LayeredBlock block, MakeLayeredBlock(cells));
-    const ConstraintSet& constraints = block.constraints;
-    EXPECT_EQ(static_cast<int>(constraints.constrained().size()), (cells[0] + 1) * (cells[1] + 1));
-    EXPECT_EQ(block.mesh.positions()(constraints.constrained(), 2).maxCoeff(), 0);
+    const Positions fixed = block.mesh.positions()(block.constraints.fixed(), Eigen::all);
+    const Positions patch =
+        block.mesh.positions()(block.constraints.handles().front().vertices, Eigen::all);
+    EXPECT_EQ(fixed.col(2).maxCoeff(), 0);
+    EXPECT_EQ(patch.col(2).maxCoeff(), 0);
+    double nearest = 1e9;
+    for (const auto& v : patch.rowwise()) {
+      nearest = std::min(nearest, (fixed.rowwise() - v).rowwise().norm().minCoeff());
+    }
+    EXPECT_GT(nearest, 2 * MoveAlong().translation_mm.x());
   }
 }
 
