@@ -156,6 +156,7 @@ absl::Status WriteResults(const CompareOptions& options, const ModelComparison& 
     Positions positions = result.deformation.positions;
     SwapToOrFromLps(problem.written_in, &positions);
     PlanProblem with_arrays = problem;
+    TF_ASSIGN_OR_RETURN(with_arrays.deformer.model, ModelFromName(result.model));
     AddDifferenceArrays(reference, positions, &with_arrays.point_data);
     TF_RETURN_IF_ERROR(WriteResult(ResultPath(options, result.model), comparison.plan, with_arrays,
                                    result.deformation.positions));

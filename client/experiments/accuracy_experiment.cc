@@ -84,10 +84,8 @@ absl::StatusOr<AccuracySweep> RunCase(const AccuracyCase& problem, const std::st
   AddAccuracyRows(problem, sweep.results, &tables->all);
   const AccuracyResult& shown = ShownResult(sweep.results);
   AddSummaryRows(problem, shown, &tables->summary);
-  if (const ModelAnswer* linear = shown.Reference("calculix_linear")) {
-    sweep.largest_displacement_mm = LargestDisplacement(problem, *linear);
-  }
-  if (shown.Reference("calculix_neo_hookean") != nullptr) {
+  if (const ModelAnswer* reference = shown.Reference("calculix_neo_hookean")) {
+    sweep.largest_displacement_mm = LargestDisplacement(problem, *reference);
     TF_RETURN_IF_ERROR(DrawAccuracyCase(
         problem, shown, options.Path(absl::StrCat("accuracy_", problem.name, ".png"))));
   }

@@ -21,7 +21,7 @@ namespace {
 constexpr int kPanelsInARow = 3;
 constexpr int kPanelHeight = 380;
 constexpr int kChartHeight = 460;
-constexpr char kColouredBy[] = "calculix_neo_hookean";
+constexpr char kReference[] = "calculix_neo_hookean";
 const Colour kPurple{0.45, 0.25, 0.60};
 
 Eigen::VectorXd Distances(const Positions& a, const Positions& b) {
@@ -80,14 +80,15 @@ Chart PoissonRatioChart(const std::vector<AccuracySweep>& sweeps, const std::str
   Chart chart;
   chart.title = title;
   chart.x_title = "Poisson's ratio";
-  chart.y_title = "mean distance to linear FEM, % of the move";
+  chart.y_title = "mean distance, % of the move";
+  chart.y_high = 1;  // from zero on
   for (const AccuracySweep& sweep : sweeps) {
     Curve curve;
     curve.name = sweep.name;
     curve.colour = LookOf(chart.curves.size()).colour;
     curve.style = LookOf(chart.curves.size()).style;
     for (const AccuracyResult& result : sweep.results) {
-      const ModelAnswer* reference = result.Reference("calculix_linear");
+      const ModelAnswer* reference = result.Reference(kReference);
       if (reference == nullptr) continue;
       curve.x.push_back(result.poisson_ratio);
       curve.y.push_back(100 *
@@ -104,7 +105,7 @@ Chart PoissonRatioChart(const std::vector<AccuracySweep>& sweeps, const std::str
 absl::Status DrawAccuracyCase(const AccuracyCase& problem, const AccuracyResult& result,
                               const std::string& path) {
   const BoundarySurface skin = BoundaryOf(problem.mesh);
-  const Positions& whole_reference = result.Reference(kColouredBy)->positions;
+  const Positions& whole_reference = result.Reference(kReference)->positions;
   const Positions reference = skin.Pick(whole_reference);
   const ColourBar bar{"mm to CalculiX neo-Hookean", 0, ColourRange(skin, result, reference)};
   Figure figure(absl::StrFormat("%s; Poisson's ratio %g", problem.title, result.poisson_ratio));
@@ -127,7 +128,7 @@ absl::Status DrawAccuracyCase(const AccuracyCase& problem, const AccuracyResult&
 }
 
 absl::Status DrawPoissonRatios(const std::vector<AccuracySweep>& sweeps, const std::string& path) {
-  Figure figure("Models without a Poisson's ratio against linear finite elements");
+  Figure figure("Models without a Poisson's ratio against CalculiX neo-Hookean");
   figure.AddRow(
       kChartHeight,
       {PoissonRatioChart(sweeps, "gradient_field_propagated", "gradient field, propagated"),

@@ -26,7 +26,7 @@ struct AccuracySweep {
   std::vector<AccuracyResult> results;
 };
 
-// Mean distance to CalculiX's linear answer over Poisson's ratio, as a part of the largest
+// Mean distance to CalculiX's neo-Hookean answer over Poisson's ratio, as a part of the largest
 // displacement, a curve for each case: of the gradient field by both modes and of ARAP.
 absl::Status DrawPoissonRatios(const std::vector<AccuracySweep>& sweeps, const std::string& path);
 

@@ -3,6 +3,7 @@
 
 #include "client/experiments/layered_block.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -21,11 +22,10 @@ constexpr double kFatPa = 3000;
 constexpr double kSkinPa = 100000;
 constexpr double kMuscleTopMm = 10;
 constexpr double kFatTopMm = 17.5;
-constexpr double kPatchShare = 1.0 / 3;
-constexpr double kOpeningShare = 2.0 / 3;
+constexpr double kRimMm = kLengthMm / 6;
 constexpr double kMoveMm = 5;
 constexpr int kTetsPerCell = 6;
-// Of the patch's border, which lies on planes of the grid that are not exact numbers.
+// Of the borders of patch and rim, which lie on planes of the grid that are not exact numbers.
 constexpr double kSlackMm = 1e-6;
 
 double StiffnessAt(double height_mm) {
@@ -44,10 +44,14 @@ Eigen::VectorXd LayerStiffness(const std::array<int, 3>& cells) {
   return stiffness;
 }
 
-// Of the middle of the bottom, `share` of each side long.
-bool IsInMiddle(const Eigen::Vector3d& v, double share) {
-  return std::abs(v.x() - kLengthMm / 2) <= share * kLengthMm / 2 + kSlackMm &&
-         std::abs(v.y() - kWidthMm / 2) <= share * kWidthMm / 2 + kSlackMm;
+bool IsInPatch(const Eigen::Vector3d& v) {
+  return std::abs(v.x() - kLengthMm / 2) <= kLengthMm / 6 + kSlackMm &&
+         std::abs(v.y() - kWidthMm / 2) <= kWidthMm / 6 + kSlackMm;
+}
+
+bool IsInRim(const Eigen::Vector3d& v) {
+  return std::min(v.x(), kLengthMm - v.x()) <= kRimMm + kSlackMm ||
+         std::min(v.y(), kWidthMm - v.y()) <= kRimMm + kSlackMm;
 }
 
 }  // namespace
@@ -56,14 +60,11 @@ absl::StatusOr<LayeredBlock> MakeLayeredBlock(const std::array<int, 3>& cells) {
   TF_ASSIGN_OR_RETURN(
       TetMesh mesh, BarMesh({EvenPlanes(0, kLengthMm, cells[0]), EvenPlanes(0, kWidthMm, cells[1]),
                              EvenPlanes(0, kHeightMm, cells[2])}));
-  // A vertex on the opening's border is free: at least one fixed row remains around it.
   const auto is_bottom = [](const Eigen::Vector3d& v) { return v.z() == 0; };
-  const std::vector<int32_t> fixed = VerticesWhere(mesh.positions(), [&](const Eigen::Vector3d& v) {
-    return is_bottom(v) && !IsInMiddle(v, kOpeningShare);
-  });
-  const std::vector<int32_t> patch = VerticesWhere(mesh.positions(), [&](const Eigen::Vector3d& v) {
-    return is_bottom(v) && IsInMiddle(v, kPatchShare);
-  });
+  const std::vector<int32_t> fixed = VerticesWhere(
+      mesh.positions(), [&](const Eigen::Vector3d& v) { return is_bottom(v) && IsInRim(v); });
+  const std::vector<int32_t> patch = VerticesWhere(
+      mesh.positions(), [&](const Eigen::Vector3d& v) { return is_bottom(v) && IsInPatch(v); });
   TF_ASSIGN_OR_RETURN(ConstraintSet constraints,
                       ConstraintSet::Create(mesh, fixed, {{"patch", patch}}));
   return LayeredBlock{std::move(mesh), LayerStiffness(cells), std::move(constraints)};

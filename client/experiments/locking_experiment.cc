@@ -138,6 +138,7 @@ Chart BlockChart(const std::vector<LockingRow>& rows) {
   chart.title = "layered block, 5 mm up, against " + MeshName(kFinestBlock) + " cells";
   chart.x_title = "Poisson's ratio";
   chart.y_title = "mean distance, mm";
+  chart.y_high = 0.01;  // from zero on
   for (size_t mesh = 0; mesh < kBlocks.size(); ++mesh) {
     Curve curve;
     curve.name = MeshName(kBlocks[mesh]) + " cells";
