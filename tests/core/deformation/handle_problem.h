@@ -49,7 +49,7 @@ inline ConstraintSet StackedHandles(const TetMesh& mesh, int num_handles) {
     handles.push_back(
         {"handle " + std::to_string(h), SelectVertices(mesh, [&](const Eigen::Vector3d& v) {
            const double y = part(v, 1) * num_handles - h;
-           return part(v, 2) >= 0.85 && y >= margin && y <= 1 - margin;
+           return part(v, 2) >= 0.8 && y >= margin && y <= 1 - margin;
          })});
   }
   return *ConstraintSet::Create(

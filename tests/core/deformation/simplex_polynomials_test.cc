@@ -4,6 +4,7 @@
 #include "core/deformation/simplex_polynomials.h"
 
 #include "gtest/gtest.h"
+#include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 
 #include "core/deformation/rotation_expansion.h"
