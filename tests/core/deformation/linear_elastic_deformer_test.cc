@@ -12,6 +12,7 @@ namespace tissueform {
 namespace {
 
 using ::testing::HasSubstr;
+using testing::BoundaryError;
 using testing::IsOk;
 using testing::Pose;
 using testing::PrepareBar;
