@@ -11,8 +11,8 @@
 namespace tissueform {
 namespace {
 
-using ::testing::HasSubstr;
 using testing::BoundaryError;
+using ::testing::HasSubstr;
 using testing::IsOk;
 using testing::Pose;
 using testing::PrepareBar;
