@@ -5,7 +5,6 @@
 
 #pragma once
 
+#include "cmake/precompiled/library.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-
-#include "cmake/precompiled/library.h"
