@@ -1,0 +1,52 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/elasticity/tet_strain.h"
+
+#include "gtest/gtest.h"
+
+#include "core/constraints/handle_pose.h"
+#include "tests/testing/meshes.h"
+
+namespace tissueform {
+namespace {
+
+Positions Transformed(const TetMesh& mesh, const Eigen::Matrix3d& F) {
+  Positions positions = mesh.positions() * F.transpose();
+  positions.rowwise() += Eigen::RowVector3d(3, -5, 7);
+  return positions;
+}
+
+TEST(TetStrainTest, RigidMotionHasNoStrain) {
+  const TetMesh mesh = testing::Bar({2, 2, 3}, 1.0, 0.2);
+  const Positions moved = Transformed(mesh, RotationMatrix({0.5, 2, -1}));
+  EXPECT_LT(PrincipalGreenStrains(ElementsOf(mesh), moved, 1).cwiseAbs().maxCoeff(), 1e-13);
+}
+
+TEST(TetStrainTest, StretchesComeOutWhateverTheRotation) {
+  const TetMesh mesh = testing::Bar({2, 2, 3}, 1.0, 0.2);
+  const Eigen::Vector3d stretches(0.9, 1.3, 1.1);
+  const Eigen::Matrix3d F = RotationMatrix({0.5, 2, -1}) * stretches.asDiagonal() *
+                            RotationMatrix({1, -0.2, 0.3}).transpose();
+  const PiecewiseLinearElements elements = ElementsOf(mesh);
+  const Positions moved = Transformed(mesh, F);
+  EXPECT_LT((TetDeformationGradient(elements, moved, 4) - F).norm(), 1e-13);
+  const PrincipalValues strains = PrincipalGreenStrains(elements, moved, 2);
+  const Eigen::RowVector3d expected((1.69 - 1) / 2, (1.21 - 1) / 2, (0.81 - 1) / 2);
+  EXPECT_LT((strains.rowwise() - expected).cwiseAbs().maxCoeff(), 1e-13);
+}
+
+TEST(TetStrainTest, UniaxialStressIsItsOwnVonMisesStress) {
+  const TetMesh mesh = testing::Bar({2, 2, 3}, 1.0, 0.2);
+  const double nu = 0.3;
+  const double strain = 0.01;
+  const Eigen::Matrix3d F =
+      Eigen::Vector3d(1 - nu * strain, 1 - nu * strain, 1 + strain).asDiagonal();
+  const Eigen::VectorXd stiffness = Eigen::VectorXd::LinSpaced(mesh.num_tets(), 1000, 9000);
+  const Eigen::VectorXd stress =
+      LinearVonMisesStress(ElementsOf(mesh), Transformed(mesh, F), stiffness, nu, 1);
+  EXPECT_LT((stress - strain * stiffness).cwiseAbs().maxCoeff(), 1e-8);
+}
+
+}  // namespace
+}  // namespace tissueform
