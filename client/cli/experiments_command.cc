@@ -4,6 +4,7 @@
 #include "client/cli/experiments_command.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -12,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "client/cli/demo_paths.h"
 #include "client/cli/stage_progress.h"
 #include "client/experiments/experiment.h"
 #include "client/rendering/virtual_display.h"
@@ -42,8 +44,8 @@ std::string ExperimentList() {
 }
 
 bool IsChosen(const ExperimentsOptions& options, const Experiment& experiment) {
-  return options.only.empty() ||
-         std::find(options.only.begin(), options.only.end(), experiment.name) != options.only.end();
+  if (options.only.empty()) return !experiment.only_when_named;
+  return std::find(options.only.begin(), options.only.end(), experiment.name) != options.only.end();
 }
 
 absl::Status MakeFolder(const std::string& folder) {
@@ -60,11 +62,20 @@ absl::Status MakeFolder(const std::string& folder) {
   return absl::OkStatus();
 }
 
+ExperimentOptions OptionsFor(const ExperimentsOptions& options) {
+  ExperimentOptions result;
+  result.folder = options.out;
+  result.threads = AvailableProcessors();
+  result.plan = FindDemoPlan("").value_or("");  // the paper's figures do without
+  result.tell = [](const std::string& line) { absl::FPrintF(stderr, "%s\n", line); };
+  return result;
+}
+
 absl::Status RunExperiments(const ExperimentsOptions& options) {
   TF_RETURN_IF_ERROR(MakeFolder(options.out));
   // Before any thread: it changes the environment.
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<VirtualDisplay> display, VirtualDisplay::Open());
-  const ExperimentOptions experiment_options{options.out, AvailableProcessors()};
+  const ExperimentOptions experiment_options = OptionsFor(options);
   for (const Experiment& experiment : AllExperiments()) {
     if (!IsChosen(options, experiment)) continue;
     const StageProgress progress(std::string(experiment.name));
@@ -80,15 +91,19 @@ absl::Status RunExperiments(const ExperimentsOptions& options) {
 void AddExperimentsCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<ExperimentsOptions>();
   CLI::App* command = app.add_subcommand(
-      "experiments", "compute the figures and the table of the method's paper again");
+      "experiments", "compute the paper's figures and table again, and the models' accuracy");
   command->add_option("--out", options->out, "folder for pictures (.png) and numbers (.csv); made")
       ->required();
-  command->add_option("--only", options->only, "only this experiment; may be given again")
+  command
+      ->add_option("NAME,--only", options->only,
+                   "only these experiments; without a name all figures and the table of the paper")
       ->check(CLI::IsMember(ExperimentNames()));
   command->footer(absl::StrCat(ExperimentList(),
                                "Example:\n"
                                "  tissueform experiments --out figures --only fig1\n"
-                               "docs/experiments.md shows them beside what the paper says."));
+                               "  tissueform experiments accuracy --out accuracy\n"
+                               "docs/experiments.md shows them beside what the paper says, "
+                               "docs/accuracy.md the models beside finite elements."));
   command->callback([options, work] { *work = [options] { return RunExperiments(*options); }; });
 }
 

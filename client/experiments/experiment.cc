@@ -3,6 +3,7 @@
 
 #include "client/experiments/experiment.h"
 
+#include "client/experiments/accuracy_experiment.h"
 #include "client/experiments/blend_experiment.h"
 #include "client/experiments/block_pull_experiment.h"
 #include "client/experiments/guidance_experiment.h"
@@ -23,6 +24,8 @@ const std::vector<Experiment>& AllExperiments() {
       {"fig5", "two materials under a twist of 360 degrees", RunMaterialsExperiment},
       {"fig6", "cotangent against uniform guidance on a graded bar", RunGuidanceExperiment},
       {"table1", "times of the factorisation and of three solves", RunSolverTimesExperiment},
+      {"accuracy", "all models against CalculiX, and locking (minutes; only when named; needs ccx)",
+       RunAccuracyExperiment, true},
   };
   return *kExperiments;
 }

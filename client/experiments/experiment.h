@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -14,20 +15,29 @@ namespace tissueform {
 struct ExperimentOptions {
   std::string folder;  // must exist
   int threads = 1;
+  std::string plan;  // the bundled plan, for experiments on a mesh that is not a grid
+  // Gets a line for every step of a long experiment. May be empty.
+  std::function<void(const std::string&)> tell;
+
+  void Tell(const std::string& line) const {
+    if (tell) tell(line);
+  }
 
   std::string Path(absl::string_view name) const { return folder + "/" + std::string(name); }
 };
 
-// One figure or table of the source (Liao et al. 2009), computed again: writes its pictures (.png)
-// and its numbers (.csv), all of whose names begin with the experiment's, into the folder. Pictures
-// need an X display (VirtualDisplay).
+// One figure or table of the source (Liao et al. 2009), computed again, or a study of our own:
+// writes its pictures (.png) and its numbers (.csv), all of whose names begin with the
+// experiment's, into the folder. Pictures need an X display (VirtualDisplay).
 struct Experiment {
   absl::string_view name;  // "fig1"
   absl::string_view topic;
   absl::Status (*run)(const ExperimentOptions& options);
+  // Not one of the source's: only run when it is asked for by its name.
+  bool only_when_named = false;
 };
 
-// In the order of the source.
+// In the order of the source, our own after them.
 const std::vector<Experiment>& AllExperiments();
 
 }  // namespace tissueform

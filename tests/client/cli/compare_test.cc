@@ -15,6 +15,7 @@ namespace tissueform::testing {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 class CompareTest : public CliTest {
  protected:
@@ -59,6 +60,37 @@ TEST_F(CompareTest, DifferenceFileHoldsTheDistances) {
   EXPECT_NEAR(ToDoubles(*distance).front(), 5, 1e-12);
   EXPECT_EQ(ToDoubles(*distance).back(), 0);
   EXPECT_NE(FindAttribute(file.point_data, "anatomy"), nullptr);
+}
+
+TEST_F(CompareTest, DifferenceFileHoldsWhatLeadsFromAToB) {
+  ASSERT_THAT(Run({"compare", "a.vtu", "b.vtu", "--out", "difference.vtu"}), Succeeds());
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile file, ReadTetMesh(Path("difference.vtu")));
+  const Attribute* difference = FindAttribute(file.point_data, "difference_mm");
+  ASSERT_NE(difference, nullptr);
+  ASSERT_EQ(difference->components, 3);
+  const std::vector<double> values = ToDoubles(*difference);
+  EXPECT_NEAR(values[0], 3, 1e-12);
+  EXPECT_NEAR(values[1], 4, 1e-12);
+  EXPECT_EQ(values[2], 0);
+  EXPECT_EQ(values.back(), 0);
+}
+
+TEST_F(CompareTest, SkinIsTheBoundaryOfTheMesh) {
+  const ProcessResult result = Run({"compare", "a.vtu", "b.vtu", "--json"});
+  ASSERT_THAT(result, Succeeds());
+  const nlohmann::json skin = nlohmann::json::parse(result.out)["skin"];
+  // 4 x 4 x 12 cells: 325 vertices, 3 x 3 x 11 of them inside.
+  EXPECT_EQ(skin["vertices"], 325 - 99);
+  EXPECT_NEAR(skin["mean_mm"].get<double>(), 5.0 * 25 / (325 - 99), 1e-12);
+}
+
+TEST_F(CompareTest, CsvHasARowForEachRegion) {
+  ASSERT_THAT(Run({"compare", "a.vtu", "b.vtu", "--by", "anatomy", "--csv", "figures.csv"}),
+              Succeeds());
+  const std::string csv = Read("figures.csv");
+  EXPECT_THAT(csv, StartsWith("region,vertices,mean_mm,p50_mm,p90_mm,p95_mm,max_mm\nall,325,"));
+  EXPECT_THAT(csv, HasSubstr("\nskin,226,"));
+  EXPECT_THAT(csv, HasSubstr("\nanatomy = 1,25,5,5,5,5,5\n"));
 }
 
 TEST_F(CompareTest, MeshesOfDifferentSizeCannotBeCompared) {

@@ -53,5 +53,11 @@ TEST_F(ExperimentsTest, MissingXvfbIsSaidInOneLine) {
               FailsWith(1, HasSubstr("install the package xvfb")));
 }
 
+TEST_F(ExperimentsTest, NamesMayBeGivenWithoutTheirOption) {
+  EXPECT_THAT(Run({"experiments", "fig9", "--out", "figures"}), FailsWith(2, HasSubstr("fig9")));
+  const ProcessResult help = Run({"experiments", "--help"});
+  EXPECT_THAT(help.out, HasSubstr("accuracy"));
+}
+
 }  // namespace
 }  // namespace tissueform::testing

@@ -1,0 +1,19 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "absl/status/status.h"
+
+#include "client/experiments/experiment.h"
+
+namespace tissueform {
+
+// All models against CalculiX on a bar, the layered block and the bundled plan, at four Poisson's
+// ratios, and volumetric locking: docs/accuracy.md. Needs the program ccx; minutes.
+//
+// Writes accuracy.csv (everything), accuracy_summary.md, accuracy_CASE.png, accuracy_nu.png and
+// accuracy_locking.csv and .png.
+absl::Status RunAccuracyExperiment(const ExperimentOptions& options);
+
+}  // namespace tissueform

@@ -1,0 +1,142 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/experiments/accuracy_figure.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_format.h"
+
+#include "client/experiments/boundary_surface.h"
+#include "client/rendering/figure.h"
+#include "core/base/status_macros.h"
+#include "core/deformation/comparison.h"
+
+namespace tissueform {
+namespace {
+
+constexpr int kPanelsInARow = 3;
+constexpr int kPanelHeight = 380;
+constexpr int kChartHeight = 460;
+constexpr char kReference[] = "calculix_neo_hookean";
+const Colour kPurple{0.45, 0.25, 0.60};
+
+Eigen::VectorXd Distances(const Positions& a, const Positions& b) {
+  return (a - b).rowwise().norm();
+}
+
+// Two digits, rounded up, so that the bar's labels are short.
+double RoundUp(double value) {
+  if (value <= 0) return 1;
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1);
+  return std::ceil(value / unit) * unit;
+}
+
+// What 95 % of the skin keeps within under the worst model but plain Poisson, which is far off
+// where a handle turns: neither it nor a few vertices beside the handle must make all others blue.
+double ColourRange(const BoundarySurface& skin, const AccuracyResult& result,
+                   const Positions& reference) {
+  double high = 0;
+  for (const ModelAnswer& model : result.models) {
+    if (model.name == "plain_poisson") continue;
+    const Eigen::VectorXd distances = Distances(skin.Pick(model.positions), reference);
+    high = std::max(high, SummarizeDistances({distances.begin(), distances.end()}).p95_mm);
+  }
+  return RoundUp(high);
+}
+
+Scene ModelScene(const AccuracyCase& problem, const BoundarySurface& skin, const ModelAnswer& model,
+                 const std::string& title, const Positions& reference) {
+  SurfaceLayer layer;
+  layer.positions = skin.Pick(model.positions);
+  layer.triangles = skin.mesh.triangles();
+  layer.vertex_values = Distances(layer.positions, reference);
+  layer.edges = false;
+  Scene scene;
+  scene.title = title;
+  scene.surfaces = {std::move(layer)};
+  scene.view = problem.view;
+  return scene;
+}
+
+struct CurveLook {
+  Colour colour;
+  CurveStyle style;
+};
+
+CurveLook LookOf(size_t index) {
+  static const std::array<CurveLook, 5> kLooks = {{{kBlue, CurveStyle::kSolid},
+                                                   {kBlue, CurveStyle::kDashed},
+                                                   {kOrange, CurveStyle::kSolid},
+                                                   {kOrange, CurveStyle::kDashed},
+                                                   {kPurple, CurveStyle::kSolid}}};
+  return kLooks[index % kLooks.size()];
+}
+
+Chart PoissonRatioChart(const std::vector<AccuracySweep>& sweeps, const std::string& model,
+                        const std::string& title) {
+  Chart chart;
+  chart.title = title;
+  chart.x_title = "Poisson's ratio";
+  chart.y_title = "mean distance, % of the move";
+  chart.y_high = 1;  // from zero on
+  for (const AccuracySweep& sweep : sweeps) {
+    Curve curve;
+    curve.name = sweep.name;
+    curve.colour = LookOf(chart.curves.size()).colour;
+    curve.style = LookOf(chart.curves.size()).style;
+    for (const AccuracyResult& result : sweep.results) {
+      const ModelAnswer* reference = result.Reference(kReference);
+      if (reference == nullptr) continue;
+      curve.x.push_back(result.poisson_ratio);
+      curve.y.push_back(100 *
+                        Distances(result.Model(model)->positions, reference->positions).mean() /
+                        sweep.largest_displacement_mm);
+    }
+    chart.curves.push_back(std::move(curve));
+  }
+  return chart;
+}
+
+}  // namespace
+
+absl::Status DrawAccuracyCase(const AccuracyCase& problem, const AccuracyResult& result,
+                              const std::string& path) {
+  const BoundarySurface skin = BoundaryOf(problem.mesh);
+  const Positions& whole_reference = result.Reference(kReference)->positions;
+  const Positions reference = skin.Pick(whole_reference);
+  const ColourBar bar{"mm to CalculiX neo-Hookean (red: or more)", 0,
+                      ColourRange(skin, result, reference)};
+  Figure figure(absl::StrFormat("%s; Poisson's ratio %g", problem.title, result.poisson_ratio));
+  std::vector<Scene> row;
+  for (const ModelVariant& variant : AllModelVariants()) {
+    const ModelAnswer& model = *result.Model(variant.name);
+    row.push_back(ModelScene(problem, skin, model,
+                             absl::StrFormat("%s: mean %.2g mm", variant.title,
+                                             Distances(model.positions, whole_reference).mean()),
+                             reference));
+    row.back().colour_bar = bar;
+    // One legend a row, so that all rows have one scale.
+    if (row.size() < kPanelsInARow) {
+      row.back().colour_bar.title.clear();
+    } else {
+      figure.AddRow(kPanelHeight, std::exchange(row, {}));
+    }
+  }
+  return figure.WritePng(path);
+}
+
+absl::Status DrawPoissonRatios(const std::vector<AccuracySweep>& sweeps, const std::string& path) {
+  Figure figure("Models without a Poisson's ratio against CalculiX neo-Hookean");
+  figure.AddRow(
+      kChartHeight,
+      {PoissonRatioChart(sweeps, "gradient_field_propagated", "gradient field, propagated"),
+       PoissonRatioChart(sweeps, "gradient_field_estimated", "gradient field, estimated"),
+       PoissonRatioChart(sweeps, "arap", "ARAP")});
+  return figure.WritePng(path);
+}
+
+}  // namespace tissueform

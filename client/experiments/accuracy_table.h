@@ -1,0 +1,24 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <vector>
+
+#include "client/experiments/accuracy_run.h"
+#include "client/experiments/csv_table.h"
+
+namespace tissueform {
+
+// Columns case, nu, model, reference, region (all or skin), mean_mm to max_mm, mean_percent (of the
+// reference's largest displacement), seconds, reference_seconds, inverted_tets, converged.
+CsvTable AccuracyTable();
+void AddAccuracyRows(const AccuracyCase& problem, const std::vector<AccuracyResult>& results,
+                     CsvTable* table);
+
+// For people: mean / max in mm over all vertices against both references at one Poisson's ratio,
+// one row for each case and model.
+CsvTable AccuracySummary();
+void AddSummaryRows(const AccuracyCase& problem, const AccuracyResult& result, CsvTable* table);
+
+}  // namespace tissueform
