@@ -45,8 +45,7 @@ class ArapDeformer : public Deformer {
                                      const DeformControl& control) override {
     TF_RETURN_IF_ERROR(CheckPoses(shared_->constraints(), poses));
     const Stopwatch stopwatch;
-    const HandleTargets targets =
-        MakeHandleTargets(shared_->constraints(), elements_.rest, poses);
+    const HandleTargets targets = MakeHandleTargets(shared_->constraints(), elements_.rest, poses);
     TF_ASSIGN_OR_RETURN(State state, Start(poses, targets, control.warm_start));
     AndersonAcceleration acceleration(options_.acceleration_depth);
     Deformation deformation;
@@ -108,8 +107,8 @@ class ArapDeformer : public Deformer {
   }
 
   absl::StatusOr<Eigen::MatrixXd> Reconstruct(const HandleTargets& targets) {
-    const Eigen::MatrixXd rhs = GatherCornerLoads(
-        shared_->vertex_cells(), elements_.num_vertices(), loads_, shared_->options().threads);
+    const Eigen::MatrixXd rhs = GatherCornerLoads(shared_->vertex_cells(), elements_.num_vertices(),
+                                                  loads_, shared_->options().threads);
     return laplacian_.system->Solve(rhs, targets.displacements);
   }
 

@@ -28,11 +28,11 @@ struct ArapOptions {
 // taken only if its energy is not above the last one, otherwise the plain step, which cannot raise
 // it; when rounding makes even that rise, the last iterate is the answer.
 //
-// Starts from the gradient field's propagated answer. E has many local minima; plain Poisson flattens
-// the middle of a bar whose end turns by half a turn, and its closest rotations then turn the wrong
-// way or into each other, for good. The propagated field has every tet near its right rotation, of
-// any angle. A warm start also tries the last answer's rotations and takes what has less energy, so a
-// jump of the poses cannot trap it.
+// Starts from the gradient field's propagated answer. E has many local minima; plain Poisson
+// flattens the middle of a bar whose end turns by half a turn, and its closest rotations then turn
+// the wrong way or into each other, for good. The propagated field has every tet near its right
+// rotation, of any angle. A warm start also tries the last answer's rotations and takes what has
+// less energy, so a jump of the poses cannot trap it.
 //
 // Errors: InvalidArgument (an option out of range), those of MeshPreparation::Laplacian.
 absl::StatusOr<std::unique_ptr<Deformer>> CreateArapDeformer(

@@ -3,6 +3,8 @@
 
 #include "core/deformation/elastic_system.h"
 
+#include <algorithm>
+
 #include "absl/memory/memory.h"
 #include "absl/strings/str_cat.h"
 
@@ -30,6 +32,14 @@ std::vector<int32_t> ConstrainedUnknowns(const ConstraintSet& constraints) {
     }
   }
   return unknowns;
+}
+
+// How much stiffer the material is against changes of volume than against shear. Beside the one the
+// other is lost in the rounding of the matrix's entries, also where the mesh locks, so that the
+// matrix itself looks sound.
+double VolumeToShear(double poisson_ratio) {
+  const ElasticModuli moduli = ModuliOf(1.0, poisson_ratio);
+  return moduli.bulk / moduli.shear;
 }
 
 absl::Status CheckCondition(double condition, double poisson_ratio) {
@@ -80,8 +90,9 @@ absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
                         DirichletSystem::Create(K, ConstrainedUnknowns(constraints),
                                                 {options.backend, options.admission}));
   }
-  TF_ASSIGN_OR_RETURN(elastic->condition_estimate_,
+  TF_ASSIGN_OR_RETURN(const double of_system,
                       elastic->system_->EstimateCondition(kConditionIterations));
+  elastic->condition_estimate_ = std::max(of_system, VolumeToShear(options.poisson_ratio));
   TF_RETURN_IF_ERROR(CheckCondition(elastic->condition_estimate_, options.poisson_ratio));
   stopwatch.Restart();
   TF_RETURN_IF_ERROR(elastic->PrepareResponses(mesh, constraints, options.admission));

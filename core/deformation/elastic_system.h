@@ -64,6 +64,8 @@ class ElasticSystem {
   // For iterations on the free unknowns; its factor stays as it is.
   DirichletSystem& system() { return *system_; }
   const DirichletSystem& system() const { return *system_; }
+  // The larger of the free block's (DirichletSystem::EstimateCondition) and the ratio of bulk to
+  // shear modulus.
   double condition_estimate() const { return condition_estimate_; }
   double assemble_seconds() const { return assemble_seconds_; }
   double response_seconds() const { return response_seconds_; }

@@ -72,8 +72,8 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateLinearElasticResponse(
   TF_RETURN_IF_ERROR(CheckTolerance(options.tolerance_mm));
   TF_RETURN_IF_ERROR(CheckChosenVertices(vertices, preparation->mesh().num_vertices()));
   if (options.admission) {
-    TF_RETURN_IF_ERROR(options.admission(LinearElasticResponseBytes(
-        *preparation, static_cast<Eigen::Index>(vertices.size()))));
+    TF_RETURN_IF_ERROR(options.admission(
+        LinearElasticResponseBytes(*preparation, static_cast<Eigen::Index>(vertices.size()))));
   }
   TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic());
   return std::make_unique<LinearElasticResponse>(preparation, *elastic, vertices,

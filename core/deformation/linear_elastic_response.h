@@ -16,7 +16,8 @@ namespace tissueform {
 
 struct LinearElasticResponseOptions {
   double tolerance_mm = 0.01;  // of any chosen vertex against the direct solve
-  // May be empty. Called with the bytes that the response will hold before any of them is allocated.
+  // May be empty. Called with the bytes that the response will hold before any of them is
+  // allocated.
   FactorAdmission admission;
 };
 

@@ -67,9 +67,11 @@ void MultiplyBaseline(const float* panels, Eigen::Index rows, Eigen::Index cols,
 // sanitizers' set-up.
 #if defined(__x86_64__)
 template <int kFactors>
-__attribute__((target("avx512f,avx512dq,avx512vl,prefer-vector-width=512"))) void MultiplyAvx512(
-    const float* panels, Eigen::Index rows, Eigen::Index cols, const float* factors,
-    float* product) {
+__attribute__((target("avx512f,avx512dq,avx512vl"))) void MultiplyAvx512(const float* panels,
+                                                                         Eigen::Index rows,
+                                                                         Eigen::Index cols,
+                                                                         const float* factors,
+                                                                         float* product) {
   MultiplyBody<kFactors>(panels, rows, cols, factors, product);
 }
 

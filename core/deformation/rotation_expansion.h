@@ -30,11 +30,12 @@ class RotationExpansion {
   // Exactly zero for poses that neither turn nor scale. REQUIRES: one legal pose per handle.
   ExpansionCoefficients Expand(absl::Span<const HandlePose> poses) const;
 
-  // How far P is from what interpolation of degree n makes of it: with r the radius of a ball around
-  // all rotation vectors (Jung's theorem), s the mean and d the half range of the scale,
+  // How far P is from what interpolation of degree n makes of it: with r the radius of a ball
+  // around all rotation vectors (Jung's theorem), s the mean and d the half range of the scale,
   //   s E_n + d E_(n-1),   E_n = min(1, 2^(4-n)) r^(n+1) / (n+1)!.
-  // r^(n+1) / (n+1)! is Taylor's remainder (turning by [w] does not lengthen), 2^-n what Chebyshev's
-  // expansion gains on it, and 2^4 an allowance for interpolating instead of approximating best.
+  // r^(n+1) / (n+1)! is Taylor's remainder (turning by [w] does not lengthen), 2^-n what
+  // Chebyshev's expansion gains on it, and 2^4 an allowance for interpolating instead of
+  // approximating best.
   double RemainderBound(absl::Span<const HandlePose> poses, int degree) const;
 
   int64_t bytes_held() const;

@@ -82,11 +82,10 @@ class ColumnFiller {
     g.col(0) = -g.rightCols<3>().rowwise().sum();
     const double weight = elements_.measures[tet] * stiffness_[tet];
     for (int corner = 0; corner < 4; ++corner) {
-      const auto own_g = g.col(own);
-      const auto other_g = g.col(corner);
-      Eigen::Matrix3d block = unit_.first_lame * (other_g * own_g.transpose()) +
-                              unit_.shear * (own_g * other_g.transpose());
-      block.diagonal().array() += unit_.shear * other_g.dot(own_g);
+      // Evaluated ahead of the factors, so that swapping the vertices transposes to the bit.
+      const Eigen::Matrix3d outer = g.col(own) * g.col(corner).transpose();
+      Eigen::Matrix3d block = unit_.first_lame * outer.transpose() + unit_.shear * outer;
+      block.diagonal().array() += unit_.shear * outer.trace();
       blocks_[slots_[elements_.cells(tet, corner)]] += weight * block;
     }
   }

@@ -63,10 +63,8 @@ NeoHookeanEnergy::Value NeoHookeanEnergy::Evaluate(const Positions& displacement
   for (const Value& block : blocks_) {
     whole.energy_nj += block.energy_nj;
     whole.inverted_tets += block.inverted_tets;
-    // Written so that NaN stays.
-    if (!(block.smallest_volume_ratio >= whole.smallest_volume_ratio)) {
-      whole.smallest_volume_ratio = block.smallest_volume_ratio;
-    }
+    whole.smallest_volume_ratio =
+        std::min(whole.smallest_volume_ratio, block.smallest_volume_ratio);
   }
   if (whole.inverted_tets > 0) {
     whole.energy_nj = std::numeric_limits<double>::infinity();
@@ -91,9 +89,7 @@ NeoHookeanEnergy::Value NeoHookeanEnergy::EvaluateTets(const Positions& displace
       const bool positive = ratio > 0 && std::isfinite(batch.energy[lane]);
       value.energy_nj += batch.energy[lane];
       value.inverted_tets += positive ? 0 : 1;
-      if (!(ratio >= value.smallest_volume_ratio)) {
-        value.smallest_volume_ratio = ratio;
-      }
+      value.smallest_volume_ratio = std::min(value.smallest_volume_ratio, ratio);
       double* loads = loads_.row(first + lane).data();
       for (int entry = 0; entry < 9; ++entry) {
         loads[entry] = batch.loads[entry][lane];

@@ -29,7 +29,7 @@ class NeoHookeanEnergy {
 
   struct Value {
     double energy_nj = 0;              // nJ = Pa mm^3; infinite when a tet is inverted
-    double smallest_volume_ratio = 1;  // the smallest J; NaN when a displacement is not finite
+    double smallest_volume_ratio = 1;  // the smallest J of the finite ones
     Eigen::Index inverted_tets = 0;    // those with J <= 0, or not finite
   };
 

@@ -13,6 +13,7 @@
 namespace tissueform {
 namespace {
 
+using testing::BoundaryError;
 using ::testing::HasSubstr;
 using testing::IsOk;
 using testing::Pose;
@@ -48,7 +49,7 @@ TEST(ElasticSystemTest, PoissonRatioOutsideItsRangeIsRefused) {
 }
 
 TEST(ElasticSystemTest, NearlyIncompressibleIsRefusedWithTheConditionEstimate) {
-  EXPECT_THAT(CreateSystem({.poisson_ratio = 0.4999999999, .admission = {}}),
+  EXPECT_THAT(CreateSystem({.poisson_ratio = 0.49999999999, .admission = {}}),
               StatusIs(kInvalid, HasSubstr("condition estimate")));
 }
 

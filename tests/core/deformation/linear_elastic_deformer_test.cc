@@ -11,6 +11,7 @@
 namespace tissueform {
 namespace {
 
+using testing::BoundaryError;
 using ::testing::HasSubstr;
 using testing::IsOk;
 using testing::Pose;

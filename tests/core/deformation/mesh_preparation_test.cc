@@ -1,0 +1,104 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/deformation/mesh_preparation.h"
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "core/deformation/arap_deformer.h"
+#include "core/deformation/gradient_field_deformer.h"
+#include "tests/core/deformation/handle_problem.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::IsOk;
+using testing::StatusIs;
+
+class MeshPreparationTest : public ::testing::Test {
+ protected:
+  std::shared_ptr<MeshPreparation> Prepare() {
+    PreparationOptions options;
+    options.admission = [this](int64_t bytes) {
+      ++admissions_;
+      return bytes <= budget_ ? absl::OkStatus() : absl::ResourceExhaustedError("no room");
+    };
+    return testing::PrepareMesh(mesh_, 1, options);
+  }
+
+  const TetMesh mesh_ = testing::Bar({4, 4, 8}, 2.0, 0.2);
+  int admissions_ = 0;
+  int64_t budget_ = int64_t{1} << 40;
+};
+
+TEST_F(MeshPreparationTest, SecondModelDoesNotFactoriseAgain) {
+  const auto preparation = Prepare();
+  EXPECT_EQ(admissions_, 0);
+  EXPECT_FALSE(preparation->has_laplacian());
+  ASSERT_OK_AND_ASSIGN(const auto propagated, CreateGradientFieldDeformer(preparation, {}));
+  EXPECT_EQ(admissions_, 1);
+  GradientFieldOptions estimated;
+  estimated.rotation = RotationMode::kEstimated;
+  ASSERT_THAT(CreateGradientFieldDeformer(preparation, estimated), IsOk());
+  ASSERT_OK_AND_ASSIGN(const auto arap, CreateArapDeformer(preparation, {}));
+  EXPECT_EQ(admissions_, 1);
+  EXPECT_TRUE(preparation->has_laplacian());
+  EXPECT_FALSE(preparation->has_elastic());
+
+  ASSERT_THAT(preparation->Elastic(), IsOk());
+  const int after_elastic = admissions_;
+  ASSERT_THAT(preparation->Elastic(), IsOk());
+  EXPECT_EQ(admissions_, after_elastic);
+}
+
+TEST_F(MeshPreparationTest, BytesAreThoseOfWhatWasMade) {
+  const auto preparation = Prepare();
+  const int64_t empty = preparation->bytes_held();
+  ASSERT_OK_AND_ASSIGN(const auto propagated, CreateGradientFieldDeformer(preparation, {}));
+  EXPECT_GT(preparation->bytes_held(), empty + propagated->preparation().factor_bytes);
+  EXPECT_EQ(propagated->preparation().bytes_held,
+            preparation->bytes_held() + propagated->preparation().own_bytes);
+  ASSERT_THAT(preparation->Elastic(), IsOk());
+  EXPECT_GT(preparation->bytes_held(), preparation->laplacian_bytes());
+}
+
+TEST_F(MeshPreparationTest, SharedAndOwnPreparationGiveTheSameAnswer) {
+  const auto preparation = Prepare();
+  ASSERT_OK_AND_ASSIGN(const auto shared, CreateGradientFieldDeformer(preparation, {}));
+  ASSERT_OK_AND_ASSIGN(const auto own, CreateGradientFieldDeformer(mesh_, preparation->stiffness(),
+                                                                   preparation->constraints(), {}));
+  testing::RandomNumbers random(7);
+  const auto poses = testing::RandomPoses(1, 0.7, 0.1, 10, &random);
+  ASSERT_OK_AND_ASSIGN(const Deformation a, shared->Deform(poses));
+  ASSERT_OK_AND_ASSIGN(const Deformation b, own->Deform(poses));
+  EXPECT_EQ(a.positions, b.positions);
+}
+
+TEST_F(MeshPreparationTest, RefusedFactorMayBeAskedForAgain) {
+  const auto preparation = Prepare();
+  budget_ = 10;
+  EXPECT_THAT(preparation->Laplacian(), StatusIs(absl::StatusCode::kResourceExhausted, "no room"));
+  EXPECT_THAT(preparation->Elastic(), StatusIs(absl::StatusCode::kResourceExhausted, "no room"));
+  budget_ = int64_t{1} << 40;
+  EXPECT_THAT(preparation->Laplacian(), IsOk());
+}
+
+TEST_F(MeshPreparationTest, UnusableInputIsRefused) {
+  const ConstraintSet constraints = testing::StackedHandles(mesh_, 1);
+  const Eigen::VectorXd stiffness = testing::MixedStiffness(mesh_.num_tets());
+  constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+  for (const double ratio : {-0.1, 0.5, std::nan("")}) {
+    PreparationOptions options;
+    options.poisson_ratio = ratio;
+    EXPECT_THAT(MeshPreparation::Create(mesh_, stiffness, constraints, options),
+                StatusIs(kInvalid, HasSubstr("Poisson")));
+  }
+  EXPECT_THAT(MeshPreparation::Create(mesh_, stiffness.head(3), constraints, {}),
+              StatusIs(kInvalid, HasSubstr("stiffness has 3 values")));
+}
+
+}  // namespace
+}  // namespace tissueform
