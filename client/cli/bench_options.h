@@ -12,7 +12,7 @@ namespace tissueform {
 
 // The options that `tissueform bench` and the benchmark program behind it share.
 struct BenchOptions {
-  std::vector<int> meshes;  // 1 to 6, at least one
+  std::vector<int> meshes;  // 1 to 8, at least one
   int repetitions = 5;
   int threads = 1;
   std::string json;  // empty: no file

@@ -7,8 +7,6 @@
 #include <string>
 #include <utility>
 
-#include "absl/strings/str_format.h"
-
 #include "client/cli/option_checks.h"
 #include "client/cli/result_writer.h"
 #include "client/cli/stage_progress.h"
@@ -71,12 +69,6 @@ absl::StatusOr<Positions> Predict(const PlanProblem& problem, PredictionStats* s
   return std::move(deformation.positions);
 }
 
-void PrintSummary(const DeformOptions& options, const PredictionStats& stats) {
-  absl::PrintF("%s: %d vertices, largest displacement %.3f mm, volume x %.4f, %d inverted tets\n",
-               options.out, stats.vertices, stats.quality.max_displacement_mm,
-               stats.quality.total_volume_ratio, stats.quality.inverted_tets);
-}
-
 absl::Status RunDeform(const DeformOptions& options) {
   TF_RETURN_IF_ERROR(CheckOutputs(options));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadChosenPlan(options));
@@ -91,7 +83,7 @@ absl::Status RunDeform(const DeformOptions& options) {
   TF_ASSIGN_OR_RETURN(const Positions deformed, Predict(problem, &stats));
   TF_RETURN_IF_ERROR(WriteResult(options.out, plan, problem, deformed));
   if (!options.stats.empty()) TF_RETURN_IF_ERROR(WriteStats(options.stats, stats));
-  PrintSummary(options, stats);
+  PrintOutcome(options.out, stats);
   return absl::OkStatus();
 }
 

@@ -6,8 +6,6 @@
 #include <memory>
 #include <string>
 
-#include "absl/strings/str_format.h"
-
 #include "client/cli/option_checks.h"
 #include "client/cli/plan_session.h"
 #include "client/cli/result_writer.h"
@@ -58,6 +56,7 @@ void AddAnswer(const v1::DeformOnceResponse& answer, PredictionStats* stats) {
   stats->quality.min_volume_ratio = answer.quality().min_volume_ratio();
   stats->quality.max_volume_ratio = answer.quality().max_volume_ratio();
   stats->quality.total_volume_ratio = answer.quality().total_volume_ratio();
+  stats->quality.worst_tet = answer.quality().worst_tet();
   stats->quality.max_displacement_mm = answer.quality().max_displacement_mm();
 }
 
@@ -98,9 +97,7 @@ absl::Status Run(const RunOptions& options) {
   TF_ASSIGN_OR_RETURN(const Positions deformed, PredictOnServer(options, problem, &stats));
   TF_RETURN_IF_ERROR(WriteResult(options.out, plan, problem, deformed));
   if (!options.stats.empty()) TF_RETURN_IF_ERROR(WriteStats(options.stats, stats));
-  absl::PrintF("%s: %d vertices, largest displacement %.3f mm, volume x %.4f, %d inverted tets\n",
-               options.out, stats.vertices, stats.quality.max_displacement_mm,
-               stats.quality.total_volume_ratio, stats.quality.inverted_tets);
+  PrintOutcome(options.out, stats);
   return absl::OkStatus();
 }
 

@@ -3,6 +3,10 @@
 
 #include "client/cli/stats_json.h"
 
+#include <cstdio>
+
+#include "absl/strings/str_format.h"
+
 #include "client/cli/version.h"
 #include "core/base/atomic_file.h"
 #include "core/mesh_io/tet_mesh_io.h"
@@ -32,6 +36,7 @@ OrderedJson SecondsToJson(const PredictionStats& stats) {
 
 OrderedJson QualityToJson(const PredictionStats& stats) {
   return {{"inverted_tets", stats.quality.inverted_tets},
+          {"worst_tet", stats.quality.worst_tet},
           {"volume_ratio_min", stats.quality.min_volume_ratio},
           {"volume_ratio_max", stats.quality.max_volume_ratio},
           {"volume_ratio_total", stats.quality.total_volume_ratio},
@@ -74,6 +79,29 @@ OrderedJson StatsToJson(const PredictionStats& stats) {
           {"bytes_held", stats.preparation.bytes_held},
           {"quality", QualityToJson(stats)},
           {"notice", kNotMedicalDeviceNotice}};
+}
+
+void PrintOutcome(const std::string& out, const PredictionStats& stats) {
+  const DeformationQuality& quality = stats.quality;
+  absl::PrintF("%s: %d vertices, largest displacement %.3f mm, volume x %.4f, %d inverted tets\n",
+               out, stats.vertices, quality.max_displacement_mm, quality.total_volume_ratio,
+               quality.inverted_tets);
+  if (quality.inverted_tets > 0) {
+    absl::FPrintF(stderr,
+                  "warning: tets are inverted, the worst is tet %d (volume x %.3g); move less, or "
+                  "use neo_hookean\n",
+                  quality.worst_tet, quality.min_volume_ratio);
+  }
+  if (stats.solve.load < 1) {
+    absl::FPrintF(stderr,
+                  "warning: only %.0f %% of the movement was reached; the file holds that state\n",
+                  100 * stats.solve.load);
+  } else if (!stats.solve.converged) {
+    absl::FPrintF(stderr,
+                  "warning: not converged after %d iterations (residual %.2g); the file holds the "
+                  "best state\n",
+                  stats.solve.iterations, stats.solve.residual);
+  }
 }
 
 absl::Status WriteStats(const std::string& path, const PredictionStats& stats) {

@@ -16,8 +16,8 @@ namespace tissueform {
 
 // What STATS.json tells of one prediction.
 struct PredictionStats {
-  std::string model;     // as in the plan
-  std::string rotation;  // mode of the gradient field
+  std::string model;         // as in the plan
+  std::string rotation;      // mode of the gradient field
   double poisson_ratio = 0;  // of the elastic models
   Eigen::Index vertices = 0;
   Eigen::Index tets = 0;
@@ -35,6 +35,10 @@ PredictionStats StatsOf(const PlanProblem& problem);
 
 // Keys in the order in which docs/plan-format.md lists them; with version and notice.
 nlohmann::ordered_json StatsToJson(const PredictionStats& stats);
+
+// One line on stdout, and a warning on stderr where tets are inverted or the answer is not what was
+// asked for.
+void PrintOutcome(const std::string& out, const PredictionStats& stats);
 
 // All or nothing, like WriteFileAtomically.
 absl::Status WriteStats(const std::string& path, const PredictionStats& stats);

@@ -15,7 +15,7 @@ DeformationQuality MeasureDeformation(const TetMesh& rest, const Positions& defo
   const Eigen::VectorXd ratios = after.cwiseQuotient(before);
   DeformationQuality quality;
   quality.inverted_tets = (after.array() <= 0).count();
-  quality.min_volume_ratio = ratios.minCoeff();
+  quality.min_volume_ratio = ratios.minCoeff(&quality.worst_tet);
   quality.max_volume_ratio = ratios.maxCoeff();
   quality.total_volume_ratio = after.sum() / before.sum();
   quality.max_displacement_mm =

@@ -12,6 +12,7 @@ namespace tissueform {
 struct DeformationQuality {
   Eigen::Index inverted_tets = 0;  // deformed volume <= 0
   double min_volume_ratio = 1;     // deformed / rest volume, over the tets
+  Eigen::Index worst_tet = 0;      // that of the smallest ratio
   double max_volume_ratio = 1;
   double total_volume_ratio = 1;  // of the whole mesh
   double max_displacement_mm = 0;

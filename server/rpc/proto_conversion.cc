@@ -314,6 +314,7 @@ v1::DeformationQuality ToProto(const DeformationQuality& quality) {
   proto.set_min_volume_ratio(quality.min_volume_ratio);
   proto.set_max_volume_ratio(quality.max_volume_ratio);
   proto.set_total_volume_ratio(quality.total_volume_ratio);
+  proto.set_worst_tet(quality.worst_tet);
   proto.set_max_displacement_mm(quality.max_displacement_mm);
   return proto;
 }

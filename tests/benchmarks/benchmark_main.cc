@@ -23,6 +23,7 @@
 #include "tests/benchmarks/frame_benchmark.h"
 #include "tests/benchmarks/linear_solver_benchmark.h"
 #include "tests/benchmarks/memory_measurement.h"
+#include "tests/benchmarks/process_benchmark.h"
 
 namespace tissueform::benchmarks {
 namespace {
@@ -87,6 +88,14 @@ absl::Status MeasureBar(int number, const BenchOptions& options, BenchmarkReport
   return absl::OkStatus();
 }
 
+absl::Status MeasureProcesses(int number, const BenchOptions& options, BenchmarkReport* report) {
+  TF_ASSIGN_OR_RETURN(BenchmarkRow row,
+                      MeasureAgainstCalculix(number, options.repetitions, options.threads));
+  std::cout << RowText(row) << std::endl;
+  report->rows.push_back(std::move(row));
+  return absl::OkStatus();
+}
+
 absl::Status Run(const BenchOptions& options) {
   if (!options.json.empty()) {
     TF_RETURN_IF_ERROR(CheckWritable(options.json));
@@ -97,7 +106,8 @@ absl::Status Run(const BenchOptions& options) {
   report.repetitions = options.repetitions;
   std::cout << CircumstancesText(report) << "\n\n" << RowsHeading() << std::endl;
   for (const int number : options.meshes) {
-    TF_RETURN_IF_ERROR(MeasureBar(number, options, &report));
+    TF_RETURN_IF_ERROR(number > kLargeBar ? MeasureProcesses(number, options, &report)
+                                          : MeasureBar(number, options, &report));
   }
   report.growth = GrowthExponents(report.rows);
   report.targets = EvaluateTargets(report);

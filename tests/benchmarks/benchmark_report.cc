@@ -118,7 +118,8 @@ std::string MemoryText(const MemoryUse& memory) {
 std::string ClosingText(const BenchmarkReport& report) {
   std::string text;
   if (!report.growth.empty()) {
-    absl::StrAppend(&text, "\ngrowth: seconds ~ tets^exponent; frames: vertices of the answer^exponent\n");
+    absl::StrAppend(&text,
+                    "\ngrowth: seconds ~ tets^exponent; frames: vertices of the answer^exponent\n");
   }
   for (const Growth& growth : report.growth) {
     absl::StrAppend(&text, absl::StrFormat("  %-28s %5.2f\n", growth.work, growth.exponent));

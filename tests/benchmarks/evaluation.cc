@@ -105,10 +105,9 @@ void AddFrames(TargetList* list) {
     list->AtLeast(absl::StrCat("back-substitution / ", work, " >= 100", on),
                   list->Ratio(work, kPaperBar, "back-substitution"), 100);
   }
-  list->AtMost(absl::StrCat("basis preparation / factorise <= 3", on),
-               Quotient(list->Ours("basis preparation", kPaperBar),
-                        list->Ours("factorise", kPaperBar)),
-               3);
+  list->AtMost(
+      absl::StrCat("basis preparation / factorise <= 3", on),
+      Quotient(list->Ours("basis preparation", kPaperBar), list->Ours("factorise", kPaperBar)), 3);
   for (const char* handles : {"", ", 3 handles"}) {
     const std::optional<double> share =
         Quotient(list->Bytes(absl::StrCat("basis frame", handles), kPaperBar),
@@ -118,6 +117,16 @@ void AddFrames(TargetList* list) {
   }
   list->AtLeast(absl::StrCat("frames a second >= 60 on ", NameOf(kLargeBar)),
                 Inverse(list->Ours("basis frame", kLargeBar)), 60);
+}
+
+// Whole programs.
+void AddProcesses(const std::vector<BenchmarkRow>& rows, TargetList* list) {
+  for (const BenchmarkRow& row : rows) {
+    if (row.peer == "ccx") {
+      list->AtLeast(absl::StrCat("ccx / ours, ", row.work, " >= 10 on ", row.mesh), row.Ratio(),
+                    10);
+    }
+  }
 }
 
 void AddMemory(const MemoryUse& use, TargetList* list) {
@@ -137,7 +146,8 @@ void AddMemory(const MemoryUse& use, TargetList* list) {
 }  // namespace
 
 std::vector<Growth> GrowthExponents(const std::vector<BenchmarkRow>& rows) {
-  // log seconds by log tets, or log vertices that are answered; one entry a mesh, whatever the number of peers.
+  // log seconds by log tets, or log vertices that are answered; one entry a mesh, whatever the
+  // number of peers.
   std::vector<std::string> works;
   std::map<std::string, std::map<double, double>> points;
   for (const BenchmarkRow& row : rows) {
@@ -167,6 +177,7 @@ std::vector<Target> EvaluateTargets(const BenchmarkReport& report) {
   AddTimes(kPaperBar, &list);
   AddTimes(kLargeBar, &list);
   AddFrames(&list);
+  AddProcesses(report.rows, &list);
   list.AtMost("solves of an estimated answer <= 10, most of all bars", MostSolves(report.rows), 10);
   for (const MemoryUse& use : report.memory) {
     if (use.bar >= kPaperBar) AddMemory(use, &list);

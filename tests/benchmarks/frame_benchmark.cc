@@ -98,8 +98,8 @@ absl::Status FrameBenchmark::MakeResponse() {
 
 absl::StatusOr<Positions> FrameBenchmark::DirectAnswer() {
   DeformerOptions options;
-  options.model = kind_ == Kind::kElastic ? DeformationModel::kLinearElastic
-                                          : DeformationModel::kGradientField;
+  options.model =
+      kind_ == Kind::kElastic ? DeformationModel::kLinearElastic : DeformationModel::kGradientField;
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<Deformer> deformer,
                       CreateDeformer(preparation_, options));
   TF_ASSIGN_OR_RETURN(Deformation deformation, deformer->Deform(poses_));
@@ -107,7 +107,8 @@ absl::StatusOr<Positions> FrameBenchmark::DirectAnswer() {
 }
 
 absl::Status FrameBenchmark::CheckAnswer() {
-  if (!response_->Covers(poses_)) return absl::InternalError("the prepared answers do not cover 30 degrees");
+  if (!response_->Covers(poses_))
+    return absl::InternalError("the prepared answers do not cover 30 degrees");
   TF_ASSIGN_OR_RETURN(const Positions direct, DirectAnswer());
   response_->Evaluate(poses_, &frame_);
   const double off =
@@ -115,8 +116,8 @@ absl::Status FrameBenchmark::CheckAnswer() {
   if (off > 1e-6 * Diagonal(bar_.mesh)) {
     return absl::InternalError(absl::StrCat("a prepared answer is off by ", off, " mm"));
   }
-  const Positions displacements = (direct - bar_.mesh.positions())(
-      preparation_->constraints().constrained(), Eigen::all);
+  const Positions displacements =
+      (direct - bar_.mesh.positions())(preparation_->constraints().constrained(), Eigen::all);
   values_ = kind_ == Kind::kElastic ? Interleaved(displacements) : Eigen::MatrixXd(displacements);
   // Of the right size; what is in it does not matter for the time.
   rhs_ = kind_ == Kind::kElastic ? Eigen::MatrixXd() : Eigen::MatrixXd(direct);
@@ -133,10 +134,10 @@ absl::StatusOr<Eigen::MatrixXd> FrameBenchmark::BackSubstitute() {
 }
 
 void FrameBenchmark::AddWork() {
-  work_.push_back({Name("frame"), kFramesPerRepetition, [this]() -> absl::StatusOr<PartSeconds> {
-                     return PartSeconds{
-                         {"frame", SecondsOf([this] { response_->Evaluate(poses_, &frame_); })}};
-                   }});
+  work_.push_back(
+      {Name("frame"), kFramesPerRepetition, [this]() -> absl::StatusOr<PartSeconds> {
+         return PartSeconds{{"frame", SecondsOf([this] { response_->Evaluate(poses_, &frame_); })}};
+       }});
   work_.push_back({Name("solve"), 3, [this]() -> absl::StatusOr<PartSeconds> {
                      const Stopwatch stopwatch;
                      TF_RETURN_IF_ERROR(BackSubstitute().status());

@@ -24,9 +24,9 @@ namespace tissueform::benchmarks {
 class FrameBenchmark {
  public:
   enum class Kind {
-    kBasis,             // gradient field, the bar's one handle
+    kBasis,              // gradient field, the bar's one handle
     kBasisThreeHandles,  // gradient field, the handle cut in three
-    kElastic,           // linear elasticity, one handle
+    kElastic,            // linear elasticity, one handle
   };
 
   // Makes the answers once and checks that they lie within a millionth of the bar's diagonal of the

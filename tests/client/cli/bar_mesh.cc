@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/experiments/layered_block.h"
 #include "tests/testing/meshes.h"
 
 namespace tissueform::testing {
@@ -32,6 +33,19 @@ TetMeshFile BarMeshOfPlan() {
           .point_data = {{"anatomy", 1, std::move(anatomy)}},
           .cell_data = {{"youngs_modulus_pa", 1, std::move(youngs_modulus_pa)},
                         {"material", 1, std::move(material)}}};
+}
+
+TetMeshFile BlockMeshOfPlan() {
+  LayeredBlock block = *MakeLayeredBlock();
+  std::vector<int32_t> anatomy(static_cast<size_t>(block.mesh.num_vertices()), 0);
+  for (const int32_t vertex : block.constraints.fixed()) anatomy[static_cast<size_t>(vertex)] = 1;
+  for (const int32_t vertex : block.constraints.handles().front().vertices) {
+    anatomy[static_cast<size_t>(vertex)] = 2;
+  }
+  std::vector<double> stiffness(block.stiffness.begin(), block.stiffness.end());
+  return {.mesh = std::move(block.mesh),
+          .point_data = {{"anatomy", 1, std::move(anatomy)}},
+          .cell_data = {{"youngs_modulus_pa", 1, std::move(stiffness)}}};
 }
 
 }  // namespace tissueform::testing

@@ -10,4 +10,7 @@ namespace tissueform::testing {
 // The mesh of tests/data/plans/bar, as its README describes it.
 TetMeshFile BarMeshOfPlan();
 
+// The layered block with its regions as anatomy: 1 fixed, 2 the patch.
+TetMeshFile BlockMeshOfPlan();
+
 }  // namespace tissueform::testing

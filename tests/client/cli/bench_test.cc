@@ -46,7 +46,7 @@ TEST_F(BenchTest, TheSmallestBarGivesEveryRow) {
 }
 
 TEST_F(BenchTest, WrongUseIsOneLineAndExitCodeTwo) {
-  EXPECT_THAT(Run({"bench", "--mesh", "7"}), FailsWith(2, HasSubstr("--mesh")));
+  EXPECT_THAT(Run({"bench", "--mesh", "9"}), FailsWith(2, HasSubstr("--mesh")));
   EXPECT_THAT(Run({"bench", "--repetitions", "0"}), FailsWith(2, HasSubstr("--repetitions")));
   EXPECT_THAT(Run({"bench", "--fast"}), FailsWith(2, HasSubstr("tissueform bench --help")));
   EXPECT_THAT(Files(), IsEmpty());

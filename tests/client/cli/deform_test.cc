@@ -46,6 +46,65 @@ TEST_F(DeformTest, BarMeshOfThePlanIsWhatItsToolMakes) {
   EXPECT_TRUE(file.cell_data.at(1).values == made.cell_data.at(1).values);
 }
 
+TEST_F(DeformTest, BlockMeshOfThePlanIsWhatItsToolMakes) {
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile file, ReadTetMesh(TestDataPath("plans/block/block.vtu")));
+  const TetMeshFile made = BlockMeshOfPlan();
+  EXPECT_EQ(file.mesh.positions(), made.mesh.positions());
+  EXPECT_EQ(file.mesh.tets(), made.mesh.tets());
+  EXPECT_TRUE(file.point_data.at(0).values == made.point_data.at(0).values);
+  EXPECT_TRUE(file.cell_data.at(0).values == made.cell_data.at(0).values);
+}
+
+TEST_F(DeformTest, EveryModelWritesStrainsAndKeepsTheHandleWhereItIsPut) {
+  std::vector<Positions> results;
+  for (const std::string model : {"gradient_field", "arap", "linear_elastic", "neo_hookean"}) {
+    ASSERT_THAT(Run({"deform", TestDataPath("plans/bar/plan.json"), "--out", model + ".vtu",
+                     "--model", model, "--stats", model + ".json"}),
+                Succeeds());
+    ASSERT_OK_AND_ASSIGN(const TetMeshFile result, ReadTetMesh(Path(model + ".vtu")));
+    const Attribute* strain = FindAttribute(result.cell_data, "principal_strain");
+    ASSERT_NE(strain, nullptr);
+    EXPECT_EQ(strain->components, 3);
+    EXPECT_EQ(FindAttribute(result.cell_data, "von_mises_stress_pa") != nullptr,
+              model == "linear_elastic");
+    const auto stats = nlohmann::json::parse(Read(model + ".json"));
+    EXPECT_EQ(stats["model"], model);
+    EXPECT_EQ(stats["converged"], true);
+    EXPECT_EQ(stats["load"], 1);
+    EXPECT_EQ(stats["poisson_ratio"], 0.45);
+    results.push_back(result.mesh.positions());
+  }
+  for (size_t i = 1; i < results.size(); ++i) {
+    EXPECT_TRUE(results[i].bottomRows(25) == results[0].bottomRows(25)) << "the handle";
+    EXPECT_GT((results[i] - results[0]).rowwise().norm().maxCoeff(), 0.1) << "another model";
+  }
+}
+
+TEST_F(DeformTest, ATetThatIsInvertedIsToldOf) {
+  nlohmann::json plan = BarPlan();
+  plan["handles"][0]["pose"] = {{"translation_mm", {0, 0, -70}}};
+  std::filesystem::copy_file(TestDataPath("plans/bar/bar.vtu"), Path("bar.vtu"));
+  Write("plan.json", plan.dump());
+  const ProcessResult result = Run({"deform", "plan.json", "--out", "out.vtu"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("inverted, the worst is tet "));
+}
+
+TEST_F(DeformTest, AMovementThatCannotBeReachedIsToldOf) {
+  nlohmann::json plan = BarPlan();
+  plan["handles"][0]["pose"] = {{"translation_mm", {0, 0, -70}}};
+  plan["model"] = "neo_hookean";
+  std::filesystem::copy_file(TestDataPath("plans/bar/bar.vtu"), Path("bar.vtu"));
+  Write("plan.json", plan.dump());
+  const ProcessResult result =
+      Run({"deform", "plan.json", "--out", "out.vtu", "--stats", "stats.json"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("% of the movement was reached"));
+  const auto stats = nlohmann::json::parse(Read("stats.json"));
+  EXPECT_LT(stats["load"].get<double>(), 1);
+  EXPECT_EQ(stats["quality"]["inverted_tets"], 0);
+}
+
 TEST_F(DeformTest, ResultIsTheRestShapePlusItsDisplacement) {
   ASSERT_THAT(Run({"deform", TestDataPath("plans/bar/plan.json"), "--out", "out.vtu"}), Succeeds());
   ASSERT_OK_AND_ASSIGN(const TetMeshFile result, ReadTetMesh(Path("out.vtu")));

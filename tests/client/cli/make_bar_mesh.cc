@@ -4,17 +4,20 @@
 // Writes the mesh of tests/data/plans/bar: make_bar_mesh OUT.vtu
 
 #include <iostream>
+#include <string>
 
 #include "core/mesh_io/tet_mesh_io.h"
 #include "tests/client/cli/bar_mesh.h"
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::cerr << "usage: make_bar_mesh OUT.vtu\n";
+  const std::string which = argc == 3 ? argv[1] : "";
+  if (which != "bar" && which != "block") {
+    std::cerr << "usage: make_bar_mesh bar|block OUT.vtu\n";
     return 2;
   }
   const absl::Status written =
-      tissueform::WriteTetMesh(argv[1], tissueform::testing::BarMeshOfPlan());
+      tissueform::WriteTetMesh(argv[2], which == "bar" ? tissueform::testing::BarMeshOfPlan()
+                                                       : tissueform::testing::BlockMeshOfPlan());
   if (written.ok()) return 0;
   std::cerr << written.message() << '\n';
   return 1;

@@ -5,6 +5,7 @@
 
 #include "gtest/gtest.h"
 
+#include "core/mesh/tet_quality.h"
 #include "tests/testing/meshes.h"
 
 namespace tissueform {
@@ -34,6 +35,21 @@ TEST(MeasureDeformationTest, FlattenedTetCountsAsInverted) {
   Positions flat = tet.positions();
   flat.col(2).setZero();
   EXPECT_EQ(MeasureDeformation(tet, flat).inverted_tets, 1);
+}
+
+TEST(MeasureDeformationTest, TheWorstTetIsNamed) {
+  const TetMesh bar = testing::Bar({2, 2, 2});
+  Positions pushed = bar.positions();
+  const int32_t corner = bar.tets()(17, 0);
+  const Eigen::RowVector3d opposite =
+      (bar.positions().row(bar.tets()(17, 1)) + bar.positions().row(bar.tets()(17, 2)) +
+       bar.positions().row(bar.tets()(17, 3))) /
+      3;
+  pushed.row(corner) += 1.5 * (opposite - pushed.row(corner));
+  const DeformationQuality quality = MeasureDeformation(bar, pushed);
+  EXPECT_GT(quality.inverted_tets, 0);
+  const Eigen::VectorXd volumes = TetVolumes(pushed, bar.tets());
+  EXPECT_EQ(volumes[quality.worst_tet], volumes.minCoeff()) << "all rest volumes are equal";
 }
 
 }  // namespace
