@@ -56,6 +56,7 @@ absl::StatusOr<std::vector<ComparedRegion>> LabelledRegions(const TetMeshFile& f
     vertices[static_cast<int64_t>(values[v])].push_back(static_cast<int32_t>(v));
   }
   std::vector<ComparedRegion> regions;
+  regions.reserve(vertices.size());
   for (auto& [label, of_label] : vertices) {
     regions.push_back({absl::StrCat(label), std::move(of_label)});
   }
