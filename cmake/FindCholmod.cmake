@@ -13,4 +13,5 @@ find_library(OPENBLAS_LIBRARY openblas REQUIRED)
 
 add_library(CHOLMOD::CHOLMOD INTERFACE IMPORTED)
 target_include_directories(CHOLMOD::CHOLMOD SYSTEM INTERFACE "${CHOLMOD_INCLUDE_DIR}")
-target_link_libraries(CHOLMOD::CHOLMOD INTERFACE "${CHOLMOD_LIBRARY}" "${OPENBLAS_LIBRARY}")
+# libgomp is GCC's, which CHOLMOD itself uses: its threads are turned off (cholmod_cholesky.cc).
+target_link_libraries(CHOLMOD::CHOLMOD INTERFACE "${CHOLMOD_LIBRARY}" "${OPENBLAS_LIBRARY}" gomp)

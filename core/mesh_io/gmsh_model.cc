@@ -220,9 +220,7 @@ void CollectArrays(const std::vector<Tet>& tets, const RowOfNumber& nodes, bool 
   for (const int view : views) CollectView(view, nodes, rows, mesh);
 }
 
-}  // namespace
-
-absl::StatusOr<RawMesh> ReadGmshModel(const std::string& path, bool is_medit) {
+absl::StatusOr<RawMesh> ReadModel(const std::string& path, bool is_medit) {
   TF_RETURN_IF_ERROR(Open(path));
   TF_RETURN_IF_ERROR(CheckOnlyLinearTets());
   TF_RETURN_IF_ERROR(CheckNothingLost());
@@ -241,4 +239,10 @@ absl::StatusOr<RawMesh> ReadGmshModel(const std::string& path, bool is_medit) {
   return mesh;
 }
 
+}  // namespace
 }  // namespace tissueform
+
+extern "C" void TissueformReadGmshModel(const std::string& path, bool is_medit,
+                                        absl::StatusOr<tissueform::RawMesh>* mesh) {
+  *mesh = tissueform::ReadModel(path, is_medit);
+}

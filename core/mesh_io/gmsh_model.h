@@ -15,9 +15,18 @@ namespace tissueform {
 // in a child process (ReadIsolated), once. Internal to core/mesh_io/gmsh_reader.cc, which says what
 // is kept.
 //
+// It lives in a module that is loaded for the call: Gmsh brings some ninety libraries, and looking
+// up their symbols would take every command a quarter of a second.
+//
 // `path` must end with .msh or .mesh and hold no script: Gmsh runs what it does not know.
 //
 // Errors: InvalidArgument; FailedPrecondition when elements were lost because they repeat a number.
 absl::StatusOr<RawMesh> ReadGmshModel(const std::string& path, bool is_medit);
+
+// What the module exports, and by which name.
+using GmshModelFunction = void (*)(const std::string& path, bool is_medit,
+                                   absl::StatusOr<RawMesh>* mesh);
+inline constexpr char kGmshModelSymbol[] = "TissueformReadGmshModel";
+inline constexpr char kGmshModule[] = "libtissueform_gmsh.so";  // beside the program
 
 }  // namespace tissueform

@@ -24,7 +24,7 @@ TEST_F(UsageTest, WrongUseIsOneLineAndExitCodeTwo) {
               FailsWith(2, HasSubstr("must end with .vtu")));
   EXPECT_THAT(Run({"deform", "plan.json", "--out", "out.vtu", "--model", "spring"}),
               FailsWith(2, HasSubstr("spring")));
-  EXPECT_THAT(Run({"compare", "a.vtu"}), FailsWith(2, HasSubstr("B is required")));
+  EXPECT_THAT(Run({"compare", "a.vtu"}), FailsWith(2, HasSubstr("B: is required")));
   EXPECT_THAT(Files(), IsEmpty());
 }
 
