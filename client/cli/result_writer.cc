@@ -42,14 +42,13 @@ std::vector<Attribute> WithStrain(std::vector<Attribute> cell_data, const PlanPr
   });
   const PiecewiseLinearElements elements = ElementsOf(*problem.mesh);
   const PreparationOptions& preparation = problem.deformer.preparation;
-  cell_data.push_back(
-      {kPrincipalStrainArray, 3,
-       ValuesOf(PrincipalGreenStrains(elements, deformed, preparation.threads))});
+  cell_data.push_back({kPrincipalStrainArray, 3,
+                       ValuesOf(PrincipalGreenStrains(elements, deformed, preparation.threads))});
   if (problem.deformer.model == DeformationModel::kLinearElastic) {
-    const Eigen::VectorXd stress =
-        LinearVonMisesStress(elements, deformed, problem.stiffness, preparation.poisson_ratio,
-                             preparation.threads);
-    cell_data.push_back({kVonMisesStressArray, 1, std::vector<double>(stress.begin(), stress.end())});
+    const Eigen::VectorXd stress = LinearVonMisesStress(
+        elements, deformed, problem.stiffness, preparation.poisson_ratio, preparation.threads);
+    cell_data.push_back(
+        {kVonMisesStressArray, 1, std::vector<double>(stress.begin(), stress.end())});
   }
   return cell_data;
 }

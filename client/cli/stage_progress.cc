@@ -17,7 +17,8 @@
 namespace tissueform {
 namespace {
 
-// What the signal handler writes, on whatever thread it runs: never freed. Zero bytes between stages.
+// What the signal handler writes, on whatever thread it runs: never freed. Zero bytes between
+// stages.
 char announcement[256];
 std::atomic<size_t> announcement_bytes = 0;
 std::atomic<bool> announced = false;

@@ -12,8 +12,8 @@ namespace tissueform {
 // Tells on stderr that a stage is at work when it takes longer than a second, and how long it took
 // when it ends. Short stages say nothing. One at a time.
 //
-// Uses the process's interval timer (SIGALRM), not a thread: reading a mesh forks, and a thread that
-// holds a lock of the allocator at that moment would leave the child waiting for it for ever.
+// Uses the process's interval timer (SIGALRM), not a thread: reading a mesh forks, and a thread
+// that holds a lock of the allocator at that moment would leave the child waiting for it for ever.
 class StageProgress {
  public:
   explicit StageProgress(std::string stage);

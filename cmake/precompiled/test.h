@@ -5,6 +5,7 @@
 
 #pragma once
 
-#include "cmake/precompiled/library.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+
+#include "cmake/precompiled/library.h"

@@ -38,9 +38,8 @@ absl::StatusOr<std::unique_ptr<Deformer>> CreateDeformer(const TetMesh& mesh,
                                                          const Eigen::VectorXd& stiffness,
                                                          const ConstraintSet& constraints,
                                                          const DeformerOptions& options) {
-  TF_ASSIGN_OR_RETURN(
-      const std::shared_ptr<MeshPreparation> preparation,
-      MeshPreparation::Create(mesh, stiffness, constraints, options.preparation));
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<MeshPreparation> preparation,
+                      MeshPreparation::Create(mesh, stiffness, constraints, options.preparation));
   return CreateDeformer(preparation, options);
 }
 

@@ -36,10 +36,20 @@ absl::StatusOr<DeformOnceJob> ReadRequest(const v1::DeformOnceRequest& request,
   return job;
 }
 
+absl::Status ClientHasCancelled() {
+  return absl::CancelledError("the client has cancelled the call");
+}
+
 // On the session's strand.
-absl::Status Run(const DeformOnceJob& job, v1::DeformOnceResponse* response) {
+absl::Status Run(const DeformOnceJob& job, const CancelledFunction& cancelled,
+                 v1::DeformOnceResponse* response) {
+  if (cancelled()) return ClientHasCancelled();
+  TF_RETURN_IF_ERROR(job.session->PrepareModel(job.model, cancelled));
+  DeformControl control;
+  control.on_progress = [&cancelled](const Deformation& /*so_far*/) { return !cancelled(); };
   TF_ASSIGN_OR_RETURN(const Deformation deformation,
-                      job.session->Deform(job.model, job.poses, DeformControl{}));
+                      job.session->Deform(job.model, job.poses, control));
+  if (deformation.summary.cancelled) return ClientHasCancelled();
   *response->mutable_summary() = ToProto(deformation.summary);
   *response->mutable_quality() =
       ToProto(MeasureDeformation(job.session->mesh().mesh, deformation.positions));
@@ -63,9 +73,8 @@ grpc::ServerUnaryReactor* DeformService::DeformOnce(grpc::CallbackServerContext*
   }
   Strand& strand = job->session->strand();
   strand.Post([reactor, response, scope, context, job = *std::move(job)] {
-    reactor->Finish(scope.End(context->IsCancelled()
-                                  ? absl::CancelledError("the client has cancelled the call")
-                                  : Run(job, response)));
+    reactor->Finish(scope.End(Run(
+        job, [context] { return context->IsCancelled(); }, response)));
   });
   return reactor;
 }

@@ -70,8 +70,7 @@ absl::Status Session::Prepare(const Eigen::VectorXd& stiffness, MemoryBudget* bu
 
 absl::Status Session::CheckOpen() const {
   if (models_ != nullptr) return absl::OkStatus();
-  return absl::NotFoundError(
-      absl::StrCat("sessions/", id_, " has been deleted; create it again"));
+  return absl::NotFoundError(absl::StrCat("sessions/", id_, " has been deleted; create it again"));
 }
 
 absl::Status Session::PrepareModel(DeformationModel model, const CancelledFunction& cancelled) {
@@ -100,8 +99,8 @@ absl::StatusOr<Deformation> Session::Deform(DeformationModel model,
   return (*deformer)->Deform(poses, control);
 }
 
-absl::StatusOr<std::optional<PreparedAnswer>> Session::Respond(
-    const ResponseRequest& request, absl::Span<const HandlePose> poses) {
+absl::StatusOr<std::optional<PreparedAnswer>> Session::Respond(const ResponseRequest& request,
+                                                               absl::Span<const HandlePose> poses) {
   Touch();
   const Stopwatch stopwatch;
   TF_ASSIGN_OR_RETURN(VertexResponse* const response,

@@ -70,8 +70,8 @@ absl::Status SessionModels::Begin(const TetMesh& mesh, const Eigen::VectorXd& st
                                            mesh.num_vertices(), mesh.num_tets(),
                                            static_cast<int64_t>(constraints.handles().size())),
                                        "session"));
-  TF_ASSIGN_OR_RETURN(preparation_, MeshPreparation::Create(mesh, stiffness, constraints,
-                                                            options_.preparation));
+  TF_ASSIGN_OR_RETURN(preparation_,
+                      MeshPreparation::Create(mesh, stiffness, constraints, options_.preparation));
   return absl::OkStatus();
 }
 
@@ -130,9 +130,9 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> SessionModels::CreateResponse(
     const ResponseRequest& request) {
   const FactorAdmission admission = [this](int64_t bytes) { return Admit(bytes); };
   if (request.model == DeformationModel::kLinearElastic) {
-    return CreateLinearElasticResponse(preparation_, request.vertices,
-                                       {.tolerance_mm = request.tolerance_mm,
-                                        .admission = admission});
+    return CreateLinearElasticResponse(
+        preparation_, request.vertices,
+        {.tolerance_mm = request.tolerance_mm, .admission = admission});
   }
   if (request.model == DeformationModel::kGradientField &&
       options_.gradient_field.rotation == RotationMode::kPropagated &&
@@ -151,7 +151,8 @@ absl::Status SessionModels::Admit(int64_t more_bytes) {
   if (cancelled_ != nullptr && (*cancelled_)()) {
     return absl::CancelledError("the client has cancelled the call");
   }
-  return reservation_.Resize(reservation_.bytes() + more_bytes, "matrix factor or prepared answers");
+  return reservation_.Resize(reservation_.bytes() + more_bytes,
+                             "matrix factor or prepared answers");
 }
 
 absl::Status SessionModels::Settle() { return reservation_.Resize(BytesHeld(), "session"); }

@@ -36,8 +36,8 @@ struct ResponseRequest {
   friend bool operator==(const ResponseRequest&, const ResponseRequest&) = default;
 };
 
-// The models of one session on one shared preparation, each made when it is first asked for, and the
-// prepared answers of its streams. Takes of the memory budget what it is about to allocate. One
+// The models of one session on one shared preparation, each made when it is first asked for, and
+// the prepared answers of its streams. Takes of the memory budget what it is about to allocate. One
 // thread at a time.
 class SessionModels {
  public:
@@ -46,7 +46,8 @@ class SessionModels {
   SessionModels(const SessionModels&) = delete;
   SessionModels& operator=(const SessionModels&) = delete;
 
-  // Checks mesh, stiffness and regions. Errors: those of MeshPreparation::Create; ResourceExhausted.
+  // Checks mesh, stiffness and regions. Errors: those of MeshPreparation::Create;
+  // ResourceExhausted.
   absl::Status Begin(const TetMesh& mesh, const Eigen::VectorXd& stiffness,
                      const ConstraintSet& constraints);
 

@@ -31,7 +31,6 @@ auto IsRefused(const std::string& why) {
                   AllOf(HasSubstr("plan plan.json: "), HasSubstr(why), Not(HasSubstr("\n"))));
 }
 
-
 TEST(BadPlanTest, UnknownKeyIsNamedWithWhatIsAllowed) {
   EXPECT_THAT(Parse(PlanWith("/modle", "arap")),
               IsRefused("unknown key \"modle\" at /; allowed there: coord"));

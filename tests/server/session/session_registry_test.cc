@@ -98,8 +98,9 @@ TEST_F(SessionRegistryTest, ADeletedSessionAnswersNoMorePoses) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create().get());
   ASSERT_THAT(Delete(session->id()), IsOk());
   std::promise<absl::Status> status;
-  session->strand().Post(
-      [&] { status.set_value(session->Deform(session->model(), {HandlePose{}}, DeformControl{}).status()); });
+  session->strand().Post([&] {
+    status.set_value(session->Deform(session->model(), {HandlePose{}}, DeformControl{}).status());
+  });
   EXPECT_THAT(status.get_future().get(),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("delete")));
 }
