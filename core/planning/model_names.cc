@@ -42,6 +42,7 @@ constexpr std::array<Word<BlendMap>, 2> kBlends = {{
 template <typename Words>
 std::string Names(const Words& words) {
   std::vector<std::string> names;
+  names.reserve(words.size());
   for (const auto& word : words) names.push_back(absl::StrCat("\"", word.name, "\""));
   return absl::StrJoin(names, " or ");
 }

@@ -32,6 +32,10 @@ DECLARATIONS = [
 ]
 
 
+# `using testing::HasSubstr;`: may be said twice, but not beside a declaration of that name.
+IMPORT = re.compile(r"^using\s+[\w:]*::(\w+);")
+
+
 def compile_command(entry):
     """The arguments without input and output files, and without GCC's precompiled header."""
     arguments = shlex.split(entry["command"])
@@ -68,23 +72,31 @@ def macros(command):
     return dict(argument[2:].partition("=")[::2] for argument in command if argument.startswith("-D"))
 
 
+def imported_names(path):
+    matches = map(IMPORT.match, path.read_text(encoding="utf-8").splitlines())
+    return {match.group(1) for match in matches if match}
+
+
 class Batch:
     def __init__(self, alone=False):
         self.alone = alone
         self.files = []
         self.names = set()
+        self.imports = set()
         self.macros = {}
         self.command = []
 
-    def takes(self, names, command):
+    def takes(self, names, imports, command):
         if self.alone:
             return False
         agree = all(self.macros.get(name, value) == value for name, value in macros(command).items())
-        return agree and len(self.files) < MOST_FILES and not names & self.names
+        clash = names & (self.names | self.imports) or imports & self.names
+        return agree and len(self.files) < MOST_FILES and not clash
 
-    def add(self, path, names, command):
+    def add(self, path, names, imports, command):
         self.files.append(path)
         self.names |= names
+        self.imports |= imports
         self.macros |= macros(command)
         # "-isystem FOLDER" is two words that stay together.
         words = re.findall(r"-isystem\0[^\0]+|[^\0]+", "\0".join(command))
@@ -99,13 +111,14 @@ def put_together(files):
     batches = []
     for path, command in files:
         names = declared_names(path)
+        imports = imported_names(path)
         if LONERS.search(path.read_text(encoding="utf-8")):
             batch = Batch(alone=True)
         else:
-            batch = next((batch for batch in batches if batch.takes(names, command)), Batch())
+            batch = next((batch for batch in batches if batch.takes(names, imports, command)), Batch())
         if batch not in batches:
             batches.append(batch)
-        batch.add(path, names, command)
+        batch.add(path, names, imports, command)
     return batches
 
 
