@@ -8,6 +8,8 @@
 #include <fcntl.h>
 #include <fstream>
 #include <iterator>
+#include <regex>
+#include <sstream>
 #include <unistd.h>
 
 #include <sys/resource.h>
@@ -21,6 +23,17 @@ namespace {
 std::string Slurp(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+// Without the lines of StageProgress, which come when a machine is slow and not otherwise.
+std::string WithoutProgress(const std::string& err) {
+  static const std::regex kProgress("[a-z0-9_ ]+( \\.\\.\\.|: [0-9]+\\.[0-9] s)");
+  std::istringstream lines(err);
+  std::string kept;
+  for (std::string line; std::getline(lines, line);) {
+    if (!std::regex_match(line, kProgress)) kept += line + "\n";
+  }
+  return kept;
 }
 
 void Redirect(int descriptor, const std::filesystem::path& path) {
@@ -54,7 +67,8 @@ ProcessResult RunTissueform(const std::vector<std::string>& arguments,
   }
   int status = 0;
   waitpid(child, &status, 0);
-  ProcessResult result{WIFEXITED(status) ? WEXITSTATUS(status) : -1, Slurp(out), Slurp(err)};
+  ProcessResult result{WIFEXITED(status) ? WEXITSTATUS(status) : -1, Slurp(out),
+                       WithoutProgress(Slurp(err))};
   std::filesystem::remove(out);
   std::filesystem::remove(err);
   return result;
