@@ -4,6 +4,7 @@
 #include "core/constraints/handle_pose.h"
 
 #include <cmath>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
@@ -11,6 +12,10 @@
 
 namespace tissueform {
 namespace {
+
+// Far beyond any head, far below where squares overflow (docs/plan-format.md).
+constexpr double kLargestScale = 1e6;
+constexpr double kLargestLengthMm = 1e9;
 
 absl::Status CheckFinite(const Eigen::Vector3d& vector, absl::string_view field) {
   if (vector.allFinite()) {
@@ -43,6 +48,18 @@ absl::Status CheckPose(const HandlePose& pose) {
   if (!std::isfinite(pose.scale) || pose.scale <= 0) {
     return absl::InvalidArgumentError(
         absl::StrCat("pose has scale ", pose.scale, "; it must be a positive number"));
+  }
+  if (pose.scale > kLargestScale) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("pose has scale ", pose.scale, "; it may be ", kLargestScale, " at most"));
+  }
+  for (const auto& [vector, what] :
+       {std::pair(pose.pivot_mm, "pivot"), std::pair(pose.translation_mm, "translation")}) {
+    if (vector.norm() > kLargestLengthMm) {
+      return absl::InvalidArgumentError(absl::StrCat("pose has a ", what, " of ", vector.norm(),
+                                                     " mm; it may be ", kLargestLengthMm,
+                                                     " mm at most"));
+    }
   }
   return absl::OkStatus();
 }

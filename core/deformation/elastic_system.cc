@@ -4,9 +4,11 @@
 #include "core/deformation/elastic_system.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "absl/memory/memory.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
@@ -46,9 +48,15 @@ absl::Status CheckCondition(double condition, double poisson_ratio) {
   if (condition <= ElasticSystem::kLargestCondition) {
     return absl::OkStatus();
   }
+  if (!std::isfinite(condition)) {
+    return absl::InvalidArgumentError(
+        "elastic system cannot be computed: the stiffness is too large or too small for double "
+        "precision; give it in Pa");
+  }
   return absl::InvalidArgumentError(absl::StrCat(
       "elastic system is too ill-conditioned for a reliable answer (condition estimate ", condition,
-      ", limit ", ElasticSystem::kLargestCondition, ") with Poisson's ratio ", poisson_ratio,
+      ", limit ", ElasticSystem::kLargestCondition, ") with Poisson's ratio ",
+      absl::StrFormat("%.15g", poisson_ratio),
       "; take a ratio further below 0.5, or a narrower range of stiffness"));
 }
 

@@ -38,7 +38,9 @@ class LinearElasticDeformer : public Deformer {
     summary_.factorise_seconds = factorization.factorise_seconds;
     summary_.prepare_seconds = elastic_.response_seconds();
     summary_.factor_bytes = factorization.factor_bytes;
-    summary_.bytes_held = preparation_->bytes_held();
+    displacements_.resize(elastic_.response_columns().rows());
+    summary_.own_bytes = displacements_.size() * static_cast<int64_t>(sizeof(double));
+    summary_.bytes_held = preparation_->bytes_held() + summary_.own_bytes;
   }
 
   absl::StatusOr<Deformation> Deform(absl::Span<const HandlePose> poses,

@@ -99,7 +99,8 @@ class NeoHookeanDeformer : public Deformer {
     summary_.factorise_seconds = factorization.factorise_seconds;
     summary_.prepare_seconds = elastic_.response_seconds();
     summary_.factor_bytes = factorization.factor_bytes;
-    summary_.bytes_held = preparation_->bytes_held() + BytesNeeded(*preparation_, options_);
+    summary_.own_bytes = BytesNeeded(*preparation_, options_);
+    summary_.bytes_held = preparation_->bytes_held() + summary_.own_bytes;
   }
 
   absl::StatusOr<Deformation> Deform(absl::Span<const HandlePose> poses,

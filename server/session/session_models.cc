@@ -99,7 +99,10 @@ absl::StatusOr<Deformer*> SessionModels::Prepare(DeformationModel model,
   }
   Deformer* const made = deformer->get();
   deformers_[model] = *std::move(deformer);
-  TF_RETURN_IF_ERROR(Settle());
+  if (const absl::Status room = Settle(); !room.ok()) {
+    deformers_.erase(model);
+    return room;
+  }
   return made;
 }
 
@@ -122,7 +125,10 @@ absl::StatusOr<VertexResponse*> SessionModels::PrepareResponse(const ResponseReq
     return response.status();
   }
   responses_.push_front({request, *std::move(response)});
-  TF_RETURN_IF_ERROR(Settle());
+  if (const absl::Status room = Settle(); !room.ok()) {
+    responses_.pop_front();
+    return room;
+  }
   return responses_.front().response.get();
 }
 

@@ -3,6 +3,8 @@
 
 #include "tests/benchmarks/frame_benchmark.h"
 
+#include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <utility>
 
@@ -133,11 +135,19 @@ absl::StatusOr<Eigen::MatrixXd> FrameBenchmark::BackSubstitute() {
   return laplacian->system->Solve(rhs_, values_);
 }
 
+absl::StatusOr<PartSeconds> FrameBenchmark::AnswerFrame() {
+  // As in a drag no pose comes twice: the response keeps what belongs to the last one.
+  poses_.front().translation_mm.x() = 1 + 1e-3 * (++frames_ % 1000);
+  const Stopwatch stopwatch;
+  if (!response_->Covers(poses_) || !std::isfinite(response_->ErrorBoundMm(poses_))) {
+    return absl::InternalError("a pose of the benchmark is not covered");
+  }
+  response_->Evaluate(poses_, &frame_);
+  return PartSeconds{{"frame", stopwatch.Seconds()}};
+}
+
 void FrameBenchmark::AddWork() {
-  work_.push_back(
-      {Name("frame"), kFramesPerRepetition, [this]() -> absl::StatusOr<PartSeconds> {
-         return PartSeconds{{"frame", SecondsOf([this] { response_->Evaluate(poses_, &frame_); })}};
-       }});
+  work_.push_back({Name("frame"), kFramesPerRepetition, [this] { return AnswerFrame(); }});
   work_.push_back({Name("solve"), 3, [this]() -> absl::StatusOr<PartSeconds> {
                      const Stopwatch stopwatch;
                      TF_RETURN_IF_ERROR(BackSubstitute().status());

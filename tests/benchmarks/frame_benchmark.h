@@ -45,6 +45,8 @@ class FrameBenchmark {
   absl::Status CheckAnswer();
   absl::StatusOr<Positions> DirectAnswer();
   absl::StatusOr<Eigen::MatrixXd> BackSubstitute();
+  // What a session does for a frame: asks whether the poses are covered, bounds the error, answers.
+  absl::StatusOr<PartSeconds> AnswerFrame();
   void AddWork();
   std::string Name(const std::string& what) const;
 
@@ -58,6 +60,7 @@ class FrameBenchmark {
   Eigen::MatrixXd values_;  // at the constrained unknowns
   FloatPositions frame_;
   int64_t predicted_bytes_ = 0;
+  int frames_ = 0;
   std::vector<TimedWork> work_;
 };
 

@@ -155,6 +155,7 @@ TEST_F(ModelsTest, PreparedAnswersOfTheSkinHoldItsVerticesOnly) {
   const std::optional<v1::DeformFrame> frame = stream->Receive();
   ASSERT_TRUE(frame.has_value());
   const Positions direct = Solve(DeformationModel::kGradientField, Turn(0.2));
+  ASSERT_GT(stream->started().vertices_size(), 0);
   ASSERT_OK_AND_ASSIGN(const Positions skin,
                        DecodePositions(frame->positions(), stream->started().vertex_count()));
   for (int i = 0; i < stream->started().vertices_size(); ++i) {

@@ -74,5 +74,18 @@ TEST(CheckPoseTest, ScaleMustBePositive) {
   }
 }
 
+TEST(CheckPoseTest, NumbersThatWouldOverflowAreRefused) {
+  HandlePose pose;
+  pose.scale = 1e200;
+  EXPECT_THAT(CheckPose(pose), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("at most")));
+  pose = {};
+  pose.translation_mm.z() = 1e300;
+  EXPECT_THAT(CheckPose(pose),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("translation")));
+  pose = {};
+  pose.pivot_mm.x() = -1e300;
+  EXPECT_THAT(CheckPose(pose), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("pivot")));
+}
+
 }  // namespace
 }  // namespace tissueform

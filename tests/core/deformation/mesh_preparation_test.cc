@@ -7,6 +7,7 @@
 #include "gtest/gtest.h"
 
 #include "core/deformation/arap_deformer.h"
+#include "core/deformation/create_deformer.h"
 #include "core/deformation/gradient_field_deformer.h"
 #include "tests/core/deformation/handle_problem.h"
 #include "tests/testing/status_matchers.h"
@@ -63,6 +64,15 @@ TEST_F(MeshPreparationTest, BytesAreThoseOfWhatWasMade) {
             preparation->bytes_held() + propagated->preparation().own_bytes);
   ASSERT_THAT(preparation->Elastic(), IsOk());
   EXPECT_GT(preparation->bytes_held(), preparation->laplacian_bytes());
+  for (const DeformationModel model :
+       {DeformationModel::kLinearElastic, DeformationModel::kNeoHookean}) {
+    DeformerOptions options;
+    options.model = model;
+    ASSERT_OK_AND_ASSIGN(const auto elastic, CreateDeformer(preparation, options));
+    EXPECT_GT(elastic->preparation().own_bytes, 0) << "a session's budget counts it";
+    EXPECT_EQ(elastic->preparation().bytes_held,
+              preparation->bytes_held() + elastic->preparation().own_bytes);
+  }
 }
 
 TEST_F(MeshPreparationTest, SharedAndOwnPreparationGiveTheSameAnswer) {
