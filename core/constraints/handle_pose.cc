@@ -50,15 +50,16 @@ absl::Status CheckPose(const HandlePose& pose) {
         absl::StrCat("pose has scale ", pose.scale, "; it must be a positive number"));
   }
   if (pose.scale > kLargestScale) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("pose has scale ", pose.scale, "; it may be ", kLargestScale, " at most"));
+    return absl::InvalidArgumentError(absl::StrCat("pose has scale ", pose.scale, "; it may be ",
+                                                   kLargestScale,
+                                                   " at most, so that positions stay finite"));
   }
   for (const auto& [vector, what] :
        {std::pair(pose.pivot_mm, "pivot"), std::pair(pose.translation_mm, "translation")}) {
-    if (vector.norm() > kLargestLengthMm) {
-      return absl::InvalidArgumentError(absl::StrCat("pose has a ", what, " of ", vector.norm(),
+    if (const double largest = vector.cwiseAbs().maxCoeff(); largest > kLargestLengthMm) {
+      return absl::InvalidArgumentError(absl::StrCat("pose has a ", what, " of ", largest,
                                                      " mm; it may be ", kLargestLengthMm,
-                                                     " mm at most"));
+                                                     " mm at most, so that positions stay finite"));
     }
   }
   return absl::OkStatus();
