@@ -3,133 +3,41 @@
 
 #include "core/mesh_io/isolated_read.h"
 
-#include <cerrno>
-#include <csignal>
-#include <exception>
-#include <fcntl.h>
-#include <fstream>
-#include <new>
-#include <unistd.h>
-
-#include "absl/strings/str_cat.h"
-#include <sys/resource.h>
-#include <sys/wait.h>
-
+#include "core/base/isolated_process.h"
+#include "core/base/status_macros.h"
 #include "core/mesh_io/raw_mesh_pipe.h"
 
 namespace tissueform {
 namespace {
 
-// AddressSanitizer reserves terabytes of addresses for itself, which a limit would forbid.
-#if defined(__SANITIZE_ADDRESS__)
-constexpr bool kLimitsMemory = false;
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-constexpr bool kLimitsMemory = false;
-#else
-constexpr bool kLimitsMemory = true;
-#endif
-#else
-constexpr bool kLimitsMemory = true;
-#endif
-
-void SetLimit(int resource, int64_t value) {
-  const rlimit limit{static_cast<rlim_t>(value), static_cast<rlim_t>(value)};
-  setrlimit(static_cast<__rlimit_resource>(resource), &limit);
-}
-
-int64_t AddressSpaceBytes() {
-  int64_t pages = 0;
-  std::ifstream("/proc/self/statm") >> pages;
-  return pages * sysconf(_SC_PAGESIZE);
-}
-
-void Silence() {
-  const int nowhere = open("/dev/null", O_RDWR | O_CLOEXEC);
-  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    dup2(nowhere, descriptor);
-  }
-}
-
-void BindToLimits(const MeshReadLimits& limits) {
-  for (const int signal_number : {SIGSEGV, SIGBUS, SIGFPE, SIGABRT, SIGTERM, SIGINT}) {
-    std::signal(signal_number, SIG_DFL);
-  }
-  std::signal(SIGXFSZ, SIG_IGN);
-  std::signal(SIGPIPE, SIG_IGN);
-  SetLimit(RLIMIT_CORE, 0);
-  SetLimit(RLIMIT_FSIZE, 0);
-  SetLimit(RLIMIT_CPU, limits.max_seconds);
-  if (kLimitsMemory) SetLimit(RLIMIT_AS, AddressSpaceBytes() + limits.max_memory_bytes);
-}
-
-absl::Status OverMemory(const MeshReadLimits& limits) {
-  return absl::ResourceExhaustedError(
-      absl::StrCat("reading it needs more than ", limits.max_memory_bytes,
-                   " bytes of memory (MeshReadLimits.max_memory_bytes)"));
-}
+constexpr char kWhat[] = "reading it";
 
 absl::StatusOr<RawMesh> ReadWithoutExceptions(
-    const MeshReadLimits& limits, const std::function<absl::StatusOr<RawMesh>()>& read) {
-  try {
-    return read();
-  } catch (const std::bad_alloc&) {
-    return OverMemory(limits);
-  } catch (const std::exception& exception) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("the library that reads it gave up (", exception.what(), ")"));
-  } catch (...) {  // TetGen throws numbers
-    return absl::InvalidArgumentError("the library that reads it gave up; it is damaged");
-  }
-}
-
-// Never returns: nothing of the parent's state may be torn down twice.
-[[noreturn]] void RunChild(int to_parent, const MeshReadLimits& limits,
-                           const std::function<absl::StatusOr<RawMesh>()>& read) {
-  Silence();
-  BindToLimits(limits);
-  const bool sent = SendRawMesh(to_parent, ReadWithoutExceptions(limits, read));
-  _exit(sent ? 0 : 1);
-}
-
-int WaitFor(pid_t child) {
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  return status;
-}
-
-absl::Status ExplainEnd(int status, const MeshReadLimits& limits) {
-  if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL)) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat("reading it took more than ", limits.max_seconds, " seconds or all memory"));
-  }
-  return absl::InvalidArgumentError(
-      "it is damaged: the library that reads such files crashed on it");
+    const IsolationLimits& limits, const std::function<absl::StatusOr<RawMesh>()>& read) {
+  absl::StatusOr<RawMesh> mesh = absl::InternalError("not read");
+  const absl::Status status = WithoutExceptions(kWhat, limits, [&] {
+    mesh = read();
+    return mesh.status();
+  });
+  if (!status.ok()) return status;
+  return mesh;
 }
 
 }  // namespace
 
 absl::StatusOr<RawMesh> ReadIsolated(const MeshReadLimits& limits,
                                      const std::function<absl::StatusOr<RawMesh>()>& read) {
-  int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) return absl::ErrnoToStatus(errno, "cannot make a pipe");
-  const pid_t child = fork();
-  if (child == 0) {
-    // Else the child could not notice that the parent reads no further, and would wait for ever.
-    close(ends[0]);
-    RunChild(ends[1], limits, read);
-  }
-  const int fork_error = errno;
-  close(ends[1]);
-  if (child < 0) {
-    close(ends[0]);
-    return absl::ErrnoToStatus(fork_error, "cannot start a child process to read a mesh");
-  }
-  absl::StatusOr<RawMesh> mesh = ReceiveRawMesh(ends[0], limits.max_memory_bytes);
-  close(ends[0]);
-  const int status = WaitFor(child);
-  if (absl::IsDataLoss(mesh.status())) return ExplainEnd(status, limits);
+  const IsolationLimits isolation{limits.max_memory_bytes, limits.max_seconds};
+  absl::StatusOr<RawMesh> mesh = absl::InternalError("not received");
+  TF_RETURN_IF_ERROR(RunIsolated(
+      kWhat, isolation,
+      [&](int descriptor) {
+        return SendRawMesh(descriptor, ReadWithoutExceptions(isolation, read));
+      },
+      [&](int descriptor) {
+        mesh = ReceiveRawMesh(descriptor, limits.max_memory_bytes);
+        return mesh.status();
+      }));
   return mesh;
 }
 
