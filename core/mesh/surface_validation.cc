@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include <Eigen/Geometry>
 
+#include "core/mesh/half_edges.h"
 #include "core/mesh/tet_topology.h"
 #include "core/mesh/vertex_groups.h"
 
@@ -20,43 +21,17 @@ namespace {
 // A triangle whose area is this small against its longest edge squared has no usable normal.
 constexpr double kDegenerateAreaRatio = 1e-12;
 
-struct HalfEdge {
-  std::array<int32_t, 2> edge;  // rising
-  bool runs_up;                 // from the lower to the higher vertex
-};
-
-std::vector<HalfEdge> SortedHalfEdges(const TriangleIndices& triangles) {
-  std::vector<HalfEdge> half_edges;
-  half_edges.reserve(3 * triangles.rows());
-  for (Eigen::Index f = 0; f < triangles.rows(); ++f) {
-    for (int k = 0; k < 3; ++k) {
-      const int32_t a = triangles(f, k);
-      const int32_t b = triangles(f, (k + 1) % 3);
-      half_edges.push_back({{std::min(a, b), std::max(a, b)}, a < b});
-    }
-  }
-  std::sort(half_edges.begin(), half_edges.end(),
-            [](const HalfEdge& a, const HalfEdge& b) { return a.edge < b.edge; });
-  return half_edges;
-}
-
 void FindBadEdges(const TriangleIndices& triangles, SurfaceReport* report) {
-  const std::vector<HalfEdge> half_edges = SortedHalfEdges(triangles);
   std::vector<Eigen::Index> open;
   std::vector<Eigen::Index> non_manifold;
   std::vector<Eigen::Index> turned;
-  for (size_t first = 0; first < half_edges.size();) {
-    size_t last = first + 1;
-    while (last < half_edges.size() && half_edges[last].edge == half_edges[first].edge) ++last;
-    const int32_t vertex = half_edges[first].edge[0];
-    if (last - first == 1) open.push_back(vertex);
-    if (last - first > 2) non_manifold.push_back(vertex);
-    if (last - first == 2 && half_edges[first].runs_up == half_edges[first + 1].runs_up) {
-      turned.push_back(vertex);
-    }
+  ForEachEdge(triangles, [&](EdgeUses uses) {
+    const int32_t vertex = uses[0].edge[0];
+    if (IsOpen(uses)) open.push_back(vertex);
+    if (IsNonManifold(uses)) non_manifold.push_back(vertex);
+    if (IsTurned(uses)) turned.push_back(vertex);
     ++report->num_edges;
-    first = last;
-  }
+  });
   AddDefect({"open_edges", Severity::kWarning, "edges have only one triangle", "at vertex",
              "the surface is open: it has no inside to fill with tets; close it"},
             open, &report->defects);
@@ -68,27 +43,26 @@ void FindBadEdges(const TriangleIndices& triangles, SurfaceReport* report) {
             turned, &report->defects);
 }
 
+std::array<Eigen::Vector3d, 3> CornersOf(const TriangleMesh& mesh, Eigen::Index triangle,
+                                         const Eigen::Vector3d& origin) {
+  std::array<Eigen::Vector3d, 3> corners;
+  for (int k = 0; k < 3; ++k) {
+    corners[k] = mesh.positions().row(mesh.triangles()(triangle, k)).transpose() - origin;
+  }
+  return corners;
+}
+
 void MeasureTriangles(const TriangleMesh& mesh, SurfaceReport* report) {
-  std::vector<Eigen::Index> degenerate;
   const Eigen::Vector3d origin = mesh.positions().row(0).transpose();
   double volume = 0;
   for (Eigen::Index f = 0; f < mesh.num_triangles(); ++f) {
-    std::array<Eigen::Vector3d, 3> corners;
-    for (int k = 0; k < 3; ++k) {
-      corners[k] = mesh.positions().row(mesh.triangles()(f, k)).transpose() - origin;
-    }
-    const Eigen::Vector3d p = corners[1] - corners[0];
-    const Eigen::Vector3d q = corners[2] - corners[0];
-    const double area = 0.5 * p.cross(q).norm();
-    const double longest = std::max({p.squaredNorm(), q.squaredNorm(), (p - q).squaredNorm()});
-    // Also when numbers so large overflow.
-    if (!(area > kDegenerateAreaRatio * longest)) degenerate.push_back(f);
-    report->area_mm2 += area;
-    volume += corners[0].dot(corners[1].cross(corners[2])) / 6.0;
+    const auto [a, b, c] = CornersOf(mesh, f, origin);
+    report->area_mm2 += 0.5 * (b - a).cross(c - a).norm();
+    volume += a.dot(b.cross(c)) / 6.0;
   }
   AddDefect({"degenerate_triangles", Severity::kError, "triangles have no area", "triangle",
              "remove or remesh them"},
-            degenerate, &report->defects);
+            DegenerateTriangles(mesh), &report->defects);
   report->enclosed_volume_mm3 = report->is_closed() ? volume : 0;
 }
 
@@ -136,6 +110,21 @@ std::vector<Eigen::Index> NonFiniteVertices(const Positions& positions) {
 }
 
 }  // namespace
+
+std::vector<Eigen::Index> DegenerateTriangles(const TriangleMesh& mesh) {
+  std::vector<Eigen::Index> degenerate;
+  const Eigen::Vector3d origin = mesh.positions().row(0).transpose();
+  for (Eigen::Index f = 0; f < mesh.num_triangles(); ++f) {
+    const auto [a, b, c] = CornersOf(mesh, f, origin);
+    const Eigen::Vector3d p = b - a;
+    const Eigen::Vector3d q = c - a;
+    const double area = 0.5 * p.cross(q).norm();
+    const double longest = std::max({p.squaredNorm(), q.squaredNorm(), (p - q).squaredNorm()});
+    // Also when numbers so large overflow.
+    if (!(area > kDegenerateAreaRatio * longest)) degenerate.push_back(f);
+  }
+  return degenerate;
+}
 
 bool SurfaceReport::is_closed() const {
   return Find("open_edges") == nullptr && Find("non_manifold_edges") == nullptr &&

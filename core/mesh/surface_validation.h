@@ -43,4 +43,8 @@ struct SurfaceReport {
 // `split_polygons` is what reading has told (TriangleMeshFile); it is only reported.
 SurfaceReport ValidateTriangleMesh(const TriangleMesh& mesh, Eigen::Index split_polygons = 0);
 
+// The triangles that count as degenerate_triangles, rising. Those with a corner that is not finite
+// are among them.
+std::vector<Eigen::Index> DegenerateTriangles(const TriangleMesh& mesh);
+
 }  // namespace tissueform

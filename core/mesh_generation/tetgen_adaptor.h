@@ -1,0 +1,32 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+#include "core/base/types.h"
+#include "core/mesh/triangle_mesh.h"
+#include "core/mesh_generation/tetrahedralization.h"
+
+namespace tissueform {
+
+// What TetGen makes, before anything of it is checked.
+struct RawTets {
+  Positions positions;
+  TetIndices tets;
+  Eigen::VectorXd attributes;  // #T, or none where there are no regions
+};
+
+// TetGen with the surface, `holes_mm` instead of those of the options, and the switches that the
+// options stand for. It may crash, throw, loop or print: call it in a child process only. Internal
+// to core/mesh_generation/tetrahedralization.cc.
+//
+// Errors: InvalidArgument, ResourceExhausted.
+absl::StatusOr<RawTets> RunTetgen(const TriangleMesh& surface,
+                                  const std::vector<Eigen::Vector3d>& holes_mm,
+                                  const TetrahedralizationOptions& options);
+
+}  // namespace tissueform
