@@ -1,0 +1,55 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace tissueform {
+
+// Where a volume came from, for the report. Holds no patient identifier and no path.
+struct CtProvenance {
+  std::string format;  // "DICOM", "NIfTI", "NRRD", "MetaImage"
+  int num_files = 0;
+
+  // SHA-256 in hexadecimal digits: of the file where it is one, otherwise of the digests of the
+  // files one after the other (slices in the order of the volume; a header before its data). Names
+  // and order of files in a folder do not matter.
+  std::string sha256;
+
+  // Angle from the stacking direction to the slices' normal, turned about the rows' direction; 0
+  // where slices are stacked upright. The volume lies sheared, as it was taken.
+  double gantry_tilt_deg = 0;
+
+  // What a reader of the report should know, one sentence each.
+  std::vector<std::string> notes;
+};
+
+// A CT volume as it was read: nothing resampled, axes as in the file.
+struct CtVolume {
+  std::array<int, 3> size = {0, 0, 0};                   // voxels along the file's axes i, j, k
+  Eigen::Vector3d spacing_mm = Eigen::Vector3d::Ones();  // between voxel centres along each
+  Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();   // centre of voxel (0, 0, 0), DICOM LPS
+
+  // Columns: the unit vectors in DICOM LPS along which i, j and k grow. Any handedness; the third
+  // is not square to the others where the gantry was tilted.
+  Eigen::Matrix3d direction = Eigen::Matrix3d::Identity();
+
+  std::vector<int16_t> hu;  // i fastest; at least -1024
+
+  CtProvenance provenance;
+
+  int64_t num_voxels() const { return int64_t{size[0]} * size[1] * size[2]; }
+  int16_t At(int i, int j, int k) const {
+    return hu[static_cast<size_t>(i + int64_t{size[0]} * (j + int64_t{size[1]} * k))];
+  }
+  // Columns: from one voxel to the next, in mm. p = origin_mm + StepsMm() * (i, j, k).
+  Eigen::Matrix3d StepsMm() const { return direction * spacing_mm.asDiagonal(); }
+};
+
+}  // namespace tissueform
