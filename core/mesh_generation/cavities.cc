@@ -12,7 +12,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "core/mesh/tet_topology.h"
+#include "core/mesh/surface_parts.h"
 
 namespace tissueform {
 namespace {
@@ -22,11 +22,6 @@ using Corners = std::array<Vector3d, 3>;
 
 // From how many triangles of its wall a cavity is looked at.
 constexpr size_t kMostViews = 24;
-
-struct Component {
-  std::vector<Eigen::Index> triangles;
-  double volume_mm3 = 0;  // signed
-};
 
 Corners CornersOf(const TriangleMesh& surface, Eigen::Index triangle) {
   Corners corners;
@@ -39,20 +34,6 @@ Corners CornersOf(const TriangleMesh& surface, Eigen::Index triangle) {
 // Twice the area as its length.
 Vector3d NormalOf(const Corners& corners) {
   return (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-}
-
-std::vector<Component> ComponentsOf(const TriangleMesh& surface) {
-  const ConnectedComponents connected =
-      FindConnectedComponents(surface.triangles(), surface.num_vertices());
-  std::vector<Component> components(static_cast<size_t>(connected.count));
-  const Vector3d origin = surface.positions().row(0).transpose();
-  for (Eigen::Index f = 0; f < surface.num_triangles(); ++f) {
-    Component& component = components[connected.component_of_vertex[surface.triangles()(f, 0)]];
-    const auto [a, b, c] = CornersOf(surface, f);
-    component.triangles.push_back(f);
-    component.volume_mm3 += (a - origin).dot((b - origin).cross(c - origin)) / 6;
-  }
-  return components;
 }
 
 // How far along `direction` the ray from `from` meets the triangle, or infinity. Edges belong to
@@ -70,8 +51,12 @@ double DistanceTo(const Corners& corners, const Vector3d& from, const Vector3d& 
 }
 
 // The largest triangles of a wall: the rays from them start well away from edges.
-std::vector<Eigen::Index> Views(const TriangleMesh& surface, const Component& wall) {
-  std::vector<Eigen::Index> views = wall.triangles;
+std::vector<Eigen::Index> Views(const TriangleMesh& surface, const SurfaceParts& parts,
+                                int32_t wall) {
+  std::vector<Eigen::Index> views;
+  for (Eigen::Index f = 0; f < surface.num_triangles(); ++f) {
+    if (parts.part_of_triangle[f] == wall) views.push_back(f);
+  }
   const auto area = [&](Eigen::Index f) { return NormalOf(CornersOf(surface, f)).squaredNorm(); };
   std::stable_sort(views.begin(), views.end(),
                    [&](Eigen::Index a, Eigen::Index b) { return area(a) > area(b); });
@@ -79,10 +64,11 @@ std::vector<Eigen::Index> Views(const TriangleMesh& surface, const Component& wa
   return views;
 }
 
-Vector3d PointInside(const TriangleMesh& surface, const Component& wall, double facing) {
+Vector3d PointInside(const TriangleMesh& surface, const std::vector<Eigen::Index>& views,
+                     double facing) {
   Vector3d point = Vector3d::Zero();
   double widest = 0;
-  for (const Eigen::Index view : Views(surface, wall)) {
+  for (const Eigen::Index view : views) {
     const Corners corners = CornersOf(surface, view);
     const Vector3d from = (corners[0] + corners[1] + corners[2]) / 3;
     const Vector3d direction = facing * NormalOf(corners).normalized();
@@ -100,16 +86,16 @@ Vector3d PointInside(const TriangleMesh& surface, const Component& wall, double 
 }  // namespace
 
 std::vector<Vector3d> CavityPoints(const TriangleMesh& surface) {
-  const std::vector<Component> components = ComponentsOf(surface);
-  const auto outer = std::max_element(components.begin(), components.end(),
-                                      [](const Component& a, const Component& b) {
-                                        return std::abs(a.volume_mm3) < std::abs(b.volume_mm3);
-                                      });
-  const double facing = outer->volume_mm3 > 0 ? 1 : -1;
+  const SurfaceParts parts = FindSurfaceParts(surface);
+  const std::vector<double>& volumes = parts.volumes_mm3;
+  const auto outer = std::max_element(volumes.begin(), volumes.end(),
+                                      [](double a, double b) { return std::abs(a) < std::abs(b); });
+  const double facing = *outer > 0 ? 1 : -1;
   std::vector<Vector3d> points;
-  for (const Component& component : components) {
-    if (component.volume_mm3 * facing >= 0) continue;
-    points.push_back(PointInside(surface, component, facing));
+  for (size_t part = 0; part < volumes.size(); ++part) {
+    if (volumes[part] * facing >= 0) continue;
+    const auto wall = static_cast<int32_t>(part);
+    points.push_back(PointInside(surface, Views(surface, parts, wall), facing));
   }
   return points;
 }
