@@ -152,11 +152,13 @@ absl::StatusOr<std::vector<double>> ValuesOf(const DicomHeader& header, const gd
   return std::vector<double>(values.begin(), values.end());
 }
 
-// GDCM pads what is missing: the length that the file states must be there.
-bool HoldsAllPixels(const gdcm::DataSet& data, size_t bytes) {
-  if (!data.FindDataElement(kPixelData)) return false;
-  const gdcm::ByteValue* const value = data.GetDataElement(kPixelData).GetByteValue();
-  return value == nullptr || value->GetLength() >= bytes;  // no value: it is compressed
+// GDCM passes over pixels that are missing at the end of a file.
+bool HoldsAllPixels(const DicomHeader& header, const gdcm::Image& image, size_t file_bytes) {
+  const gdcm::TransferSyntax syntax = image.GetTransferSyntax();
+  const bool compressed =
+      syntax.IsEncapsulated() || syntax == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian;
+  return compressed || (header.pixel_offset <= file_bytes &&
+                        file_bytes - header.pixel_offset >= image.GetBufferLength());
 }
 
 }  // namespace
@@ -195,10 +197,13 @@ std::string DescribeKind(const DicomHeader& header) {
 std::optional<DicomHeader> ReadDicomHeader(const std::string& path) {
   gdcm::Reader reader;
   reader.SetFileName(path.c_str());
-  if (!reader.CanRead() || !reader.ReadUpToTag(kPixelData)) return std::nullopt;
+  if (!reader.CanRead()) return std::nullopt;
+  // A skipped tag is left unread: the stream stands where its value begins.
+  if (!reader.ReadUpToTag(kPixelData, {kPixelData})) return std::nullopt;
   const gdcm::DataSet& data = reader.GetFile().GetDataSet();
   DicomHeader header;
   header.path = path;
+  header.pixel_offset = reader.GetStreamCurrentPosition();
   header.modality = TextOf(data, kModality).substr(0, 16);
   header.kind = KindOf(reader.GetFile(), header.modality);
   header.series_uid = TextOf(data, kSeriesUid);
@@ -218,7 +223,7 @@ absl::StatusOr<std::vector<double>> DecodeDicomPixels(const DicomHeader& header,
   if (!reader.Read()) return CannotDecode(header, "it is cut off or damaged");
   const gdcm::Image& image = reader.GetImage();
   const gdcm::PixelFormat format = image.GetPixelFormat();
-  if (!HoldsAllPixels(reader.GetFile().GetDataSet(), image.GetBufferLength())) {
+  if (!HoldsAllPixels(header, image, contents.size())) {
     return CannotDecode(header, "it is cut off");
   }
   switch (format.GetScalarType()) {

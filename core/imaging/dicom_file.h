@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,6 +45,8 @@ struct DicomHeader {
   std::optional<Eigen::Vector2d> pixel_spacing_mm;  // between rows; between columns
   std::optional<double> rescale_slope;
   std::optional<double> rescale_intercept;
+
+  size_t pixel_offset = 0;  // where in the file the pixels begin
 };
 
 // "file 12 of the folder (instance number 31)".
