@@ -14,6 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "client/cli/companion.h"
 #include "client/cli/demo_paths.h"
 #include "client/cli/demo_report.h"
 #include "client/cli/drag.h"
@@ -135,8 +136,7 @@ absl::Status RunDemo(const DemoOptions& options) {
 
 void AddDemoCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<DemoOptions>();
-  CLI::App* command =
-      app.add_subcommand("demo", "drag a handle of a bundled mesh through a server, end to end");
+  CLI::App* command = app.add_subcommand(kDemoCommand.name, kDemoCommand.description);
   command->add_option("--out", options->out, "folder for result.vtu, frames.csv and summary.json")
       ->capture_default_str();
   command->add_option("--plan", options->plan, "another plan than the bundled one");

@@ -13,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "client/cli/companion.h"
 #include "client/cli/demo_paths.h"
 #include "client/cli/stage_progress.h"
 #include "client/experiments/experiment.h"
@@ -90,8 +91,7 @@ absl::Status RunExperiments(const ExperimentsOptions& options) {
 
 void AddExperimentsCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<ExperimentsOptions>();
-  CLI::App* command = app.add_subcommand(
-      "experiments", "compute the paper's figures and table again, and the models' accuracy");
+  CLI::App* command = app.add_subcommand(kExperimentsCommand.name, kExperimentsCommand.description);
   command->add_option("--out", options->out, "folder for pictures (.png) and numbers (.csv); made")
       ->required();
   command

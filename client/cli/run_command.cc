@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "client/cli/companion.h"
 #include "client/cli/option_checks.h"
 #include "client/cli/plan_session.h"
 #include "client/cli/result_writer.h"
@@ -105,7 +106,7 @@ absl::Status Run(const RunOptions& options) {
 
 void AddRunCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<RunOptions>();
-  CLI::App* command = app.add_subcommand("run", "predict through a tissueform-server");
+  CLI::App* command = app.add_subcommand(kRunCommand.name, kRunCommand.description);
   command->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
   command->add_option("--server", options->server, "where the server listens")
       ->required()

@@ -16,12 +16,14 @@ namespace {
 
 // Plenty: the fixed point is compared, not a number of steps.
 constexpr int kMaxEstimations = 200;
+constexpr double kNeoHookeanTolerance = 1e-6;
 
 DeformerOptions OptionsOf(const ModelVariant& variant) {
   DeformerOptions options;
   options.model = variant.model;
   options.gradient_field.rotation = variant.rotation;
   options.gradient_field.max_iterations = kMaxEstimations;
+  options.neo_hookean.tolerance = kNeoHookeanTolerance;
   return options;
 }
 

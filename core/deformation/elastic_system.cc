@@ -20,9 +20,8 @@
 namespace tissueform {
 namespace {
 
-// Enough to tell the condition number to a factor of two or so; each step costs a
-// back-substitution.
-constexpr int kConditionIterations = 8;
+// Enough to tell the condition number to a factor of a few; each step costs a back-substitution.
+constexpr int kConditionIterations = 3;
 
 // The three unknowns of every constrained vertex, rising.
 std::vector<int32_t> ConstrainedUnknowns(const ConstraintSet& constraints) {
@@ -94,9 +93,11 @@ absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
     const SparseMatrix K =
         ElasticStiffness(elements, vertex_cells, stiffness, options.poisson_ratio, options.threads);
     elastic->assemble_seconds_ = stopwatch.Seconds();
-    TF_ASSIGN_OR_RETURN(elastic->system_,
-                        DirichletSystem::Create(K, ConstrainedUnknowns(constraints),
-                                                {options.backend, options.admission}));
+    TF_ASSIGN_OR_RETURN(
+        elastic->system_,
+        DirichletSystem::Create(
+            K, ConstrainedUnknowns(constraints),
+            {.backend = options.backend, .admission = options.admission, .unknowns_per_node = 3}));
   }
   TF_ASSIGN_OR_RETURN(const double of_system,
                       elastic->system_->EstimateCondition(kConditionIterations));

@@ -26,8 +26,13 @@ constexpr double kLargestShortening = 0.5;
 }  // namespace
 
 EquilibriumSearch::EquilibriumSearch(NeoHookeanEnergy* energy, DirichletSystem* system,
+                                     std::unique_ptr<SinglePrecisionSolver> rounded,
                                      double force_unit, int history)
-    : energy_(*energy), system_(*system), force_unit_(force_unit), history_(history) {}
+    : energy_(*energy),
+      system_(*system),
+      rounded_(std::move(rounded)),
+      force_unit_(force_unit),
+      history_(history) {}
 
 bool EquilibriumSearch::Start(Positions displacements) {
   trial_.displacements = std::move(displacements);
@@ -106,6 +111,16 @@ Eigen::VectorXd EquilibriumSearch::FreePart(const Positions& field) const {
 }
 
 absl::StatusOr<Eigen::VectorXd> EquilibriumSearch::Precondition(const Eigen::VectorXd& rhs) {
+  if (rounded_ != nullptr) {
+    // Forces of any size fit into single precision as shares of the largest.
+    const double unit = rhs.lpNorm<Eigen::Infinity>();
+    if (unit == 0) {
+      return rhs;
+    }
+    rounded_rhs_ = (rhs / unit).cast<float>();
+    rounded_->Solve(rounded_rhs_, &rounded_solution_);
+    return Eigen::VectorXd(unit * rounded_solution_.cast<double>());
+  }
   rhs_ = rhs;
   TF_RETURN_IF_ERROR(system_.SolveFree(rhs_, &solution_));
   return Eigen::VectorXd(solution_.col(0));

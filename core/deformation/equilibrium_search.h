@@ -21,10 +21,10 @@ namespace tissueform {
 class EquilibriumSearch {
  public:
   // Refers to energy and system. `system` is the linear stiffness with unknowns 3 v + axis, three
-  // for every free vertex. `force_unit` is the size, in Pa mm^2, of the forces below which rounding
-  // is all that is left; see residual().
-  EquilibriumSearch(NeoHookeanEnergy* energy, DirichletSystem* system, double force_unit,
-                    int history);
+  // for every free vertex; `rounded` stands in for its factor, or is null. `force_unit` is the
+  // size, in Pa mm^2, of the forces below which rounding is all that is left; see residual().
+  EquilibriumSearch(NeoHookeanEnergy* energy, DirichletSystem* system,
+                    std::unique_ptr<SinglePrecisionSolver> rounded, double force_unit, int history);
 
   // Goes on from these displacements (#V by 3, mm), forgetting the steps so far. False, and nothing
   // is changed, when they invert a tet.
@@ -61,6 +61,7 @@ class EquilibriumSearch {
 
   NeoHookeanEnergy& energy_;
   DirichletSystem& system_;
+  const std::unique_ptr<SinglePrecisionSolver> rounded_;  // may be null
   const double force_unit_;
 
   // The state.
@@ -75,6 +76,8 @@ class EquilibriumSearch {
   Trial trial_;
   Eigen::MatrixXd rhs_;
   Eigen::MatrixXd solution_;
+  Eigen::VectorXf rounded_rhs_;
+  Eigen::VectorXf rounded_solution_;
 };
 
 }  // namespace tissueform

@@ -45,7 +45,9 @@ absl::StatusOr<std::shared_ptr<MeshPreparation>> MeshPreparation::Create(
     const TetMesh& mesh, const Eigen::VectorXd& stiffness, const ConstraintSet& constraints,
     PreparationOptions options) {
   TF_RETURN_IF_ERROR(CheckPoissonRatio(options.poisson_ratio));
-  TF_RETURN_IF_ERROR(CheckUsable(ValidateTetMesh(mesh)));
+  if (!options.mesh_is_usable) {
+    TF_RETURN_IF_ERROR(CheckTetMesh(mesh));
+  }
   TF_RETURN_IF_ERROR(CheckStiffness(mesh.num_tets(), stiffness, "tet"));
   TF_RETURN_IF_ERROR(CheckEveryComponentConstrained(mesh.tets(), mesh.num_vertices(), constraints));
   return absl::WrapUnique(new MeshPreparation(mesh, stiffness, constraints, std::move(options)));

@@ -24,6 +24,9 @@ struct PreparationOptions {
   // columns, a response basis) with the bytes that come on top; an error stops that preparation.
   FactorAdmission admission;
   int threads = 1;  // answers do not depend on it
+  // The caller has found the mesh usable (CheckTetMesh): it is not asked
+  // again.
+  bool mesh_is_usable = false;
 };
 
 // The Laplacian of the mesh with the constrained vertices eliminated, and what is solved with it at

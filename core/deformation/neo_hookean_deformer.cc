@@ -30,6 +30,9 @@ constexpr double kSmallestLoadStep = 1.0 / 512;
 constexpr double kStepTolerance = 0.02;
 // Strain whose forces are added to those that the residual is measured by.
 constexpr double kSmallStrain = 1e-6;
+// Up to this condition number the factor rounded to single precision preconditions as well as the
+// factor itself, in half the time.
+constexpr double kLargestRoundedCondition = 1e6;
 
 absl::Status CheckOptions(const NeoHookeanOptions& options) {
   if (options.max_iterations < 1) {
@@ -73,18 +76,27 @@ Eigen::MatrixXd HandleShares(const ElasticSystem& elastic, Eigen::Index num_vert
   return shares;
 }
 
+bool UsesRoundedFactor(const ElasticSystem& elastic) {
+  return elastic.system().num_free() > 0 &&
+         elastic.condition_estimate() <= kLargestRoundedCondition;
+}
+
 // What a deformer holds beside the preparation.
-int64_t BytesNeeded(const MeshPreparation& preparation, const NeoHookeanOptions& options) {
+int64_t BytesNeeded(const MeshPreparation& preparation, const ElasticSystem& elastic,
+                    const NeoHookeanOptions& options) {
   const Eigen::Index num_vertices = preparation.mesh().num_vertices();
   const auto handles = static_cast<int64_t>(preparation.constraints().handles().size());
   return NeoHookeanEnergy::BytesNeeded(preparation.mesh().num_tets()) +
          EquilibriumSearch::BytesNeeded(num_vertices, options.history) +
-         num_vertices * handles * static_cast<int64_t>(sizeof(double));
+         num_vertices * handles * static_cast<int64_t>(sizeof(double)) +
+         (UsesRoundedFactor(elastic) ? elastic.system().single_precision_bytes() : 0);
 }
 
 class NeoHookeanDeformer : public Deformer {
  public:
+  // `rounded` may be null.
   NeoHookeanDeformer(std::shared_ptr<MeshPreparation> preparation, ElasticSystem* elastic,
+                     std::unique_ptr<SinglePrecisionSolver> rounded,
                      const NeoHookeanOptions& options)
       : preparation_(std::move(preparation)),
         elastic_(*elastic),
@@ -92,14 +104,15 @@ class NeoHookeanDeformer : public Deformer {
         shares_(HandleShares(*elastic, rest().rows())),
         energy_(preparation_->elements(), preparation_->vertex_cells(), preparation_->stiffness(),
                 preparation_->options().poisson_ratio, preparation_->options().threads),
-        search_(&energy_, &elastic->system(), ForceUnit(*preparation_), options.history) {
+        search_(&energy_, &elastic->system(), std::move(rounded), ForceUnit(*preparation_),
+                options.history) {
     const FactorizationSummary& factorization = elastic_.system().factorization();
     summary_.assemble_seconds = elastic_.assemble_seconds();
     summary_.analyse_seconds = factorization.analyse_seconds;
     summary_.factorise_seconds = factorization.factorise_seconds;
     summary_.prepare_seconds = elastic_.response_seconds();
     summary_.factor_bytes = factorization.factor_bytes;
-    summary_.own_bytes = BytesNeeded(*preparation_, options_);
+    summary_.own_bytes = BytesNeeded(*preparation_, elastic_, options_);
     summary_.bytes_held = preparation_->bytes_held() + summary_.own_bytes;
   }
 
@@ -262,9 +275,14 @@ absl::StatusOr<std::unique_ptr<Deformer>> CreateNeoHookeanDeformer(
   TF_RETURN_IF_ERROR(CheckOptions(options));
   TF_ASSIGN_OR_RETURN(ElasticSystem * elastic, preparation->Elastic());
   if (const FactorAdmission& admission = preparation->options().admission) {
-    TF_RETURN_IF_ERROR(admission(BytesNeeded(*preparation, options)));
+    TF_RETURN_IF_ERROR(admission(BytesNeeded(*preparation, *elastic, options)));
   }
-  return std::make_unique<NeoHookeanDeformer>(std::move(preparation), elastic, options);
+  std::unique_ptr<SinglePrecisionSolver> rounded;
+  if (UsesRoundedFactor(*elastic)) {
+    TF_ASSIGN_OR_RETURN(rounded, elastic->system().FreeInSinglePrecision());
+  }
+  return std::make_unique<NeoHookeanDeformer>(std::move(preparation), elastic, std::move(rounded),
+                                              options);
 }
 
 }  // namespace tissueform

@@ -17,7 +17,8 @@ struct NeoHookeanOptions {
   // On the norm of the elastic forces on the free vertices, which vanish in equilibrium, over that
   // of the forces that the constrained vertices bear. (To the latter is added what a strain of 1e-6
   // all over would bring, so that the rest shape, where all forces vanish, counts as reached.)
-  double tolerance = 1e-6;
+  // Displacements are then right to some 1e-5 of the largest.
+  double tolerance = 1e-4;
   int history = 8;  // pairs of the L-BFGS iteration
 };
 

@@ -3,12 +3,19 @@
 
 #include "core/linear_solvers/cholmod_cholesky.h"
 
+#include <cmath>
+#include <limits>
 #include <mutex>
+#include <new>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 
 #include "cholmod.h"
+#include "core/base/status_macros.h"
+#include "core/linear_solvers/supernodal_factor.h"
 
 // Declared here because clang has no omp.h without a package of its own.
 extern "C" void omp_set_max_active_levels(int levels);
@@ -75,9 +82,42 @@ cholmod_dense ViewDense(const Eigen::MatrixXd& matrix) {
   return view;
 }
 
+// The pattern of A's lower triangle between nodes of b unknowns each.
+SparseMatrix NodePattern(const SparseMatrix& A, int b) {
+  SparseMatrix pattern(A.rows() / b, A.cols() / b);
+  pattern.reserve(A.nonZeros() / b);
+  for (Eigen::Index node = 0; node < pattern.cols(); ++node) {
+    pattern.startVec(node);
+    int32_t last = -1;
+    // The first of a node's columns holds the rows of all its neighbours.
+    for (SparseMatrix::InnerIterator entry(A, node * b); entry; ++entry) {
+      if (const int32_t row = entry.row() / b; row > last) {
+        pattern.insertBack(row, node) = 1;
+        last = row;
+      }
+    }
+  }
+  pattern.finalize();
+  return pattern;
+}
+
+absl::Status CheckPivots(const SupernodalFactor& factor) {
+  for (size_t s = 0; s + 1 < factor.first_columns.size(); ++s) {
+    const int32_t columns = factor.first_columns[s + 1] - factor.first_columns[s];
+    const int32_t leading = factor.first_rows[s + 1] - factor.first_rows[s];
+    for (int32_t c = 0; c < columns; ++c) {
+      const float pivot = factor.values[factor.first_values[s] + int64_t{c} * (leading + 1)];
+      if (!(pivot >= std::numeric_limits<float>::min() && std::isfinite(pivot))) {
+        return absl::FailedPreconditionError("a pivot is outside the range of single precision");
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
 class CholmodCholesky : public SparseCholesky {
  public:
-  CholmodCholesky() {
+  explicit CholmodCholesky(int unknowns_per_node) : unknowns_per_node_(unknowns_per_node) {
     cholmod_start(&common_);
     common_.supernodal = CHOLMOD_SUPERNODAL;
     common_.nmethods = 1;
@@ -103,7 +143,9 @@ class CholmodCholesky : public SparseCholesky {
     }
     cholmod_sparse view = ViewLowerTriangle(A);
     cholmod_free_factor(&factor_, &common_);
-    {
+    if (unknowns_per_node_ > 1 && A.rows() > 0 && A.rows() % unknowns_per_node_ == 0) {
+      AnalyzeByNodes(A, &view);
+    } else {
       const std::lock_guard lock(OrderingMutex());
       factor_ = cholmod_analyze(&view, &common_);
     }
@@ -133,7 +175,63 @@ class CholmodCholesky : public SparseCholesky {
     return ToStatus(common_.status, "solving the linear system");
   }
 
+  absl::StatusOr<std::unique_ptr<SinglePrecisionSolver>> ToSinglePrecision() const override {
+    SupernodalFactor factor;
+    try {
+      factor = RoundedFactor();
+    } catch (const std::bad_alloc&) {
+      return absl::ResourceExhaustedError("out of memory while rounding the factor");
+    }
+    TF_RETURN_IF_ERROR(CheckPivots(factor));
+    return std::make_unique<SupernodalSolver>(std::move(factor));
+  }
+
+  int64_t single_precision_bytes() const override {
+    const size_t indices = factor_->ssize + 3 * (factor_->nsuper + 1) + factor_->n;
+    const size_t workspace = 2 * factor_->n;
+    return static_cast<int64_t>((factor_->xsize + workspace) * sizeof(float) +
+                                indices * sizeof(int32_t));
+  }
+
  private:
+  SupernodalFactor RoundedFactor() const {
+    const auto indices = [](const void* data, size_t size) {
+      const auto* begin = static_cast<const int32_t*>(data);
+      return std::vector<int32_t>(begin, begin + size);
+    };
+    const auto* values = static_cast<const double*>(factor_->x);
+    return {.permutation = indices(factor_->Perm, factor_->n),
+            .first_columns = indices(factor_->super, factor_->nsuper + 1),
+            .first_rows = indices(factor_->pi, factor_->nsuper + 1),
+            .first_values = indices(factor_->px, factor_->nsuper + 1),
+            .rows = indices(factor_->s, factor_->ssize),
+            .values = std::vector<float>(values, values + factor_->xsize)};
+  }
+
+  void AnalyzeByNodes(const SparseMatrix& A, cholmod_sparse* view) {
+    const int b = unknowns_per_node_;
+    const SparseMatrix pattern = NodePattern(A, b);
+    cholmod_sparse nodes = ViewLowerTriangle(pattern);
+    std::vector<int32_t> node_order(static_cast<size_t>(pattern.cols()));
+    {
+      const std::lock_guard lock(OrderingMutex());
+      if (cholmod_metis(&nodes, nullptr, 0, 1, node_order.data(), &common_) == 0) {
+        return;
+      }
+    }
+    std::vector<int32_t> order;
+    order.reserve(static_cast<size_t>(A.rows()));
+    for (const int32_t node : node_order) {
+      for (int k = 0; k < b; ++k) {
+        order.push_back(node * b + k);
+      }
+    }
+    common_.method[0].ordering = CHOLMOD_GIVEN;
+    factor_ = cholmod_analyze_p(view, order.data(), nullptr, 0, &common_);
+    common_.method[0].ordering = CHOLMOD_METIS;
+  }
+
+  const int unknowns_per_node_;
   cholmod_common common_{};
   cholmod_factor* factor_ = nullptr;
   // Kept between solves: cholmod_solve2 allocates them once.
@@ -143,8 +241,8 @@ class CholmodCholesky : public SparseCholesky {
 
 }  // namespace
 
-std::unique_ptr<SparseCholesky> CreateCholmodCholesky() {
-  return std::make_unique<CholmodCholesky>();
+std::unique_ptr<SparseCholesky> CreateCholmodCholesky(int unknowns_per_node) {
+  return std::make_unique<CholmodCholesky>(unknowns_per_node);
 }
 
 }  // namespace tissueform

@@ -7,10 +7,11 @@
 
 namespace tissueform {
 
-std::unique_ptr<SparseCholesky> CreateSparseCholesky(CholeskyBackend backend) {
+std::unique_ptr<SparseCholesky> CreateSparseCholesky(CholeskyBackend backend,
+                                                     int unknowns_per_node) {
   switch (backend) {
     case CholeskyBackend::kCholmod:
-      return CreateCholmodCholesky();
+      return CreateCholmodCholesky(unknowns_per_node);
     case CholeskyBackend::kEigen:
       break;
   }

@@ -103,7 +103,7 @@ absl::StatusOr<std::unique_ptr<DirichletSystem>> DirichletSystem::Create(
     return system;
   }
 
-  system->cholesky_ = CreateSparseCholesky(options.backend);
+  system->cholesky_ = CreateSparseCholesky(options.backend, options.unknowns_per_node);
   Stopwatch stopwatch;
   TF_RETURN_IF_ERROR(system->cholesky_->Analyze(system->free_free_));
   system->factorization_.analyse_seconds = stopwatch.Restart();

@@ -37,6 +37,8 @@ class DirichletSystem {
   struct Options {
     CholeskyBackend backend = CholeskyBackend::kCholmod;
     FactorAdmission admission;  // may be empty
+    // Prescribed and free unknowns, too, come in whole nodes; see CreateSparseCholesky.
+    int unknowns_per_node = 1;
   };
 
   // `K` is n by n, symmetric, both triangles stored. `prescribed` is rising and without repetition.
@@ -58,6 +60,13 @@ class DirichletSystem {
   absl::Status SolveFree(const Eigen::MatrixXd& rhs, Eigen::MatrixXd* solution) {
     return cholesky_->Solve(rhs, solution);
   }
+
+  // SolveFree in single precision, as a solver of its own, and the bytes that it holds. REQUIRES:
+  // num_free() > 0. Errors: those of SparseCholesky::ToSinglePrecision.
+  absl::StatusOr<std::unique_ptr<SinglePrecisionSolver>> FreeInSinglePrecision() const {
+    return cholesky_->ToSinglePrecision();
+  }
+  int64_t single_precision_bytes() const { return cholesky_->single_precision_bytes(); }
 
   // Condition number of the free block in the 2-norm, the largest over the smallest eigenvalue,
   // each by `iterations` steps of power iteration with A and with its inverse: an estimate from

@@ -3,7 +3,9 @@
 
 #include "core/linear_solvers/eigen_cholesky.h"
 
+#include <limits>
 #include <new>
+#include <utility>
 
 #include <Eigen/SparseCholesky>
 
@@ -15,6 +17,26 @@ namespace {
 class SimplicialFactor : public Eigen::SimplicialLLT<SparseMatrix> {
  public:
   int64_t PredictedEntries() const { return m_matrix.outerIndexPtr()[m_matrix.cols()]; }
+};
+
+class SimplicialSolver : public SinglePrecisionSolver {
+ public:
+  using Factor = Eigen::SparseMatrix<float, Eigen::ColMajor, int32_t>;
+  using Permutation = Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int32_t>;
+
+  SimplicialSolver(Factor factor, const Permutation& permutation)
+      : factor_(std::move(factor)), permutation_(permutation) {}
+
+  void Solve(const Eigen::VectorXf& rhs, Eigen::VectorXf* solution) override {
+    Eigen::VectorXf x = permutation_ * rhs;
+    factor_.triangularView<Eigen::Lower>().solveInPlace(x);
+    factor_.transpose().triangularView<Eigen::Upper>().solveInPlace(x);
+    *solution = permutation_.inverse() * x;
+  }
+
+ private:
+  const Factor factor_;
+  const Permutation permutation_;
 };
 
 class EigenCholesky : public SparseCholesky {
@@ -50,6 +72,23 @@ class EigenCholesky : public SparseCholesky {
   absl::Status Solve(const Eigen::MatrixXd& rhs, Eigen::MatrixXd* solution) override {
     *solution = factor_.solve(rhs);
     return absl::OkStatus();
+  }
+
+  absl::StatusOr<std::unique_ptr<SinglePrecisionSolver>> ToSinglePrecision() const override {
+    try {
+      SimplicialSolver::Factor factor = factor_.matrixL().nestedExpression().cast<float>();
+      const Eigen::ArrayXf pivots = factor.diagonal();
+      if (!(pivots >= std::numeric_limits<float>::min()).all() || !pivots.isFinite().all()) {
+        return absl::FailedPreconditionError("a pivot is outside the range of single precision");
+      }
+      return std::make_unique<SimplicialSolver>(std::move(factor), factor_.permutationP());
+    } catch (const std::bad_alloc&) {
+      return absl::ResourceExhaustedError("out of memory while rounding the factor");
+    }
+  }
+
+  int64_t single_precision_bytes() const override {
+    return factor_.PredictedEntries() * static_cast<int64_t>(sizeof(float) + sizeof(int32_t));
   }
 
  private:

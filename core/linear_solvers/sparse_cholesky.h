@@ -10,6 +10,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/types.h"
+#include "core/linear_solvers/single_precision_solver.h"
 
 namespace tissueform {
 
@@ -42,9 +43,18 @@ class SparseCholesky {
   // Solves for all columns of `rhs` (#rows by k) in one pass over the factor and writes `solution`
   // (#rows by k, resized). REQUIRES: Factorize succeeded.
   virtual absl::Status Solve(const Eigen::MatrixXd& rhs, Eigen::MatrixXd* solution) = 0;
+
+  // A solver of its own with the factor in single precision, and the bytes that it holds.
+  // REQUIRES: Factorize succeeded. Errors: FailedPrecondition (a pivot is outside the range of
+  // single precision), ResourceExhausted (out of memory).
+  virtual absl::StatusOr<std::unique_ptr<SinglePrecisionSolver>> ToSinglePrecision() const = 0;
+  virtual int64_t single_precision_bytes() const = 0;
 };
 
-// Never null.
-std::unique_ptr<SparseCholesky> CreateSparseCholesky(CholeskyBackend backend);
+// Never null. `unknowns_per_node`: rows b i to b i + b - 1 of every matrix belong to node i and are
+// coupled to the same others (the displacements of a vertex), so ordering the nodes, which takes a
+// fraction of the time, orders the rows. A hint: a backend may pass it over.
+std::unique_ptr<SparseCholesky> CreateSparseCholesky(CholeskyBackend backend,
+                                                     int unknowns_per_node = 1);
 
 }  // namespace tissueform

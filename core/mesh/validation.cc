@@ -21,14 +21,18 @@ namespace {
 // precision.
 constexpr double kDegenerateVolumeRatio = 1e-12;
 
-std::vector<Eigen::Index> NonFiniteVertices(const TetMesh& mesh) {
+// True when there are none.
+bool FindNonFiniteVertices(const TetMesh& mesh, MeshReport* report) {
   std::vector<Eigen::Index> found;
   for (Eigen::Index v = 0; v < mesh.num_vertices(); ++v) {
     if (!mesh.positions().row(v).allFinite()) {
       found.push_back(v);
     }
   }
-  return found;
+  AddDefect({"non_finite_vertices", Severity::kError, "vertices have NaN or infinite coordinates",
+             "vertex", "rewrite the file from the program that made it"},
+            found, &report->defects);
+  return found.empty();
 }
 
 double LongestEdge(const TetMesh& mesh, Eigen::Index t) {
@@ -206,11 +210,7 @@ MeshReport ValidateTetMesh(const TetMesh& mesh, Eigen::Index reoriented_tets) {
   report.num_tets = mesh.num_tets();
   ReportReorientation(reoriented_tets, &report);
   const TriangleIndices boundary = BoundaryFacets(mesh);
-  const std::vector<Eigen::Index> non_finite = NonFiniteVertices(mesh);
-  AddDefect({"non_finite_vertices", Severity::kError, "vertices have NaN or infinite coordinates",
-             "vertex", "rewrite the file from the program that made it"},
-            non_finite, &report.defects);
-  if (non_finite.empty()) ValidatePlaces(mesh, boundary, &report);
+  if (FindNonFiniteVertices(mesh, &report)) ValidatePlaces(mesh, boundary, &report);
   FindDuplicateTets(mesh, &report);
   FindOversharedFacets(mesh, &report);
 
@@ -229,5 +229,13 @@ MeshReport ValidateTetMesh(const TetMesh& mesh, Eigen::Index reoriented_tets) {
 }
 
 absl::Status CheckUsable(const MeshReport& report) { return CheckDefects(report.defects); }
+
+absl::Status CheckTetMesh(const TetMesh& mesh) {
+  MeshReport errors;
+  if (FindNonFiniteVertices(mesh, &errors)) FindBadVolumes(mesh, &errors);
+  FindDuplicateTets(mesh, &errors);
+  FindOversharedFacets(mesh, &errors);
+  return CheckUsable(errors);
+}
 
 }  // namespace tissueform

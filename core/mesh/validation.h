@@ -53,4 +53,8 @@ MeshReport ValidateTetMesh(const TetMesh& mesh, Eigen::Index reoriented_tets = 0
 // the number of further ones.
 absl::Status CheckUsable(const MeshReport& report);
 
+// The same as CheckUsable(ValidateTetMesh(mesh)) without what the report tells beside errors, in
+// less than half the time.
+absl::Status CheckTetMesh(const TetMesh& mesh);
+
 }  // namespace tissueform

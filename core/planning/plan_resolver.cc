@@ -18,7 +18,7 @@ namespace {
 
 absl::StatusOr<TetMeshFile> ReadUsableMesh(const std::string& path) {
   TF_ASSIGN_OR_RETURN(TetMeshFile file, ReadTetMesh(path));
-  const absl::Status usable = CheckUsable(ValidateTetMesh(file.mesh));
+  const absl::Status usable = CheckTetMesh(file.mesh);
   if (usable.ok()) return file;
   return absl::Status(usable.code(), absl::StrCat("mesh ", path, ": ", usable.message()));
 }
@@ -72,6 +72,7 @@ absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan) {
   DeformerOptions deformer;
   deformer.model = plan.model;
   deformer.preparation.poisson_ratio = plan.poisson_ratio;
+  deformer.preparation.mesh_is_usable = true;  // ReadUsableMesh
   deformer.gradient_field = plan.gradient_field;
   return PlanProblem{.mesh = std::move(mesh),
                      .point_data = std::move(file.point_data),

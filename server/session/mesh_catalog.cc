@@ -160,7 +160,7 @@ absl::StatusOr<std::shared_ptr<const StoredMesh>> MeshCatalog::Finish(
   TF_RETURN_IF_ERROR(CheckCellArraysFinite(upload->payload_.cell_arrays()));
   TF_ASSIGN_OR_RETURN(TetMesh mesh, TetMesh::Create(std::move(upload->payload_.positions()),
                                                     std::move(upload->payload_.tets())));
-  TF_RETURN_IF_ERROR(CheckUsable(ValidateTetMesh(mesh)));
+  TF_RETURN_IF_ERROR(CheckTetMesh(mesh));
   std::vector<int32_t> skin = BoundaryVertices(mesh);
   TF_RETURN_IF_ERROR(upload->reservation_.Resize(
       upload->announcement_.total_bytes + static_cast<int64_t>(skin.size() * sizeof(int32_t)),

@@ -56,6 +56,7 @@ absl::Status Session::Prepare(const Eigen::VectorXd& stiffness, MemoryBudget* bu
   DeformerOptions options;
   options.model = model_;
   options.preparation.poisson_ratio = poisson_ratio_;
+  options.preparation.mesh_is_usable = true;  // MeshCatalog
   options.gradient_field = gradient_field_;
   // Told in every answer; a small part of a solve.
   options.gradient_field.compute_residual = true;

@@ -41,6 +41,7 @@ TetIndices TakeTets(ByteSource* source) {
 
 void CheckReport(const TetMesh& mesh, const MeshReport& report) {
   Require(report.usable() == CheckUsable(report).ok());
+  Require(CheckTetMesh(mesh) == CheckUsable(report));
   for (const MeshDefect& defect : report.defects) {
     Require(defect.count > 0 && !defect.explanation.empty());
     Require(static_cast<Eigen::Index>(defect.examples.size()) <= defect.count);

@@ -24,8 +24,11 @@ using testing::PrepareBar;
 using testing::PrepareWrappedBlock;
 using testing::StatusIs;
 
+// Tighter than the default: the equilibrium itself is looked at.
+constexpr double kTolerance = 1e-6;
+
 std::unique_ptr<Deformer> Create(std::shared_ptr<MeshPreparation> preparation,
-                                 const NeoHookeanOptions& options = {}) {
+                                 const NeoHookeanOptions& options = {.tolerance = kTolerance}) {
   return CreateNeoHookeanDeformer(std::move(preparation), options).value();
 }
 
@@ -62,7 +65,7 @@ TEST(NeoHookeanDeformerTest, AnswerIsAnEquilibriumWithTheBoundaryInPlace) {
                                          Pose({0, 0, 0}, {0, 1, -1})};
   const Deformation answer = Create(preparation)->Deform(poses).value();
   ASSERT_TRUE(answer.summary.converged);
-  EXPECT_LE(answer.summary.residual, 1e-6);
+  EXPECT_LE(answer.summary.residual, kTolerance);
   EXPECT_EQ(answer.summary.load, 1.0);
   EXPECT_EQ(InvertedTets(*preparation, answer.positions), 0);
   EXPECT_LT(BoundaryError(*preparation, poses[0], 0, answer.positions), 1e-12);
@@ -75,6 +78,19 @@ TEST(NeoHookeanDeformerTest, AnswerIsAnEquilibriumWithTheBoundaryInPlace) {
   const double all = forces.norm();
   forces(preparation->constraints().constrained(), Eigen::all).setZero();
   EXPECT_LT(forces.norm(), 2e-6 * all);
+}
+
+TEST(NeoHookeanDeformerTest, DefaultToleranceIsRightToAFractionOfTheMovement) {
+  const auto preparation = PrepareBar({}, 2).value();
+  const std::vector<HandlePose> poses = {Pose({0.3, 0, 0.4}, {1, 0, 1.5}),
+                                         Pose({0, 0, 0}, {0, 1, -1})};
+  const Deformation quick = Create(preparation, {})->Deform(poses).value();
+  const Deformation tight = Create(preparation, {.tolerance = 1e-9})->Deform(poses).value();
+  ASSERT_TRUE(quick.summary.converged);
+  ASSERT_TRUE(tight.summary.converged);
+  EXPECT_LT(quick.summary.iterations, tight.summary.iterations);
+  const double moved = LargestDifference(tight.positions, preparation->mesh().positions());
+  EXPECT_LT(LargestDifference(quick.positions, tight.positions), 1e-4 * moved);
 }
 
 TEST(NeoHookeanDeformerTest, EnergyNeverRisesAndIsTold) {

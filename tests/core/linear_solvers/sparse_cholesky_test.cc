@@ -4,6 +4,8 @@
 #include "core/linear_solvers/sparse_cholesky.h"
 
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -66,6 +68,55 @@ TEST_P(SparseCholeskyTest, SolvesAgainWithAnotherNumberOfColumns) {
     ASSERT_EQ(solution.cols(), columns);
     EXPECT_LT((A * solution - rhs).norm(), 1e-11 * rhs.norm());
   }
+}
+
+TEST_P(SparseCholeskyTest, SinglePrecisionComesCloseToADenseFactorisation) {
+  const SparseMatrix A = PositiveDefinite();
+  ASSERT_THAT(cholesky_->Analyze(A), IsOk());
+  ASSERT_THAT(cholesky_->Factorize(A), IsOk());
+  ASSERT_OK_AND_ASSIGN(const auto rounded, cholesky_->ToSinglePrecision());
+  EXPECT_GT(cholesky_->single_precision_bytes(), cholesky_->factor_bytes() / 2);
+  const Eigen::LDLT<Eigen::MatrixXd> oracle{Eigen::MatrixXd(A)};
+  for (int repetition = 0; repetition < 2; ++repetition) {
+    const Eigen::VectorXd rhs = RandomMatrix(A.rows(), 1);
+    Eigen::VectorXf solution;
+    rounded->Solve(rhs.cast<float>(), &solution);
+    const Eigen::VectorXd expected = oracle.solve(rhs);
+    EXPECT_LT((solution.cast<double>() - expected).norm(), 1e-5 * expected.norm());
+  }
+}
+
+TEST_P(SparseCholeskyTest, SinglePrecisionRefusesPivotsOutOfItsRange) {
+  const SparseMatrix A = 1e-80 * PositiveDefinite();
+  ASSERT_THAT(cholesky_->Analyze(A), IsOk());
+  ASSERT_THAT(cholesky_->Factorize(A), IsOk());
+  EXPECT_THAT(cholesky_->ToSinglePrecision(),
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("single precision")));
+}
+
+TEST_P(SparseCholeskyTest, OrderingByNodesGivesTheSameSolution) {
+  // Two unknowns a node: the matrix twice, coupled within a node.
+  const SparseMatrix one = PositiveDefinite();
+  SparseMatrix A(2 * one.rows(), 2 * one.cols());
+  std::vector<Eigen::Triplet<double>> entries;
+  for (Eigen::Index column = 0; column < one.cols(); ++column) {
+    for (SparseMatrix::InnerIterator entry(one, column); entry; ++entry) {
+      for (const auto& [i, j] : {std::pair{0, 0}, {0, 1}, {1, 0}, {1, 1}}) {
+        entries.emplace_back(2 * entry.row() + i, 2 * column + j, i == j ? entry.value() : 0.0);
+      }
+    }
+  }
+  A.setFromTriplets(entries.begin(), entries.end());
+  const auto by_nodes = CreateSparseCholesky(GetParam(), 2);
+  ASSERT_THAT(by_nodes->Analyze(A), IsOk());
+  ASSERT_THAT(by_nodes->Factorize(A), IsOk());
+  ASSERT_THAT(cholesky_->Analyze(A), IsOk());
+  const auto bytes = static_cast<double>(cholesky_->factor_bytes());
+  EXPECT_NEAR(static_cast<double>(by_nodes->factor_bytes()), bytes, 0.5 * bytes);
+  const Eigen::MatrixXd rhs = RandomMatrix(A.rows(), 2);
+  Eigen::MatrixXd solution;
+  ASSERT_THAT(by_nodes->Solve(rhs, &solution), IsOk());
+  EXPECT_LT((A * solution - rhs).norm(), 1e-11 * rhs.norm());
 }
 
 TEST_P(SparseCholeskyTest, FactorisesNewValuesWithTheSameAnalysis) {

@@ -22,8 +22,12 @@ using testing::IsOk;
 using ::testing::Not;
 using testing::StatusIs;
 
+// The short check must say of every mesh what the long one says.
 MeshReport Validate(Positions positions, TetIndices tets) {
-  return ValidateTetMesh(*TetMesh::Create(std::move(positions), std::move(tets)));
+  const TetMesh mesh = *TetMesh::Create(std::move(positions), std::move(tets));
+  MeshReport report = ValidateTetMesh(mesh);
+  EXPECT_EQ(CheckTetMesh(mesh), CheckUsable(report));
+  return report;
 }
 
 TEST(ValidationTest, GoodMeshHasNoDefect) {
