@@ -12,11 +12,11 @@
 
 namespace tissueform {
 
-// Place and size of a regular grid of cubic voxels whose axes are the patient's (DICOM LPS): x grows
-// toward the left, y toward the back, z toward the head.
+// Place and size of a regular grid of cubic voxels whose axes are the patient's (DICOM LPS): x
+// grows toward the left, y toward the back, z toward the head.
 struct GridGeometry {
-  std::array<int, 3> size = {0, 0, 0};                    // voxels along x, y, z
-  Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();    // centre of voxel (0, 0, 0)
+  std::array<int, 3> size = {0, 0, 0};                  // voxels along x, y, z
+  Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();  // centre of voxel (0, 0, 0)
   double spacing_mm = 1;
 
   int64_t num_voxels() const { return int64_t{size[0]} * size[1] * size[2]; }

@@ -15,8 +15,7 @@ namespace tissueform {
 // in a child process (ReadIsolated), once. Internal to core/mesh_io/gmsh_reader.cc, which says what
 // is kept.
 //
-// It lives in a module that is loaded for the call: Gmsh brings some ninety libraries, and looking
-// up their symbols would take every command a quarter of a second.
+// It lives in a module of its own (see module_symbol.h): Gmsh brings some ninety libraries.
 //
 // `path` must end with .msh or .mesh and hold no script: Gmsh runs what it does not know.
 //

@@ -3,12 +3,12 @@
 
 #include "core/mesh_io/vtk_surface_reader.h"
 
+#include <vtkAlgorithm.h>
 #include <vtkCellData.h>
 #include <vtkNew.h>
 #include <vtkPLYReader.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
-#include <vtkSTLReader.h>
 #include <vtkSmartPointer.h>
 #include <vtkXMLPolyDataReader.h>
 
@@ -16,29 +16,31 @@
 
 #include "core/base/status_macros.h"
 #include "core/mesh_io/isolated_read.h"
+#include "core/mesh_io/module_symbol.h"
 #include "core/mesh_io/polygon_fan.h"
+#include "core/mesh_io/stl_reader.h"
 #include "core/mesh_io/vtk_arrays.h"
 #include "core/mesh_io/vtk_error_scope.h"
 
 namespace tissueform {
 namespace {
 
-vtkSmartPointer<vtkAlgorithm> MakeReader(const CheckedMeshFile& file) {
+absl::StatusOr<vtkSmartPointer<vtkAlgorithm>> MakeReader(const CheckedMeshFile& file) {
   switch (file.format) {
     case MeshFormat::kStl: {
-      auto reader = vtkSmartPointer<vtkSTLReader>::New();
-      reader->SetFileName(file.path.c_str());
-      return reader;
+      TF_ASSIGN_OR_RETURN(void* const make, ModuleSymbol(kStlModule, kStlReaderSymbol));
+      return vtkSmartPointer<vtkAlgorithm>::Take(
+          reinterpret_cast<StlReaderFunction>(make)(file.path.c_str()));
     }
     case MeshFormat::kPly: {
       auto reader = vtkSmartPointer<vtkPLYReader>::New();
       reader->SetFileName(file.path.c_str());
-      return reader;
+      return vtkSmartPointer<vtkAlgorithm>(reader);
     }
     default: {
       auto reader = vtkSmartPointer<vtkXMLPolyDataReader>::New();
       reader->SetFileName(file.path.c_str());
-      return reader;
+      return vtkSmartPointer<vtkAlgorithm>(reader);
     }
   }
 }
@@ -67,7 +69,7 @@ absl::Status CopyPolygons(vtkPolyData* surface, RawMesh* mesh) {
 
 absl::StatusOr<RawMesh> ReadWithVtk(const CheckedMeshFile& file) {
   VtkErrorScope errors;
-  const vtkSmartPointer<vtkAlgorithm> reader = MakeReader(file);
+  TF_ASSIGN_OR_RETURN(const vtkSmartPointer<vtkAlgorithm> reader, MakeReader(file));
   reader->Update();
   if (!errors.first_error().empty() || reader->GetErrorCode() != 0) {
     return absl::InvalidArgumentError(absl::StrCat("it is damaged (", errors.first_error(), ")"));
