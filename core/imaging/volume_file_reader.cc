@@ -14,12 +14,14 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
 #include "core/imaging/hu_check.h"
 #include "core/imaging/itk_setup.h"
 #include "core/imaging/patient_axes.h"
+#include "core/imaging/unpacked_size.h"
 #include "core/imaging/whole_file.h"
 #include "core/mesh_payload/sha256.h"
 
@@ -56,31 +58,93 @@ itk::ImageIOBase::Pointer MakeIo(VolumeFormat format) {
   return nullptr;
 }
 
+absl::Status Damaged() {
+  return absl::InvalidArgumentError("the file is cut off, damaged, or not of its ending's format");
+}
+
 // ITK's messages hold paths, and several lines.
 absl::Status ExplainFailure(const itk::ExceptionObject& exception) {
   if (absl::StrContains(exception.GetDescription(), "rthonormal")) {
     return absl::InvalidArgumentError(
         "the file's axes are not square to each other; resample it upright");
   }
-  return absl::InvalidArgumentError("the file is cut off, damaged, or not of its ending's format");
+  return Damaged();
 }
 
-// Bytes of the file and of the data file beside it, as CtProvenance tells.
-absl::Status HashFiles(const std::vector<std::string>& paths, int64_t max_bytes,
-                       CtProvenance* provenance) {
-  std::string digests;
-  for (const std::string& path : paths) {
-    TF_ASSIGN_OR_RETURN(const std::string contents, ReadWholeFile(path, &max_bytes));
-    digests += Sha256Hex({contents});
+// What the file and the data file beside it hold.
+struct FileContents {
+  std::string file;
+  std::string data_file;  // empty without one
+};
+
+absl::StatusOr<FileContents> ReadContents(const std::string& path, const VolumeHeader& header,
+                                          int64_t max_bytes) {
+  FileContents contents;
+  TF_ASSIGN_OR_RETURN(contents.file, ReadWholeFile(path, &max_bytes));
+  if (header.data_path.empty()) return contents;
+  TF_ASSIGN_OR_RETURN(contents.data_file, ReadWholeFile(header.data_path, &max_bytes));
+  return contents;
+}
+
+CtProvenance ProvenanceOf(VolumeFormat format, const VolumeHeader& header,
+                          const FileContents& contents) {
+  CtProvenance provenance;
+  provenance.format = NameOf(format);
+  provenance.num_files = header.data_path.empty() ? 1 : 2;
+  provenance.sha256 = Sha256Hex({contents.file});
+  if (!header.data_path.empty()) {
+    provenance.sha256 = Sha256Hex({provenance.sha256 + Sha256Hex({contents.data_file})});
   }
-  provenance->num_files = static_cast<int>(paths.size());
-  provenance->sha256 = paths.size() == 1 ? digests : Sha256Hex({digests});
-  return absl::OkStatus();
+  return provenance;
+}
+
+std::string MetaDataOf(const itk::ImageIOBase& io, const char* key) {
+  std::string value;
+  itk::ExposeMetaData<std::string>(io.GetMetaDataDictionary(), key, value);
+  return value;
+}
+
+bool HoldsAllOfNifti(const std::string& file, const itk::ImageIOBase& io) {
+  double voxel_offset = 0;
+  double voxel_bits = 0;  // in the file: ITK tells of those after scaling
+  if (!absl::SimpleAtod(MetaDataOf(io, "vox_offset"), &voxel_offset) ||
+      !absl::SimpleAtod(MetaDataOf(io, "bitpix"), &voxel_bits)) {
+    return false;
+  }
+  const auto bytes = static_cast<int64_t>(
+      voxel_offset + static_cast<double>(io.GetImageSizeInPixels()) * voxel_bits / 8);
+  return (IsGzip(file) ? UnpackedSize(file, bytes) : static_cast<int64_t>(file.size())) >= bytes;
+}
+
+bool HoldsAllOfMetaImage(const VolumeHeader& header, const FileContents& contents,
+                         const itk::ImageIOBase& io) {
+  const auto bytes = static_cast<int64_t>(io.GetImageSizeInBytes());
+  const bool local = header.data_path.empty();
+  absl::string_view data = contents.data_file;
+  if (local) data = absl::string_view(contents.file).substr(header.data_offset);
+  if (!header.compressed) return static_cast<int64_t>(data.size()) >= bytes;
+  // Without the size ITK would take the header for data.
+  if (local && header.compressed_bytes == 0) return false;
+  if (header.compressed_bytes > 0) data = data.substr(0, header.compressed_bytes);
+  return UnpackedSize(data, bytes) >= bytes;
+}
+
+// ITK fills up with anything what is missing from NIfTI and MetaImage.
+bool HoldsAllVoxels(VolumeFormat format, const VolumeHeader& header, const FileContents& contents,
+                    const itk::ImageIOBase& io) {
+  switch (format) {
+    case VolumeFormat::kNifti:
+      return HoldsAllOfNifti(contents.file, io);
+    case VolumeFormat::kMetaImage:
+      return HoldsAllOfMetaImage(header, contents, io);
+    case VolumeFormat::kNrrd:
+      return true;  // its library sees to it
+  }
+  return false;
 }
 
 bool IsPositiveCode(const itk::ImageIOBase& io, const char* key) {
-  std::string value;
-  itk::ExposeMetaData<std::string>(io.GetMetaDataDictionary(), key, value);
+  const std::string value = MetaDataOf(io, key);
   return !value.empty() && value != "0";
 }
 
@@ -178,11 +242,13 @@ absl::Status TakeValues(const Image& image, double offset, CtVolume* volume) {
 }
 
 absl::StatusOr<CtVolume> ReadWithItk(const std::string& path, VolumeFormat format,
-                                     const VolumeHeader& header, const CtReadOptions& options) {
+                                     const VolumeHeader& header, const FileContents& contents,
+                                     const CtReadOptions& options) {
   const itk::ImageIOBase::Pointer io = MakeIo(format);
   io->SetFileName(path);
   io->ReadImageInformation();
   TF_RETURN_IF_ERROR(CheckShape(*io, options.limits));
+  if (!HoldsAllVoxels(format, header, contents, *io)) return Damaged();
   const auto reader = itk::ImageFileReader<Image>::New();
   reader->SetImageIO(io);
   reader->SetFileName(path);
@@ -201,14 +267,11 @@ absl::StatusOr<CtVolume> ReadVolumeFile(const std::string& path, VolumeFormat fo
                                         const CtReadOptions& options) {
   SetUpItk();
   TF_ASSIGN_OR_RETURN(const VolumeHeader header, ReadVolumeHeader(path, format));
-  std::vector<std::string> files = {path};
-  if (!header.data_path.empty()) files.push_back(header.data_path);
-  CtProvenance provenance;
-  provenance.format = NameOf(format);
-  TF_RETURN_IF_ERROR(HashFiles(files, options.limits.max_file_bytes, &provenance));
+  TF_ASSIGN_OR_RETURN(const FileContents contents,
+                      ReadContents(path, header, options.limits.max_file_bytes));
   try {
-    TF_ASSIGN_OR_RETURN(CtVolume volume, ReadWithItk(path, format, header, options));
-    volume.provenance = std::move(provenance);
+    TF_ASSIGN_OR_RETURN(CtVolume volume, ReadWithItk(path, format, header, contents, options));
+    volume.provenance = ProvenanceOf(format, header, contents);
     return volume;
   } catch (const itk::ExceptionObject& exception) {
     return ExplainFailure(exception);

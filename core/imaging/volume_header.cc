@@ -10,6 +10,7 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
@@ -82,7 +83,11 @@ absl::Status ReadMetaImage(std::istream& stream, const std::string& path, Volume
       break;
     }
     if (key == "anatomicalorientation") header->orientation = value;
-    if (key == "elementdatafile") return SetDataFile(path, value, header);  // always the last
+    if (key == "compresseddata") header->compressed = absl::StartsWith(value, "T");
+    if (key == "compresseddatasize" && !absl::SimpleAtoi(value, &header->compressed_bytes)) break;
+    if (key != "elementdatafile") continue;  // which is always the last
+    header->data_offset = static_cast<size_t>(stream.tellg());
+    return SetDataFile(path, value, header);
   }
   return NotOfItsFormat("MetaImage");
 }

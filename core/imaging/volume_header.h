@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 
@@ -18,6 +19,10 @@ std::optional<VolumeFormat> VolumeFormatOfPath(const std::string& path);
 // What ITK does not tell of a file of NRRD or MetaImage: said in the text at its head.
 struct VolumeHeader {
   std::string data_path;  // of the voxels, beside the header; empty when they are in the same file
+
+  size_t data_offset = 0;   // in MetaImage: where the voxels begin when they are in the same file
+  bool compressed = false;  // MetaImage's "CompressedData"
+  size_t compressed_bytes = 0;  // "CompressedDataSize"; 0 where it is missing
 
   // "space" of NRRD, "AnatomicalOrientation" of MetaImage; empty where the file has none.
   std::string orientation;
