@@ -55,9 +55,9 @@ bool SendCtVolume(int descriptor, const absl::StatusOr<CtVolume>& volume) {
   sender.Outcome(volume.status());
   if (!volume.ok()) return sender.ok();
   for (const int size : volume->size) sender.Number(size);
-  sender.Entries(volume->spacing_mm);
-  sender.Entries(volume->origin_mm);
-  sender.Entries(volume->direction);
+  sender.Bytes(volume->spacing_mm.data(), sizeof(volume->spacing_mm));
+  sender.Bytes(volume->origin_mm.data(), sizeof(volume->origin_mm));
+  sender.Bytes(volume->direction.data(), sizeof(volume->direction));
   SendProvenance(volume->provenance, &sender);
   sender.Bytes(volume->hu.data(), volume->hu.size() * sizeof(int16_t));
   return sender.ok();
@@ -69,9 +69,9 @@ absl::StatusOr<CtVolume> ReceiveCtVolume(int descriptor, int64_t max_voxels) {
   TF_RETURN_IF_ERROR(receiver.Outcome());
   CtVolume volume;
   TF_RETURN_IF_ERROR(ReceiveSize(&receiver, max_voxels, &volume));
-  TF_RETURN_IF_ERROR(receiver.Entries(1, &volume.spacing_mm));
-  TF_RETURN_IF_ERROR(receiver.Entries(1, &volume.origin_mm));
-  TF_RETURN_IF_ERROR(receiver.Entries(3, &volume.direction));
+  TF_RETURN_IF_ERROR(receiver.Bytes(volume.spacing_mm.data(), sizeof(volume.spacing_mm)));
+  TF_RETURN_IF_ERROR(receiver.Bytes(volume.origin_mm.data(), sizeof(volume.origin_mm)));
+  TF_RETURN_IF_ERROR(receiver.Bytes(volume.direction.data(), sizeof(volume.direction)));
   TF_RETURN_IF_ERROR(ReceiveProvenance(&receiver, &volume.provenance));
   volume.hu.resize(static_cast<size_t>(volume.num_voxels()));
   TF_RETURN_IF_ERROR(receiver.Bytes(volume.hu.data(), volume.hu.size() * kVoxelBytes));

@@ -12,6 +12,7 @@
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include "core/imaging/tet_voxels.h"
