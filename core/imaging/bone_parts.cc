@@ -12,123 +12,14 @@
 #include "absl/strings/str_format.h"
 
 #include "core/base/status_macros.h"
+#include "core/imaging/bone_pieces.h"
 #include "core/imaging/itk_filters.h"
 
 namespace tissueform {
 namespace {
 
-constexpr int kLowestMarkerHu = 500;
-constexpr int kHighestMarkerHu = 1300;
-constexpr int kMarkerStepHu = 100;
-constexpr double kSmallestMarkerMm3 = 150;
 constexpr double kSmallestUpperTeethMm3 = 400;
-
-// Half the width of the cut through teeth that touch: what it takes away is grown back.
-constexpr double kCutHalfWidthVoxels = 0.75;
-
-struct PieceShape {
-  double volume_mm3 = 0;
-  Eigen::Vector3d low_mm = Eigen::Vector3d::Constant(1e9);
-  Eigen::Vector3d high_mm = Eigen::Vector3d::Constant(-1e9);
-  Eigen::Vector3d centre_mm = Eigen::Vector3d::Zero();
-
-  Eigen::Vector3d extent_mm() const { return high_mm - low_mm; }
-};
-
-struct Pieces {
-  Components components;
-  std::vector<PieceShape> shapes;
-};
-
-std::vector<PieceShape> MeasurePieces(const Components& components) {
-  std::vector<PieceShape> shapes(components.voxels.size());
-  const GridGeometry& geometry = components.labels.geometry;
-  size_t index = 0;
-  for (int z = 0; z < geometry.size[2]; ++z) {
-    for (int y = 0; y < geometry.size[1]; ++y) {
-      for (int x = 0; x < geometry.size[0]; ++x, ++index) {
-        const int32_t label = components.labels.values[index];
-        if (label == 0) continue;
-        PieceShape& shape = shapes[static_cast<size_t>(label) - 1];
-        const Eigen::Vector3d place = geometry.Centre(x, y, z);
-        shape.low_mm = shape.low_mm.cwiseMin(place);
-        shape.high_mm = shape.high_mm.cwiseMax(place);
-        shape.centre_mm += place;
-      }
-    }
-  }
-  for (size_t i = 0; i < shapes.size(); ++i) {
-    shapes[i].centre_mm /= static_cast<double>(components.voxels[i]);
-    shapes[i].volume_mm3 = static_cast<double>(components.voxels[i]) * VoxelVolumeMm3(geometry);
-  }
-  return shapes;
-}
-
-bool Between(double value, double low, double high) { return value >= low && value <= high; }
-
-bool HasSizeOfMandible(const PieceShape& shape) {
-  const Eigen::Vector3d extent = shape.extent_mm();
-  return Between(shape.volume_mm3, 6e3, 150e3) && Between(extent.x(), 70, 150) &&
-         Between(extent.y(), 40, 120) && Between(extent.z(), 40, 130);
-}
-
-// An arch that is open behind, whose upper third (the rami) lies farther back than its lower third
-// (the chin): neither cranium, upper jaw nor spine is that.
-bool HasShapeOfMandible(const Components& components, int32_t piece, const PieceShape& shape) {
-  const Eigen::Vector3d middle = (shape.low_mm + shape.high_mm) / 2;
-  const double third = shape.extent_mm().z() / 3;
-  int64_t inner = 0;
-  int64_t count = 0;
-  std::array<double, 2> sum_y = {0, 0};
-  std::array<int64_t, 2> counts = {0, 0};
-  ForEachVoxel(components.Mask(piece), [&](size_t, const Eigen::Vector3d& place) {
-    ++count;
-    if (std::abs(place.x() - middle.x()) < 12 && place.y() > middle.y()) ++inner;
-    const bool lower = place.z() < shape.low_mm.z() + third;
-    if (!lower && place.z() <= shape.high_mm.z() - third) return;
-    sum_y[lower ? 0 : 1] += place.y();
-    ++counts[lower ? 0 : 1];
-  });
-  if (counts[0] == 0 || counts[1] == 0) return false;
-  const double back_mm =
-      sum_y[1] / static_cast<double>(counts[1]) - sum_y[0] / static_cast<double>(counts[0]);
-  return static_cast<double>(inner) < 0.05 * static_cast<double>(count) && back_mm > 8;
-}
-
-// The number of the piece, from 1; 0 when none looks like a mandible.
-int32_t FindMandible(const Pieces& pieces) {
-  for (size_t i = 0; i < pieces.shapes.size(); ++i) {  // by falling size
-    const auto piece = static_cast<int32_t>(i) + 1;
-    if (HasSizeOfMandible(pieces.shapes[i]) &&
-        HasShapeOfMandible(pieces.components, piece, pieces.shapes[i])) {
-      return piece;
-    }
-  }
-  return 0;
-}
-
-struct DentalCut {
-  Plane plane;
-  DentalBox box;
-};
-
-// The dense pieces above a threshold, without what the cut takes away.
-Pieces DensePieces(const HeadSegmentation& head, int threshold_hu, const DentalCut* cut) {
-  LabelGrid dense = MaskWhere(head.hu, [=](int16_t hu) { return hu > threshold_hu; });
-  if (cut != nullptr) {
-    const double half_mm = kCutHalfWidthVoxels * dense.geometry.spacing_mm;
-    ForEachVoxel(dense, [&](size_t index, const Eigen::Vector3d& place) {
-      if (std::abs(cut->plane.HeightMm(place)) <= half_mm && cut->box.Contains(place)) {
-        dense.values[index] = 0;
-      }
-    });
-  }
-  const double voxels = std::ceil(kSmallestMarkerMm3 / VoxelVolumeMm3(dense.geometry));
-  Pieces pieces;
-  pieces.components = ConnectedComponents(dense, Neighbours::kFaces, static_cast<int64_t>(voxels));
-  pieces.shapes = MeasurePieces(pieces.components);
-  return pieces;
-}
+constexpr double kFaceDepthMm = 50;  // from the foremost bone of the head to the chin
 
 struct Markers {
   Pieces pieces;
@@ -138,7 +29,8 @@ struct Markers {
   const PieceShape& shape() const { return pieces.shapes[static_cast<size_t>(mandible) - 1]; }
 };
 
-absl::StatusOr<Markers> FindMarkers(const HeadSegmentation& head, const DentalCut* cut) {
+// The mandible as a piece of its own, at the lowest threshold at which there is one.
+std::optional<Markers> FindMarkers(const HeadSegmentation& head, const DentalCut* cut) {
   for (int hu = kLowestMarkerHu; hu <= kHighestMarkerHu; hu += kMarkerStepHu) {
     Markers markers;
     markers.pieces = DensePieces(head, hu, cut);
@@ -146,6 +38,10 @@ absl::StatusOr<Markers> FindMarkers(const HeadSegmentation& head, const DentalCu
     markers.threshold_hu = static_cast<int16_t>(hu);
     if (markers.mandible != 0) return markers;
   }
+  return std::nullopt;
+}
+
+absl::Status NoLowerJaw() {
   return absl::InvalidArgumentError(absl::StrFormat(
       "no lower jaw in view: above none of the thresholds %d to %d HU is there a piece of bone "
       "shaped "
@@ -163,11 +59,31 @@ absl::Status CheckInView(const PieceShape& mandible, const GridGeometry& geometr
       geometry.origin_mm.z()));
 }
 
+// `chin_z_mm` is the lowest, `front_mm` the foremost of the lower jaw.
+DentalBox BoxOfTeeth(double middle_mm, double front_mm, double chin_z_mm) {
+  return {{middle_mm - 38, front_mm - 10, chin_z_mm + 20},
+          {middle_mm + 38, front_mm + 55, chin_z_mm + 78}};
+}
+
 DentalBox BoxOfTeeth(const PieceShape& mandible) {
-  const double middle_mm = (mandible.low_mm.x() + mandible.high_mm.x()) / 2;
-  const double top_mm = std::min(mandible.low_mm.z() + 78, mandible.high_mm.z());
-  return {{middle_mm - 38, mandible.low_mm.y() - 10, mandible.low_mm.z() + 20},
-          {middle_mm + 38, mandible.low_mm.y() + 55, top_mm}};
+  DentalBox box = BoxOfTeeth((mandible.low_mm.x() + mandible.high_mm.x()) / 2, mandible.low_mm.y(),
+                             mandible.low_mm.z());
+  box.high_mm.z() = std::min(box.high_mm.z(), mandible.high_mm.z());
+  return box;
+}
+
+// Where the lower jaw hangs together with the cranium at every threshold: over the lowest bone of
+// the face's front.
+DentalBox BoxOfTeeth(const LabelGrid& bone) {
+  const VoxelBox box = BoundingBox(bone);
+  const Eigen::Vector3d low = bone.geometry.Centre(box.first[0], box.first[1], box.first[2]);
+  const Eigen::Vector3d high = bone.geometry.Centre(box.last[0], box.last[1], box.last[2]);
+  Eigen::Vector3d chin = high;
+  ForEachVoxel(bone, [&](size_t, const Eigen::Vector3d& place) {
+    const bool front = place.y() < low.y() + kFaceDepthMm;
+    if (front && place.z() < chin.z()) chin = place;
+  });
+  return BoxOfTeeth((low.x() + high.x()) / 2, low.y() + 10, chin.z());
 }
 
 // Whether the piece holds teeth on the far side of the plane: those of the upper jaw.
@@ -270,12 +186,12 @@ double ShownBorder(const LabelGrid& labels) {
   return static_cast<double>(shown) / static_cast<double>(std::max<int64_t>(1, shown + decided));
 }
 
-// The cut to use, or nothing when the jaws are pieces of their own without one.
-absl::StatusOr<std::optional<DentalCut>> ChooseCut(const HeadSegmentation& head,
-                                                   const Markers& uncut,
-                                                   const std::optional<Plane>& given_cut,
-                                                   BoneParts* result) {
-  const DentalBox box = BoxOfTeeth(uncut.shape());
+// The cut to use, or nothing when the jaws are pieces of their own without one. `uncut` is where
+// they are.
+std::optional<DentalCut> ChooseCut(const HeadSegmentation& head,
+                                   const std::optional<Markers>& uncut,
+                                   const std::optional<Plane>& given_cut, BoneParts* result) {
+  const DentalBox box = uncut.has_value() ? BoxOfTeeth(uncut->shape()) : BoxOfTeeth(head.bone);
   const std::optional<OcclusalCut> occlusal = given_cut.has_value()
                                                   ? MeasureOcclusalCut(head.hu, box, *given_cut)
                                                   : FindOcclusalCut(head.hu, box);
@@ -287,7 +203,7 @@ absl::StatusOr<std::optional<DentalCut>> ChooseCut(const HeadSegmentation& head,
     result->separation = JawSeparation::kGivenCut;
     return cut;
   }
-  if (!HoldsUpperTeeth(uncut, cut)) return std::nullopt;
+  if (uncut.has_value() && !HoldsUpperTeeth(*uncut, cut)) return std::nullopt;
   result->separation = JawSeparation::kAutomaticCut;
   return cut;
 }
@@ -299,14 +215,15 @@ absl::StatusOr<BoneParts> SeparateBoneParts(const HeadSegmentation& head,
                                             const StageFunction& tell) {
   TellStage(tell, "looking for the lower jaw", 0);
   BoneParts result;
-  TF_ASSIGN_OR_RETURN(Markers markers, FindMarkers(head, nullptr));
-  TF_RETURN_IF_ERROR(CheckInView(markers.shape(), head.hu.geometry));
-  TF_ASSIGN_OR_RETURN(const std::optional<DentalCut> cut,
-                      ChooseCut(head, markers, given_cut, &result));
+  std::optional<Markers> found = FindMarkers(head, nullptr);
+  const std::optional<DentalCut> cut = ChooseCut(head, found, given_cut, &result);
   if (cut.has_value()) {
     TellStage(tell, "cutting between the teeth", 0.3);
-    TF_ASSIGN_OR_RETURN(markers, FindMarkers(head, &*cut));
+    found = FindMarkers(head, &*cut);
   }
+  if (!found.has_value()) return NoLowerJaw();
+  const Markers& markers = *found;
+  TF_RETURN_IF_ERROR(CheckInView(markers.shape(), head.hu.geometry));
   TellStage(tell, "growing the parts of the bone", 0.5);
   result.marker_hu = markers.threshold_hu;
   const DentalCut* const used_cut = cut.has_value() ? &*cut : nullptr;

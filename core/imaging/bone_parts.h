@@ -45,7 +45,7 @@ struct BoneParts {
 // any threshold: then a plane cuts it. `given_cut` is used instead of looking for one.
 //
 // Errors: InvalidArgument when no piece looks like a lower jaw (it is not in view, or cut off by
-// the border of the image), or when the teeth touch and no plane between them is found.
+// the border of the image; or the teeth touch, and neither is there a plane between them).
 absl::StatusOr<BoneParts> SeparateBoneParts(const HeadSegmentation& head,
                                             const std::optional<Plane>& given_cut = std::nullopt,
                                             const StageFunction& tell = nullptr);

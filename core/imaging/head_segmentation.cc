@@ -68,12 +68,25 @@ double BareFraction(const LabelGrid& head, const LabelGrid& bone) {
   return surface == 0 ? 1.0 : static_cast<double>(bare) / static_cast<double>(surface);
 }
 
-absl::Status CheckTissue(const LabelGrid& head, int16_t tissue_above_hu) {
-  const double volume_mm3 = VolumeMm3(head);
+// A skull falls apart under the opening, however large it is: that is want of skin, not of HU.
+absl::Status CheckTissue(const HuGrid& ct, const LabelGrid& body,
+                         const HeadSegmentationOptions& options) {
+  const double volume_mm3 = VolumeMm3(body);
   if (volume_mm3 >= kSmallestHeadMm3) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrFormat(
-      "the largest body above %d HU has %.0f cm3, a head needs %.0f; check that the values are HU",
-      tissue_above_hu, volume_mm3 / 1e3, kSmallestHeadMm3 / 1e3));
+  const double bone_mm3 =
+      VolumeMm3(MaskWhere(ct, [&](int16_t hu) { return hu > options.bone_above_hu; }));
+  if (bone_mm3 >= kSmallestSkullMm3) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "no skin: %.0f cm3 are above %d HU, but the largest body that is thicker than %.0f mm has "
+        "%.0f cm3, a head more than %.0f; soft tissue cannot be predicted for a bare skull or a "
+        "phantom",
+        bone_mm3 / 1e3, options.bone_above_hu, 2 * options.opening_radius_mm, volume_mm3 / 1e3,
+        kSmallestHeadMm3 / 1e3));
+  }
+  return absl::InvalidArgumentError(
+      absl::StrFormat("the largest body above %d HU has %.0f cm3, a head more than %.0f; check "
+                      "that the values are HU",
+                      options.tissue_above_hu, volume_mm3 / 1e3, kSmallestHeadMm3 / 1e3));
 }
 
 absl::Status CheckBone(const LabelGrid& bone, int16_t bone_above_hu) {
@@ -113,7 +126,7 @@ absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
   TellStage(tell, "finding the head", 0);
   const auto is_tissue = [&](int16_t hu) { return hu > options.tissue_above_hu; };
   const LabelGrid body = LargestBody(MaskWhere(ct, is_tissue), options.opening_radius_mm);
-  TF_RETURN_IF_ERROR(CheckTissue(body, options.tissue_above_hu));
+  TF_RETURN_IF_ERROR(CheckTissue(ct, body, options));
   const VoxelBox box = Grown(BoundingBox(body), kMarginVoxels, ct.geometry);
 
   HeadSegmentation result;

@@ -24,16 +24,17 @@ struct Landmarks {
   Plane midsagittal;  // normal to the left
 
   // Bone and teeth, centres of voxels.
-  Eigen::Vector3d menton;         // lowest of the chin in the midline
-  Eigen::Vector3d pogonion;       // foremost of the chin in the midline
-  Eigen::Vector3d lower_incisor;  // highest of the lower front teeth
-  Eigen::Vector3d upper_incisor;  // lowest of the upper front teeth
-  LeftAndRight lower_molar;       // highest of the lower jaw 25 to 36 mm behind the incisor
-  LeftAndRight upper_molar;       // lowest of the upper jaw there
-  LeftAndRight ramus_front;       // front border of the ramus, 4 mm over the lower teeth
-  LeftAndRight gonion;            // farthest back and down
-  LeftAndRight condyle;           // top
-  Eigen::Vector3d nasal_floor;    // top of the hard palate, 15 to 30 mm behind the incisor
+  Eigen::Vector3d menton = Eigen::Vector3d::Zero();         // lowest of the chin in the midline
+  Eigen::Vector3d pogonion = Eigen::Vector3d::Zero();       // foremost of the chin in the midline
+  Eigen::Vector3d lower_incisor = Eigen::Vector3d::Zero();  // highest of the lower front teeth
+  Eigen::Vector3d upper_incisor = Eigen::Vector3d::Zero();  // lowest of the upper front teeth
+  LeftAndRight lower_molar;  // highest of the lower jaw 25 to 36 mm behind the incisor
+  LeftAndRight upper_molar;  // lowest of the upper jaw there
+  LeftAndRight ramus_front;  // front border of the ramus, 4 mm over the lower teeth
+  LeftAndRight gonion;       // farthest back and down
+  LeftAndRight condyle;      // top
+  Eigen::Vector3d nasal_floor =
+      Eigen::Vector3d::Zero();  // top of the hard palate, 15 to 30 mm behind the incisor
 
   // Planes through the incisor and midway between the molars, without cant: square to the
   // midsagittal plane; normal up. The occlusal plane lies midway between the two.
@@ -42,12 +43,12 @@ struct Landmarks {
   Plane occlusal;
 
   // Skin, on the CT's isosurface.
-  Eigen::Vector3d nose_tip;
-  Eigen::Vector3d subnasale;  // rearmost between nose and upper lip
-  Eigen::Vector3d upper_lip;  // foremost of the lip in the midline
-  Eigen::Vector3d lower_lip;
-  Eigen::Vector3d skin_pogonion;  // foremost of the soft chin
-  LeftAndRight mouth_corner;      // an estimate: the skin 25 mm beside the midline between the lips
+  Eigen::Vector3d nose_tip = Eigen::Vector3d::Zero();
+  Eigen::Vector3d subnasale = Eigen::Vector3d::Zero();  // rearmost between nose and upper lip
+  Eigen::Vector3d upper_lip = Eigen::Vector3d::Zero();  // foremost of the lip in the midline
+  Eigen::Vector3d lower_lip = Eigen::Vector3d::Zero();
+  Eigen::Vector3d skin_pogonion = Eigen::Vector3d::Zero();  // foremost of the soft chin
+  LeftAndRight mouth_corner;  // an estimate: the skin 25 mm beside the midline between the lips
 
   // Forward in the midsagittal plane, square to the normal of a plane that looks up.
   Eigen::Vector3d ForwardOf(const Plane& plane) const;

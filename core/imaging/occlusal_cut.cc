@@ -4,6 +4,7 @@
 #include "core/imaging/occlusal_cut.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -17,8 +18,9 @@ constexpr int16_t kToothHu = 1300;
 constexpr int16_t kSolidHu = 400;
 constexpr double kBesideMm = 8;
 constexpr double kSmallestToothRowMm3 = 300;
-constexpr int kPitchStepsDeg[] = {-24, -20, -16, -12, -8, -4, 0, 4, 8, 12, 16, 20, 24};
-constexpr int kRollStepsDeg[] = {-8, -4, 0, 4, 8};
+constexpr std::array<int, 13> kPitchStepsDeg = {-24, -20, -16, -12, -8, -4, 0,
+                                                4,   8,   12,  16,  20, 24};
+constexpr std::array<int, 5> kRollStepsDeg = {-8, -4, 0, 4, 8};
 
 struct Sample {
   Eigen::Vector3d place_mm;
@@ -111,6 +113,10 @@ Plane TurnedPlane(const Eigen::Vector3d& point_mm, int pitch_deg, int roll_deg) 
 struct Candidate {
   OcclusalCut cut;
   double teeth = 0;
+  double tilt_deg = 0;
+
+  // Both rows whole on their sides, not a plane that splits one row; the less tilted of equals.
+  double Score() const { return cut.clearance * teeth * (1 - 0.002 * tilt_deg); }
 };
 
 std::vector<Candidate> AllCandidates(const std::vector<Sample>& samples, const DentalBox& box,
@@ -124,7 +130,8 @@ std::vector<Candidate> AllCandidates(const std::vector<Sample>& samples, const D
       const HeightProfile profile(samples, plane, step_mm, reach_mm);
       for (int bin = 0; bin < profile.num_bins(); ++bin) {
         const Plane moved = {middle + profile.HeightMm(bin) * plane.normal, plane.normal};
-        candidates.push_back({{moved, profile.Clearance(bin)}, profile.TeethBeside(bin)});
+        const double tilt_deg = std::abs(pitch_deg) + std::abs(roll_deg);
+        candidates.push_back({{moved, profile.Clearance(bin)}, profile.TeethBeside(bin), tilt_deg});
       }
     }
   }
@@ -141,9 +148,7 @@ std::optional<OcclusalCut> FindOcclusalCut(const HuGrid& hu, const DentalBox& bo
   if (most_teeth * step_mm * step_mm * step_mm < kSmallestToothRowMm3) return std::nullopt;
   const Candidate* best = nullptr;
   for (const Candidate& candidate : candidates) {
-    // Both rows whole on their sides, not a plane that splits one row.
-    const double score = candidate.cut.clearance * candidate.teeth;
-    if (best == nullptr || score > best->cut.clearance * best->teeth) best = &candidate;
+    if (best == nullptr || candidate.Score() > best->Score()) best = &candidate;
   }
   return best->cut;
 }

@@ -30,8 +30,10 @@ constexpr double kHuPerVoxel = 700;
 
 // How far the CT's own surface may lie outside the mask's before the mask cuts it, in voxels; and
 // how smooth such cuts are.
-constexpr double kToleranceVoxels = 1;
+constexpr double kToleranceVoxels = 0.75;
 constexpr double kCutSigmaVoxels = 0.8;
+
+constexpr double kDiagonalVoxels = 1.75;  // longer than that of a voxel
 
 double VolumeMm3(const LabelGrid& mask) {
   return static_cast<double>(CountVoxels(mask)) * VoxelVolumeMm3(mask.geometry);
@@ -118,30 +120,42 @@ double FieldOfHu(double hu, const HeadSegmentationOptions& thresholds, double vo
   return std::clamp(nearest / kHuPerVoxel, -1.0, 1.0) * voxel_mm;
 }
 
-FloatGrid SurfaceField(const HuGrid& hu, const HeadSegmentationOptions& thresholds,
-                       const LabelGrid& mask, const std::vector<Plane>& planes) {
+// The field of the CT alone, positive in what was filled too. A voxel without a border beside it
+// gets the largest value: the HU of muscle are near those of bone, and would draw the planes of the
+// region in.
+FloatGrid UncutField(const HuGrid& hu, const HeadSegmentationOptions& thresholds,
+                     const LabelGrid& mask) {
   const double voxel_mm = hu.geometry.spacing_mm;
   FloatGrid field(hu.geometry);
   LabelGrid filled(hu.geometry);
   for (size_t i = 0; i < field.values.size(); ++i) {
     const double value = FieldOfHu(hu.values[i], thresholds, voxel_mm);
     field.values[i] = static_cast<float>(value);
-    filled.values[i] = mask.values[i] != 0 && value <= 0 ? 1 : 0;
+    filled.values[i] = mask.values[i] != 0 && value < 0 ? 1 : 0;
   }
-  const FloatGrid outer = TolerantDistance(mask);
   const FloatGrid inner = TolerantDistance(filled);
-  size_t index = 0;
-  for (int z = 0; z < hu.geometry.size[2]; ++z) {
-    for (int y = 0; y < hu.geometry.size[1]; ++y) {
-      for (int x = 0; x < hu.geometry.size[0]; ++x, ++index) {
-        const auto height = static_cast<float>(LeastHeightMm(planes, hu.geometry.Centre(x, y, z)));
-        const float with_filled = std::max(field.values[index], inner.values[index]);
-        field.values[index] =
-            std::clamp(std::min({with_filled, outer.values[index], height}),
-                       static_cast<float>(-voxel_mm), static_cast<float>(voxel_mm));
-      }
+  for (size_t i = 0; i < field.values.size(); ++i) {
+    field.values[i] = std::max(field.values[i], inner.values[i]);
+  }
+  const FloatGrid to_border = DistanceMm(MaskWhere(field, [](float mm) { return mm <= 0; }));
+  for (size_t i = 0; i < field.values.size(); ++i) {
+    if (to_border.values[i] > kDiagonalVoxels * voxel_mm) {
+      field.values[i] = static_cast<float>(voxel_mm);
     }
   }
+  return field;
+}
+
+FloatGrid SurfaceField(const HuGrid& hu, const HeadSegmentationOptions& thresholds,
+                       const LabelGrid& mask, const std::vector<Plane>& planes) {
+  const auto voxel_mm = static_cast<float>(hu.geometry.spacing_mm);
+  FloatGrid field = UncutField(hu, thresholds, mask);
+  const FloatGrid outer = TolerantDistance(mask);
+  ForEachVoxel(LabelGrid(hu.geometry, 1), [&](size_t index, const Eigen::Vector3d& place) {
+    const auto height = static_cast<float>(LeastHeightMm(planes, place));
+    const float least = std::min({field.values[index], outer.values[index], height});
+    field.values[index] = std::clamp(least, -voxel_mm, voxel_mm);
+  });
   return field;
 }
 
