@@ -3,13 +3,14 @@
 
 #include "client/cli/mesh_command.h"
 
-#include <iostream>
 #include <memory>
 #include <string>
 
 #include "absl/strings/str_cat.h"
 
+#include "client/cli/mesh_generate_command.h"
 #include "client/cli/mesh_report.h"
+#include "client/cli/report_parts.h"
 #include "client/cli/stage_progress.h"
 #include "client/cli/surface_report.h"
 #include "core/base/status_macros.h"
@@ -26,16 +27,6 @@ struct MeshCheckOptions {
   bool json = false;
 };
 
-void Print(const MeshCheckOptions& options, const std::string& text,
-           const nlohmann::ordered_json& json) {
-  using Json = nlohmann::ordered_json;
-  if (options.json) {
-    std::cout << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
-  } else {
-    std::cout << text;
-  }
-}
-
 absl::Status NameMesh(const std::string& path, const absl::Status& usable) {
   if (usable.ok()) return usable;
   return absl::Status(usable.code(), absl::StrCat("mesh ", path, ": ", usable.message()));
@@ -44,16 +35,16 @@ absl::Status NameMesh(const std::string& path, const absl::Status& usable) {
 absl::Status CheckTets(const MeshCheckOptions& options) {
   TF_ASSIGN_OR_RETURN(const TetMeshFile file, ReadTetMesh(options.mesh));
   const MeshReport report = ValidateTetMesh(file.mesh, file.reoriented_tets);
-  Print(options, MeshReportText(options.mesh, file, report),
-        MeshReportJson(options.mesh, file, report));
+  PrintReport(options.json, MeshReportText(options.mesh, file, report),
+              MeshReportJson(options.mesh, file, report));
   return NameMesh(options.mesh, CheckUsable(report));
 }
 
 absl::Status CheckSurface(const MeshCheckOptions& options) {
   TF_ASSIGN_OR_RETURN(const TriangleMeshFile file, ReadTriangleMesh(options.mesh));
   const SurfaceReport report = ValidateTriangleMesh(file.mesh, file.split_polygons);
-  Print(options, SurfaceReportText(options.mesh, file, report),
-        SurfaceReportJson(options.mesh, file, report));
+  PrintReport(options.json, SurfaceReportText(options.mesh, file, report),
+              SurfaceReportJson(options.mesh, file, report));
   return NameMesh(options.mesh, CheckDefects(report.defects));
 }
 
@@ -66,7 +57,10 @@ absl::Status RunMeshCheck(const MeshCheckOptions& options) {
 
 void AddMeshCommand(CLI::App& app, CommandWork* work) {
   CLI::App* mesh = app.add_subcommand("mesh", "work on meshes");
-  mesh->footer("Example:\n  tissueform mesh check face.vtu");
+  mesh->footer(
+      "Examples:\n"
+      "  tissueform mesh check face.vtu\n"
+      "  tissueform mesh generate face.stl --out face.vtu");
 
   auto options = std::make_shared<MeshCheckOptions>();
   CLI::App* check = mesh->add_subcommand("check", "validate a mesh of tets or a surface");
@@ -83,6 +77,7 @@ void AddMeshCommand(CLI::App& app, CommandWork* work) {
       "  tissueform mesh check skull.stl\n"
       "Exit code 0: usable, perhaps with warnings. 1: not usable or not readable.");
   check->callback([options, work] { *work = [options] { return RunMeshCheck(*options); }; });
+  AddMeshGenerateCommand(*mesh, work);
 }
 
 }  // namespace tissueform

@@ -6,14 +6,20 @@
 #include <filesystem>
 
 namespace tissueform {
+namespace {
 
-CLI::Validator VtuEnding() {
-  const auto check = [](std::string& path) {
-    return std::filesystem::path(path).extension() == ".vtu" ? std::string()
-                                                             : path + " must end with .vtu";
+CLI::Validator Ending(const std::string& ending, const std::string& form) {
+  const auto check = [ending](std::string& path) {
+    return std::filesystem::path(path).extension() == ending ? std::string()
+                                                             : path + " must end with " + ending;
   };
-  return {check, "OUT.vtu", "vtu ending"};
+  return {check, form, ending + " ending"};
 }
+
+}  // namespace
+
+CLI::Validator VtuEnding() { return Ending(".vtu", "OUT.vtu"); }
+CLI::Validator VtpEnding() { return Ending(".vtp", "FILE.vtp"); }
 
 void AddAllowOutside(CLI::App* command, PlanReadOptions* options) {
   command->add_flag("--allow-outside", options->allow_outside,

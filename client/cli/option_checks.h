@@ -13,6 +13,9 @@ namespace tissueform {
 // written.
 CLI::Validator VtuEnding();
 
+// The same for surfaces with arrays: .vtp.
+CLI::Validator VtpEnding();
+
 // Adds the flag --allow-outside to a command that reads a plan. `options` outlives the parsing.
 void AddAllowOutside(CLI::App* command, PlanReadOptions* options);
 

@@ -4,6 +4,7 @@
 #include "client/cli/report_parts.h"
 
 #include <array>
+#include <iostream>
 #include <variant>
 
 #include "absl/strings/str_cat.h"
@@ -65,6 +66,14 @@ OrderedJson DefectsJson(const std::vector<MeshDefect>& defects) {
                     {"explanation", defect.explanation}});
   }
   return json;
+}
+
+void PrintReport(bool as_json, const std::string& text, const OrderedJson& json) {
+  if (as_json) {
+    std::cout << json.dump(2, ' ', false, OrderedJson::error_handler_t::replace) << '\n';
+  } else {
+    std::cout << text;
+  }
 }
 
 }  // namespace tissueform

@@ -23,4 +23,7 @@ nlohmann::ordered_json ArraysJson(const std::vector<Attribute>& attributes);
 std::string DefectsText(const std::vector<MeshDefect>& defects);
 nlohmann::ordered_json DefectsJson(const std::vector<MeshDefect>& defects);
 
+// Prints the one or the other on stdout.
+void PrintReport(bool as_json, const std::string& text, const nlohmann::ordered_json& json);
+
 }  // namespace tissueform

@@ -61,7 +61,7 @@ void FindIntersections(const TriangleMesh& surface, SurfaceDefects* defects) {
   defects->num_intersecting_pairs = static_cast<int64_t>(found.pairs.size());
   defects->found_all_pairs = found.complete;
   AddDefect({"intersecting_triangles", Severity::kError, "triangles go through each other",
-             "triangle", "take them apart, or remesh the surface from the volume it came from"},
+             "triangle", "take them apart, or remesh the surface (`mesh generate --remesh-mm`)"},
             {triangles.begin(), triangles.end()}, &defects->defects);
 }
 
@@ -91,6 +91,8 @@ SurfaceDefects FindSurfaceDefects(const TriangleMesh& surface) {
     FindIntersections(surface, &defects);
     FindInwardFacing(&defects);
   }
+  std::stable_partition(defects.defects.begin(), defects.defects.end(),
+                        [](const MeshDefect& d) { return d.severity == Severity::kError; });
   return defects;
 }
 

@@ -34,7 +34,7 @@ enum class TriangleFlaw : uint8_t {
 //   inward_facing           warning  the surface is closed and faces inwards
 struct SurfaceDefects {
   SurfaceReport report;
-  std::vector<MeshDefect> defects;  // instead of report.defects
+  std::vector<MeshDefect> defects;  // instead of report.defects; errors first
   std::vector<TriangleFlaw> flaws;  // #F
   int64_t num_intersecting_pairs = 0;
   bool found_all_pairs = true;  // false: there are even more
