@@ -48,8 +48,10 @@ Eigen::Matrix3d DirectionOf(const std::string& axes) {
   Eigen::Matrix3d direction = Eigen::Matrix3d::Zero();
   for (int column = 0; column < 3; ++column) {
     const char letter = axes[static_cast<size_t>(column)];
-    const int axis = AxisOf(letter);
-    direction(axis, column) = letter == kToward[axis] ? 1 : -1;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (letter == kToward[axis]) direction(axis, column) = 1;
+      if (letter == kFrom[axis]) direction(axis, column) = -1;
+    }
   }
   return direction;
 }
