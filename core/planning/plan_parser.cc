@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 #include <filesystem>
-#include <numbers>
 #include <utility>
 
 #include "absl/strings/numbers.h"
@@ -11,6 +10,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/planning/json_text.h"
+#include "core/planning/json_values.h"
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
 #include "core/planning/plan_schema.h"
@@ -22,14 +22,6 @@ using Json = nlohmann::json;
 
 // What follows reads a text that has passed the schema: keys and types are as they must be.
 
-Eigen::Vector3d ToVector(const Json& json) {
-  return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
-}
-
-Eigen::Vector3d VectorOrZero(const Json& json, const char* key) {
-  return json.contains(key) ? ToVector(json.at(key)) : Eigen::Vector3d::Zero();
-}
-
 VertexSelector ToSelector(const Json& json) {
   if (json.contains("vertices")) {
     return {SelectVertices{json.at("vertices").get<std::vector<int64_t>>()}};
@@ -39,7 +31,7 @@ VertexSelector ToSelector(const Json& json) {
   }
   if (json.contains("box_mm")) {
     const Json& box = json.at("box_mm");
-    return {SelectBox{ToVector(box.at("min")), ToVector(box.at("max"))}};
+    return {SelectBox{VectorFromJson(box.at("min")), VectorFromJson(box.at("max"))}};
   }
   SelectUnion parts;
   for (const Json& part : json.at("union")) parts.of.push_back(ToSelector(part));
@@ -61,18 +53,9 @@ absl::StatusOr<StiffnessChoice> ToStiffness(const Json& json) {
   return by_label;
 }
 
-HandlePose ToPose(const Json& json) {
-  HandlePose pose;
-  pose.rotation_vector = VectorOrZero(json, "rotation_vector_deg") * (std::numbers::pi / 180.0);
-  pose.pivot_mm = VectorOrZero(json, "pivot_mm");
-  pose.translation_mm = VectorOrZero(json, "translation_mm");
-  pose.scale = json.value("scale", 1.0);
-  return pose;
-}
-
 PlannedHandle ToHandle(const Json& json) {
   return {json.at("name"), ToSelector(json.at("region")),
-          ToPose(json.value("pose", Json::object()))};
+          PoseFromJson(json.value("pose", Json::object()))};
 }
 
 absl::Status ReadModel(const Json& json, Plan* plan) {

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/planning/soft_tissue_mesh.h"
+#include "core/plan_building/soft_tissue_mesh.h"
 
 #include <algorithm>
 #include <array>

@@ -1,0 +1,77 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/imaging/bone_parts.h"
+#include "core/imaging/ct_volume.h"
+#include "core/imaging/grid_operations.h"
+#include "core/imaging/head_segmentation.h"
+#include "core/imaging/landmarks.h"
+#include "core/imaging/osteotomy.h"
+#include "core/imaging/soft_tissue.h"
+#include "core/imaging/tet_stiffness.h"
+#include "core/plan_building/planning_regions.h"
+#include "core/plan_building/recipe.h"
+#include "core/plan_building/skin_distance.h"
+#include "core/plan_building/soft_tissue_mesh.h"
+
+namespace tissueform {
+
+// A piece of bone that moves.
+struct BuiltSegment {
+  OsteotomySegment cut;  // with the planes that were used
+  HandlePose pose;
+  double volume_mm3 = 0;
+  TriangleMesh surface;  // closed, LPS
+};
+
+// A planning model with all that led to it: what is written, reported and drawn.
+struct PlanBuild {
+  Recipe recipe;
+  CtProvenance ct;
+  std::array<int, 3> ct_size = {0, 0, 0};
+  Eigen::Vector3d ct_spacing_mm = Eigen::Vector3d::Zero();
+  HeadSegmentation head;  // its geometry is the resampled CT's
+  BoneParts parts;
+  LabelGrid bone;  // 0 none, 1 stays, 2.. the segments; on the head's grid
+  Landmarks landmarks;
+  std::vector<BuiltSegment> segments;
+  SoftTissue soft_tissue;
+  double contact_band_mm = 0;
+  std::optional<SoftTissueMesh> mesh;  // there in every build that BuildPlan returns
+  TetStiffness stiffness;
+  PlanningRegions regions;
+  SkinDistance skin_distance;
+};
+
+struct PlanBuildOptions {
+  int threads = 1;  // the plan does not depend on it
+  // Told what begins and how much of the whole is done, in [0, 1], rising.
+  StageFunction tell;
+};
+
+// From a CT to a planning model, by the recipe.
+//
+// Errors: those of the stages (core/imaging, core/mesh_generation), each of which says what it
+// found and what to do.
+absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& recipe,
+                                    const PlanBuildOptions& options = {});
+
+// Writes into the folder, which exists:
+//   plan.json           the plan (docs/plan-format.md)
+//   head.vtu            the mesh; point arrays anatomy, skin_region; cell arrays mean_hu, voxels,
+//                       tissue, youngs_modulus_pa
+//   segments/NAME.stl   the pieces of bone
+// The same build gives the same bytes. Errors: those of writing files.
+absl::Status WritePlan(const PlanBuild& build, const std::string& folder);
+
+}  // namespace tissueform

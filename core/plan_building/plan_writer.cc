@@ -1,0 +1,80 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <filesystem>
+#include <system_error>
+
+#include "absl/strings/str_cat.h"
+#include "nlohmann/json.hpp"
+
+#include "core/base/atomic_file.h"
+#include "core/base/status_macros.h"
+#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh_io/triangle_mesh_io.h"
+#include "core/plan_building/plan_builder.h"
+#include "core/planning/json_values.h"
+#include "core/planning/model_names.h"
+
+namespace tissueform {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr char kMeshFile[] = "head.vtu";
+
+Json Equals(size_t label) { return {{"point_data", "anatomy"}, {"equals", label}}; }
+
+std::string PlanJson(const PlanBuild& build) {
+  Json plan = {{"format", "tissueform-plan"},
+               {"version", 1},
+               {"unit", "mm"},
+               {"coordinate_system", "LPS"},
+               {"mesh", kMeshFile},
+               {"stiffness", {{"cell_data", "youngs_modulus_pa"}}},
+               {"poisson_ratio", build.recipe.poisson_ratio},
+               {"fixed", Equals(kFixedBone)},
+               {"model", ModelName(build.recipe.model)}};
+  for (size_t s = 0; s < build.segments.size(); ++s) {
+    plan["handles"].push_back({{"name", build.segments[s].cut.name},
+                               {"region", Equals(kFirstSegment + s)},
+                               {"pose", ToJson(build.segments[s].pose)}});
+  }
+  return plan.dump(2) + "\n";
+}
+
+TetMeshFile MeshFile(const PlanBuild& build) {
+  const TetStiffness& stiffness = build.stiffness;
+  return {.mesh = build.mesh->mesh,
+          .point_data = {{"anatomy", 1, build.regions.anatomy},
+                         {"skin_region", 1, build.regions.skin_region}},
+          .cell_data = {{"mean_hu", 1, stiffness.mean_hu},
+                        {"voxels", 1, stiffness.voxels},
+                        {"tissue", 1, stiffness.tissue},
+                        {"youngs_modulus_pa", 1, stiffness.youngs_modulus_pa}}};
+}
+
+absl::Status WriteSegments(const PlanBuild& build, const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directory(folder, error);
+  if (error) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("cannot make the folder ", folder.string(), ": ", error.message()));
+  }
+  for (const BuiltSegment& segment : build.segments) {
+    TF_RETURN_IF_ERROR(
+        WriteTriangleMesh((folder / (segment.cut.name + ".stl")).string(),
+                          {.mesh = segment.surface, .point_data = {}, .cell_data = {}}));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status WritePlan(const PlanBuild& build, const std::string& folder) {
+  const std::filesystem::path root = folder;
+  TF_RETURN_IF_ERROR(WriteTetMesh((root / kMeshFile).string(), MeshFile(build)));
+  TF_RETURN_IF_ERROR(WriteSegments(build, root / "segments"));
+  return WriteFileAtomically((root / "plan.json").string(), PlanJson(build));
+}
+
+}  // namespace tissueform
