@@ -75,6 +75,7 @@ class JawLandmarkFinder {
     TF_RETURN_IF_ERROR(FindLowerIncisor());
     TF_RETURN_IF_ERROR(FindTeeth());
     FindTeethPlanes();
+    TF_RETURN_IF_ERROR(FindLastUpperTooth());
     TF_RETURN_IF_ERROR(FindChin());
     TF_RETURN_IF_ERROR(FindSide(1, &LeftAndRight::left));
     TF_RETURN_IF_ERROR(FindSide(-1, &LeftAndRight::right));
@@ -152,6 +153,19 @@ class JawLandmarkFinder {
     l.upper_teeth = ThroughTeeth(l.upper_incisor, l.upper_molar);
     l.occlusal.point_mm = (l.lower_teeth.point_mm + l.upper_teeth.point_mm) / 2;
     l.occlusal.normal = (l.lower_teeth.normal + l.upper_teeth.normal).normalized();
+  }
+
+  // At the height of the crowns, under the pterygoid plates.
+  absl::Status FindLastUpperTooth() {
+    Landmarks& l = landmarks_;
+    const Eigen::Vector3d back = -l.ForwardOf(l.upper_teeth);
+    const Places crowns = Where(cranium_, [&](const auto& p) {
+      const double lateral = std::abs(Lateral(p));
+      const double height = l.upper_teeth.HeightMm(p);
+      const double behind = back.dot(p - l.upper_incisor);
+      return lateral > 12 && lateral < 36 && height > -3 && height < 5 && behind < 62;
+    });
+    return Farthest(crowns, back, "the last upper tooth", &l.last_upper_tooth);
   }
 
   absl::Status FindSide(double side, Eigen::Vector3d LeftAndRight::*member) {

@@ -30,6 +30,8 @@ struct Landmarks {
   Eigen::Vector3d upper_incisor = Eigen::Vector3d::Zero();  // lowest of the upper front teeth
   LeftAndRight lower_molar;  // highest of the lower jaw 25 to 36 mm behind the incisor
   LeftAndRight upper_molar;  // lowest of the upper jaw there
+  // Rearmost of the upper crowns, on the side where they reach farther back.
+  Eigen::Vector3d last_upper_tooth = Eigen::Vector3d::Zero();
   LeftAndRight ramus_front;  // front border of the ramus, 4 mm over the lower teeth
   LeftAndRight gonion;       // farthest back and down
   LeftAndRight condyle;      // top

@@ -23,7 +23,7 @@ constexpr double kSplitAngleDeg = 40;
 constexpr double kBehindRamusFrontMm = 4;
 constexpr double kOverLowerTeethMm = 6;
 constexpr double kOverNasalFloorMm = 5;
-constexpr double kBehindUpperMolarMm = 20;
+constexpr double kBehindUpperTeethMm = 3;
 constexpr double kBesideUpperMolarMm = 14;
 constexpr double kGenioplastyHeight = 0.3;
 
@@ -51,9 +51,8 @@ std::vector<Plane> LeFort1Planes(const Landmarks& l) {
   const Eigen::Vector3d up = l.upper_teeth.normal;
   const Eigen::Vector3d front = l.ForwardOf(l.upper_teeth);
   const Eigen::Vector3d& left = l.midsagittal.normal;
-  const Eigen::Vector3d molars = (l.upper_molar.left + l.upper_molar.right) / 2;
   return {{l.nasal_floor + kOverNasalFloorMm * up, -up},
-          {molars - kBehindUpperMolarMm * front, front},
+          {l.last_upper_tooth - kBehindUpperTeethMm * front, front},
           {l.upper_molar.left + kBesideUpperMolarMm * left, -left},
           {l.upper_molar.right - kBesideUpperMolarMm * left, left}};
 }

@@ -38,8 +38,10 @@ struct OsteotomySegment {
 //   inward,
 //                so that the segment keeps more of the inner side; and 6 mm over the lower teeth,
 //                so that the coronoid process stays
-//   le_fort_1    5 mm over the nasal floor, parallel to the upper teeth; in front of the pterygoid
-//                plates, 20 mm behind the molars; 14 mm beside them, so that the cheekbones stay
+//   le_fort_1    5 mm over the nasal floor, parallel to the upper teeth; 3 mm behind the last of
+//   them, so
+//                that the pterygoid plates stay; 14 mm beside the molars, so that the cheekbones
+//                stay
 //   genioplasty  parallel to the lower teeth, at 0.3 of the height from the chin to the incisor
 OsteotomySegment DefaultSegment(OsteotomyKind kind, absl::string_view name,
                                 const Landmarks& landmarks);
