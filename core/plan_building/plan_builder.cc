@@ -12,6 +12,7 @@
 #include "core/imaging/isotropic_resample.h"
 #include "core/imaging/itk_filters.h"
 #include "core/imaging/surface_extraction.h"
+#include "core/plan_building/contact_trial.h"
 
 namespace tissueform {
 namespace {
@@ -145,7 +146,7 @@ double BandMm(const PlanBuild& build) {
                   kBandOfMove * LargestMoveMm(build.bone, poses));
 }
 
-absl::Status Describe(Progress* progress, PlanBuild* build) {
+absl::Status Describe(int threads, Progress* progress, PlanBuild* build) {
   progress->Begin("stiffness and regions", 0.9, 1);
   const TetMesh& mesh = build->mesh->mesh;
   TF_ASSIGN_OR_RETURN(build->stiffness, ComputeTetStiffness(mesh, build->head.hu, build->head.bone,
@@ -159,6 +160,15 @@ absl::Status Describe(Progress* progress, PlanBuild* build) {
           mesh, build->mesh->surface.num_vertices(), build->soft_tissue, names,
           build->contact_band_mm, build->landmarks,
           {build->head.hu, static_cast<double>(build->recipe.segmentation.tissue_above_hu)}));
+  std::vector<HandlePose> poses;
+  for (const BuiltSegment& segment : build->segments) poses.push_back(segment.pose);
+  TF_ASSIGN_OR_RETURN(build->freed_by_trial,
+                      ReleaseTornContacts({.mesh = mesh,
+                                           .youngs_modulus_pa = build->stiffness.youngs_modulus_pa,
+                                           .poisson_ratio = build->recipe.poisson_ratio,
+                                           .poses = std::move(poses),
+                                           .threads = threads},
+                                          &build->regions));
   build->skin_distance =
       MeasureSkinDistance(build->mesh->surface, build->regions.on_skin, build->head.hu,
                           build->recipe.segmentation.tissue_above_hu);
@@ -179,7 +189,7 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
   TF_RETURN_IF_ERROR(CutBone(&progress, &build));
   TF_RETURN_IF_ERROR(FindSoftTissue(&progress, &build));
   TF_RETURN_IF_ERROR(Mesh(&progress, &build));
-  TF_RETURN_IF_ERROR(Describe(&progress, &build));
+  TF_RETURN_IF_ERROR(Describe(options.threads, &progress, &build));
   TellStage(options.tell, "done", 1);
   return build;
 }

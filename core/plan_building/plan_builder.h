@@ -50,6 +50,7 @@ struct PlanBuild {
   std::optional<SoftTissueMesh> mesh;  // there in every build that BuildPlan returns
   TetStiffness stiffness;
   PlanningRegions regions;
+  int64_t freed_by_trial = 0;  // of regions.freed_by_contact, by ReleaseTornContacts
   SkinDistance skin_distance;
 };
 

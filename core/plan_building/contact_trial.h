@@ -1,0 +1,36 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+#include "core/constraints/handle_pose.h"
+#include "core/mesh/tet_mesh.h"
+#include "core/plan_building/planning_regions.h"
+
+namespace tissueform {
+
+// What is deformed on trial.
+struct ContactTrial {
+  const TetMesh& mesh;
+  const std::vector<double>& youngs_modulus_pa;  // #T
+  double poisson_ratio = 0.45;
+  std::vector<HandlePose> poses;  // of segments 2.., as planned
+  int threads = 1;                // the outcome does not depend on it
+};
+
+// Widens the contact band where it is too narrow for the planned moves: deforms the mesh by a third
+// more than planned, with gradient_field and linear_elastic, frees the constrained vertices of
+// inverted tets and of those beside them, and again, until no tet is inverted or after some rounds.
+// What is narrow (the gap between teeth, the walls of a cut) is so given way where it must be, and
+// held elsewhere. Nothing is tried where nothing moves.
+//
+// Returns how many vertices were freed and adds them to `regions`. Errors: InvalidArgument when
+// nothing of a segment or of the fixed bone would be left.
+absl::StatusOr<int64_t> ReleaseTornContacts(const ContactTrial& trial, PlanningRegions* regions);
+
+}  // namespace tissueform
