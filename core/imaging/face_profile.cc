@@ -16,6 +16,7 @@ namespace tissueform {
 namespace {
 
 constexpr double kCornerFromMidlineMm = 25;
+constexpr double kAirHu = -1000;
 
 class FaceProfile {
  public:
@@ -25,10 +26,9 @@ class FaceProfile {
   // Where a ray from the front at that height, so far to the left of the midline, meets the skin.
   std::optional<Eigen::Vector3d> SkinAt(double z_mm, double left_mm) const {
     const double step_mm = hu_.geometry.spacing_mm / 2;
-    const double first_mm = hu_.geometry.origin_mm.y();
-    const double last_mm = first_mm + hu_.geometry.spacing_mm * hu_.geometry.size[1];
-    double before_hu = -1e4;
-    for (double y_mm = first_mm; y_mm < last_mm; y_mm += step_mm) {
+    double before_hu = kAirHu;
+    for (int step = 0; step < 2 * hu_.geometry.size[1]; ++step) {
+      const double y_mm = hu_.geometry.origin_mm.y() + step * step_mm;
       const double hu = InterpolateHu(hu_, Place(y_mm, z_mm, left_mm));
       if (hu > threshold_hu_) {
         const double part = (hu - threshold_hu_) / (hu - before_hu);
@@ -43,8 +43,10 @@ class FaceProfile {
   absl::Status Farthest(double low_mm, double high_mm, const Eigen::Vector3d& direction,
                         absl::string_view name, Eigen::Vector3d* found) const {
     std::optional<Eigen::Vector3d> best;
-    for (double z_mm = low_mm; z_mm <= high_mm; z_mm += hu_.geometry.spacing_mm / 2) {
-      const std::optional<Eigen::Vector3d> skin = SkinAt(z_mm, 0);
+    const double step_mm = hu_.geometry.spacing_mm / 2;
+    const auto steps = static_cast<int>(std::floor((high_mm - low_mm) / step_mm));
+    for (int step = 0; step <= steps; ++step) {
+      const std::optional<Eigen::Vector3d> skin = SkinAt(low_mm + step * step_mm, 0);
       if (!skin.has_value()) continue;
       if (!best.has_value() || direction.dot(*skin - *best) > 0) best = skin;
     }

@@ -146,10 +146,9 @@ std::optional<OcclusalCut> FindOcclusalCut(const HuGrid& hu, const DentalBox& bo
   double most_teeth = 0;
   for (const Candidate& candidate : candidates) most_teeth = std::max(most_teeth, candidate.teeth);
   if (most_teeth * step_mm * step_mm * step_mm < kSmallestToothRowMm3) return std::nullopt;
-  const Candidate* best = nullptr;
-  for (const Candidate& candidate : candidates) {
-    if (best == nullptr || candidate.Score() > best->Score()) best = &candidate;
-  }
+  const auto best = std::max_element(
+      candidates.begin(), candidates.end(),
+      [](const Candidate& a, const Candidate& b) { return a.Score() < b.Score(); });
   return best->cut;
 }
 

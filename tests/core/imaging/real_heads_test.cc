@@ -191,7 +191,7 @@ TEST(RealHeadsTest, ACadaverWithTeethInOcclusionIsTakenApart) {
   const UnpackedArchive files(archive, "'vhm_head/vhm.10[2-9]*' 'vhm_head/vhm.11[0-6]*'");
   ASSERT_TRUE(files.ok());
   ASSERT_OK_AND_ASSIGN(const CtVolume volume, ReadCtVolume(files.Path("vhm_head")));
-  ASSERT_OK_AND_ASSIGN(const HuGrid ct, ResampleIsotropic(volume, 2));
+  ASSERT_OK_AND_ASSIGN(const HuGrid ct, ResampleIsotropic(volume, 2.5));
   ASSERT_OK_AND_ASSIGN(const Anatomy a, AnatomyOf(ct));
   EXPECT_EQ(a.parts.separation, JawSeparation::kAutomaticCut);
   EXPECT_GT(a.parts.confidence, 0.9);
