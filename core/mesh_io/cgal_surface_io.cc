@@ -68,6 +68,17 @@ Soup ToSoup(const TriangleMesh& mesh) {
   return soup;
 }
 
+// A binary STL begins with bytes that readers pass over.
+constexpr size_t kStlHeaderBytes = 80;
+constexpr char kStlNotice[] = "Tissueform, not a medical device: not for diagnosis or treatment";
+static_assert(sizeof(kStlNotice) <= kStlHeaderBytes);
+
+std::string StlHeader() {
+  std::string header = kStlNotice;
+  header.resize(kStlHeaderBytes, ' ');
+  return header;
+}
+
 bool WriteSoup(const Soup& soup, MeshFormat format, std::ostream& stream) {
   const auto exactly =
       CGAL::parameters::stream_precision(std::numeric_limits<double>::max_digits10);
@@ -77,7 +88,8 @@ bool WriteSoup(const Soup& soup, MeshFormat format, std::ostream& stream) {
     case MeshFormat::kOff:
       return CGAL::IO::write_OFF(stream, soup.points, soup.triangles, exactly);
     case MeshFormat::kStl:
-      return CGAL::IO::write_STL(stream, soup.points, soup.triangles, exactly);
+      CGAL::IO::set_binary_mode(stream);
+      return CGAL::IO::write_STL(stream, soup.points, soup.triangles);
     default:
       return CGAL::IO::write_PLY(stream, soup.points, soup.triangles, exactly);
   }
@@ -89,12 +101,14 @@ absl::StatusOr<RawMesh> ReadCgalSurface(const CheckedMeshFile& file, const MeshR
   return ReadIsolated(limits, [&file] { return ReadWithCgal(file); });
 }
 
-absl::StatusOr<std::string> SurfaceText(const TriangleMesh& mesh, MeshFormat format) {
+absl::StatusOr<std::string> SurfaceFileContents(const TriangleMesh& mesh, MeshFormat format) {
   std::ostringstream stream;
   if (!WriteSoup(ToSoup(mesh), format, stream)) {
     return absl::InternalError("CGAL cannot write the surface");
   }
-  return stream.str();
+  std::string contents = stream.str();
+  if (format == MeshFormat::kStl) contents.replace(0, kStlHeaderBytes, StlHeader());
+  return contents;
 }
 
 }  // namespace tissueform

@@ -22,10 +22,10 @@ namespace tissueform {
 // Errors: InvalidArgument, ResourceExhausted, without the name of the file.
 absl::StatusOr<RawMesh> ReadCgalSurface(const CheckedMeshFile& file, const MeshReadLimits& limits);
 
-// The mesh as the text of an .obj, .off, .ply or (without shared vertices) .stl file. Coordinates
-// are written so that the same doubles are read again.
+// The mesh as an .obj, .off or .ply file, texts whose coordinates are written so that the same
+// doubles are read again, or as a binary .stl file.
 //
 // REQUIRES: one of these four formats.
-absl::StatusOr<std::string> SurfaceText(const TriangleMesh& mesh, MeshFormat format);
+absl::StatusOr<std::string> SurfaceFileContents(const TriangleMesh& mesh, MeshFormat format);
 
 }  // namespace tissueform

@@ -44,7 +44,7 @@ absl::StatusOr<std::string> Serialize(MeshFormat format, const TriangleMeshFile&
   if (!file.point_data.empty() || !file.cell_data.empty()) {
     return absl::InvalidArgumentError("only .vtp keeps arrays; name such a file");
   }
-  return SurfaceText(file.mesh, format);
+  return SurfaceFileContents(file.mesh, format);
 }
 
 }  // namespace

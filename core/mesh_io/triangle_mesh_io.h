@@ -35,10 +35,10 @@ bool NamesSurface(const std::string& path);
 absl::StatusOr<TriangleMeshFile> ReadTriangleMesh(const std::string& path,
                                                   const MeshReadLimits& limits = {});
 
-// Writes the format that the ending names: .vtp (with all arrays), or .stl .ply .obj .off as text,
-// for which `file` must have no arrays, because they would be lost (InvalidArgument). Coordinates
-// come back exactly, except from .stl, which VTK reads in single precision. All or nothing, as
-// WriteTetMesh.
+// Writes the format that the ending names: .vtp (with all arrays), .ply .obj .off as text, or .stl
+// in binary form, single precision, with "not a medical device" in its header; all but .vtp must
+// have no arrays, because they would be lost (InvalidArgument). Coordinates come back exactly,
+// except from .stl. All or nothing, as WriteTetMesh.
 absl::Status WriteTriangleMesh(const std::string& path, const TriangleMeshFile& file);
 
 }  // namespace tissueform

@@ -127,6 +127,13 @@ TEST_F(SurfaceFormatsTest, VtpKeepsArraysOfPointsAndTriangles) {
   EXPECT_TRUE(read.cell_data[0].values == file.cell_data[0].values);
 }
 
+TEST_F(SurfaceFormatsTest, StlIsBinaryAndSaysThatItIsNoMedicalDevice) {
+  ASSERT_THAT(WriteTriangleMesh(Path("a.stl"), OnlySurface(Tetrahedron())), IsOk());
+  const std::string contents = Slurp(Path("a.stl"));
+  EXPECT_EQ(contents.size(), 80U + 4U + 4U * 50U);
+  EXPECT_THAT(contents.substr(0, 80), HasSubstr("not a medical device"));
+}
+
 TEST_F(SurfaceFormatsTest, ArraysThatAFormatWouldLoseAreRefused) {
   TriangleMeshFile file = OnlySurface(Tetrahedron());
   file.point_data.push_back({"anatomy", 1, std::vector<int32_t>{1, 2, 3, 4}});
