@@ -176,7 +176,8 @@ class JawLandmarkFinder {
         Farthest(half, back_and_down.normalized(), "the angle of the jaw", &(l.gonion.*member)));
     const Places ramus = Where(half, [&](const auto& p) {
       const double height = l.lower_teeth.HeightMm(p);
-      return height > 3 && height < 5 && p.y() > l.lower_incisor.y() + 25;
+      // Beside the molars, whose crowns and metal streaks reach over the plane too.
+      return height > 3 && height < 5 && side * Lateral(p) > 32 && p.y() > l.lower_incisor.y() + 25;
     });
     TF_RETURN_IF_ERROR(Farthest(ramus, kFront, "the front of the ramus", &(l.ramus_front.*member)));
     return FindCondyle(half, &(l.condyle.*member));
