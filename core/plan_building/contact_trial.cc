@@ -20,7 +20,7 @@ namespace {
 
 // The trial goes so much farther than the plan.
 constexpr double kOverreach = 4.0 / 3.0;
-constexpr int kMaxRounds = 12;
+constexpr int kMaxRounds = 20;
 
 std::vector<HandlePose> Overreaching(std::vector<HandlePose> poses) {
   for (HandlePose& pose : poses) {
@@ -91,21 +91,14 @@ absl::StatusOr<std::vector<bool>> TornTets(const ContactTrial& trial,
   return torn;
 }
 
-// Vertices of the torn tets and of the tets beside them.
-std::set<int32_t> Surroundings(const TetMesh& mesh, const std::vector<bool>& torn) {
+std::set<int32_t> CornersOf(const TetMesh& mesh, const std::vector<bool>& torn) {
   std::set<int32_t> corners;
   for (size_t t = 0; t < torn.size(); ++t) {
     if (!torn[t]) continue;
     const auto tet = mesh.tets().row(static_cast<Eigen::Index>(t));
     corners.insert(tet.begin(), tet.end());
   }
-  std::set<int32_t> vertices = corners;
-  for (const auto& tet : mesh.tets().rowwise()) {
-    if (std::any_of(tet.begin(), tet.end(), [&](int32_t v) { return corners.contains(v); })) {
-      vertices.insert(tet.begin(), tet.end());
-    }
-  }
-  return vertices;
+  return corners;
 }
 
 }  // namespace
@@ -116,7 +109,7 @@ absl::StatusOr<int64_t> ReleaseTornContacts(const ContactTrial& trial, PlanningR
   for (int round = 0; round < kMaxRounds; ++round) {
     TF_ASSIGN_OR_RETURN(const std::vector<bool> torn, TornTets(trial, regions->anatomy));
     int64_t now = 0;
-    for (const int32_t v : Surroundings(trial.mesh, torn)) {
+    for (const int32_t v : CornersOf(trial.mesh, torn)) {
       uint8_t& held_by = regions->anatomy[static_cast<size_t>(v)];
       now += held_by != 0 ? 1 : 0;
       held_by = 0;

@@ -25,7 +25,7 @@ struct ContactTrial {
 
 // Widens the contact band where it is too narrow for the planned moves: deforms the mesh by a third
 // more than planned, with gradient_field and linear_elastic, frees the constrained vertices of
-// inverted tets and of those beside them, and again, until no tet is inverted or after some rounds.
+// inverted tets, and again, until no tet is inverted or after some rounds.
 // What is narrow (the gap between teeth, the walls of a cut) is so given way where it must be, and
 // held elsewhere. Nothing is tried where nothing moves.
 //
