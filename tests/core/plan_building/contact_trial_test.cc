@@ -1,0 +1,100 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/plan_building/contact_trial.h"
+
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "core/deformation/create_deformer.h"
+#include "core/deformation/deformation_quality.h"
+#include "core/imaging/osteotomy.h"
+#include "tests/testing/meshes.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::StatusIs;
+
+// A bar of 4 by 4 by 10 mm, held at its lower end and moved at the other, and at one vertex close
+// to the lower end, which a move down pushes through it.
+class ContactTrialTest : public ::testing::Test {
+ protected:
+  ContactTrialTest() {
+    regions_.anatomy.assign(static_cast<size_t>(mesh_.num_vertices()), 0);
+    for (Eigen::Index v = 0; v < mesh_.num_vertices(); ++v) {
+      const Eigen::Vector3d p = mesh_.positions().row(v);
+      if (p.z() == 0) regions_.anatomy[v] = kFixedBone;
+      if (p.z() == 10 || p == Eigen::Vector3d(2, 2, 1)) regions_.anatomy[v] = kFirstSegment;
+    }
+  }
+
+  absl::StatusOr<int64_t> Release(double down_mm) {
+    HandlePose pose;
+    pose.translation_mm.z() = -down_mm;
+    return ReleaseTornContacts({.mesh = mesh_,
+                                .youngs_modulus_pa = stiffness_,
+                                .poisson_ratio = 0.3,
+                                .poses = {pose},
+                                .threads = 2},
+                               &regions_);
+  }
+
+  std::vector<int32_t> VerticesWith(uint8_t label) const {
+    std::vector<int32_t> vertices;
+    for (size_t v = 0; v < regions_.anatomy.size(); ++v) {
+      if (regions_.anatomy[v] == label) vertices.push_back(static_cast<int32_t>(v));
+    }
+    return vertices;
+  }
+
+  Eigen::Index InvertedTets(DeformationModel model, double down_mm) const {
+    const auto constraints = ConstraintSet::Create(mesh_, VerticesWith(kFixedBone),
+                                                   {{"piece", VerticesWith(kFirstSegment)}});
+    DeformerOptions options;
+    options.model = model;
+    HandlePose pose;
+    pose.translation_mm.z() = -down_mm;
+    const auto deformer = CreateDeformer(mesh_, Eigen::VectorXd::Constant(mesh_.num_tets(), 1e4),
+                                         *constraints, options);
+    const Positions deformed = (*deformer)->Deform({pose})->positions;
+    return MeasureDeformation(mesh_, deformed).inverted_tets;
+  }
+
+  const TetMesh mesh_ = testing::Bar({4, 4, 10});
+  const std::vector<double> stiffness_ =
+      std::vector<double>(static_cast<size_t>(mesh_.num_tets()), 1e4);
+  PlanningRegions regions_;
+};
+
+TEST_F(ContactTrialTest, WhatTearsIsReleasedAndTheRestHeld) {
+  ASSERT_GT(InvertedTets(DeformationModel::kGradientField, 2), 0);
+  const size_t fixed_before = VerticesWith(kFixedBone).size();
+  ASSERT_OK_AND_ASSIGN(const int64_t freed, Release(2));
+  EXPECT_GT(freed, 0);
+  EXPECT_EQ(regions_.freed_by_contact, freed);
+  EXPECT_EQ(InvertedTets(DeformationModel::kGradientField, 2), 0);
+  EXPECT_EQ(InvertedTets(DeformationModel::kLinearElastic, 2), 0);
+  EXPECT_EQ(VerticesWith(kFirstSegment).size(), 25U);  // its own end
+  EXPECT_GT(VerticesWith(kFixedBone).size(), fixed_before / 2);
+}
+
+TEST_F(ContactTrialTest, NothingIsReleasedWhereNothingTears) {
+  const std::vector<uint8_t> before = regions_.anatomy;
+  ASSERT_OK_AND_ASSIGN(const int64_t freed, Release(0.3));
+  EXPECT_EQ(freed, 0);
+  EXPECT_EQ(regions_.anatomy, before);
+  ASSERT_OK_AND_ASSIGN(const int64_t at_rest, Release(0));
+  EXPECT_EQ(at_rest, 0);
+}
+
+TEST_F(ContactTrialTest, MovesThatTearEverythingAreRefused) {
+  EXPECT_THAT(Release(40), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("plan smaller")));
+}
+
+}  // namespace
+}  // namespace tissueform

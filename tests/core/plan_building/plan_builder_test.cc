@@ -1,0 +1,155 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/plan_building/plan_builder.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "core/deformation/deformation_quality.h"
+#include "core/mesh/validation.h"
+#include "core/mesh_io/tet_mesh_io.h"
+#include "core/planning/plan_io.h"
+#include "tests/testing/meshes.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::IsOk;
+using testing::StatusIs;
+using testing::TestDataPath;
+
+// Quick: the bundled head on coarse voxels with coarse tets.
+Recipe CoarseRecipe() {
+  Recipe recipe;
+  recipe.ct.hu_offset = -1024;
+  recipe.ct.axes = "RPI";
+  recipe.spacing_mm = 2.5;
+  recipe.mesh.edge_mm = 6.5;
+  recipe.mesh.fine_edge_mm = 5;
+  RecipeSegment mandible;
+  mandible.name = "mandible";
+  mandible.pose.translation_mm.y() = -6;
+  recipe.segments = {mandible};
+  return recipe;
+}
+
+std::string BundledCt() { return TestDataPath("ct/headsq/headsq_quarter.nhdr"); }
+
+TEST(PlanBuilderTest, BundledHeadBecomesAUsablePlan) {
+  double last = 0;
+  PlanBuildOptions options;
+  options.threads = 2;
+  options.tell = [&last](absl::string_view stage, double fraction) {
+    EXPECT_FALSE(stage.empty());
+    EXPECT_GE(fraction, last) << std::string(stage);
+    last = fraction;
+  };
+  ASSERT_OK_AND_ASSIGN(const PlanBuild build, BuildPlan(BundledCt(), CoarseRecipe(), options));
+  EXPECT_EQ(last, 1);
+  const TetMesh& mesh = build.mesh->mesh;
+  EXPECT_THAT(CheckTetMesh(mesh), IsOk());
+  EXPECT_EQ(ValidateTetMesh(mesh).num_components, 1);
+  EXPECT_LE(build.mesh->report.tets_below_3_deg, mesh.num_tets() / 1000);
+  EXPECT_NEAR(build.mesh->report.volume_ratio, 1, 0.03);
+  EXPECT_LE(build.skin_distance.mean_mm, 0.6 * 2.5);
+  EXPECT_LE(build.skin_distance.p99_mm, 2 * 2.5);
+  EXPECT_GT(build.skin_distance.mm.size(), 500U);
+  EXPECT_EQ(build.stiffness.youngs_modulus_pa.size(), static_cast<size_t>(mesh.num_tets()));
+  EXPECT_EQ(build.segments.size(), 1U);
+  EXPECT_GT(build.segments[0].volume_mm3, 20e3);
+
+  const std::string folder = ::testing::TempDir() + "plan_builder_test";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  ASSERT_THAT(WritePlan(build, folder), IsOk());
+  ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(folder + "/plan.json"));
+  ASSERT_OK_AND_ASSIGN(const PlanProblem problem, ResolvePlan(plan));
+  EXPECT_EQ(problem.poses[0].translation_mm.y(), -6);
+  for (const char* name : {"mean_hu", "voxels", "tissue", "youngs_modulus_pa"}) {
+    EXPECT_NE(FindAttribute(problem.cell_data, name), nullptr) << name;
+  }
+  EXPECT_NE(FindAttribute(problem.point_data, "skin_region"), nullptr);
+  EXPECT_TRUE(std::filesystem::is_regular_file(folder + "/segments/mandible.stl"));
+  std::filesystem::remove_all(folder);
+}
+
+TEST(PlanBuilderTest, FirstErrorIsTold) {
+  Recipe recipe = CoarseRecipe();
+  recipe.ct.hu_offset.reset();
+  EXPECT_THAT(BuildPlan(BundledCt(), recipe),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("hu_offset")));
+  recipe = CoarseRecipe();
+  recipe.segments[0].planes = {{Eigen::Vector3d(0, 0, 5000), Eigen::Vector3d::UnitZ()}};
+  EXPECT_THAT(BuildPlan(BundledCt(), recipe),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("mandible")));
+}
+
+// What issue-tracker and README promise of the bundled plans.
+class BundledHeadTest : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(BundledHeadTest, PlannedMoveInvertsNoTetAndMovesTheBoneExactly) {
+  ASSERT_OK_AND_ASSIGN(const Plan plan,
+                       ReadPlan(TestDataPath(std::string("plans/") + GetParam() + "/plan.json")));
+  ASSERT_OK_AND_ASSIGN(PlanProblem problem, ResolvePlan(plan));
+  problem.deformer.preparation.threads = 2;
+  for (const DeformationModel model :
+       {DeformationModel::kGradientField, DeformationModel::kLinearElastic}) {
+    problem.deformer.model = model;
+    ASSERT_OK_AND_ASSIGN(
+        const auto deformer,
+        CreateDeformer(*problem.mesh, problem.stiffness, problem.constraints, problem.deformer));
+    ASSERT_OK_AND_ASSIGN(const Deformation answer, deformer->Deform(problem.poses));
+    EXPECT_EQ(MeasureDeformation(*problem.mesh, answer.positions).inverted_tets, 0);
+    for (const int32_t v : problem.constraints.handles()[0].vertices) {
+      const Eigen::Vector3d rest = problem.mesh->positions().row(v);
+      const Eigen::Vector3d moved = answer.positions.row(v);
+      ASSERT_LT((moved - ApplyPose(problem.poses[0], rest)).norm(), 1e-9);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Plans, BundledHeadTest,
+                         ::testing::Values("head", "head_maxilla", "head_chin"),
+                         [](const auto& test) { return std::string(test.param); });
+
+// How far the foremost vertex of a region of the skin moves.
+double MovementOf(const PlanProblem& problem, const Positions& deformed, double region) {
+  const std::vector<double> of_vertex =
+      ToDoubles(*FindAttribute(problem.point_data, "skin_region"));
+  Eigen::Index foremost = -1;
+  for (Eigen::Index v = 0; v < problem.mesh->num_vertices(); ++v) {
+    const bool here = of_vertex[static_cast<size_t>(v)] == region;
+    if (here && (foremost < 0 ||
+                 problem.mesh->positions()(v, 1) < problem.mesh->positions()(foremost, 1))) {
+      foremost = v;
+    }
+  }
+  return (deformed.row(foremost) - problem.mesh->positions().row(foremost)).norm();
+}
+
+TEST(BundledMandibleTest, ChinFollowsTheJawAndTheNoseDoesNot) {
+  ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(TestDataPath("plans/head/plan.json")));
+  ASSERT_OK_AND_ASSIGN(PlanProblem problem, ResolvePlan(plan));
+  for (const DeformationModel model :
+       {DeformationModel::kGradientField, DeformationModel::kLinearElastic}) {
+    problem.deformer.model = model;
+    ASSERT_OK_AND_ASSIGN(
+        const auto deformer,
+        CreateDeformer(*problem.mesh, problem.stiffness, problem.constraints, problem.deformer));
+    ASSERT_OK_AND_ASSIGN(const Deformation answer, deformer->Deform(problem.poses));
+    constexpr double kChin = 3;
+    constexpr double kNose = 4;
+    EXPECT_GE(MovementOf(problem, answer.positions, kChin), 4);
+    EXPECT_LE(MovementOf(problem, answer.positions, kChin), 6.5);
+    EXPECT_LT(MovementOf(problem, answer.positions, kNose), 1);
+  }
+}
+
+}  // namespace
+}  // namespace tissueform
