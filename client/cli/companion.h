@@ -25,9 +25,11 @@ inline constexpr CompanionCommand kDemoCommand = {
 inline constexpr CompanionCommand kExperimentsCommand = {
     "experiments", "compute the paper's figures and table again, and the models' accuracy",
     "tissueform-experiments"};
+inline constexpr CompanionCommand kPlanBuildCommand = {  // of `plan`
+    "build", "make a plan from a CT of a head", "tissueform-plan-build"};
 
-// Adds the command to `app`; all that follows its name, --help too, is left to the companion, which
-// is given the words of this process's command line.
+// Adds the command to `app`, which may be a command itself (`plan`); all that follows its name,
+// --help too, is left to the companion, which is given the words of this process's command line.
 void AddCompanionCommand(CLI::App& app, const CompanionCommand& companion,
                          std::vector<std::string> words, CommandWork* work);
 

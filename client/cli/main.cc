@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   const std::vector<std::string> words(argv + 1, argv + argc);
   return tissueform::RunCommandLine(argc, argv, [&](CLI::App& app, tissueform::CommandWork* work) {
     tissueform::AddMeshCommand(app, work);
-    tissueform::AddPlanCommand(app, work);
+    tissueform::AddPlanCommand(app, words, work);
     tissueform::AddDeformCommand(app, work);
     tissueform::AddCompanionCommand(app, tissueform::kRunCommand, words, work);
     tissueform::AddCompareCommand(app, work);

@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "client/cli/companion.h"
 #include "client/cli/option_checks.h"
 #include "core/base/status_macros.h"
 #include "core/planning/model_names.h"
@@ -56,9 +57,13 @@ absl::Status RunPlanCheck(const PlanCheckOptions& options) {
 
 }  // namespace
 
-void AddPlanCommand(CLI::App& app, CommandWork* work) {
+void AddPlanCommand(CLI::App& app, const std::vector<std::string>& words, CommandWork* work) {
   CLI::App* plan = app.add_subcommand("plan", "work on plan files");
-  plan->footer("Example:\n  tissueform plan check plan.json");
+  plan->footer(
+      "Examples:\n"
+      "  tissueform plan build --ct series/ --recipe recipe.json --out head\n"
+      "  tissueform plan check head/plan.json");
+  AddCompanionCommand(*plan, kPlanBuildCommand, words, work);
 
   auto options = std::make_shared<PlanCheckOptions>();
   CLI::App* check =

@@ -3,11 +3,15 @@
 
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "client/cli/command.h"
 
 namespace tissueform {
 
-// `plan check PLAN.json`: reads a plan, puts it upon its mesh and says what it asks for.
-void AddPlanCommand(CLI::App& app, CommandWork* work);
+// `plan check PLAN.json`: reads a plan, puts it upon its mesh and says what it asks for; and
+// `plan build`, which a companion does with the words of this process's command line.
+void AddPlanCommand(CLI::App& app, const std::vector<std::string>& words, CommandWork* work);
 
 }  // namespace tissueform

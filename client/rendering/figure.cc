@@ -17,6 +17,7 @@
 
 #include "client/rendering/chart_renderer.h"
 #include "client/rendering/indexed_png.h"
+#include "client/rendering/picture_renderer.h"
 #include "client/rendering/scene_renderer.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
@@ -107,6 +108,14 @@ std::vector<vtkSmartPointer<vtkRenderer>> RenderPanels(const std::vector<Chart>&
   return renderers;
 }
 
+std::vector<vtkSmartPointer<vtkRenderer>> RenderPanels(const std::vector<Picture>& pictures,
+                                                       double aspect) {
+  std::vector<vtkSmartPointer<vtkRenderer>> renderers;
+  renderers.reserve(pictures.size());
+  for (const Picture& picture : pictures) renderers.push_back(RenderPicture(picture, aspect));
+  return renderers;
+}
+
 }  // namespace
 
 Figure::Figure(std::string title, int width_px) : title_(std::move(title)), width_px_(width_px) {}
@@ -117,6 +126,10 @@ void Figure::AddRow(int height_px, std::vector<Scene> scenes) {
 
 void Figure::AddRow(int height_px, std::vector<Chart> charts) {
   rows_.push_back({height_px, std::move(charts)});
+}
+
+void Figure::AddRow(int height_px, std::vector<Picture> pictures) {
+  rows_.push_back({height_px, std::move(pictures)});
 }
 
 absl::Status Figure::WritePng(const std::string& path) const {

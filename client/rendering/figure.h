@@ -10,6 +10,7 @@
 #include "absl/status/status.h"
 
 #include "client/rendering/chart.h"
+#include "client/rendering/picture.h"
 #include "client/rendering/scene.h"
 
 namespace tissueform {
@@ -23,6 +24,7 @@ class Figure {
   // Panels of one width. All scenes of one row have one scale, so that sizes can be compared.
   void AddRow(int height_px, std::vector<Scene> scenes);
   void AddRow(int height_px, std::vector<Chart> charts);
+  void AddRow(int height_px, std::vector<Picture> pictures);
 
   // Renders offscreen and writes the file all or nothing. Needs an X display (VirtualDisplay).
   //
@@ -32,7 +34,7 @@ class Figure {
  private:
   struct Row {
     int height_px = 0;
-    std::variant<std::vector<Scene>, std::vector<Chart>> panels;
+    std::variant<std::vector<Scene>, std::vector<Chart>, std::vector<Picture>> panels;
   };
 
   std::string title_;

@@ -1,0 +1,28 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nlohmann/json.hpp"
+
+#include "client/plan_report/plan_measures.h"
+#include "client/plan_report/plan_pictures.h"
+#include "core/plan_building/plan_builder.h"
+
+namespace tissueform {
+
+// What a report tells that the build does not know.
+struct ReportOrigin {
+  std::string program_version;
+  std::string recipe_sha256;
+};
+
+// report.json (docs/recipe-format.md tells its keys).
+nlohmann::ordered_json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
+                                      const ReportOrigin& origin,
+                                      const std::vector<ReportPicture>& pictures);
+
+}  // namespace tissueform
