@@ -73,7 +73,7 @@ absl::Status PipeReceiver::Outcome() {
 
 absl::Status PipeReceiver::Reserve(int64_t count, int64_t size) {
   if (count > bytes_left_ / size) {
-    return absl::ResourceExhaustedError("the mesh is larger than the memory limit");
+    return absl::ResourceExhaustedError("what was read is larger than the memory limit");
   }
   bytes_left_ -= count * size;
   return absl::OkStatus();

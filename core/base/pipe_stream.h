@@ -58,6 +58,7 @@ class PipeReceiver {
 
   template <typename Matrix>
   absl::Status Entries(int64_t most_columns, Matrix* matrix) {
+    static_assert(Matrix::RowsAtCompileTime == Eigen::Dynamic, "as many rows as the sender says");
     int64_t rows = 0;
     int64_t columns = 0;
     constexpr auto kScalarBytes = static_cast<int64_t>(sizeof(typename Matrix::Scalar));
