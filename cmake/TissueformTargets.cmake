@@ -3,7 +3,7 @@
 #
 # One target a folder. Includes are written from the repository root.
 
-# Precompiled headers: most of a compilation is reading Eigen, Abseil and GoogleTest again. Two of them serve all
+# Precompiled headers: most of a compilation is reading Eigen, Abseil and GoogleTest again. Three of them serve all
 # targets; every target is compiled with the same options (-fPIC, executables too) so that they fit.
 option(TISSUEFORM_PRECOMPILED_HEADERS "Precompile the large headers" ON)
 
@@ -19,6 +19,7 @@ endfunction()
 function(tissueform_precompile_headers)
   if(TISSUEFORM_PRECOMPILED_HEADERS)
     _tissueform_precompiled(library)
+    _tissueform_precompiled(command CLI11::CLI11 nlohmann_json::nlohmann_json)
     if(BUILD_TESTING)
       _tissueform_precompiled(test GTest::gmock)
     endif()
@@ -34,13 +35,16 @@ endfunction()
 # tissueform_library(core_mesh SOURCES a.cc b.cc DEPS core_base absl::status)
 #
 # A static library tissueform_core_mesh with alias tissueform::core_mesh. DEPS are public; names
-# without :: are folders of this project.
+# without :: are folders of this project. PRECOMPILED command: the files read options or JSON.
 function(tissueform_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PRIVATE_DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "" "PRECOMPILED" "SOURCES;DEPS;PRIVATE_DEPS" ${ARGN})
+  if(NOT ARG_PRECOMPILED)
+    set(ARG_PRECOMPILED library)
+  endif()
   set(target tissueform_${name})
   if(ARG_SOURCES)
     add_library(${target} STATIC ${ARG_SOURCES})
-    _tissueform_use_precompiled(${target} library)
+    _tissueform_use_precompiled(${target} ${ARG_PRECOMPILED})
     set(scope PUBLIC)
   else()
     add_library(${target} INTERFACE)
@@ -58,9 +62,12 @@ endfunction()
 
 # tissueform_binary(tissueform SOURCES main.cc DEPS client_cli)
 function(tissueform_binary name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "" "PRECOMPILED" "SOURCES;DEPS" ${ARGN})
+  if(NOT ARG_PRECOMPILED)
+    set(ARG_PRECOMPILED library)
+  endif()
   add_executable(${name} ${ARG_SOURCES})
-  _tissueform_use_precompiled(${name} library)
+  _tissueform_use_precompiled(${name} ${ARG_PRECOMPILED})
   _tissueform_resolve(deps ${ARG_DEPS})
   target_link_libraries(${name} PRIVATE ${deps})
 endfunction()
