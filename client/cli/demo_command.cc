@@ -10,20 +10,29 @@
 #include <signal.h>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 
 #include "client/cli/companion.h"
 #include "client/cli/demo_paths.h"
+#include "client/cli/demo_pictures.h"
+#include "client/cli/demo_prediction.h"
 #include "client/cli/demo_report.h"
 #include "client/cli/drag.h"
+#include "client/cli/handle_words.h"
 #include "client/cli/plan_session.h"
 #include "client/cli/result_writer.h"
 #include "client/cli/server_process.h"
 #include "client/cpp/tissueform_client.h"
+#include "client/rendering/virtual_display.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
+#include "core/mesh/tet_topology.h"
+#include "core/mesh_io/triangle_mesh_io.h"
+#include "core/planning/coordinates.h"
 #include "core/planning/plan_io.h"
 
 namespace tissueform {
@@ -31,15 +40,21 @@ namespace {
 
 constexpr std::chrono::seconds kServerStartDeadline{30};
 
+// How far beyond its plan the bundled head is dragged: 8 mm instead of 6.
+constexpr double kHeadReach = 4.0 / 3.0;
+
 struct DemoOptions {
   std::string out = "out/demo";
   std::string plan;
   int port = 0;
   bool no_browser = false;
+  DragOptions drag;
 
-  std::string ResultPath() const { return out + "/result.vtu"; }
-  std::string FramesPath() const { return out + "/frames.csv"; }
-  std::string SummaryPath() const { return out + "/summary.json"; }
+  std::string Path(const std::string& name) const { return out + "/" + name; }
+  std::string ResultPath() const { return Path("result.vtu"); }
+  std::string SkinPath() const { return Path("skin.stl"); }
+  std::string FramesPath() const { return Path("frames.csv"); }
+  std::string SummaryPath() const { return Path("summary.json"); }
 };
 
 // Set by SIGINT and SIGTERM; the demo then ends by itself, and its server with it.
@@ -67,46 +82,123 @@ absl::Status MakeFolder(const DemoOptions& options) {
   return CheckWritable(options.ResultPath());
 }
 
-absl::Status Drag(const DemoOptions& options, const PlanProblem& problem, TissueformClient* client,
-                  const std::string& session) {
-  const std::vector<NamedPose> poses = NamedPoses(problem);
-  const DragOptions drag_options;
-  absl::PrintF("dragging %d handle(s) for %g s at %g poses a second ...\n", poses.size(),
-               drag_options.seconds, drag_options.poses_per_second);
-  TF_ASSIGN_OR_RETURN(const DragResult drag,
-                      RunDrag(client, session, poses, drag_options, interrupted));
+// A plan with what is dragged: to the plan's pose, the bundled head farther.
+struct DemoCase {
+  Plan plan;
+  PlanProblem problem;
+};
+
+absl::StatusOr<DemoCase> ReadCase(const DemoOptions& options) {
+  TF_ASSIGN_OR_RETURN(const std::string path, FindDemoPlan(options.plan));
+  TF_ASSIGN_OR_RETURN(Plan plan, ReadPlan(path));
+  TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan));
+  if (options.plan.empty()) {
+    for (HandlePose& pose : problem.poses) pose = PartOfPose(pose, kHeadReach);
+  }
+  absl::PrintF("plan %s: %d vertices, %d tets\n", path, problem.mesh->num_vertices(),
+               problem.mesh->num_tets());
+  return DemoCase{std::move(plan), std::move(problem)};
+}
+
+double LargestDistance(const Positions& a, const Positions& b) {
+  return (a - b).rowwise().norm().maxCoeff();
+}
+
+absl::StatusOr<DragResult> Drag(const DemoOptions& options, const PlanProblem& problem,
+                                TissueformClient* client, const std::string& session) {
+  absl::PrintF("dragging: %s, over %g s at %g poses a second ...\n", MovesInWords(problem),
+               options.drag.seconds, options.drag.poses_per_second);
+  TF_ASSIGN_OR_RETURN(DragResult drag,
+                      RunDrag(client, session, NamedPoses(problem), options.drag, interrupted));
   if (drag.frames.empty()) {
     return absl::InternalError("the server answered no pose");
   }
-  TF_ASSIGN_OR_RETURN(const Positions last,
-                      DecodePositions(drag.last_positions, problem.mesh->num_vertices()));
-  DragSummary summary = SummarizeDrag(drag);
-  summary.vertices = problem.mesh->num_vertices();
-  summary.rest_error_mm = (last - problem.mesh->positions()).rowwise().norm().maxCoeff();
-  TF_RETURN_IF_ERROR(WriteFramesCsv(options.FramesPath(), drag));
-  TF_RETURN_IF_ERROR(WriteSummaryJson(options.SummaryPath(), summary));
-  PrintDragSummary(summary);
+  return drag;
+}
+
+// How exact the frames were, by other ways to the same answers.
+absl::Status CheckFrames(const PlanProblem& problem, const DragResult& drag,
+                         const Positions& deformed, TissueformClient* client,
+                         const std::string& session, DragSummary* summary) {
+  const int64_t count = problem.mesh->num_vertices();
+  TF_ASSIGN_OR_RETURN(const Positions last, DecodePositions(drag.last_positions, count));
+  TF_ASSIGN_OR_RETURN(const v1::DeformOnceResponse answer,
+                      client->DeformOnce(session, PartOfPoses(NamedPoses(problem), 0)));
+  TF_ASSIGN_OR_RETURN(const Positions rest, DecodePositions(answer.positions(), count));
+  summary->vertices = count;
+  summary->end_error_mm = LargestDistance(last, deformed);
+  summary->rest_error_mm = LargestDistance(rest, problem.mesh->positions());
   return absl::OkStatus();
 }
 
-absl::Status WriteFullPose(const DemoOptions& options, const Plan& plan, const PlanProblem& problem,
-                           TissueformClient* client, const std::string& session) {
-  TF_ASSIGN_OR_RETURN(const v1::DeformOnceResponse answer,
-                      client->DeformOnce(session, NamedPoses(problem)));
-  TF_ASSIGN_OR_RETURN(const Positions deformed,
-                      DecodePositions(answer.positions(), problem.mesh->num_vertices()));
-  return WriteResult(options.ResultPath(), plan, problem, deformed);
+absl::Status WriteSkin(const std::string& path, const PlanProblem& problem,
+                       const Positions& deformed) {
+  Positions written = deformed;
+  SwapToOrFromLps(problem.written_in, &written);
+  TF_ASSIGN_OR_RETURN(TriangleMesh skin,
+                      TriangleMesh::Create(std::move(written), BoundaryFacets(*problem.mesh)));
+  return WriteTriangleMesh(path, {std::move(skin), {}, {}});
+}
+
+absl::Status WriteResults(const DemoOptions& options, const DemoCase& demo, const DragResult& drag,
+                          const DragSummary& summary, const DemoPrediction& prediction) {
+  TF_RETURN_IF_ERROR(WriteFramesCsv(options.FramesPath(), drag));
+  TF_RETURN_IF_ERROR(WriteSummaryJson(options.SummaryPath(), summary, prediction));
+  TF_RETURN_IF_ERROR(
+      WriteResult(options.ResultPath(), demo.plan, demo.problem, prediction.deformed));
+  TF_RETURN_IF_ERROR(WriteSkin(options.SkinPath(), demo.problem, prediction.deformed));
+  absl::PrintF("\nresults: %s and %s (the end of the drag), %s, %s\n", options.ResultPath(),
+               options.SkinPath(), options.FramesPath(), options.SummaryPath());
+  return absl::OkStatus();
+}
+
+// Pictures are a bonus: where they cannot be made the demo says so and has done its work.
+void DrawPictures(const DemoOptions& options, const PlanProblem& problem,
+                  const DemoPrediction& prediction, const absl::Status& display) {
+  absl::Status drawn = display;
+  if (drawn.ok()) {
+    drawn = DrawBeforeAndAfter({.mesh = *problem.mesh,
+                                .deformed = prediction.deformed,
+                                .move = prediction.move,
+                                .is_face = !prediction.movement.empty()},
+                               options.out);
+  }
+  if (drawn.ok()) {
+    absl::PrintF("pictures, before and after: %s in %s\n",
+                 absl::StrJoin(BeforeAndAfterPictures(), ", "), options.out);
+  } else {
+    absl::PrintF("no pictures: %s\n", drawn.message());
+  }
+}
+
+absl::Status DragAndPredict(const DemoOptions& options, const DemoCase& demo,
+                            TissueformClient* client, const absl::Status& display) {
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<PlanSession> session,
+                      PlanSession::Create(client, demo.problem));
+  const v1::Session& description = session->description();
+  absl::PrintF("session ready: %d free vertices, factorised in %.1f ms, %.1f MiB\n",
+               description.free_vertex_count(), description.seconds().factorise() * 1e3,
+               static_cast<double>(description.bytes_held()) / (1 << 20));
+  TF_RETURN_IF_ERROR(CheckNotInterrupted());
+  const std::string& name = description.name();
+  TF_ASSIGN_OR_RETURN(const DragResult drag, Drag(options, demo.problem, client, name));
+  TF_ASSIGN_OR_RETURN(const DemoPrediction prediction, PredictAtEnd(demo.problem, client, name));
+  DragSummary summary = SummarizeDrag(drag);
+  TF_RETURN_IF_ERROR(CheckFrames(demo.problem, drag, prediction.deformed, client, name, &summary));
+  TF_RETURN_IF_ERROR(CheckNotInterrupted());
+  PrintDragSummary(summary);
+  PrintPrediction(prediction);
+  PrintInWords(summary, prediction);
+  TF_RETURN_IF_ERROR(WriteResults(options, demo, drag, summary, prediction));
+  DrawPictures(options, demo.problem, prediction, display);
+  return CheckNotInterrupted();
 }
 
 absl::Status RunDemo(const DemoOptions& options) {
   CatchInterrupts();
   std::setvbuf(stdout, nullptr, _IOLBF, 0);  // progress is seen at once, also through a pipe
   TF_RETURN_IF_ERROR(MakeFolder(options));
-  TF_ASSIGN_OR_RETURN(const std::string plan_path, FindDemoPlan(options.plan));
-  TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(plan_path));
-  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
-  absl::PrintF("plan %s: %d vertices, %d tets\n", plan_path, problem.mesh->num_vertices(),
-               problem.mesh->num_tets());
+  TF_ASSIGN_OR_RETURN(const DemoCase demo, ReadCase(options));
 
   // Before the client: no thread of gRPC runs yet when the process forks.
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<ServerProcess> server,
@@ -115,21 +207,11 @@ absl::Status RunDemo(const DemoOptions& options) {
                                             std::to_string(options.port), "--log-level", "warn"},
                                            kServerStartDeadline));
   absl::PrintF("tissueform-server listens on %s\n", server->address());
+  const absl::StatusOr<std::unique_ptr<VirtualDisplay>> display = VirtualDisplay::Open();
   TF_RETURN_IF_ERROR(CheckNotInterrupted());
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client,
                       TissueformClient::Connect(server->address(), {}));
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<PlanSession> session,
-                      PlanSession::Create(client.get(), problem));
-  const v1::Session& description = session->description();
-  absl::PrintF("session ready: %d free vertices, factorised in %.1f ms, %.1f MiB\n",
-               description.free_vertex_count(), description.seconds().factorise() * 1e3,
-               static_cast<double>(description.bytes_held()) / (1 << 20));
-  TF_RETURN_IF_ERROR(CheckNotInterrupted());
-  TF_RETURN_IF_ERROR(Drag(options, problem, client.get(), description.name()));
-  TF_RETURN_IF_ERROR(WriteFullPose(options, plan, problem, client.get(), description.name()));
-  absl::PrintF("results: %s (the plan's pose), %s, %s\n", options.ResultPath(),
-               options.FramesPath(), options.SummaryPath());
-  return absl::OkStatus();
+  return DragAndPredict(options, demo, client.get(), display.status());
 }
 
 }  // namespace
@@ -137,9 +219,15 @@ absl::Status RunDemo(const DemoOptions& options) {
 void AddDemoCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<DemoOptions>();
   CLI::App* command = app.add_subcommand(kDemoCommand.name, kDemoCommand.description);
-  command->add_option("--out", options->out, "folder for result.vtu, frames.csv and summary.json")
+  command
+      ->add_option("--out", options->out,
+                   "folder for result.vtu, skin.stl, frames.csv, summary.json and pictures")
       ->capture_default_str();
-  command->add_option("--plan", options->plan, "another plan than the bundled one");
+  command->add_option("--plan", options->plan,
+                      "another plan than the bundled head; it is dragged to its own pose");
+  command->add_option("--seconds", options->drag.seconds, "how long the drag takes")
+      ->check(CLI::Range(0.1, 60.0))
+      ->capture_default_str();
   command->add_option("--port", options->port, "port of the server; 0 takes a free one")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
@@ -147,7 +235,8 @@ void AddDemoCommand(CLI::App& app, CommandWork* work) {
                     "for scripts: never open a browser (this version opens none)");
   command->footer(
       "Starts the tissueform-server that lies beside this program on loopback and ends it again.\n"
-      "Open result.vtu in ParaView or 3D Slicer.");
+      "The lower jaw of the bundled head goes 8 mm forward, 2 more than its plan. Open front.png,\n"
+      "left.png and three_quarter.png, and result.vtu or skin.stl in ParaView or 3D Slicer.");
   command->callback([options, work] { *work = [options] { return RunDemo(*options); }; });
 }
 

@@ -7,9 +7,9 @@
 
 namespace tissueform {
 
-// `demo [--out DIR] [--plan PLAN] [--port N] [--no-browser]`: the main job on a bundled mesh, end
+// `demo [--out DIR] [--plan PLAN] [--port N] [--no-browser]`: the main job on the bundled head, end
 // to end. Starts the tissueform-server that lies beside this program on loopback, uploads, streams
-// a drag, writes what came back.
+// a drag, tells what it means, writes and draws what came back.
 void AddDemoCommand(CLI::App& app, CommandWork* work);
 
 }  // namespace tissueform

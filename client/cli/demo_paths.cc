@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <system_error>
 
+#include "absl/strings/str_cat.h"
+
 namespace tissueform {
 namespace {
 
@@ -20,20 +22,28 @@ fs::path ProgramFolder() {
 
 std::string SiblingProgram(const std::string& name) { return (ProgramFolder() / name).string(); }
 
-absl::StatusOr<std::string> FindDemoPlan(const std::string& chosen) {
-  if (!chosen.empty()) {
-    return chosen;
-  }
+absl::StatusOr<std::string> FindBundledPlan(const std::string& name) {
   const fs::path source_tree = TISSUEFORM_SOURCE_DIR;
-  for (const fs::path& plan : {ProgramFolder().parent_path() / "share/tissueform/demo/plan.json",
-                               source_tree / "tests/data/plans/tongue/plan.json"}) {
+  for (const fs::path& folder : {ProgramFolder().parent_path() / "share/tissueform/plans",
+                                 source_tree / "tests/data/plans"}) {
+    const fs::path plan = folder / name / "plan.json";
     std::error_code error;
     if (fs::is_regular_file(plan, error)) {
       return plan.string();
     }
   }
   return absl::NotFoundError(
-      "the bundled plan is neither installed nor in the source tree; give one with --plan");
+      absl::StrCat("the bundled plan \"", name, "\" is neither installed nor in the source tree"));
+}
+
+absl::StatusOr<std::string> FindDemoPlan(const std::string& chosen) {
+  if (!chosen.empty()) {
+    return chosen;
+  }
+  const absl::StatusOr<std::string> head = FindBundledPlan("head");
+  if (head.ok()) return head;
+  return absl::NotFoundError(
+      absl::StrCat(absl::string_view(head.status().message()), "; give one with --plan"));
 }
 
 }  // namespace tissueform

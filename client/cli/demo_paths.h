@@ -12,9 +12,14 @@ namespace tissueform {
 // The program of that name in the folder of this one.
 std::string SiblingProgram(const std::string& name);
 
-// The plan of the demo: `chosen` unless empty, else the installed one
-// (../share/tissueform/demo/plan.json seen from this program), else the one in the source tree that
-// this program was built from.
+// A plan that comes with the program, by the name of its folder under tests/data/plans: the
+// installed one (../share/tissueform/plans/NAME/plan.json seen from this program), else the one in
+// the source tree that this program was built from.
+//
+// Errors: NotFound.
+absl::StatusOr<std::string> FindBundledPlan(const std::string& name);
+
+// The plan of the demo: `chosen` unless empty, else the bundled real head.
 //
 // Errors: NotFound.
 absl::StatusOr<std::string> FindDemoPlan(const std::string& chosen);

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include "nlohmann/json.hpp"
 
 #include "client/cli/version.h"
@@ -14,6 +15,57 @@
 #include "core/mesh_io/tet_mesh_io.h"
 
 namespace tissueform {
+namespace {
+
+constexpr double kSeemsImmediateMs = 100;
+// What studies of predicted faces take for a useful prediction.
+constexpr double kAcceptedDifferenceMm = 2;
+
+void PrintSpeedInWords(const DragSummary& summary) {
+  absl::PrintF(
+      "  The picture %s the hand: of 100 positions 99 came within %.0f ms; below %.0f ms a "
+      "movement seems immediate.\n",
+      summary.latency_p99_ms < kSeemsImmediateMs ? "follows" : "lags behind",
+      summary.latency_p99_ms, kSeemsImmediateMs);
+}
+
+void PrintMovementInWords(const DemoPrediction& prediction) {
+  std::vector<std::string> parts;
+  for (const RegionMovement& region : prediction.movement) {
+    if (region.name.find("cheek") != std::string::npos) continue;
+    parts.push_back(absl::StrFormat("%s%s %.1f mm", region.name,
+                                    region.name == "nose" ? " tip" : "", region.foremost.total_mm));
+  }
+  if (!parts.empty()) {
+    absl::PrintF("  With the %s the skin is predicted to move: %s.\n", prediction.move,
+                 absl::StrJoin(parts, ", "));
+  }
+  if (prediction.inverted_tets == 0) {
+    absl::PrintF("  No piece of tissue was turned inside out.\n");
+  } else {
+    absl::PrintF(
+        "  %d of %d pieces of tissue were turned inside out: the move is at the limit of what "
+        "this model can follow.\n",
+        prediction.inverted_tets, prediction.tets);
+  }
+}
+
+void PrintDifferenceInWords(const DemoPrediction& prediction) {
+  if (prediction.differences.empty()) return;
+  const bool is_face = prediction.differences.size() > 1;
+  const DistanceSummary& skin = prediction.differences[is_face ? 1 : 0].distances;
+  absl::PrintF(
+      "  Two models that work differently lie within %.1f mm of each other on 95 %% of the "
+      "%s.\n",
+      skin.p95_mm, is_face ? "face" : "skin");
+  if (!is_face) return;
+  absl::PrintF(
+      "  That is %s the %.0f mm that studies of predicted faces accept; how near either is to "
+      "a patient's outcome is another question.\n",
+      skin.p95_mm <= kAcceptedDifferenceMm ? "less than" : "MORE than", kAcceptedDifferenceMm);
+}
+
+}  // namespace
 
 double Percentile(std::vector<double> values, double percent) {
   const auto rank =
@@ -54,19 +106,22 @@ absl::Status WriteFramesCsv(const std::string& path, const DragResult& drag) {
   return WriteFileAtomically(path, text);
 }
 
-absl::Status WriteSummaryJson(const std::string& path, const DragSummary& summary) {
-  const nlohmann::ordered_json json = {{"format", "tissueform-demo"},
-                                       {"version", kVersion},
-                                       {"vertices", summary.vertices},
-                                       {"frames_sent", summary.frames_sent},
-                                       {"frames_answered", summary.frames_answered},
-                                       {"frames_coalesced", summary.frames_coalesced},
-                                       {"latency_p50_ms", summary.latency_p50_ms},
-                                       {"latency_p99_ms", summary.latency_p99_ms},
-                                       {"solve_p50_ms", summary.solve_p50_ms},
-                                       {"transport_overhead_p50_ms", summary.overhead_p50_ms},
-                                       {"rest_error_mm", summary.rest_error_mm},
-                                       {"notice", kNotMedicalDeviceNotice}};
+absl::Status WriteSummaryJson(const std::string& path, const DragSummary& summary,
+                              const DemoPrediction& prediction) {
+  nlohmann::ordered_json json = {{"format", "tissueform-demo"},
+                                 {"version", kVersion},
+                                 {"vertices", summary.vertices},
+                                 {"frames_sent", summary.frames_sent},
+                                 {"frames_answered", summary.frames_answered},
+                                 {"frames_coalesced", summary.frames_coalesced},
+                                 {"latency_p50_ms", summary.latency_p50_ms},
+                                 {"latency_p99_ms", summary.latency_p99_ms},
+                                 {"solve_p50_ms", summary.solve_p50_ms},
+                                 {"transport_overhead_p50_ms", summary.overhead_p50_ms},
+                                 {"end_error_mm", summary.end_error_mm},
+                                 {"rest_error_mm", summary.rest_error_mm}};
+  AddToJson(prediction, &json);
+  json["notice"] = kNotMedicalDeviceNotice;
   return WriteFileAtomically(path, json.dump(2) + "\n");
 }
 
@@ -77,7 +132,16 @@ void PrintDragSummary(const DragSummary& summary) {
                summary.latency_p50_ms, summary.latency_p99_ms);
   absl::PrintF("transport overhead (latency minus solve): p50 %.2f ms; solve: p50 %.2f ms\n",
                summary.overhead_p50_ms, summary.solve_p50_ms);
-  absl::PrintF("back at rest within %.1e mm\n", summary.rest_error_mm);
+  absl::PrintF("last frame equals a single answer within %.1e mm; back at rest within %.1e mm\n",
+               summary.end_error_mm, summary.rest_error_mm);
+}
+
+void PrintInWords(const DragSummary& summary, const DemoPrediction& prediction) {
+  absl::PrintF("\nin words:\n");
+  PrintSpeedInWords(summary);
+  PrintMovementInWords(prediction);
+  PrintDifferenceInWords(prediction);
+  absl::PrintF("  %s\n", kNotMedicalDeviceNotice);
 }
 
 }  // namespace tissueform

@@ -8,6 +8,7 @@
 
 #include "absl/status/status.h"
 
+#include "client/cli/demo_prediction.h"
 #include "client/cli/drag.h"
 
 namespace tissueform {
@@ -25,17 +26,22 @@ struct DragSummary {
   double latency_p99_ms = 0;
   double overhead_p50_ms = 0;
   double solve_p50_ms = 0;
-  double rest_error_mm = 0;  // how far the last frame, which is rest again, is from the rest shape
+  double end_error_mm = 0;   // how far the last frame is from a single answer to the end pose
+  double rest_error_mm = 0;  // how far an answer to the rest pose is from the rest shape
 };
 
 // REQUIRES: at least one frame.
 DragSummary SummarizeDrag(const DragResult& drag);
 
-// frames.csv: one line a frame. summary.json: the summary. All or nothing each.
+// frames.csv: one line a frame. summary.json: the summary and the prediction. All or nothing each.
 absl::Status WriteFramesCsv(const std::string& path, const DragResult& drag);
-absl::Status WriteSummaryJson(const std::string& path, const DragSummary& summary);
+absl::Status WriteSummaryJson(const std::string& path, const DragSummary& summary,
+                              const DemoPrediction& prediction);
 
 // For people, on stdout.
 void PrintDragSummary(const DragSummary& summary);
+
+// What the numbers mean to somebody who plans operations, and the notice of every result.
+void PrintInWords(const DragSummary& summary, const DemoPrediction& prediction);
 
 }  // namespace tissueform

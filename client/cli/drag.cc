@@ -55,14 +55,6 @@ void Receive(DeformStream* stream, Clock::time_point start, const SendTimes& sen
   }
 }
 
-std::vector<NamedPose> PartOfPoses(absl::Span<const NamedPose> poses, double amount) {
-  std::vector<NamedPose> parts;
-  for (const NamedPose& pose : poses) {
-    parts.push_back({pose.handle, PartOfPose(pose.pose, amount)});
-  }
-  return parts;
-}
-
 }  // namespace
 
 HandlePose PartOfPose(const HandlePose& pose, double amount) {
@@ -71,6 +63,14 @@ HandlePose PartOfPose(const HandlePose& pose, double amount) {
   part.translation_mm *= amount;
   part.scale = std::pow(pose.scale, amount);
   return part;
+}
+
+std::vector<NamedPose> PartOfPoses(absl::Span<const NamedPose> poses, double amount) {
+  std::vector<NamedPose> parts;
+  for (const NamedPose& pose : poses) {
+    parts.push_back({pose.handle, PartOfPose(pose.pose, amount)});
+  }
+  return parts;
 }
 
 absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& session,
@@ -88,7 +88,8 @@ absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& 
     // Deadlines of their own: a late pose does not delay the ones after it.
     std::this_thread::sleep_until(start +
                                   std::chrono::duration_cast<Clock::duration>(interval * i));
-    const double amount = (1 - std::cos(2 * M_PI * static_cast<double>(i + 1) / count)) / 2;
+    const double amount =
+        (1 - std::cos(M_PI * static_cast<double>(i + 1) / static_cast<double>(count))) / 2;
     send_times.Set(i, Clock::now());
     sent = stream->SendPoses(i, PartOfPoses(poses, amount));
     ++result.poses_sent;

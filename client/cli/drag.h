@@ -15,7 +15,7 @@
 
 namespace tissueform {
 
-// A drag of all handles from rest to their poses and back, smoothly.
+// A drag of all handles from rest to their poses, smoothly.
 struct DragOptions {
   double seconds = 3;
   double poses_per_second = 60;
@@ -47,7 +47,8 @@ absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& 
                                    absl::Span<const NamedPose> poses, const DragOptions& options,
                                    const std::atomic<bool>& interrupted);
 
-// The pose at the part `amount` (0 rest, 1 `pose`) of its way.
+// The pose at the part `amount` (0 rest, 1 `pose`) of its way; beyond 1 it goes farther.
 HandlePose PartOfPose(const HandlePose& pose, double amount);
+std::vector<NamedPose> PartOfPoses(absl::Span<const NamedPose> poses, double amount);
 
 }  // namespace tissueform

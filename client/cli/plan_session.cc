@@ -24,6 +24,19 @@ v1::RotationMode ToProto(RotationMode mode) {
   return v1::ROTATION_MODE_NONE;
 }
 
+v1::GradientFieldSettings ToProto(const GradientFieldOptions& options) {
+  v1::GradientFieldSettings proto;
+  proto.set_rotation_mode(ToProto(options.rotation));
+  proto.set_guidance(options.guidance == Guidance::kUniform ? v1::GUIDANCE_UNIFORM
+                                                            : v1::GUIDANCE_COTANGENT);
+  proto.set_blend(options.blend == BlendMap::kLinear ? v1::BLEND_MAP_LINEAR : v1::BLEND_MAP_COSINE);
+  proto.set_max_iterations(options.max_iterations);
+  proto.set_tolerance_mm(options.tolerance_mm);
+  return proto;
+}
+
+}  // namespace
+
 v1::DeformationModel ToProto(DeformationModel model) {
   switch (model) {
     case DeformationModel::kGradientField:
@@ -37,19 +50,6 @@ v1::DeformationModel ToProto(DeformationModel model) {
   }
   return v1::DEFORMATION_MODEL_GRADIENT_FIELD;
 }
-
-v1::GradientFieldSettings ToProto(const GradientFieldOptions& options) {
-  v1::GradientFieldSettings proto;
-  proto.set_rotation_mode(ToProto(options.rotation));
-  proto.set_guidance(options.guidance == Guidance::kUniform ? v1::GUIDANCE_UNIFORM
-                                                            : v1::GUIDANCE_COTANGENT);
-  proto.set_blend(options.blend == BlendMap::kLinear ? v1::BLEND_MAP_LINEAR : v1::BLEND_MAP_COSINE);
-  proto.set_max_iterations(options.max_iterations);
-  proto.set_tolerance_mm(options.tolerance_mm);
-  return proto;
-}
-
-}  // namespace
 
 absl::StatusOr<std::unique_ptr<PlanSession>> PlanSession::Create(TissueformClient* client,
                                                                  const PlanProblem& problem) {

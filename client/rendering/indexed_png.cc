@@ -16,7 +16,7 @@
 namespace tissueform {
 namespace {
 
-constexpr int kColours = 128;
+constexpr int kColours = 256;
 
 std::vector<uint8_t> Palette(vtkLookupTable* table) {
   std::vector<uint8_t> palette;

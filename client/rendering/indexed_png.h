@@ -10,7 +10,7 @@
 
 namespace tissueform {
 
-// An 8-bit RGB picture as a PNG of the 128 colours that suit it best: a third of the size, for
+// An 8-bit RGB picture as a PNG of the 256 colours that suit it best: a third of the size, for
 // pictures that are kept with their text. Internal when the library refuses.
 absl::StatusOr<std::string> EncodeIndexedPng(vtkImageData* picture);
 

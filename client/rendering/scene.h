@@ -30,6 +30,7 @@ struct SurfaceLayer {
   Eigen::VectorXd vertex_values = {};         // #V or none, in the range of the scene's colour bar
   double opacity = 1;
   bool edges = true;
+  bool smooth = false;  // shaded as one curved surface with creases, not as flat triangles
 };
 
 // Arrows from `origins` (#A by 3, mm) along `directions` (#A by 3), as long as these are.
@@ -45,6 +46,7 @@ struct ColourBar {
   std::string title;  // with the unit
   double low = 0;
   double high = 1;
+  std::vector<Colour> colours = {};  // instead, evenly spaced from low to high; two or more
 };
 
 // Where the observer stands, seen from the scene, and what is up. Parallel projection.
@@ -60,6 +62,10 @@ struct Scene {
   std::vector<ArrowLayer> arrows = {};
   ColourBar colour_bar = {};
   View view = {};
+  // Kept in the picture though not drawn (#P by 3), and as much room as a legend takes: panels that
+  // agree in both are seen by one camera.
+  Positions room_for = {};
+  bool room_for_legend = false;
 };
 
 }  // namespace tissueform

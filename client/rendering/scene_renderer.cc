@@ -19,6 +19,7 @@
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
 #include <vtkPolyDataMapper.h>
+#include <vtkPolyDataNormals.h>
 #include <vtkProperty.h>
 #include <vtkScalarBarActor.h>
 #include <vtkTextProperty.h>
@@ -64,7 +65,12 @@ Extent ExtentOf(const Scene& scene) {
     extent.Add(arrows.origins);
     extent.Add(arrows.origins + arrows.directions);
   }
+  extent.Add(scene.room_for);
   return extent;
+}
+
+bool HasRoomForLegend(const Scene& scene) {
+  return scene.room_for_legend || !scene.colour_bar.title.empty();
 }
 
 vtkSmartPointer<vtkPoints> MakePoints(const Positions& positions) {
@@ -109,10 +115,35 @@ vtkSmartPointer<vtkLookupTable> BlueToRed(const ColourBar& bar) {
   return table;
 }
 
+vtkSmartPointer<vtkLookupTable> TableOf(const ColourBar& bar) {
+  auto table = BlueToRed(bar);
+  if (bar.colours.size() < 2) return table;
+  const auto spans = static_cast<double>(bar.colours.size() - 1);
+  const vtkIdType count = table->GetNumberOfTableValues();
+  for (vtkIdType i = 0; i < count; ++i) {
+    const double place = spans * static_cast<double>(i) / static_cast<double>(count - 1);
+    const size_t from = std::min(static_cast<size_t>(place), bar.colours.size() - 2);
+    const double part = place - static_cast<double>(from);
+    const Colour colour = (1 - part) * bar.colours[from] + part * bar.colours[from + 1];
+    table->SetTableValue(i, colour.x(), colour.y(), colour.z());
+  }
+  return table;
+}
+
+// Normals at the vertices; edges sharper than that stay edges.
+vtkSmartPointer<vtkPolyData> WithNormals(vtkPolyData* data) {
+  constexpr double kCreaseDegrees = 60;
+  vtkNew<vtkPolyDataNormals> normals;
+  normals->SetInputData(data);
+  normals->SetFeatureAngle(kCreaseDegrees);
+  normals->ConsistencyOff();
+  normals->Update();
+  return normals->GetOutput();
+}
+
 vtkSmartPointer<vtkActor> SurfaceActor(const SurfaceLayer& surface, vtkLookupTable* table) {
   const auto data = MakePolyData(surface);
   vtkNew<vtkPolyDataMapper> mapper;
-  mapper->SetInputData(data);
   mapper->ScalarVisibilityOff();
   if (surface.vertex_values.size() > 0) {
     vtkNew<vtkDoubleArray> values;
@@ -126,12 +157,13 @@ vtkSmartPointer<vtkActor> SurfaceActor(const SurfaceLayer& surface, vtkLookupTab
     data->GetCellData()->SetScalars(MakeColours(surface.triangle_colours));
     mapper->ScalarVisibilityOn();
   }
+  mapper->SetInputData(surface.smooth ? WithNormals(data) : data);
   auto actor = vtkSmartPointer<vtkActor>::New();
   actor->SetMapper(mapper);
   vtkProperty* property = actor->GetProperty();
   property->SetColor(Colour(surface.colour).data());
   property->SetOpacity(surface.opacity);
-  property->SetInterpolationToFlat();
+  property->SetInterpolation(surface.smooth ? VTK_PHONG : VTK_FLAT);
   property->SetAmbient(0.25);
   property->SetDiffuse(0.85);
   property->SetEdgeVisibility(surface.edges);
@@ -205,13 +237,13 @@ double HalfHeightToHold(const Scene& scene, double aspect) {
   constexpr double kRoomForLegend = 0.35;
   const Extent extent = ExtentOf(scene);
   const Eigen::Vector3d size = extent.high - extent.low;
-  const double up = kRoomForTitle + (scene.colour_bar.title.empty() ? 0 : kRoomForLegend);
+  const double up = kRoomForTitle + (HasRoomForLegend(scene) ? kRoomForLegend : 0);
   return std::max(up * size.y(), 1.06 * size.x() / aspect) / 2;
 }
 
 vtkSmartPointer<vtkRenderer> RenderScene(const Scene& scene, double half_height_mm) {
   auto renderer = vtkSmartPointer<vtkRenderer>::New();
-  const auto table = BlueToRed(scene.colour_bar);
+  const auto table = TableOf(scene.colour_bar);
   for (const SurfaceLayer& surface : scene.surfaces) {
     renderer->AddActor(SurfaceActor(surface, table));
   }
@@ -224,7 +256,7 @@ vtkSmartPointer<vtkRenderer> RenderScene(const Scene& scene, double half_height_
 
   const Extent extent = ExtentOf(scene);
   // A little out of the middle: away from the title, or from the legend where there is one.
-  const double shift = (scene.colour_bar.title.empty() ? 0.1 : -0.08) * half_height_mm;
+  const double shift = (HasRoomForLegend(scene) ? -0.08 : 0.1) * half_height_mm;
   const Eigen::Vector3d middle = extent.Middle() + extent.up * shift;
   const Eigen::Vector3d eye = middle + extent.towards * (extent.high - extent.low).norm() * 2;
   vtkCamera* camera = renderer->GetActiveCamera();

@@ -2,21 +2,29 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <signal.h>
 #include <string>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "nlohmann/json.hpp"
 #include <sys/wait.h>
 
 #include "client/cli/server_process.h"
 #include "client/cpp/tissueform_client.h"
+#include "client/rendering/virtual_display.h"
+#include "core/imaging/skin_regions.h"
+#include "core/mesh/tet_topology.h"
 #include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh_io/triangle_mesh_io.h"
+#include "tests/testing/scoped_environment.h"
 #include "tests/testing/status_matchers.h"
 
 // `tissueform run` and `tissueform demo` as real programs with a real server.
@@ -24,12 +32,32 @@ namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using ::testing::AllOf;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
 
 constexpr std::chrono::seconds kPatience{60};
-const std::string kPlan = TISSUEFORM_TEST_DATA_DIR "/plans/tongue/plan.json";
+const std::string kTonguePlan = TISSUEFORM_TEST_DATA_DIR "/plans/tongue/plan.json";
+const std::string kChinPlan = TISSUEFORM_TEST_DATA_DIR "/plans/head_chin/plan.json";
 
 int ExitCodeOf(const std::string& command) { return WEXITSTATUS(std::system(command.c_str())); }
+
+// Of the vertices of that region, from the arrays of a result.
+double MeanMovement(const TetMeshFile& result, SkinRegion region) {
+  const std::vector<double> regions = ToDoubles(*FindAttribute(result.point_data, "skin_region"));
+  const std::vector<double> moves = ToDoubles(*FindAttribute(result.point_data, "displacement_mm"));
+  double sum = 0;
+  int count = 0;
+  for (size_t v = 0; v < regions.size(); ++v) {
+    if (regions[v] != static_cast<double>(region)) continue;
+    sum += std::hypot(moves[3 * v], moves[3 * v + 1], moves[3 * v + 2]);
+    ++count;
+  }
+  return sum / count;
+}
 
 class ServedCommandTest : public ::testing::Test {
  protected:
@@ -37,6 +65,30 @@ class ServedCommandTest : public ::testing::Test {
   ~ServedCommandTest() override { fs::remove_all(folder_); }
 
   std::string PathOf(const std::string& name) const { return (folder_ / name).string(); }
+
+  std::string Read(const std::string& name) const {
+    std::ifstream stream(PathOf(name), std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+
+  // Its results go into the folder, what it says into out.txt there.
+  int RunDemo(const std::string& options, const std::string& before = "") const {
+    // Under AddressSanitizer: Mesa's leaks, see tests/client/rendering/figure_test.cc.
+    const ScopedEnvironment no_leak_check("LSAN_OPTIONS", "detect_leaks=0");
+    return ExitCodeOf(before + TISSUEFORM_BINARY + " demo --no-browser --out " + folder_.string() +
+                      " " + options + " > " + PathOf("out.txt"));
+  }
+
+  Json Summary() const { return Json::parse(Read("summary.json")); }
+
+  // Where there is a display, or Xvfb to make one.
+  void ExpectPictures() const {
+    if (absl::IsNotFound(VirtualDisplay::Open().status())) return;
+    for (const char* name : {"front.png", "left.png", "three_quarter.png"}) {
+      EXPECT_THAT(Read(name), StartsWith("\x89PNG")) << name;
+      EXPECT_THAT(Read("out.txt"), HasSubstr(name));
+    }
+  }
 
   const fs::path folder_ = fs::path(::testing::TempDir()) /
                            (std::string("tissueform_") +
@@ -48,10 +100,10 @@ TEST_F(ServedCommandTest, RunEqualsDeformUpToFloat32) {
                        ServerProcess::Start(TISSUEFORM_SERVER_BINARY,
                                             {"--port", "0", "--log-level", "warn"}, kPatience));
   const std::string program = TISSUEFORM_BINARY;
-  ASSERT_EQ(ExitCodeOf(program + " run " + kPlan + " --server " + server->address() + " --out " +
-                       PathOf("run.vtu") + " --stats " + PathOf("run.json")),
+  ASSERT_EQ(ExitCodeOf(program + " run " + kTonguePlan + " --server " + server->address() +
+                       " --out " + PathOf("run.vtu") + " --stats " + PathOf("run.json")),
             0);
-  ASSERT_EQ(ExitCodeOf(program + " deform " + kPlan + " --out " + PathOf("deform.vtu")), 0);
+  ASSERT_EQ(ExitCodeOf(program + " deform " + kTonguePlan + " --out " + PathOf("deform.vtu")), 0);
   ASSERT_OK_AND_ASSIGN(const TetMeshFile run, ReadTetMesh(PathOf("run.vtu")));
   ASSERT_OK_AND_ASSIGN(const TetMeshFile deform, ReadTetMesh(PathOf("deform.vtu")));
   ASSERT_EQ(run.mesh.num_vertices(), deform.mesh.num_vertices());
@@ -61,23 +113,72 @@ TEST_F(ServedCommandTest, RunEqualsDeformUpToFloat32) {
 }
 
 TEST_F(ServedCommandTest, RunWithoutServerFailsAndWritesNothing) {
-  EXPECT_EQ(ExitCodeOf(std::string(TISSUEFORM_BINARY) + " run " + kPlan +
+  EXPECT_EQ(ExitCodeOf(std::string(TISSUEFORM_BINARY) + " run " + kTonguePlan +
                        " --server 127.0.0.1:1 --out " + PathOf("run.vtu") + " 2>" + PathOf("err")),
             1);
   EXPECT_FALSE(fs::exists(PathOf("run.vtu")));
 }
 
-TEST_F(ServedCommandTest, DemoLeavesItsResults) {
-  ASSERT_EQ(ExitCodeOf(std::string(TISSUEFORM_BINARY) + " demo --no-browser --out " +
-                       folder_.string() + " > " + PathOf("out.txt")),
-            0);
+TEST_F(ServedCommandTest, DemoTellsHowTheFaceFollowsAndLeavesResultsAndPictures) {
+  ASSERT_EQ(RunDemo("--plan " + kChinPlan + " --seconds 0.5"), 0);
+  EXPECT_THAT(
+      Read("out.txt"),
+      AllOf(HasSubstr("dragging: chin 4 mm forward, over 0.5 s at 60 poses a second"),
+            ContainsRegex("\nchin +[0-9.]+ +[0-9.]+ +[0-9.]+ +[0-9.]+\n"),
+            ContainsRegex("\nnose +[0-9.]+"), HasSubstr("gradient_field and linear_elastic"),
+            HasSubstr("\nface "), HasSubstr("not a medical device")));
+  ExpectPictures();
   ASSERT_OK_AND_ASSIGN(const TetMeshFile result, ReadTetMesh(PathOf("result.vtu")));
-  EXPECT_EQ(result.mesh.num_vertices(), 2238);
-  EXPECT_NE(FindAttribute(result.point_data, "displacement_mm"), nullptr);
+  ASSERT_OK_AND_ASSIGN(const TriangleMeshFile skin, ReadTriangleMesh(PathOf("skin.stl")));
+  EXPECT_EQ(skin.mesh.num_triangles(), BoundaryFacets(result.mesh).rows());
   EXPECT_GT(fs::file_size(PathOf("frames.csv")), 1000);
-  std::ifstream summary(PathOf("summary.json"));
-  const std::string text((std::istreambuf_iterator<char>(summary)), {});
-  EXPECT_THAT(text, HasSubstr("\"frames_sent\": 180"));
+
+  const Json summary = Summary();
+  EXPECT_EQ(summary["frames_sent"], 30);
+  EXPECT_EQ(summary["end_error_mm"], 0);
+  EXPECT_LT(summary["rest_error_mm"], 1e-4);
+  EXPECT_EQ(summary["inverted_tets"], 0);
+  // What the file of the result says of the chin.
+  const Json& chin = summary["movement"]["chin"];
+  EXPECT_NEAR(chin["mean"]["total_mm"], MeanMovement(result, SkinRegion::kChin), 1e-9);
+  EXPECT_GT(chin["mean"]["forward_mm"], 1);
+  EXPECT_LT(chin["mean"]["forward_mm"], 4);
+  EXPECT_LT(summary["movement"]["nose"]["foremost"]["total_mm"], 0.1);
+}
+
+TEST_F(ServedCommandTest, DemoComparesWithTheElasticModelAsInProcess) {
+  ASSERT_EQ(RunDemo("--plan " + kTonguePlan + " --seconds 0.1"), 0);
+  const std::string program = TISSUEFORM_BINARY;
+  const std::string elastic = PathOf("elastic.vtu");
+  ASSERT_EQ(ExitCodeOf(program + " deform " + kTonguePlan + " --model linear_elastic --out " +
+                       elastic + " 2>" + PathOf("err")),
+            0);
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile ours, ReadTetMesh(PathOf("result.vtu")));
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile other, ReadTetMesh(elastic));
+  const Json difference = Summary()["difference"];
+  EXPECT_EQ(difference["model"], "linear_elastic");
+  // The largest difference is on the skin here; float32 steps at 8 mm are 4.8e-7 mm.
+  EXPECT_NEAR(difference["regions"]["free skin"]["max_mm"],
+              (ours.mesh.positions() - other.mesh.positions()).rowwise().norm().maxCoeff(), 2e-6);
+  // A tongue has no parts of a face.
+  EXPECT_EQ(difference["regions"].size(), 1U);
+  EXPECT_TRUE(Summary()["movement"].empty());
+  EXPECT_THAT(Read("out.txt"), Not(HasSubstr("chin")));
+  ExpectPictures();
+}
+
+TEST_F(ServedCommandTest, DemoMovesTheJawOfTheBundledHeadBy8MmAlsoWithoutADisplay) {
+  ASSERT_EQ(RunDemo("--seconds 0.3", "env -u DISPLAY PATH=/nonexistent "), 0);
+  EXPECT_THAT(Read("out.txt"),
+              AllOf(HasSubstr("plans/head/plan.json"), HasSubstr("mandible 8 mm forward"),
+                    ContainsRegex("\nno pictures: [^\n]*xvfb[^\n]*\n")));
+  EXPECT_FALSE(fs::exists(PathOf("front.png")));
+  const Json summary = Summary();
+  EXPECT_EQ(summary["inverted_tets"], 0);
+  const Json& chin = summary["movement"]["chin"]["mean"];
+  EXPECT_GT(chin["forward_mm"], 4 * 8 / 6.0);
+  EXPECT_LT(chin["forward_mm"], 8.5);
+  EXPECT_LT(summary["movement"]["nose"]["foremost"]["total_mm"], 1);
 }
 
 TEST_F(ServedCommandTest, AnInterruptedDemoEndsItsServer) {

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 
 #include "client/rendering/display_check.h"
@@ -77,6 +78,14 @@ class FigureTest : public ::testing::Test {
     std::filesystem::create_directories(folder_);
   }
 
+  // A small picture of that scene alone: a number that tells pictures apart.
+  size_t PictureOf(const Scene& scene) const {
+    Figure figure("", 120);
+    figure.AddRow(100, {scene});
+    EXPECT_THAT(figure.WritePng(folder_ + "/scene.png"), IsOk());
+    return std::hash<std::string>()(Contents(folder_ + "/scene.png"));
+  }
+
   // One for each test: tests run side by side.
   const std::string folder_ = ::testing::TempDir() + "/client_rendering_test/" +
                               ::testing::UnitTest::GetInstance()->current_test_info()->name();
@@ -98,6 +107,56 @@ TEST_F(FigureTest, SameFigureGivesTheSamePicture) {
   ASSERT_THAT(SmallFigure().WritePng(folder_ + "/one.png"), IsOk());
   ASSERT_THAT(SmallFigure().WritePng(folder_ + "/two.png"), IsOk());
   EXPECT_EQ(Contents(folder_ + "/one.png"), Contents(folder_ + "/two.png"));
+}
+
+TEST_F(FigureTest, PanelsWithRoomForEachOtherHaveOneCamera) {
+  Scene far;
+  far.surfaces = {OneTriangle()};
+  far.surfaces[0].positions *= 2;
+  Scene near = far;
+  near.surfaces = {OneTriangle()};
+  Scene with_room = near;
+  with_room.room_for = near.surfaces[0].positions;
+  EXPECT_EQ(PictureOf(with_room), PictureOf(near)) << "room that is there changes nothing";
+  // Only the camera: nothing of the far triangle is drawn.
+  with_room.room_for = far.surfaces[0].positions;
+  Scene both = with_room;
+  both.surfaces.push_back(far.surfaces[0]);
+  both.surfaces[1].opacity = 0;
+  EXPECT_NE(PictureOf(with_room), PictureOf(near));
+  EXPECT_EQ(PictureOf(with_room), PictureOf(both));
+}
+
+TEST_F(FigureTest, ColoursOfABarReplaceBlueToRed) {
+  Scene scene;
+  scene.surfaces = {OneTriangle()};
+  scene.surfaces[0].vertex_values = Eigen::Vector3d::Zero();
+  const size_t blue = PictureOf(scene);
+  const Colour lowest_colour(1, 0.8, 0.6);  // without rounding to 8 bits
+  scene.colour_bar.colours = {lowest_colour, kGreen, kOrange};
+  scene.surfaces[0].colour = lowest_colour;  // of the edges
+  const size_t lowest = PictureOf(scene);
+  EXPECT_NE(lowest, blue);
+  scene.surfaces[0].vertex_values = {};
+  EXPECT_EQ(PictureOf(scene), lowest) << "the low end has the first colour";
+}
+
+TEST_F(FigureTest, SmoothShadingChangesBentSurfacesOnly) {
+  Scene scene;
+  scene.surfaces = {OneTriangle()};
+  scene.surfaces[0].edges = false;
+  const size_t flat = PictureOf(scene);
+  scene.surfaces[0].smooth = true;
+  EXPECT_EQ(PictureOf(scene), flat);
+
+  SurfaceLayer& bent = scene.surfaces[0];
+  bent.positions.conservativeResize(4, 3);
+  bent.positions.row(3) << 2, 0.5, 1;
+  bent.triangles.conservativeResize(2, 3);
+  bent.triangles.row(1) << 1, 3, 2;
+  const size_t smooth = PictureOf(scene);
+  bent.smooth = false;
+  EXPECT_NE(PictureOf(scene), smooth);
 }
 
 TEST_F(FigureTest, MissingFolderIsNamed) {

@@ -1,0 +1,41 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "client/cli/comparison_report.h"
+#include "core/base/types.h"
+#include "core/planning/plan.h"
+
+namespace tissueform {
+
+// Vertices of the boundary that are neither fixed nor moved with a bone, rising: the skin, and what
+// lines the mouth and the airway.
+std::vector<int32_t> FreeSkin(const PlanProblem& problem);
+
+// The named places of a face that the mesh has, "chin" and others, by its point array skin_region
+// (docs/plan-format.md). Empty for a mesh without that array.
+std::vector<ComparedRegion> FaceRegions(const PlanProblem& problem);
+
+// How far skin goes, and how far of that to the front (-y of LPS), in mm.
+struct Movement {
+  double total_mm = 0;
+  double forward_mm = 0;
+};
+
+struct RegionMovement {
+  std::string name;
+  int64_t vertices = 0;
+  Movement foremost;  // of the vertex that lies farthest to the front at rest: the tip of the nose
+  Movement mean;      // over all vertices of the region
+};
+
+// How the regions go from `rest` to `deformed` (#V by 3 each, LPS). REQUIRES: no region is empty.
+std::vector<RegionMovement> MeasureMovement(const std::vector<ComparedRegion>& regions,
+                                            const Positions& rest, const Positions& deformed);
+
+}  // namespace tissueform
