@@ -2,8 +2,8 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
-# From a fresh clone to a real mesh moving over the network: installs what is missing, builds, and runs
-# `tissueform demo`, which starts a server on loopback and drags a handle of the bundled tongue.
+# From a fresh clone to a real head moving over the network: installs what is missing, builds, and runs
+# `tissueform demo`, which starts a server on loopback and drags the bundled head's lower jaw 8 mm forward.
 #
 #   deploy/demo.sh [options of `tissueform demo`]
 #
