@@ -1,0 +1,82 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/plan_report/plan_measures.h"
+
+#include <algorithm>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "core/mesh/tet_quality.h"
+#include "tests/testing/meshes.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::ElementsAre;
+
+// A bar of 3 x 3 x 4 cubes of 1 mm as if it were the soft tissue of a head.
+PlanBuild BuildOfBar(const TetMesh& mesh) {
+  PlanBuild build;
+  build.head.hu.geometry.spacing_mm = 2;
+  build.parts.labels = LabelGrid({.size = {2, 2, 1}, .spacing_mm = 2});
+  build.parts.labels.values = {kCranium, kMandible, kMandible, 0};
+  build.mesh =
+      SoftTissueMesh{.mesh = mesh,
+                     .surface = *TriangleMesh::Create(mesh.positions(), TriangleIndices{{0, 1, 2}}),
+                     .report = {}};
+  build.soft_tissue.volume_mm3 = 36;
+  build.stiffness.tissue.assign(static_cast<size_t>(mesh.num_tets()), 1);
+  build.stiffness.tissue[0] = 0;
+  build.skin_distance.mm = {1, 3};
+  build.skin_distance.mean_mm = 1;
+  build.skin_distance.p99_mm = 3;
+  return build;
+}
+
+std::vector<bool> Passed(const PlanBuild& build) {
+  std::vector<bool> passed;
+  for (const QualityCheck& check : CheckQuality(build, MeasurePlan(build))) {
+    passed.push_back(check.passed);
+  }
+  return passed;
+}
+
+TEST(PlanMeasuresTest, CubesAreMeasuredAsCubes) {
+  const PlanBuild build = BuildOfBar(testing::Bar({3, 3, 4}));
+  const PlanMeasures measures = MeasurePlan(build);
+  EXPECT_EQ(measures.inverted_tets, 0);
+  EXPECT_EQ(measures.components, 1);
+  EXPECT_NEAR(measures.ratio_to_voxels, 1, 1e-12);
+  EXPECT_EQ(measures.share_over_3_deg, 1);
+  EXPECT_NEAR(*std::min_element(measures.smallest_dihedral_deg.begin(),
+                                measures.smallest_dihedral_deg.end()),
+              45, 1e-9);  // six tets a cube
+  EXPECT_EQ(measures.bone_mm3[kCranium], 8);
+  EXPECT_EQ(measures.bone_mm3[kMandible], 16);
+  EXPECT_THAT(measures.tets_of_tissue, ElementsAre(1, 6 * 36 - 1, 0));
+  EXPECT_THAT(measures.skin_voxels, ElementsAre(0.5, 1.5));
+}
+
+TEST(PlanMeasuresTest, EveryRequirementCanFail) {
+  PlanBuild build = BuildOfBar(testing::Bar({3, 3, 4}));
+  EXPECT_THAT(Passed(build), ElementsAre(true, true, true, true, true, true));
+  build.soft_tissue.volume_mm3 = 37.5;
+  build.skin_distance.mean_mm = 1.3;
+  build.skin_distance.p99_mm = 4.1;
+  EXPECT_THAT(Passed(build), ElementsAre(true, true, true, false, false, false));
+
+  // An inverted tet, without an angle to speak of, that hangs on nothing.
+  const TetMesh bar = testing::Bar({3, 3, 4});
+  Positions positions(bar.num_vertices() + 4, 3);
+  positions << bar.positions(), Positions{{9, 0, 0}, {10, 0, 0}, {9, 1, 0}, {9.3, 0.3, -0.001}};
+  TetIndices tets(bar.num_tets() + 1, 4);
+  const auto first = static_cast<int32_t>(bar.num_vertices());
+  tets << bar.tets(), TetIndices{{first, first + 1, first + 2, first + 3}};
+  build = BuildOfBar(*TetMesh::Create(positions, tets));
+  EXPECT_THAT(Passed(build), ElementsAre(false, false, false, true, true, true));
+}
+
+}  // namespace
+}  // namespace tissueform

@@ -1,0 +1,60 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/plan_report/report_html.h"
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr char kAttack[] = "<script>alert(1)</script>\"'";
+
+nlohmann::ordered_json SmallReport(bool passed) {
+  return nlohmann::ordered_json{
+      {"quality",
+       {{{"requirement", kAttack}, {"required", kAttack}, {"measured", "1"}, {"passed", passed}}}},
+      {"program", {{"tissueform", kAttack}}},
+      {"input", {{"format", kAttack}, {"notes", {kAttack}}}},
+      {"head", {{"removed_mm3", 1.0}}},
+      {"bone", {{"separation", kAttack}}},
+      {"landmarks", {{"unit", "mm"}}},
+      {"segments",
+       {{{"name", kAttack},
+         {"osteotomy", kAttack},
+         {"volume_mm3", 1000.0},
+         {"pose",
+          {{"translation_mm", {0.0, -3.0, 4.0}}, {"rotation_vector_deg", {2.0, 0.0, 0.0}}}}}}},
+      {"region_of_interest", {{"from", kAttack}}},
+      {"soft_tissue", {{"volume_mm3", 5.0}}},
+      {"mesh", {{"vertices", 1500}, {"tets", 6000}}},
+      {"distances", {{"skin_to_ct", {{"mean_mm", 0.25}}}}},
+      {"stiffness", {{"tissues", {{{"name", kAttack}, {"source", kAttack}}}}}},
+      {"regions", {{kAttack, 1}}},
+      {"recipe", {{"name", kAttack}}}};
+}
+
+TEST(ReportHtmlTest, NoTextOfTheReportIsMarkup) {
+  const ReportPicture picture{kAttack, kAttack, kAttack, {{kAttack, kBlue}}};
+  const std::string html = PlanReportHtml(SmallReport(true), {picture});
+  EXPECT_THAT(html, AllOf(Not(HasSubstr("<script")), HasSubstr("&lt;script&gt;"),
+                          Not(HasSubstr(")\"'")), Not(HasSubstr("http"))));
+}
+
+TEST(ReportHtmlTest, PageSaysWhatIsMetAndThatItIsNoMedicalDevice) {
+  const std::string good = PlanReportHtml(SmallReport(true), {});
+  EXPECT_THAT(good, AllOf(HasSubstr("all requirements are met"), Not(HasSubstr("not met")),
+                          HasSubstr("moved by 5 mm and turned by 2°")));
+  EXPECT_THAT(PlanReportHtml(SmallReport(false), {}), HasSubstr("not met"));
+  const std::string notice = "not a medical device";
+  EXPECT_LT(good.find(notice), good.find("<h1>"));
+  EXPECT_GT(good.rfind(notice), good.rfind("</section>"));
+}
+
+}  // namespace
+}  // namespace tissueform
