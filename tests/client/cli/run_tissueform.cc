@@ -25,9 +25,11 @@ std::string Slurp(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
-// Without the lines of StageProgress, which come when a machine is slow and not otherwise.
+// Without the lines of StageTimes, and those of StageProgress, which come when a machine is slow
+// and not otherwise.
 std::string WithoutProgress(const std::string& err) {
-  static const std::regex kProgress("[a-z0-9_ ]+( \\.\\.\\.|: [0-9]+\\.[0-9] s)");
+  static const std::regex kProgress(
+      "[a-z0-9_ ]+( \\.\\.\\.|: [0-9]+\\.[0-9] s)|\\[ *[0-9]+ % +[0-9]+\\.[0-9] s\\] .+");
   std::istringstream lines(err);
   std::string kept;
   for (std::string line; std::getline(lines, line);) {
