@@ -3,7 +3,7 @@
 #
 # One target a folder. Includes are written from the repository root.
 
-# Precompiled headers: most of a compilation is reading Eigen, Abseil and GoogleTest again. Three of them serve all
+# Precompiled headers: most of a compilation is reading Eigen, Abseil and GoogleTest again. Five of them serve all
 # targets; every target is compiled with the same options (-fPIC, executables too) so that they fit.
 option(TISSUEFORM_PRECOMPILED_HEADERS "Precompile the large headers" ON)
 
@@ -20,8 +20,10 @@ function(tissueform_precompile_headers)
   if(TISSUEFORM_PRECOMPILED_HEADERS)
     _tissueform_precompiled(library)
     _tissueform_precompiled(command CLI11::CLI11 nlohmann_json::nlohmann_json)
+    _tissueform_precompiled(rpc gRPC::grpc++ protobuf::libprotobuf)
     if(BUILD_TESTING)
       _tissueform_precompiled(test GTest::gmock)
+      _tissueform_precompiled(rpc_test GTest::gmock gRPC::grpc++ protobuf::libprotobuf)
     endif()
   endif()
 endfunction()
@@ -35,7 +37,7 @@ endfunction()
 # tissueform_library(core_mesh SOURCES a.cc b.cc DEPS core_base absl::status)
 #
 # A static library tissueform_core_mesh with alias tissueform::core_mesh. DEPS are public; names
-# without :: are folders of this project. PRECOMPILED command: the files read options or JSON.
+# without :: are folders of this project. PRECOMPILED command: the files read options or JSON; rpc: they speak gRPC.
 function(tissueform_library name)
   cmake_parse_arguments(ARG "" "PRECOMPILED" "SOURCES;DEPS;PRIVATE_DEPS" ${ARGN})
   if(NOT ARG_PRECOMPILED)
@@ -77,10 +79,13 @@ endfunction()
 # One test program a folder, named core_mesh_test; ctest sees every test of it by itself. The target tests-server
 # builds the programs with the label "server".
 function(tissueform_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT;PRECOMPILED" "SOURCES;DEPS;LABELS" ${ARGN})
+  if(NOT ARG_PRECOMPILED)
+    set(ARG_PRECOMPILED test)
+  endif()
   set(target ${name}_test)
   add_executable(${target} ${ARG_SOURCES})
-  _tissueform_use_precompiled(${target} test)
+  _tissueform_use_precompiled(${target} ${ARG_PRECOMPILED})
   _tissueform_resolve(deps ${ARG_DEPS})
   target_link_libraries(${target} PRIVATE ${deps} GTest::gmock GTest::gtest_main)
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
