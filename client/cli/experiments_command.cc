@@ -16,6 +16,8 @@
 #include "client/cli/companion.h"
 #include "client/cli/demo_paths.h"
 #include "client/cli/stage_progress.h"
+#include "client/experiments/accuracy_case_list.h"
+#include "client/experiments/accuracy_experiment.h"
 #include "client/experiments/experiment.h"
 #include "client/rendering/virtual_display.h"
 #include "core/base/atomic_file.h"
@@ -28,11 +30,18 @@ namespace {
 struct ExperimentsOptions {
   std::string out;
   std::vector<std::string> only;
+  std::vector<std::string> cases;
 };
 
 std::vector<std::string> ExperimentNames() {
   std::vector<std::string> names;
   for (const Experiment& experiment : AllExperiments()) names.emplace_back(experiment.name);
+  return names;
+}
+
+std::vector<std::string> CaseNames() {
+  std::vector<std::string> names = AccuracyCaseNames();
+  names.emplace_back(kLockingCase);
   return names;
 }
 
@@ -67,7 +76,8 @@ ExperimentOptions OptionsFor(const ExperimentsOptions& options) {
   ExperimentOptions result;
   result.folder = options.out;
   result.threads = AvailableProcessors();
-  result.plan = FindDemoPlan("").value_or("");  // the paper's figures do without
+  result.find_plan = FindBundledPlan;
+  result.cases = options.cases;
   result.tell = [](const std::string& line) { absl::FPrintF(stderr, "%s\n", line); };
   return result;
 }
@@ -98,10 +108,15 @@ void AddExperimentsCommand(CLI::App& app, CommandWork* work) {
       ->add_option("NAME,--only", options->only,
                    "only these experiments; without a name all figures and the table of the paper")
       ->check(CLI::IsMember(ExperimentNames()));
+  command
+      ->add_option("--case", options->cases,
+                   "only these cases of the experiment accuracy; without it all")
+      ->check(CLI::IsMember(CaseNames()));
   command->footer(absl::StrCat(ExperimentList(),
                                "Example:\n"
                                "  tissueform experiments --out figures --only fig1\n"
                                "  tissueform experiments accuracy --out accuracy\n"
+                               "  tissueform experiments accuracy --case head_chin --out accuracy\n"
                                "docs/experiments.md shows them beside what the paper says, "
                                "docs/accuracy.md the models beside finite elements."));
   command->callback([options, work] { *work = [options] { return RunExperiments(*options); }; });

@@ -26,7 +26,10 @@ constexpr double kStretch = 0.15;
 const View kBarView{{0.35, -1.0, 0.25}, {0, 0, 1}};
 const View kBlockView{{0.35, -1.0, 0.75}, {0, 0, 1}};
 // Tip and back of the bundled tongue lie on opposite sides of y.
-const View kPlanView{{1.0, -0.4, 0.35}, {0, 0, 1}};
+const View kTongueView{{1.0, -0.4, 0.35}, {0, 0, 1}};
+// LPS: the patient looks along -y, and +x is his left.
+const View kFrontView{{0, -1, 0}, {0, 0, 1}};
+const View kLeftView{{1, 0, 0}, {0, 0, 1}};
 
 absl::StatusOr<AccuracyCase> BarCase(std::string name, std::string title, int cells,
                                      const HandlePose& pose) {
@@ -34,7 +37,7 @@ absl::StatusOr<AccuracyCase> BarCase(std::string name, std::string title, int ce
   TF_ASSIGN_OR_RETURN(ConstraintSet ends, ConstrainEnds(bar.positions()));
   Eigen::VectorXd stiffness = Eigen::VectorXd::Constant(bar.num_tets(), kBarPa);
   return AccuracyCase{std::move(name), std::move(title), std::move(bar), std::move(stiffness),
-                      std::move(ends), {pose},           kBarView};
+                      std::move(ends), {pose},           {kBarView}};
 }
 
 HandlePose AtUpperEnd() {
@@ -52,7 +55,7 @@ absl::StatusOr<AccuracyCase> BlockCase(std::string name, std::string title,
                       std::move(block.stiffness),
                       std::move(block.constraints),
                       {pose},
-                      kBlockView};
+                      {kBlockView}};
 }
 
 }  // namespace
@@ -87,13 +90,19 @@ absl::StatusOr<AccuracyCase> CaseOfPlan(const std::string& name, const std::stri
                                         const std::string& plan_path) {
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(plan_path));
   TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan));
-  return AccuracyCase{name,
+  AccuracyCase result{name,
                       title,
                       *problem.mesh,
                       std::move(problem.stiffness),
                       std::move(problem.constraints),
                       std::move(problem.poses),
-                      kPlanView};
+                      {kTongueView}};
+  TF_ASSIGN_OR_RETURN(result.places, SkinPlaces(problem.point_data));
+  if (!result.places.empty()) {
+    result.views = {kFrontView, kLeftView};
+    result.poisson_ratios = {0.3, 0.45};
+  }
+  return result;
 }
 
 }  // namespace tissueform

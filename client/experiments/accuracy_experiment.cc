@@ -3,6 +3,7 @@
 
 #include "client/experiments/accuracy_experiment.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <string>
 #include <system_error>
@@ -11,11 +12,12 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "client/experiments/accuracy_case_list.h"
 #include "client/experiments/accuracy_figure.h"
 #include "client/experiments/accuracy_run.h"
 #include "client/experiments/accuracy_table.h"
-#include "client/experiments/layered_block.h"
 #include "client/experiments/locking_experiment.h"
+#include "client/experiments/movement_table.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
 #include "core/linear_solvers/blas_threads.h"
@@ -23,7 +25,6 @@
 namespace tissueform {
 namespace {
 
-constexpr int kBarCells = 8;
 // The planning default: pictures and the summary are of this one.
 constexpr double kShownPoissonRatio = 0.45;
 
@@ -47,19 +48,19 @@ class ScratchFolder {
   const std::string path_;
 };
 
-absl::StatusOr<std::vector<AccuracyCase>> AllCases(const ExperimentOptions& options) {
+bool IsChosen(const ExperimentOptions& options, const std::string& name) {
+  return options.cases.empty() ||
+         std::find(options.cases.begin(), options.cases.end(), name) != options.cases.end();
+}
+
+// All before the first is solved, so that a missing plan is told of at once.
+absl::StatusOr<std::vector<AccuracyCase>> ChosenCases(const ExperimentOptions& options) {
   std::vector<AccuracyCase> cases;
-  const auto add = [&](absl::StatusOr<AccuracyCase> problem) -> absl::Status {
-    TF_RETURN_IF_ERROR(problem.status());
-    cases.push_back(*std::move(problem));
-    return absl::OkStatus();
-  };
-  TF_RETURN_IF_ERROR(add(BendCase(kBarCells)));
-  TF_RETURN_IF_ERROR(add(TwistAndStretchCase(kBarCells)));
-  TF_RETURN_IF_ERROR(add(BlockAlongCase(kLayeredBlockCells)));
-  TF_RETURN_IF_ERROR(add(BlockUpCase(kLayeredBlockCells)));
-  TF_RETURN_IF_ERROR(
-      add(CaseOfPlan("tongue", "bundled tongue, tip turned by 20\u00b0", options.plan)));
+  for (const std::string& name : AccuracyCaseNames()) {
+    if (!IsChosen(options, name)) continue;
+    TF_ASSIGN_OR_RETURN(AccuracyCase problem, CreateAccuracyCase(name, options.find_plan));
+    cases.push_back(std::move(problem));
+  }
   return cases;
 }
 
@@ -72,7 +73,22 @@ const AccuracyResult& ShownResult(const std::vector<AccuracyResult>& results) {
 
 struct Tables {
   CsvTable all = AccuracyTable();
+  CsvTable movements = MovementTable();
   CsvTable summary = AccuracySummary();
+  CsvTable place_summary = PlaceSummary();
+  CsvTable movement_summary = MovementSummary();
+
+  absl::Status Write(const ExperimentOptions& options) const {
+    TF_RETURN_IF_ERROR(all.WriteCsv(options.Path("accuracy.csv")));
+    TF_RETURN_IF_ERROR(movements.WriteCsv(options.Path("accuracy_movements.csv")));
+    return WriteFileAtomically(
+        options.Path("accuracy_summary.md"),
+        absl::StrCat("Mean / max in mm\n\n", summary.Markdown(),
+                     "\np50 / p95 / max in mm to CalculiX neo-Hookean\n\n",
+                     place_summary.Markdown(),
+                     "\nForward / up in mm: foremost vertex; mean of the place\n\n",
+                     movement_summary.Markdown(), "\n", kCsvNotice, "\n"));
+  }
 };
 
 absl::StatusOr<AccuracySweep> RunCase(const AccuracyCase& problem, const std::string& scratch,
@@ -80,10 +96,13 @@ absl::StatusOr<AccuracySweep> RunCase(const AccuracyCase& problem, const std::st
   AccuracySweep sweep;
   sweep.name = problem.name;
   TF_ASSIGN_OR_RETURN(sweep.results,
-                      RunAccuracyCase(problem, {0.0, 0.3, 0.45, 0.49}, scratch, options.tell));
+                      RunAccuracyCase(problem, problem.poisson_ratios, scratch, options.tell));
   AddAccuracyRows(problem, sweep.results, &tables->all);
+  AddMovementRows(problem, sweep.results, &tables->movements);
   const AccuracyResult& shown = ShownResult(sweep.results);
   AddSummaryRows(problem, shown, &tables->summary);
+  AddPlaceSummaryRows(problem, shown, &tables->place_summary);
+  AddMovementSummaryRows(problem, shown, &tables->movement_summary);
   if (const ModelAnswer* reference = shown.Reference("calculix_neo_hookean")) {
     sweep.largest_displacement_mm = LargestDisplacement(problem, *reference);
     TF_RETURN_IF_ERROR(DrawAccuracyCase(
@@ -92,23 +111,27 @@ absl::StatusOr<AccuracySweep> RunCase(const AccuracyCase& problem, const std::st
   return sweep;
 }
 
-}  // namespace
-
-absl::Status RunAccuracyExperiment(const ExperimentOptions& options) {
-  SetBlasThreads(1);  // CalculiX gets one thread too
-  TF_ASSIGN_OR_RETURN(const std::vector<AccuracyCase> cases, AllCases(options));
+absl::Status RunCases(const std::vector<AccuracyCase>& cases, const ExperimentOptions& options) {
   const ScratchFolder scratch(options.Path("accuracy_scratch"));
   Tables tables;
   std::vector<AccuracySweep> sweeps;
   for (const AccuracyCase& problem : cases) {
     TF_ASSIGN_OR_RETURN(AccuracySweep sweep, RunCase(problem, scratch.path(), options, &tables));
-    sweeps.push_back(std::move(sweep));
+    // Heads are solved at two ratios, which make no curve.
+    if (sweep.results.size() > 2) sweeps.push_back(std::move(sweep));
   }
-  TF_RETURN_IF_ERROR(tables.all.WriteCsv(options.Path("accuracy.csv")));
-  TF_RETURN_IF_ERROR(
-      WriteFileAtomically(options.Path("accuracy_summary.md"), tables.summary.Markdown()));
-  TF_RETURN_IF_ERROR(DrawPoissonRatios(sweeps, options.Path("accuracy_nu.png")));
-  return RunLockingExperiment(options);
+  TF_RETURN_IF_ERROR(tables.Write(options));
+  if (sweeps.empty()) return absl::OkStatus();
+  return DrawPoissonRatios(sweeps, options.Path("accuracy_nu.png"));
+}
+
+}  // namespace
+
+absl::Status RunAccuracyExperiment(const ExperimentOptions& options) {
+  SetBlasThreads(1);  // CalculiX gets one thread too
+  TF_ASSIGN_OR_RETURN(const std::vector<AccuracyCase> cases, ChosenCases(options));
+  if (!cases.empty()) TF_RETURN_IF_ERROR(RunCases(cases, options));
+  return IsChosen(options, kLockingCase) ? RunLockingExperiment(options) : absl::OkStatus();
 }
 
 }  // namespace tissueform

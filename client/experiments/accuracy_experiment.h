@@ -9,11 +9,14 @@
 
 namespace tissueform {
 
-// All models against CalculiX on a bar, the layered block and the bundled plan, at four Poisson's
-// ratios, and volumetric locking: docs/accuracy.md. Needs the program ccx; minutes.
+// Beside the names of cases, the study of volumetric locking.
+inline constexpr char kLockingCase[] = "locking";
+
+// All models against CalculiX on a bar, the layered block and the bundled plans, at two or four
+// Poisson's ratios, and volumetric locking: docs/accuracy.md. Needs the program ccx; minutes.
 //
-// Writes accuracy.csv (everything), accuracy_summary.md, accuracy_CASE.png, accuracy_nu.png and
-// accuracy_locking.csv and .png.
+// Writes accuracy.csv (distances), accuracy_movements.csv (of the face's foremost points),
+// accuracy_summary.md, accuracy_CASE.png, accuracy_nu.png and accuracy_locking.csv and .png.
 absl::Status RunAccuracyExperiment(const ExperimentOptions& options);
 
 }  // namespace tissueform

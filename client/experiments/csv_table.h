@@ -29,6 +29,10 @@ class CsvTable {
   std::vector<std::vector<std::string>> rows_;  // the header first
 };
 
+// What tables of models' answers say in every row, in a last column "notice": a first line that is
+// no row would stop most readers.
+inline constexpr char kCsvNotice[] = "research software - not a medical device";
+
 // A number as a cell, with up to six digits that count.
 std::string Cell(double value);
 

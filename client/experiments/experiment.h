@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
 namespace tissueform {
@@ -15,7 +16,10 @@ namespace tissueform {
 struct ExperimentOptions {
   std::string folder;  // must exist
   int threads = 1;
-  std::string plan;  // the bundled plan, for experiments on a mesh that is not a grid
+  // The file of a bundled plan by its name, for experiments on meshes that are no grids.
+  std::function<absl::StatusOr<std::string>(const std::string& name)> find_plan;
+  // Of the experiment "accuracy": AccuracyCaseNames and "locking"; all when empty.
+  std::vector<std::string> cases;
   // Gets a line for every step of a long experiment. May be empty.
   std::function<void(const std::string&)> tell;
 

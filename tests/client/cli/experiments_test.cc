@@ -59,5 +59,12 @@ TEST_F(ExperimentsTest, NamesMayBeGivenWithoutTheirOption) {
   EXPECT_THAT(help.out, HasSubstr("accuracy"));
 }
 
+TEST_F(ExperimentsTest, CasesOfTheAccuracyAreNamedAndNoOthersAreTaken) {
+  EXPECT_THAT(
+      Run({"experiments", "accuracy", "--case", "jelly", "--out", "accuracy"}),
+      FailsWith(2, AllOf(HasSubstr("jelly"), HasSubstr("head_mandible"), HasSubstr("locking"))));
+  EXPECT_THAT(Files(), ElementsAre());
+}
+
 }  // namespace
 }  // namespace tissueform::testing

@@ -56,6 +56,30 @@ TEST_F(AccuracyRunTest, TableHasARowForEachModelReferenceAndRegion) {
   EXPECT_THAT(csv, HasSubstr("\nbar_bend,0.3,arap,calculix_neo_hookean,skin,"));
 }
 
+// Answers that are no model's, so that every figure is known: all vertices lie as the reference has
+// them but one of the chin, which is 3 mm off.
+TEST_F(AccuracyRunTest, PlacesOfSkinHaveRowsOfTheirOwnAndTellWhatIsOverTheAcceptedDistance) {
+  AccuracyCase bend = bend_;
+  bend.places = {{"chin", {0, 1, 2, 3}}, {"nose", {4, 5}}};
+  AccuracyResult result;
+  result.poisson_ratio = 0.3;
+  result.references = {{"calculix_neo_hookean", bend.mesh.positions() * 1.5}};
+  for (const ModelVariant& variant : AllModelVariants()) {
+    result.models.push_back({variant.name, result.references[0].positions});
+    result.models.back().positions(2, 1) += 3;
+  }
+  CsvTable table = AccuracyTable();
+  AddAccuracyRows(bend, {result}, &table);
+  const std::string csv = table.Csv();
+  EXPECT_THAT(csv, HasSubstr("\nbar_bend,0.3,arap,calculix_neo_hookean,chin,0.75,0,3,3,3,"));
+  EXPECT_THAT(csv, HasSubstr(",yes,4,1,research software - not a medical device\n"));
+  EXPECT_THAT(csv, HasSubstr("\nbar_bend,0.3,arap,calculix_neo_hookean,nose,0,0,0,0,0,0,"));
+  EXPECT_THAT(csv, HasSubstr(",yes,2,0,research software - not a medical device\n"));
+  CsvTable summary = PlaceSummary();
+  AddPlaceSummaryRows(bend, result, &summary);
+  EXPECT_THAT(summary.Markdown(), HasSubstr("| bar_bend | chin | 4 | 0.00 / 3.00 / 3.00 |"));
+}
+
 TEST_F(AccuracyRunTest, MissingProgramEndsTheRun) {
   const testing::ScopedEnvironment no_programs("PATH", "/nonexistent");
   EXPECT_TRUE(absl::IsNotFound(Run({0.3}).status()));

@@ -76,6 +76,11 @@ double LargestMove(const AccuracyCase& problem) {
       .maxCoeff();
 }
 
+// The coarser of the bundled heads: three stiffnesses by tissue.
+absl::StatusOr<AccuracyCase> HeadChin() {
+  return CaseOfPlan("head_chin", "", testing::TestDataPath("plans/head_chin/plan.json"));
+}
+
 // CalculiX prints seven digits: up to 5e-7 mm for each coordinate of a move of some millimetres.
 TEST_F(CalculixOracleTest, LinearElasticityEqualsCalculixOnTheLayeredBlock) {
   for (const double poisson_ratio : {0.0, 0.3, 0.45}) {
@@ -105,6 +110,12 @@ TEST_F(CalculixOracleTest, LinearElasticityEqualsCalculixOnTheTongue) {
         Distance(Tongue().value(), DeformationModel::kLinearElastic, poisson_ratio));
     EXPECT_LT(distance, 1e-6) << "nu = " << poisson_ratio;
   }
+}
+
+TEST_F(CalculixOracleTest, LinearElasticityEqualsCalculixOnARealHead) {
+  ASSERT_OK_AND_ASSIGN(const double distance,
+                       Distance(HeadChin().value(), DeformationModel::kLinearElastic, 0.45));
+  EXPECT_LT(distance, 1e-6);
 }
 
 TEST_F(CalculixOracleTest, NeoHookeanEqualsCalculixOnTheLayeredBlock) {
