@@ -33,7 +33,7 @@ std::string Grouped(int64_t number) {
 
 std::string NumberText(double number) {
   if (std::abs(number) >= 1000 && std::abs(number) < 1e15) return Grouped(std::llround(number));
-  return absl::StrFormat("%.4g", number);
+  return absl::StrFormat("%.4g", number + 0.0);  // no "-0"
 }
 
 bool IsList(const Json& value) {

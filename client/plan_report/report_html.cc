@@ -90,17 +90,21 @@ std::string Facts(const Json& report) {
       "</div>\n");
 }
 
-// "mandible (bssro, 21.3 cm³), moved by 6 mm"
+// "mandible (bssro, 21.3 cm³), moved by 6 mm and turned by 3°"
 std::string SegmentText(const Json& segment) {
-  const Json& pose = segment["pose"];
-  double square_mm = 0;
-  double square_deg = 0;
-  for (const double mm : pose["translation_mm"]) square_mm += mm * mm;
-  for (const double deg : pose["rotation_vector_deg"]) square_deg += deg * deg;
-  return absl::StrFormat(
-      "%s (%s, %.1f cm³), moved by %.3g mm and turned by %.3g°", segment["name"].get<std::string>(),
-      segment["osteotomy"].get<std::string>(), segment["volume_mm3"].get<double>() / 1000,
-      std::sqrt(square_mm), std::sqrt(square_deg));
+  const auto length = [&segment](const char* key) {
+    double square = 0;
+    for (const double entry : segment["pose"][key]) square += entry * entry;
+    return std::sqrt(square);
+  };
+  std::string text =
+      absl::StrFormat("%s (%s, %.1f cm³), moved by %.3g mm", segment["name"].get<std::string>(),
+                      segment["osteotomy"].get<std::string>(),
+                      segment["volume_mm3"].get<double>() / 1000, length("translation_mm"));
+  if (const double turn_deg = length("rotation_vector_deg"); turn_deg > 0) {
+    absl::StrAppendFormat(&text, " and turned by %.3g°", turn_deg);
+  }
+  return text;
 }
 
 std::string Lead(const Json& report) {
