@@ -133,6 +133,7 @@ absl::Status DrawAccuracyCase(const AccuracyCase& problem, const AccuracyResult&
       row.push_back(
           ModelScene(skin, model, PanelTitle(variant, model, reference, face), reference, view));
       row.back().colour_bar = bar;
+      row.back().room_for_legend = true;
       // One legend a row, so that all rows have one scale.
       if (row.size() < kPanelsInARow) {
         row.back().colour_bar.title.clear();
