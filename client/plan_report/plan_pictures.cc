@@ -19,7 +19,8 @@ namespace {
 
 constexpr int kSceneHeightPx = 560;
 
-absl::Status WriteFigure(const ReportPicture& picture, Figure figure, const std::string& folder) {
+absl::Status WriteFigure(const ReportPicture& picture, const Figure& figure,
+                         const std::string& folder) {
   return figure.WritePng(absl::StrCat(folder, "/", picture.file));
 }
 
@@ -28,7 +29,7 @@ absl::Status WriteScenes(const ReportPicture& picture, std::vector<Scene> scenes
                          const std::string& folder) {
   Figure figure(picture.title);
   figure.AddRow(kSceneHeightPx, std::move(scenes));
-  return WriteFigure(picture, std::move(figure), folder);
+  return WriteFigure(picture, figure, folder);
 }
 
 std::vector<LegendEntry> BoneLegend(const PlanBuild& build) {
@@ -58,7 +59,7 @@ absl::StatusOr<ReportPicture> DrawSlices(const PlanBuild& build, const std::stri
   Figure figure(picture.title);
   figure.AddRow(640, {panels[0], panels[1]});
   figure.AddRow(640, {panels[2], panels[3]});
-  TF_RETURN_IF_ERROR(WriteFigure(picture, std::move(figure), folder));
+  TF_RETURN_IF_ERROR(WriteFigure(picture, figure, folder));
   return picture;
 }
 
@@ -149,7 +150,7 @@ absl::StatusOr<ReportPicture> DrawHistograms(const PlanMeasures& measures,
                 .logarithmic_y = true,
                 .curves = {distances, LimitCurve("0.6 voxels", 0.6, distances, CurveStyle::kDashed),
                            LimitCurve("2 voxels", 2, distances, CurveStyle::kDotted)}}});
-  TF_RETURN_IF_ERROR(WriteFigure(picture, std::move(figure), folder));
+  TF_RETURN_IF_ERROR(WriteFigure(picture, figure, folder));
   return picture;
 }
 

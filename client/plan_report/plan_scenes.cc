@@ -30,6 +30,7 @@ const Vector3d kLeft(1, 0, 0);
 std::vector<Scene> SeenFrom(const std::vector<NamedView>& views,
                             const std::vector<SurfaceLayer>& surfaces) {
   std::vector<Scene> scenes;
+  scenes.reserve(views.size());
   for (const NamedView& view : views) {
     scenes.push_back({.title = view.title, .surfaces = surfaces, .view = view.view});
   }
