@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <itkMultiThreaderBase.h>
 #include <string>
+#include <unistd.h>
 
 #include "absl/strings/str_cat.h"
 
@@ -166,7 +167,8 @@ TEST(RealHeadsTest, ResultsDoNotDependOnTheNumberOfThreads) {
 class UnpackedArchive {
  public:
   explicit UnpackedArchive(const std::string& archive, const std::string& members)
-      : folder_(std::filesystem::path(::testing::TempDir()) / "real_heads_test") {
+      : folder_(std::filesystem::path(::testing::TempDir()) /
+                absl::StrCat("real_heads_", getpid())) {
     std::filesystem::create_directories(folder_);
     const std::string command =
         absl::StrCat("tar -xJf '", archive, "' -C '", folder_.string(), "' --wildcards ", members);
