@@ -6,7 +6,7 @@
 
 #pragma once
 
-#include "cmake/precompiled/library.h"
-
 #include "CLI/CLI.hpp"
 #include "nlohmann/json.hpp"
+
+#include "cmake/precompiled/library.h"

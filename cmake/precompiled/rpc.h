@@ -5,7 +5,7 @@
 
 #pragma once
 
-#include "cmake/precompiled/library.h"
-
 #include <google/protobuf/message.h>
 #include <grpcpp/grpcpp.h>
+
+#include "cmake/precompiled/library.h"

@@ -93,8 +93,8 @@ absl::Status WithoutExceptions(absl::string_view what, const IsolationLimits& li
   try {
     return work();
   } catch (const std::bad_alloc&) {
-    return absl::ResourceExhaustedError(absl::StrCat(
-        what, " needs more than ", limits.max_memory_bytes, " bytes of memory"));
+    return absl::ResourceExhaustedError(
+        absl::StrCat(what, " needs more than ", limits.max_memory_bytes, " bytes of memory"));
   } catch (const std::exception& exception) {
     return absl::InvalidArgumentError(
         absl::StrCat("the library gave up while ", what, " (", exception.what(), ")"));

@@ -17,20 +17,21 @@ struct IsolationLimits {
   int max_seconds = 600;                         // of processor time
 };
 
-// Calls `work` without letting an exception out: InvalidArgument where a library gave up (`what` says
-// what was tried, "reading it"), ResourceExhausted where there was no memory.
+// Calls `work` without letting an exception out: InvalidArgument where a library gave up (`what`
+// says what was tried, "reading it"), ResourceExhausted where there was no memory.
 absl::Status WithoutExceptions(absl::string_view what, const IsolationLimits& limits,
                                const std::function<absl::Status()>& work);
 
-// Runs `work` in a child process of its own: libraries that read files or mesh surfaces crash, loop,
-// print and end the program on damaged input, and some know one state for the whole process. The child
-// is bound to the limits, cannot write files, and what it prints is lost. It hands its result over
-// through the pipe: `work` writes into the descriptor that it is given and says whether all of it went
-// through (false when the reader has gone away); `receive` reads from the other end, in this process.
+// Runs `work` in a child process of its own: libraries that read files or mesh surfaces crash,
+// loop, print and end the program on damaged input, and some know one state for the whole process.
+// The child is bound to the limits, cannot write files, and what it prints is lost. It hands its
+// result over through the pipe: `work` writes into the descriptor that it is given and says whether
+// all of it went through (false when the reader has gone away); `receive` reads from the other end,
+// in this process.
 //
 // Errors: those of `receive`. Where `receive` says DataLoss, because the child ended in the middle:
-// InvalidArgument when it crashed, ResourceExhausted when a limit stopped it. Internal when there can
-// be no child. `what` says what was tried ("reading it").
+// InvalidArgument when it crashed, ResourceExhausted when a limit stopped it. Internal when there
+// can be no child. `what` says what was tried ("reading it").
 //
 // REQUIRES: `work` needs no other thread of this process and no lock that one may hold.
 absl::Status RunIsolated(absl::string_view what, const IsolationLimits& limits,

@@ -9,9 +9,9 @@
 namespace tissueform {
 
 void SetUpItk() {
-  // The default is a pool of threads, which a child process does not inherit: it would wait for ever.
-  itk::MultiThreaderBase::SetGlobalDefaultThreader(
-      itk::MultiThreaderBase::ThreaderEnum::Platform);
+  // The default is a pool of threads, which a child process does not inherit: it would wait for
+  // ever.
+  itk::MultiThreaderBase::SetGlobalDefaultThreader(itk::MultiThreaderBase::ThreaderEnum::Platform);
   itk::Object::GlobalWarningDisplayOff();
 }
 

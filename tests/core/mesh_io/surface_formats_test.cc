@@ -99,7 +99,8 @@ TEST_P(EverySurfaceFormatTest, ChangedBytesNeverEndTheProgram) {
     }
     if (!ReadSurface(std::string("changed") + GetParam(), contents).ok()) ++refused;
   }
-  // Nearly every byte of a binary STL is one of a coordinate, and another number there is no damage.
+  // Nearly every byte of a binary STL is one of a coordinate, and another number there is no
+  // damage.
   EXPECT_GT(refused, std::string(GetParam()) == ".stl" ? 0 : 5);
 }
 
