@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -74,6 +75,7 @@ double BarEnd(double largest_mm) {
 
 std::vector<std::string> BeforeAndAfterPictures() {
   std::vector<std::string> names;
+  names.reserve(std::size(kViews));
   for (const NamedView& view : kViews) names.emplace_back(view.file);
   return names;
 }

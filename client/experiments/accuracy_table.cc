@@ -75,8 +75,7 @@ std::vector<std::string> Row(const AccuracyCase& problem, double poisson_ratio,
           absl::StrCat(model.inverted_tets),
           model.converged ? "yes" : "no",
           absl::StrCat(s.count),
-          absl::StrCat((distances.array() > kAcceptedMm).count()),
-          kCsvNotice};
+          absl::StrCat((distances.array() > kAcceptedMm).count())};
 }
 
 }  // namespace
@@ -84,7 +83,7 @@ std::vector<std::string> Row(const AccuracyCase& problem, double poisson_ratio,
 CsvTable AccuracyTable() {
   return CsvTable({"case", "nu", "model", "reference", "region", "mean_mm", "p50_mm", "p90_mm",
                    "p95_mm", "max_mm", "mean_percent", "seconds", "reference_seconds",
-                   "inverted_tets", "converged", "vertices", "vertices_over_2_mm", "notice"});
+                   "inverted_tets", "converged", "vertices", "vertices_over_2_mm"});
 }
 
 void AddAccuracyRows(const AccuracyCase& problem, const std::vector<AccuracyResult>& results,

@@ -20,6 +20,11 @@ std::string Quoted(const std::string& cell) {
   return absl::StrCat("\"", absl::StrReplaceAll(cell, {{"\"", "\"\""}}), "\"");
 }
 
+std::string Line(const std::vector<std::string>& row) {
+  return absl::StrJoin(
+      row, ",", [](std::string* out, const std::string& cell) { out->append(Quoted(cell)); });
+}
+
 }  // namespace
 
 CsvTable::CsvTable(std::vector<std::string> header) { rows_.push_back(std::move(header)); }
@@ -28,13 +33,7 @@ void CsvTable::AddRow(std::vector<std::string> cells) { rows_.push_back(std::mov
 
 std::string CsvTable::Csv() const {
   std::string text;
-  for (const auto& row : rows_) {
-    absl::StrAppend(
-        &text,
-        absl::StrJoin(row, ",",
-                      [](std::string* out, const std::string& cell) { out->append(Quoted(cell)); }),
-        "\n");
-  }
+  for (const auto& row : rows_) absl::StrAppend(&text, Line(row), "\n");
   return text;
 }
 
@@ -51,7 +50,11 @@ std::string CsvTable::Markdown() const {
 }
 
 absl::Status CsvTable::WriteCsv(const std::string& path) const {
-  return WriteFileAtomically(path, Csv());
+  std::string text;
+  for (size_t r = 0; r < rows_.size(); ++r) {
+    absl::StrAppend(&text, Line(rows_[r]), ",", r == 0 ? "notice" : kCsvNotice, "\n");
+  }
+  return WriteFileAtomically(path, text);
 }
 
 std::string Cell(double value) { return absl::StrFormat("%.6g", value); }

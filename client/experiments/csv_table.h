@@ -23,14 +23,15 @@ class CsvTable {
   // A table of GitHub's Markdown.
   std::string Markdown() const;
 
+  // As Csv, with a last column "notice" that says in every row that this comes from no medical
+  // device: a first line that is no row would stop most readers.
   absl::Status WriteCsv(const std::string& path) const;
 
  private:
   std::vector<std::vector<std::string>> rows_;  // the header first
 };
 
-// What tables of models' answers say in every row, in a last column "notice": a first line that is
-// no row would stop most readers.
+// What the column says.
 inline constexpr char kCsvNotice[] = "research software - not a medical device";
 
 // A number as a cell, with up to six digits that count.

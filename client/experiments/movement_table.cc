@@ -52,7 +52,7 @@ void AddAnswers(const AccuracyCase& problem, const std::vector<ModelAnswer>& ans
       table->AddRow({problem.name, Cell(poisson_ratio), answer.name, place.name,
                      absl::StrCat(m.vertex), Cell(ForwardMm(m.foremost)), Cell(UpMm(m.foremost)),
                      Cell(LeftMm(m.foremost)), Cell(m.foremost.norm()), Cell(ForwardMm(m.mean)),
-                     Cell(UpMm(m.mean)), Cell(LeftMm(m.mean)), kCsvNotice});
+                     Cell(UpMm(m.mean)), Cell(LeftMm(m.mean))});
     }
   }
 }
@@ -67,7 +67,7 @@ std::string ForwardAndUp(const Eigen::RowVector3d& lps_mm) {
 
 CsvTable MovementTable() {
   return CsvTable({"case", "nu", "answer", "place", "vertex", "forward_mm", "up_mm", "left_mm",
-                   "moved_mm", "mean_forward_mm", "mean_up_mm", "mean_left_mm", "notice"});
+                   "moved_mm", "mean_forward_mm", "mean_up_mm", "mean_left_mm"});
 }
 
 void AddMovementRows(const AccuracyCase& problem, const std::vector<AccuracyResult>& results,

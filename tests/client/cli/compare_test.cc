@@ -88,9 +88,11 @@ TEST_F(CompareTest, CsvHasARowForEachRegion) {
   ASSERT_THAT(Run({"compare", "a.vtu", "b.vtu", "--by", "anatomy", "--csv", "figures.csv"}),
               Succeeds());
   const std::string csv = Read("figures.csv");
-  EXPECT_THAT(csv, StartsWith("region,vertices,mean_mm,p50_mm,p90_mm,p95_mm,max_mm\nall,325,"));
+  EXPECT_THAT(csv,
+              StartsWith("region,vertices,mean_mm,p50_mm,p90_mm,p95_mm,max_mm,notice\nall,325,"));
   EXPECT_THAT(csv, HasSubstr("\nskin,226,"));
-  EXPECT_THAT(csv, HasSubstr("\nanatomy = 1,25,5,5,5,5,5\n"));
+  EXPECT_THAT(csv,
+              HasSubstr("\nanatomy = 1,25,5,5,5,5,5,research software - not a medical device\n"));
 }
 
 TEST_F(CompareTest, MeshesOfDifferentSizeCannotBeCompared) {

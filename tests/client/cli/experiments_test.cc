@@ -29,7 +29,8 @@ TEST_F(ExperimentsTest, Figure1LeavesItsPictureAndItsNumbers) {
   EXPECT_THAT(Read("figures/fig1.csv"),
               AllOf(StartsWith("case,volume_ratio,"), HasSubstr("\nvolume,0.85"),
                     HasSubstr("\nsurface,0.5")));
-  EXPECT_THAT(Read("figures/fig1_sections.csv"), StartsWith("position_mm,volume,surface\n0.5,"));
+  EXPECT_THAT(Read("figures/fig1_sections.csv"),
+              StartsWith("position_mm,volume,surface,notice\n0.5,"));
 }
 
 TEST_F(ExperimentsTest, UnknownNameIsWrongUseAndLeavesNothing) {
