@@ -36,6 +36,9 @@ DECLARATIONS = [
 IMPORT = re.compile(r"^using\s+[\w:]*::(\w+);")
 
 
+KNOWS_GCC_ONLY = re.compile(r"^#include <itk", re.MULTILINE)
+
+
 def compile_command(entry):
     """The arguments without input and output files, and without GCC's precompiled header."""
     arguments = shlex.split(entry["command"])
@@ -127,6 +130,10 @@ def main():
     chosen = {pathlib.Path(name).resolve() for name in sys.argv[2:]}
     entries = json.loads((build / "compile_commands.json").read_text(encoding="utf-8"))
     commands = {pathlib.Path(entry["file"]).resolve(): compile_command(entry) for entry in entries}
+    for path in [path for path in commands if path in chosen and KNOWS_GCC_ONLY.search(path.read_text(encoding="utf-8"))]:
+        print(f"tidy_batches.py: {path.name} is left out: Debian's ITK refuses every compiler but GCC", file=sys.stderr)
+        chosen.discard(path)
+        del commands[path]
     folder = build / "tidy"
     folder.mkdir(exist_ok=True)
     database = []
