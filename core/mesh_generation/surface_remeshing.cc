@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <exception>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -209,12 +210,8 @@ RemeshingOptions FinerAround(const TriangleMesh& mesh, const std::vector<Eigen::
   return finer;
 }
 
-}  // namespace
-
-absl::StatusOr<RemeshedSurface> RemeshSurface(const TriangleMesh& surface,
-                                              const RemeshingOptions& options) {
-  TF_RETURN_IF_ERROR(CheckOptions(options));
-  TF_RETURN_IF_ERROR(CheckClosed(surface));
+absl::StatusOr<RemeshedSurface> RemeshAndRepair(const TriangleMesh& surface,
+                                                const RemeshingOptions& options) {
   RemeshingOptions current = options;
   std::vector<int64_t> repaired_pairs;
   while (true) {
@@ -233,6 +230,21 @@ absl::StatusOr<RemeshedSurface> RemeshSurface(const TriangleMesh& surface,
                        " repairs; ask for shorter edges, or smooth the surface"));
     }
     current = FinerAround(mesh, bad, current);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<RemeshedSurface> RemeshSurface(const TriangleMesh& surface,
+                                              const RemeshingOptions& options) {
+  TF_RETURN_IF_ERROR(CheckOptions(options));
+  TF_RETURN_IF_ERROR(CheckClosed(surface));
+  try {
+    return RemeshAndRepair(surface, options);
+  } catch (const std::exception& exception) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("CGAL gave up remeshing the surface (", exception.what(),
+                     "); ask for other edge lengths, or smooth the surface"));
   }
 }
 

@@ -85,7 +85,7 @@ TEST(SurfaceDefectsTest, BoxesThatGoThroughEachOtherAreNamedWithTheirTriangles) 
 
 TEST(SurfaceDefectsTest, FlatTriangleIsMarked) {
   Positions positions = Box().positions();
-  const auto corners = Box().triangles().row(0);
+  const Eigen::RowVector3i corners = Box().triangles().row(0);
   positions.row(corners[2]) = 0.5 * (positions.row(corners[0]) + positions.row(corners[1]));
   const SurfaceDefects defects =
       FindSurfaceDefects(*TriangleMesh::Create(positions, Box().triangles()));
