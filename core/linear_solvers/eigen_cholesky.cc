@@ -5,7 +5,6 @@
 
 #include <limits>
 #include <new>
-#include <utility>
 
 #include <Eigen/SparseCholesky>
 
@@ -24,8 +23,9 @@ class SimplicialSolver : public SinglePrecisionSolver {
   using Factor = Eigen::SparseMatrix<float, Eigen::ColMajor, int32_t>;
   using Permutation = Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int32_t>;
 
-  SimplicialSolver(Factor factor, const Permutation& permutation)
-      : factor_(std::move(factor)), permutation_(permutation) {}
+  // Eigen 3.4's sparse matrices cannot be moved.
+  SimplicialSolver(const Factor& factor, const Permutation& permutation)
+      : factor_(factor), permutation_(permutation) {}
 
   void Solve(const Eigen::VectorXf& rhs, Eigen::VectorXf* solution) override {
     Eigen::VectorXf x = permutation_ * rhs;
@@ -81,7 +81,7 @@ class EigenCholesky : public SparseCholesky {
       if (!(pivots >= std::numeric_limits<float>::min()).all() || !pivots.isFinite().all()) {
         return absl::FailedPreconditionError("a pivot is outside the range of single precision");
       }
-      return std::make_unique<SimplicialSolver>(std::move(factor), factor_.permutationP());
+      return std::make_unique<SimplicialSolver>(factor, factor_.permutationP());
     } catch (const std::bad_alloc&) {
       return absl::ResourceExhaustedError("out of memory while rounding the factor");
     }

@@ -53,7 +53,8 @@ Centre CentreOf(const std::string& path, Fits fits) {
   for (size_t p = 0; p < pixels.size() / 3; ++p) {
     if (!fits(pixels[3 * p], pixels[3 * p + 1], pixels[3 * p + 2])) continue;
     centre.column += static_cast<double>(p % image.width);
-    centre.row += static_cast<double>(p / image.width);
+    const size_t row = p / image.width;
+    centre.row += static_cast<double>(row);
     ++count;
   }
   EXPECT_GT(count, 100);
