@@ -20,6 +20,7 @@
 #include "client/cli/companion.h"
 #include "client/cli/stage_times.h"
 #include "client/cli/version.h"
+#include "client/plan_report/cautions.h"
 #include "client/plan_report/plan_measures.h"
 #include "client/plan_report/plan_report.h"
 #include "client/rendering/virtual_display.h"
@@ -114,6 +115,9 @@ std::string Outcome(const PlanBuildArguments& arguments, const PlanBuild& build)
                           OsteotomyKindName(segment.cut.kind), segment.volume_mm3 / 1000);
   }
   absl::StrAppendFormat(&text, "report  %s/report.html: %s\n", arguments.out, QualityText(build));
+  for (const std::string& caution : Cautions(build)) {
+    absl::StrAppend(&text, "mind    ", caution, "\n");
+  }
   absl::StrAppendFormat(
       &text, "the plan is ready: tissueform deform %s/plan.json --out after.vtu\n", arguments.out);
   return text;

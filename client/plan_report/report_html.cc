@@ -136,6 +136,15 @@ std::string QualitySection(const Json& checks) {
                    rows, "</table>\n"));
 }
 
+std::string CautionsSection(const Json& cautions) {
+  if (cautions.empty()) return "";
+  std::string items;
+  for (const Json& caution : cautions) {
+    absl::StrAppend(&items, "<li>", EscapeHtml(caution.get<std::string>()), "</li>\n");
+  }
+  return Section("Mind about this CT", absl::StrCat("<ul>\n", items, "</ul>\n"));
+}
+
 std::string LegendHtml(const std::vector<LegendEntry>& legend) {
   if (legend.empty()) return "";
   std::string items;
@@ -186,8 +195,9 @@ std::string Tables(const Json& report) {
 }  // namespace
 
 std::string PlanReportHtml(const Json& report, const std::vector<ReportPicture>& pictures) {
-  std::string html = absl::StrCat(kHead, "<h1>Planning model from a CT</h1>\n", Lead(report),
-                                  Facts(report), QualitySection(report["quality"]));
+  std::string html =
+      absl::StrCat(kHead, "<h1>Planning model from a CT</h1>\n", Lead(report), Facts(report),
+                   QualitySection(report["quality"]), CautionsSection(report["cautions"]));
   for (const ReportPicture& picture : pictures) html += PictureHtml(picture);
   return absl::StrCat(html, Tables(report), kFoot);
 }

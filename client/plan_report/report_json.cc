@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "client/plan_report/cautions.h"
 #include "client/plan_report/library_versions.h"
 #include "core/imaging/skin_regions.h"
 #include "core/planning/json_values.h"
@@ -116,6 +117,7 @@ Json LandmarksJson(const Landmarks& landmarks) {
         std::pair("mouth_corner_right", landmarks.mouth_corner.right)}) {
     json[name] = ToJson(point);
   }
+  json["nose_prominence_mm"] = landmarks.nose_prominence_mm;
   for (const auto& [name, plane] : {std::pair("midsagittal_plane", landmarks.midsagittal),
                                     std::pair("lower_teeth_plane", landmarks.lower_teeth),
                                     std::pair("upper_teeth_plane", landmarks.upper_teeth),
@@ -134,6 +136,7 @@ Json SegmentsJson(const PlanBuild& build) {
                         {"osteotomy", std::string(OsteotomyKindName(segment.cut.kind))},
                         {"volume_mm3", segment.volume_mm3},
                         {"pose", ToJson(segment.pose)},
+                        {"largest_move_mm", segment.largest_move_mm},
                         {"planes_from", given ? "recipe" : "anatomy"},
                         {"planes", PlanesJson(segment.cut.planes)}});
   }
@@ -276,6 +279,7 @@ Json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
           {"notice", "research software, not a medical device"},
           {"coordinate_system", "LPS"},
           {"quality", QualityJson(build, measures)},
+          {"cautions", Cautions(build)},
           {"program", ProgramJson(origin)},
           {"input", InputJson(build, origin)},
           {"head", HeadJson(build)},

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 
 #include "core/base/status_macros.h"
 #include "core/imaging/isotropic_resample.h"
@@ -76,6 +76,14 @@ absl::StatusOr<TriangleMesh> SegmentSurface(const LabelGrid& bone, uint8_t label
   return ExtractSurface(GaussianSmooth(SignedDistanceMm(mask), 0.7 * mask.geometry.spacing_mm));
 }
 
+absl::Status CheckMove(const std::string& segment, double largest_move_mm) {
+  if (largest_move_mm <= kMostMoveMm) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrFormat("the \"pose\" of segment \"%s\" moves some of its bone by %.1f mm; a plan "
+                      "moves bone by at most %g mm (is the pivot where the bone is, in mm, LPS?)",
+                      segment, largest_move_mm, kMostMoveMm));
+}
+
 absl::Status CutBone(Progress* progress, PlanBuild* build) {
   progress->Begin("cutting the bone", 0.46, 0.5);
   std::vector<OsteotomySegment> cuts;
@@ -87,11 +95,15 @@ absl::Status CutBone(Progress* progress, PlanBuild* build) {
   TF_ASSIGN_OR_RETURN(build->bone, CutSegments(build->parts.labels, cuts));
   for (size_t s = 0; s < cuts.size(); ++s) {
     const auto label = static_cast<uint8_t>(kFirstSegment + s);
+    const HandlePose& pose = build->recipe.segments[s].pose;
+    const double largest_move_mm = LargestMoveMm(build->bone, label, pose);
+    TF_RETURN_IF_ERROR(CheckMove(cuts[s].name, largest_move_mm));
     TF_ASSIGN_OR_RETURN(TriangleMesh surface, SegmentSurface(build->bone, label));
     const auto voxels = std::count(build->bone.values.begin(), build->bone.values.end(), label);
     build->segments.push_back(
         {.cut = std::move(cuts[s]),
-         .pose = build->recipe.segments[s].pose,
+         .pose = pose,
+         .largest_move_mm = largest_move_mm,
          .volume_mm3 = static_cast<double>(voxels) * VoxelVolumeMm3(build->bone.geometry),
          .surface = std::move(surface)});
   }
@@ -140,10 +152,11 @@ absl::Status Mesh(Progress* progress, PlanBuild* build) {
 
 double BandMm(const PlanBuild& build) {
   if (build.recipe.contact_band_mm) return *build.recipe.contact_band_mm;
-  std::vector<HandlePose> poses;
-  for (const BuiltSegment& segment : build.segments) poses.push_back(segment.pose);
-  return std::max(kBandVoxels * build.recipe.spacing_mm,
-                  kBandOfMove * LargestMoveMm(build.bone, poses));
+  double largest_move_mm = 0;
+  for (const BuiltSegment& segment : build.segments) {
+    largest_move_mm = std::max(largest_move_mm, segment.largest_move_mm);
+  }
+  return std::max(kBandVoxels * build.recipe.spacing_mm, kBandOfMove * largest_move_mm);
 }
 
 absl::Status Describe(int threads, Progress* progress, PlanBuild* build) {

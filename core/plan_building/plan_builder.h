@@ -26,10 +26,14 @@
 
 namespace tissueform {
 
+// More than any jaw is moved: what is above comes from a slip in the recipe.
+inline constexpr double kMostMoveMm = 50;
+
 // A piece of bone that moves.
 struct BuiltSegment {
   OsteotomySegment cut;  // with the planes that were used
   HandlePose pose;
+  double largest_move_mm = 0;  // of the voxel that the pose moves farthest; at most kMostMoveMm
   double volume_mm3 = 0;
   TriangleMesh surface;  // closed, LPS
 };

@@ -175,15 +175,12 @@ std::vector<uint8_t> RegionsOfSkin(const TetMesh& mesh, const std::vector<bool>&
 
 }  // namespace
 
-double LargestMoveMm(const LabelGrid& labels, const std::vector<HandlePose>& poses) {
+double LargestMoveMm(const LabelGrid& labels, uint8_t label, const HandlePose& pose) {
   double largest = 0;
-  for (size_t s = 0; s < poses.size(); ++s) {
-    const LabelGrid segment =
-        MaskWhere(labels, [s](uint8_t label) { return label == kFirstSegment + s; });
-    ForEachVoxel(segment, [&](size_t /*index*/, const Eigen::Vector3d& place) {
-      largest = std::max(largest, (ApplyPose(poses[s], place) - place).norm());
-    });
-  }
+  const LabelGrid segment = MaskWhere(labels, [label](uint8_t value) { return value == label; });
+  ForEachVoxel(segment, [&](size_t /*index*/, const Eigen::Vector3d& place) {
+    largest = std::max(largest, (ApplyPose(pose, place) - place).norm());
+  });
   return largest;
 }
 

@@ -34,8 +34,8 @@ struct PlanningRegions {
   int64_t freed_by_contact = 0;  // vertices on bone that were left free
 };
 
-// How far the farthest voxel of a segment moves, in mm: the largest over all of them.
-double LargestMoveMm(const LabelGrid& labels, const std::vector<HandlePose>& poses);
+// How far the farthest voxel with `label` moves, in mm; 0 when there is none.
+double LargestMoveMm(const LabelGrid& labels, uint8_t label, const HandlePose& pose);
 
 // A vertex of the boundary is on a cut where a plane of the region is nearer than 0.6 voxels, and
 // on what the nearest voxel outside the soft tissue is: bone that stays, a segment, or air.

@@ -19,6 +19,7 @@ nlohmann::ordered_json SmallReport(bool passed) {
   return nlohmann::ordered_json{
       {"quality",
        {{{"requirement", kAttack}, {"required", kAttack}, {"measured", "1"}, {"passed", passed}}}},
+      {"cautions", {kAttack}},
       {"program", {{"tissueform", kAttack}}},
       {"input", {{"format", kAttack}, {"notes", {kAttack}}}},
       {"head", {{"removed_mm3", 1.0}}},
@@ -44,6 +45,15 @@ TEST(ReportHtmlTest, NoTextOfTheReportIsMarkup) {
   const std::string html = PlanReportHtml(SmallReport(true), {picture});
   EXPECT_THAT(html, AllOf(Not(HasSubstr("<script")), HasSubstr("&lt;script&gt;"),
                           Not(HasSubstr(")\"'")), Not(HasSubstr("http"))));
+}
+
+TEST(ReportHtmlTest, CautionsHaveASectionIfThereAreAny) {
+  nlohmann::ordered_json report = SmallReport(true);
+  report["cautions"] = {"no nose", "no chin"};
+  EXPECT_THAT(PlanReportHtml(report, {}),
+              AllOf(HasSubstr("Mind about this CT"), HasSubstr("<li>no nose</li>\n<li>no chin")));
+  report["cautions"] = nlohmann::ordered_json::array();
+  EXPECT_THAT(PlanReportHtml(report, {}), Not(HasSubstr("Mind about this CT")));
 }
 
 TEST(ReportHtmlTest, PageSaysWhatIsMetAndThatItIsNoMedicalDevice) {

@@ -80,6 +80,8 @@ TEST(LandmarksTest, ThoseOfALivingHeadAreWherePicturesShowThem) {
   ExpectNear(l.upper_lip, {-97, 27, -90}, 7, "upper lip");
   ExpectNear(l.lower_lip, {-97, 39, -109}, 7, "lower lip");
   EXPECT_NEAR(l.nasal_floor.z(), -63, 6);
+  EXPECT_GT(l.nose_prominence_mm, 5);
+  EXPECT_LT(l.nose_prominence_mm, 20);
 }
 
 TEST(LandmarksTest, WhatIsNotInViewIsNamed) {

@@ -88,6 +88,11 @@ TEST(PlanBuilderTest, FirstErrorIsTold) {
   recipe.segments[0].planes = {{Eigen::Vector3d(0, 0, 5000), Eigen::Vector3d::UnitZ()}};
   EXPECT_THAT(BuildPlan(BundledCt(), recipe),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("mandible")));
+  recipe = CoarseRecipe();
+  recipe.segments[0].pose.translation_mm = {0, -300, 0};
+  EXPECT_THAT(BuildPlan(BundledCt(), recipe),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       HasSubstr("segment \"mandible\" moves some of its bone by 300.0 mm")));
 }
 
 // What issue-tracker and README promise of the bundled plans.

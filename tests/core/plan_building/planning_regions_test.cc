@@ -129,8 +129,10 @@ TEST(PlanningRegionsTest, LargestMoveIsThatOfTheFarthestVoxel) {
   labels.At(5, 0, 0) = kFixedBone;
   HandlePose pose;
   pose.rotation_vector = {0, 0, EIGEN_PI / 2};
-  EXPECT_NEAR(LargestMoveMm(labels, {pose}), 10 * std::sqrt(2.0), 1e-12);
-  EXPECT_EQ(LargestMoveMm(labels, {HandlePose()}), 0);
+  EXPECT_NEAR(LargestMoveMm(labels, kFirstSegment, pose), 10 * std::sqrt(2.0), 1e-12);
+  EXPECT_NEAR(LargestMoveMm(labels, kFixedBone, pose), 5 * std::sqrt(2.0), 1e-12);
+  EXPECT_EQ(LargestMoveMm(labels, kFirstSegment + 1, pose), 0);
+  EXPECT_EQ(LargestMoveMm(labels, kFirstSegment, HandlePose()), 0);
 }
 
 }  // namespace

@@ -1,0 +1,45 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/plan_report/cautions.h"
+
+#include "absl/strings/str_format.h"
+
+namespace tissueform {
+namespace {
+
+// A nose stands some 8 to 15 mm before the skin 10 mm beside its tip.
+constexpr double kFlatNoseMm = 3;
+// Below, skin follows freely where the neck would hold it.
+constexpr double kLittleUnderChinMm = 15;
+
+}  // namespace
+
+std::vector<std::string> Cautions(const PlanBuild& build) {
+  std::vector<std::string> cautions;
+  const double nose_mm = build.landmarks.nose_prominence_mm;
+  if (nose_mm < kFlatNoseMm) {
+    cautions.push_back(absl::StrFormat(
+        "The nose is cut off or pressed flat in this CT: its foremost skin stands %.1f mm before "
+        "the skin 10 mm beside it. There is no tip to predict, and what is called nose lies near "
+        "the upper lip and moves more than a tip does.",
+        nose_mm));
+  }
+  const GridGeometry& grid = build.head.hu.geometry;
+  const double under_chin_mm =
+      build.landmarks.menton.z() - (grid.origin_mm.z() - grid.spacing_mm / 2);
+  if (under_chin_mm < kLittleUnderChinMm) {
+    cautions.push_back(
+        absl::StrFormat("The CT ends %.0f mm under the bone of the chin: the neck, which holds the "
+                        "skin there, is missing, and the skin under the chin moves too much.",
+                        under_chin_mm));
+  }
+  if (build.parts.separation == JawSeparation::kAutomaticCut) {
+    cautions.push_back(
+        "Upper and lower teeth touch in this CT and were cut apart by a plane that was found: look "
+        "at the bone's picture, and give \"occlusal_plane\" in the recipe if it cuts teeth.");
+  }
+  return cautions;
+}
+
+}  // namespace tissueform
