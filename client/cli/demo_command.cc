@@ -11,6 +11,7 @@
 #include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -22,6 +23,7 @@
 #include "client/cli/demo_prediction.h"
 #include "client/cli/demo_report.h"
 #include "client/cli/drag.h"
+#include "client/cli/face_movement.h"
 #include "client/cli/handle_words.h"
 #include "client/cli/plan_session.h"
 #include "client/cli/result_writer.h"
@@ -86,18 +88,20 @@ absl::Status MakeFolder(const DemoOptions& options) {
 struct DemoCase {
   Plan plan;
   PlanProblem problem;
+  std::vector<ComparedRegion> face;
 };
 
 absl::StatusOr<DemoCase> ReadCase(const DemoOptions& options) {
   TF_ASSIGN_OR_RETURN(const std::string path, FindDemoPlan(options.plan));
   TF_ASSIGN_OR_RETURN(Plan plan, ReadPlan(path));
   TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan));
+  TF_ASSIGN_OR_RETURN(std::vector<ComparedRegion> face, FaceRegions(problem));
   if (options.plan.empty()) {
     for (HandlePose& pose : problem.poses) pose = PartOfPose(pose, kHeadReach);
   }
   absl::PrintF("plan %s: %d vertices, %d tets\n", path, problem.mesh->num_vertices(),
                problem.mesh->num_tets());
-  return DemoCase{std::move(plan), std::move(problem)};
+  return DemoCase{std::move(plan), std::move(problem), std::move(face)};
 }
 
 double LargestDistance(const Positions& a, const Positions& b) {
@@ -182,7 +186,8 @@ absl::Status DragAndPredict(const DemoOptions& options, const DemoCase& demo,
   TF_RETURN_IF_ERROR(CheckNotInterrupted());
   const std::string& name = description.name();
   TF_ASSIGN_OR_RETURN(const DragResult drag, Drag(options, demo.problem, client, name));
-  TF_ASSIGN_OR_RETURN(const DemoPrediction prediction, PredictAtEnd(demo.problem, client, name));
+  TF_ASSIGN_OR_RETURN(const DemoPrediction prediction,
+                      PredictAtEnd(demo.problem, demo.face, client, name));
   DragSummary summary = SummarizeDrag(drag);
   TF_RETURN_IF_ERROR(CheckFrames(demo.problem, drag, prediction.deformed, client, name, &summary));
   TF_RETURN_IF_ERROR(CheckNotInterrupted());

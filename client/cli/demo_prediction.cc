@@ -44,8 +44,9 @@ OrderedJson ToJson(const Movement& movement) {
 
 }  // namespace
 
-absl::StatusOr<DemoPrediction> PredictAtEnd(const PlanProblem& problem, TissueformClient* client,
-                                            const std::string& session) {
+absl::StatusOr<DemoPrediction> PredictAtEnd(const PlanProblem& problem,
+                                            const std::vector<ComparedRegion>& face,
+                                            TissueformClient* client, const std::string& session) {
   DemoPrediction prediction;
   const std::vector<NamedPose> poses = NamedPoses(problem);
   TF_ASSIGN_OR_RETURN(const v1::DeformOnceResponse answer, client->DeformOnce(session, poses));
@@ -55,7 +56,6 @@ absl::StatusOr<DemoPrediction> PredictAtEnd(const PlanProblem& problem, Tissuefo
   prediction.model = ModelName(problem.deformer.model);
   prediction.tets = problem.mesh->num_tets();
   prediction.inverted_tets = answer.quality().inverted_tet_count();
-  const std::vector<ComparedRegion> face = FaceRegions(problem);
   prediction.movement = MeasureMovement(face, problem.mesh->positions(), prediction.deformed);
 
   const DeformationModel other = OtherModel(problem.deformer.model);

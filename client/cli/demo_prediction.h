@@ -33,9 +33,11 @@ struct DemoPrediction {
 };
 
 // Asks the server for the end pose by the plan's model, and by linear_elastic (gradient_field where
-// the plan's is that) of the same session. Errors: those of DeformOnce with the plan's model.
-absl::StatusOr<DemoPrediction> PredictAtEnd(const PlanProblem& problem, TissueformClient* client,
-                                            const std::string& session);
+// the plan's is that) of the same session. `face` are the FaceRegions of the problem. Errors: those
+// of DeformOnce with the plan's model.
+absl::StatusOr<DemoPrediction> PredictAtEnd(const PlanProblem& problem,
+                                            const std::vector<ComparedRegion>& face,
+                                            TissueformClient* client, const std::string& session);
 
 // Keys of summary.json.
 void AddToJson(const DemoPrediction& prediction, nlohmann::ordered_json* json);

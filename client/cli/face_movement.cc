@@ -6,16 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
-#include <utility>
 
-#include "core/imaging/skin_regions.h"
+#include "core/base/status_macros.h"
+#include "core/mesh/skin_region.h"
 #include "core/mesh/tet_topology.h"
-#include "core/mesh_io/tet_mesh_io.h"
+#include "core/planning/skin_places.h"
 
 namespace tissueform {
 namespace {
-
-constexpr char kRegionArray[] = "skin_region";
 
 struct RegionWords {
   SkinRegion region;
@@ -30,19 +28,6 @@ constexpr std::array<RegionWords, 6> kRegions = {{{SkinRegion::kChin, "chin"},
                                                   {SkinRegion::kLeftCheek, "left cheek"},
                                                   {SkinRegion::kRightCheek, "right cheek"}}};
 
-std::vector<int32_t> VerticesEqual(const std::vector<double>& values, SkinRegion region) {
-  std::vector<int32_t> vertices;
-  for (size_t v = 0; v < values.size(); ++v) {
-    if (values[v] == static_cast<double>(region)) vertices.push_back(static_cast<int32_t>(v));
-  }
-  return vertices;
-}
-
-int32_t Foremost(const std::vector<int32_t>& vertices, const Positions& rest) {
-  return *std::min_element(vertices.begin(), vertices.end(),
-                           [&](int32_t a, int32_t b) { return rest(a, 1) < rest(b, 1); });
-}
-
 }  // namespace
 
 std::vector<int32_t> FreeSkin(const PlanProblem& problem) {
@@ -53,14 +38,12 @@ std::vector<int32_t> FreeSkin(const PlanProblem& problem) {
   return free;
 }
 
-std::vector<ComparedRegion> FaceRegions(const PlanProblem& problem) {
-  const Attribute* array = FindAttribute(problem.point_data, kRegionArray);
-  if (array == nullptr || array->components != 1) return {};
-  const std::vector<double> values = ToDoubles(*array);
+absl::StatusOr<std::vector<ComparedRegion>> FaceRegions(const PlanProblem& problem) {
+  TF_ASSIGN_OR_RETURN(const std::vector<SkinPlace> places, SkinPlaces(problem.point_data));
   std::vector<ComparedRegion> regions;
   for (const auto& [region, words] : kRegions) {
-    ComparedRegion found{words, VerticesEqual(values, region)};
-    if (!found.vertices.empty()) regions.push_back(std::move(found));
+    const SkinPlace* place = FindPlace(places, SkinRegionName(region));
+    if (place != nullptr) regions.push_back({words, place->vertices});
   }
   return regions;
 }
@@ -71,7 +54,7 @@ std::vector<RegionMovement> MeasureMovement(const std::vector<ComparedRegion>& r
   const Eigen::VectorXd forward = rest.col(1) - deformed.col(1);
   std::vector<RegionMovement> movements;
   for (const auto& [name, vertices] : regions) {
-    const int32_t tip = Foremost(vertices, rest);
+    const int32_t tip = ForemostVertex(rest, vertices);
     movements.push_back({.name = name,
                          .vertices = static_cast<int64_t>(vertices.size()),
                          .foremost = {total[tip], forward[tip]},

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "absl/status/statusor.h"
+
 #include "client/cli/comparison_report.h"
 #include "core/base/types.h"
 #include "core/planning/plan.h"
@@ -17,9 +19,9 @@ namespace tissueform {
 // lines the mouth and the airway.
 std::vector<int32_t> FreeSkin(const PlanProblem& problem);
 
-// The named places of a face that the mesh has, "chin" and others, by its point array skin_region
-// (docs/plan-format.md). Empty for a mesh without that array.
-std::vector<ComparedRegion> FaceRegions(const PlanProblem& problem);
+// The named places of a face that the mesh has, in words for people: chin, lower lip, upper lip,
+// nose, left cheek, right cheek. Empty for a mesh that has none. Errors: those of SkinPlaces.
+absl::StatusOr<std::vector<ComparedRegion>> FaceRegions(const PlanProblem& problem);
 
 // How far skin goes, and how far of that to the front (-y of LPS), in mm.
 struct Movement {

@@ -9,11 +9,11 @@
 
 #include "absl/status/statusor.h"
 
-#include "client/experiments/skin_places.h"
 #include "client/rendering/scene.h"
 #include "core/constraints/constraint_set.h"
 #include "core/constraints/handle_pose.h"
 #include "core/mesh/tet_mesh.h"
+#include "core/planning/skin_places.h"
 
 namespace tissueform {
 

@@ -11,10 +11,14 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "core/mesh/skin_region.h"
+#include "core/planning/skin_places.h"
+
 namespace tissueform {
 namespace {
 
-constexpr std::array<const char*, 4> kProfile = {"chin", "lower_lip", "upper_lip", "nose"};
+constexpr std::array<SkinRegion, 4> kProfile = {SkinRegion::kChin, SkinRegion::kLowerLip,
+                                                SkinRegion::kUpperLip, SkinRegion::kNose};
 
 struct PlaceMovement {
   int32_t vertex = 0;           // the foremost one
@@ -30,7 +34,7 @@ double LeftMm(const Eigen::RowVector3d& lps_mm) { return lps_mm.x(); }
 PlaceMovement MovementOf(const AccuracyCase& problem, const SkinPlace& place,
                          const ModelAnswer& answer) {
   const Positions& rest = problem.mesh.positions();
-  const int32_t vertex = ForemostVertex(rest, place);
+  const int32_t vertex = ForemostVertex(rest, place.vertices);
   const Positions moved =
       answer.positions(place.vertices, Eigen::all) - rest(place.vertices, Eigen::all);
   return {vertex, answer.positions.row(vertex) - rest.row(vertex), moved.colwise().mean()};
@@ -38,8 +42,9 @@ PlaceMovement MovementOf(const AccuracyCase& problem, const SkinPlace& place,
 
 std::vector<SkinPlace> ProfileOf(const AccuracyCase& problem) {
   std::vector<SkinPlace> profile;
-  for (const char* name : kProfile) {
-    if (const SkinPlace* place = FindPlace(problem.places, name)) profile.push_back(*place);
+  for (const SkinRegion region : kProfile) {
+    const SkinPlace* place = FindPlace(problem.places, SkinRegionName(region));
+    if (place != nullptr) profile.push_back(*place);
   }
   return profile;
 }

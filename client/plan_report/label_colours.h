@@ -6,7 +6,7 @@
 #include <cstddef>
 
 #include "client/rendering/scene.h"
-#include "core/imaging/skin_regions.h"
+#include "core/mesh/skin_region.h"
 
 namespace tissueform {
 

@@ -3,7 +3,6 @@
 
 #include "core/imaging/skin_regions.h"
 
-#include <array>
 #include <cmath>
 
 namespace tissueform {
@@ -84,12 +83,6 @@ class RegionRules {
 };
 
 }  // namespace
-
-absl::string_view SkinRegionName(SkinRegion region) {
-  constexpr std::array<absl::string_view, 7> kNames = {"none", "upper_lip",  "lower_lip",  "chin",
-                                                       "nose", "cheek_left", "cheek_right"};
-  return kNames[static_cast<size_t>(region)];
-}
 
 std::vector<SkinRegion> NameSkinRegions(const Positions& positions_mm, const Landmarks& landmarks) {
   const RegionRules rules(landmarks);

@@ -3,29 +3,13 @@
 
 #pragma once
 
-#include <cstdint>
 #include <vector>
-
-#include "absl/strings/string_view.h"
 
 #include "core/base/types.h"
 #include "core/imaging/landmarks.h"
+#include "core/mesh/skin_region.h"
 
 namespace tissueform {
-
-// Names of places on the face's skin.
-enum class SkinRegion : uint8_t {
-  kNone = 0,
-  kUpperLip = 1,
-  kLowerLip = 2,
-  kChin = 3,
-  kNose = 4,
-  kLeftCheek = 5,  // of the patient
-  kRightCheek = 6,
-};
-
-// "none", "upper_lip", "lower_lip", "chin", "nose", "cheek_left", "cheek_right".
-absl::string_view SkinRegionName(SkinRegion region);
 
 // The region of every position of the skin, by rules from the landmarks. With x to the left of the
 // midsagittal plane, z along the upper teeth's normal (up) and y square to both (back):

@@ -20,7 +20,7 @@
 #include "client/cli/server_process.h"
 #include "client/cpp/tissueform_client.h"
 #include "client/rendering/virtual_display.h"
-#include "core/imaging/skin_regions.h"
+#include "core/mesh/skin_region.h"
 #include "core/mesh/tet_topology.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "core/mesh_io/triangle_mesh_io.h"

@@ -14,6 +14,7 @@ namespace tissueform::testing {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::UnorderedElementsAreArray;
 
@@ -22,19 +23,27 @@ PlanProblem ProblemOf(const std::string& plan) {
 }
 
 TEST(FaceMovementTest, HeadHasAllRegionsAndTheTongueNone) {
+  ASSERT_OK_AND_ASSIGN(const auto regions, FaceRegions(ProblemOf("head_chin")));
   std::vector<std::string> names;
-  for (const ComparedRegion& region : FaceRegions(ProblemOf("head_chin"))) {
-    names.push_back(region.name);
-  }
+  for (const ComparedRegion& region : regions) names.push_back(region.name);
   EXPECT_THAT(names,
               ElementsAre("chin", "lower lip", "upper lip", "nose", "left cheek", "right cheek"));
-  EXPECT_THAT(FaceRegions(ProblemOf("tongue")), IsEmpty());
+  EXPECT_THAT(FaceRegions(ProblemOf("tongue")).value(), IsEmpty());
+}
+
+TEST(FaceMovementTest, RegionsOfThreeComponentsAreRefused) {
+  PlanProblem tongue = ProblemOf("tongue");
+  const auto values = static_cast<size_t>(3 * tongue.mesh->num_vertices());
+  tongue.point_data.push_back({"skin_region", 3, std::vector<uint8_t>(values, 1)});
+  const absl::Status refused = FaceRegions(tongue).status();
+  EXPECT_TRUE(absl::IsInvalidArgument(refused));
+  EXPECT_THAT(refused.message(), HasSubstr("\"skin_region\" has 3 components"));
 }
 
 TEST(FaceMovementTest, RegionsLieWhereTheirNamesSay) {
   const PlanProblem head = ProblemOf("head_chin");
   const Positions& rest = head.mesh->positions();
-  const std::vector<ComparedRegion> regions = FaceRegions(head);
+  const std::vector<ComparedRegion> regions = FaceRegions(head).value();
   const auto middle = [&](size_t r) -> Eigen::Vector3d {
     return rest(regions[r].vertices, Eigen::all).colwise().mean();
   };
@@ -47,7 +56,8 @@ TEST(FaceMovementTest, RegionsLieWhereTheirNamesSay) {
 TEST(FaceMovementTest, RegionsAreOnTheFreeSkin) {
   const PlanProblem head = ProblemOf("head_chin");
   const std::vector<int32_t> skin = FreeSkin(head);
-  for (const auto& [name, vertices] : FaceRegions(head)) {
+  const std::vector<ComparedRegion> regions = FaceRegions(head).value();
+  for (const auto& [name, vertices] : regions) {
     EXPECT_TRUE(std::includes(skin.begin(), skin.end(), vertices.begin(), vertices.end())) << name;
   }
 }

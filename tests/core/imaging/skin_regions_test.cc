@@ -77,10 +77,5 @@ TEST(SkinRegionsTest, RegionsMoveWithTheFace) {
   EXPECT_EQ(RegionsOf(places, moved), before);
 }
 
-TEST(SkinRegionsTest, EveryRegionHasAName) {
-  EXPECT_EQ(SkinRegionName(SkinRegion::kNone), "none");
-  EXPECT_EQ(SkinRegionName(SkinRegion::kRightCheek), "cheek_right");
-}
-
 }  // namespace
 }  // namespace tissueform

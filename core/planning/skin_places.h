@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 
 #include "core/base/types.h"
 #include "core/mesh/attribute.h"
@@ -21,16 +22,17 @@ struct SkinPlace {
 };
 
 // The places on a head's skin by the point array "skin_region" that `tissueform plan build` writes:
-// upper_lip, lower_lip, chin, nose, cheek_left, cheek_right, those that have a vertex, and after
-// them "face", all of these together. None when the mesh has no such array.
+// those of kNamedSkinRegions (core/mesh/skin_region.h) that have a vertex, by their names and in
+// that order, and after them "face", all of these together. None when the mesh has no such array.
 //
 // Errors: InvalidArgument when the array has more than one component.
 absl::StatusOr<std::vector<SkinPlace>> SkinPlaces(const std::vector<Attribute>& point_data);
 
-// The vertex of the place that lies foremost: smallest y, as LPS has it.
-int32_t ForemostVertex(const Positions& positions, const SkinPlace& place);
+// The one of `vertices` that lies foremost: smallest y of `positions` (#V by 3, LPS); of equals the
+// first. REQUIRES: there is one.
+int32_t ForemostVertex(const Positions& positions, const std::vector<int32_t>& vertices);
 
 // Null when there is none of that name.
-const SkinPlace* FindPlace(const std::vector<SkinPlace>& places, const std::string& name);
+const SkinPlace* FindPlace(const std::vector<SkinPlace>& places, absl::string_view name);
 
 }  // namespace tissueform
