@@ -76,8 +76,8 @@ endfunction()
 
 # tissueform_test(core_mesh SOURCES tet_mesh_test.cc DEPS core_mesh LABELS server)
 #
-# One test program a folder, named core_mesh_test; ctest sees every test of it by itself. The target tests-server
-# builds the programs with the label "server".
+# One test program a folder, named core_mesh_test; ctest sees every test of it by itself. The targets tests-server
+# and tests-inputs build the programs with these labels: the server; what reads from outside.
 function(tissueform_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT;PRECOMPILED" "SOURCES;DEPS;LABELS" ${ARGN})
   if(NOT ARG_PRECOMPILED)

@@ -4,16 +4,19 @@
 #
 # Builds and runs tests under sanitizers; ends with ctest's summary.
 #
-#   tests/scripts/run_sanitizers.sh asan [options of ctest]   AddressSanitizer, LeakSanitizer and
-#                                                            UndefinedBehaviorSanitizer, all tests
-#   tests/scripts/run_sanitizers.sh tsan [options of ctest]   ThreadSanitizer, tests with the label "server"
+#   tests/scripts/run_sanitizers.sh asan [options of ctest]          AddressSanitizer, LeakSanitizer and
+#                                                                   UndefinedBehaviorSanitizer, all tests
+#   tests/scripts/run_sanitizers.sh asan-inputs [options of ctest]   the same for the tests with the labels "inputs"
+#                                                                   (what reads from outside) and "server"
+#   tests/scripts/run_sanitizers.sh tsan [options of ctest]          ThreadSanitizer, tests with the label "server"
 #
 # TISSUEFORM_BUILD_DIR and JOBS: see deploy/build.sh.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-preset=${1:?usage: run_sanitizers.sh asan|tsan [options of ctest]}
+run=${1:?usage: run_sanitizers.sh asan|asan-inputs|tsan [options of ctest]}
 shift
+preset=${run%-inputs}
 export TISSUEFORM_BUILD_DIR=${TISSUEFORM_BUILD_DIR:-$PWD/build/$preset}
 suppressions=$PWD/tests/testing
 
@@ -25,8 +28,8 @@ with_suppressions() {
   fi
 }
 
-case $preset in
-  asan)
+case $run in
+  asan | asan-inputs)
     # Every allocation counts; exit code 1 of a leak fails the test.
     ASAN_OPTIONS="detect_leaks=1:strict_string_checks=1:detect_stack_use_after_return=1"
     UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1$(with_suppressions ubsan.supp)"
@@ -35,6 +38,10 @@ case $preset in
     targets=()
     # CalculiX is no code of ours, and what it is compared with runs in other tests, too.
     selection=(--label-exclude '^oracle$')
+    if [[ $run == asan-inputs ]]; then
+      targets=(tests-inputs tests-server)
+      selection+=(--label-regex '^(inputs|server)$')
+    fi
     ;;
   tsan)
     # Debian's libraries are not compiled for it: what they call (memcpy, delete) is not ours to judge.
@@ -45,7 +52,7 @@ case $preset in
     selection=(--label-regex '^server$')
     ;;
   *)
-    echo "run_sanitizers.sh: asan or tsan, not '$preset'" >&2
+    echo "run_sanitizers.sh: asan, asan-inputs or tsan, not '$run'" >&2
     exit 2
     ;;
 esac
