@@ -49,8 +49,8 @@ absl::StatusOr<std::vector<SurfaceLayer>> FixedBone(const LabelGrid& bone) {
   constexpr double kSmallestPieceMm3 = 1000;
   const LabelGrid mask = MaskWhere(bone, [](uint8_t label) { return label == kFixedBone; });
   const double voxel_mm3 = VoxelVolumeMm3(bone.geometry);
-  const Components pieces = ConnectedComponents(
-      mask, Neighbours::kFaces, static_cast<int64_t>(kSmallestPieceMm3 / voxel_mm3));
+  const Components pieces = LabelComponents(mask, Neighbours::kFaces,
+                                            static_cast<int64_t>(kSmallestPieceMm3 / voxel_mm3));
   std::vector<SurfaceLayer> layers;
   for (size_t p = 0; p < pieces.voxels.size(); ++p) {
     LabelGrid piece = pieces.Mask(static_cast<int32_t>(p + 1));

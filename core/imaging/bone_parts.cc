@@ -141,7 +141,7 @@ LabelGrid MarkerLabels(const Markers& markers, const Pieces& others) {
 void RelabelUnmarked(const LabelGrid& bone, const LabelGrid& markers, const PieceShape& mandible,
                      LabelGrid* labels) {
   Pieces pieces;
-  pieces.components = ConnectedComponents(bone, Neighbours::kFaces);
+  pieces.components = LabelComponents(bone, Neighbours::kFaces);
   pieces.shapes = MeasurePieces(pieces.components);
   std::vector<bool> marked(pieces.shapes.size() + 1, false);
   for (size_t i = 0; i < markers.values.size(); ++i) {

@@ -83,7 +83,7 @@ Pieces DensePieces(const HeadSegmentation& head, int threshold_hu, const DentalC
   }
   const double voxels = std::ceil(kSmallestMarkerMm3 / VoxelVolumeMm3(dense.geometry));
   Pieces pieces;
-  pieces.components = ConnectedComponents(dense, Neighbours::kFaces, static_cast<int64_t>(voxels));
+  pieces.components = LabelComponents(dense, Neighbours::kFaces, static_cast<int64_t>(voxels));
   pieces.shapes = MeasurePieces(pieces.components);
   return pieces;
 }

@@ -44,7 +44,7 @@ LabelGrid LargestBody(const LabelGrid& tissue, double radius_mm) {
 LabelGrid WithoutSpecks(const LabelGrid& mask, double smallest_mm3) {
   const double voxels = std::ceil(smallest_mm3 / VoxelVolumeMm3(mask.geometry));
   const Components components =
-      ConnectedComponents(mask, Neighbours::kCorners, static_cast<int64_t>(voxels));
+      LabelComponents(mask, Neighbours::kCorners, static_cast<int64_t>(voxels));
   return MaskWhere(components.labels, [](int32_t label) { return label != 0; });
 }
 

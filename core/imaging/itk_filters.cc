@@ -60,7 +60,7 @@ LabelGrid Components::Mask(int32_t component) const {
   return MaskWhere(labels, [=](int32_t label) { return label == component; });
 }
 
-Components ConnectedComponents(const LabelGrid& mask, Neighbours neighbours, int64_t min_voxels) {
+Components LabelComponents(const LabelGrid& mask, Neighbours neighbours, int64_t min_voxels) {
   auto connected = itk::ConnectedComponentImageFilter<Image<uint8_t>, Image<int32_t>>::New();
   connected->SetInput(View(mask));
   connected->SetFullyConnected(neighbours == Neighbours::kCorners);
@@ -76,7 +76,7 @@ Components ConnectedComponents(const LabelGrid& mask, Neighbours neighbours, int
 }
 
 LabelGrid LargestComponent(const LabelGrid& mask, Neighbours neighbours) {
-  return ConnectedComponents(mask, neighbours).Mask(1);
+  return LabelComponents(mask, neighbours).Mask(1);
 }
 
 FloatGrid DistanceMm(const LabelGrid& mask) {

@@ -33,8 +33,7 @@ struct Components {
 };
 
 // Parts of fewer than `min_voxels` are left out (0).
-Components ConnectedComponents(const LabelGrid& mask, Neighbours neighbours,
-                               int64_t min_voxels = 1);
+Components LabelComponents(const LabelGrid& mask, Neighbours neighbours, int64_t min_voxels = 1);
 
 // The largest part, empty when the mask is.
 LabelGrid LargestComponent(const LabelGrid& mask, Neighbours neighbours);

@@ -59,7 +59,7 @@ LabelGrid SoftVoxels(const LabelGrid& head, const LabelGrid& bone_labels) {
 // connected piece; 2 where a piece reaches a depth that only the brain has, over the jaw joints.
 LabelGrid BrainMarkers(const FloatGrid& depth, double neck_mm, double joint_z_mm) {
   const LabelGrid cores = MaskWhere(depth, [=](float mm) { return mm > neck_mm / 2; });
-  const Components components = ConnectedComponents(cores, Neighbours::kFaces);
+  const Components components = LabelComponents(cores, Neighbours::kFaces);
   std::vector<uint8_t> marker(components.voxels.size() + 1, kFaceMarker);
   marker[0] = 0;
   ForEachVoxel(cores, [&](size_t index, const Eigen::Vector3d& place) {
@@ -99,8 +99,7 @@ LabelGrid Inside(const LabelGrid& mask, const std::vector<Plane>& planes) {
 void FillSmallCavities(double smallest_mm3, LabelGrid* mask) {
   const LabelGrid rest = MaskWhere(*mask, [](uint8_t value) { return value == 0; });
   const double voxels = std::ceil(smallest_mm3 / VoxelVolumeMm3(mask->geometry));
-  const Components large =
-      ConnectedComponents(rest, Neighbours::kFaces, static_cast<int64_t>(voxels));
+  const Components large = LabelComponents(rest, Neighbours::kFaces, static_cast<int64_t>(voxels));
   for (size_t i = 0; i < mask->values.size(); ++i) {
     if (large.labels.values[i] == 0) mask->values[i] = 1;
   }

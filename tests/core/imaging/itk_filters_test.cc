@@ -88,8 +88,8 @@ TEST(ItkFiltersTest, ComponentsComeByFallingSizeAndSpecksAreLeftOut) {
   for (int x = 0; x < 6; ++x) mask.At(x, 5, 5) = 1;
   mask.At(9, 9, 9) = 1;
   mask.At(6, 6, 6) = 1;  // touches the row of six by a corner
-  EXPECT_THAT(ConnectedComponents(mask, Neighbours::kFaces).voxels, ElementsAre(6, 3, 1, 1));
-  const Components corners = ConnectedComponents(mask, Neighbours::kCorners, 2);
+  EXPECT_THAT(LabelComponents(mask, Neighbours::kFaces).voxels, ElementsAre(6, 3, 1, 1));
+  const Components corners = LabelComponents(mask, Neighbours::kCorners, 2);
   EXPECT_THAT(corners.voxels, ElementsAre(7, 3));
   EXPECT_EQ(corners.labels.At(6, 6, 6), 1);
   EXPECT_EQ(corners.labels.At(0, 0, 0), 2);

@@ -189,9 +189,9 @@ TEST_F(SoftTissueOfPhantomTest, AirPartsTheLips) {
 TEST_F(SoftTissueOfPhantomTest, FieldAndLabelsHaveOneVolumeAndOneComponent) {
   const LabelGrid soft =
       MaskWhere(tissue_.labels, [](uint8_t label) { return label == kSoftTissue; });
-  EXPECT_EQ(ConnectedComponents(soft, Neighbours::kFaces).voxels.size(), 1U);
+  EXPECT_EQ(LabelComponents(soft, Neighbours::kFaces).voxels.size(), 1U);
   const LabelGrid inside = MaskWhere(tissue_.field, [](float value) { return value > 0; });
-  EXPECT_EQ(ConnectedComponents(inside, Neighbours::kFaces).voxels.size(), 1U);
+  EXPECT_EQ(LabelComponents(inside, Neighbours::kFaces).voxels.size(), 1U);
   EXPECT_NEAR(FieldVolumeMm3(tissue_.field), tissue_.volume_mm3, 0.02 * tissue_.volume_mm3);
 }
 
