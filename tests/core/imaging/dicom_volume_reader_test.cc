@@ -23,7 +23,26 @@ using tissueform::testing::WorstPhantomError;
 
 constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
 
-using DicomVolumeTest = CtFolder;
+// A value that a slice must not have, or not beside the others, and what is said of it.
+struct BadValue {
+  uint32_t tag;
+  std::string vr;
+  std::string value;
+  std::string message;
+};
+
+class DicomVolumeTest : public CtFolder {
+ protected:
+  // Where only the fifth slice has the value.
+  void ExpectFifthSliceIsRefused(const BadValue& bad) const {
+    std::vector<DicomFile> series = PhantomSeries();
+    series[4].Text(bad.tag, bad.vr, bad.value);
+    WriteSeries(series);
+    EXPECT_THAT(Read(),
+                StatusIs(kInvalid, AllOf(HasSubstr("file 5 of the folder (instance number 5)"),
+                                         HasSubstr(bad.message))));
+  }
+};
 
 void Expect(const absl::StatusOr<CtVolume>& volume, const std::string& message) {
   EXPECT_THAT(volume, StatusIs(kInvalid, HasSubstr(message)));
@@ -171,15 +190,8 @@ TEST_F(DicomVolumeTest, FolderWithoutCtSlicesIsRefusedWithWhatItHolds) {
   Expect(Read({}, "readme.txt"), "the file is no DICOM file");
 }
 
-struct Kind {
-  uint32_t tag;
-  std::string vr;
-  std::string value;
-  std::string message;
-};
-
 TEST_F(DicomVolumeTest, SliceThatIsNoCtSliceIsRefused) {
-  const std::vector<Kind> kinds = {
+  const std::vector<BadValue> values = {
       {DicomFile::kModality, "CS", "MR", "of modality MR"},
       {DicomFile::kSopClass, "UI", "1.2.840.10008.5.1.4.1.1.7", "a photograph or copy of a screen"},
       {DicomFile::kSopClass, "UI", "1.2.840.10008.5.1.4.1.1.77.1.4", "a photograph"},
@@ -188,17 +200,13 @@ TEST_F(DicomVolumeTest, SliceThatIsNoCtSliceIsRefused) {
       {DicomFile::kPhotometric, "CS", "RGB", "a colour image"},
       {DicomFile::kSamplesPerPixel, "US", std::string("\3\0", 2), "a colour image"},
   };
-  for (const Kind& kind : kinds) {
+  for (const BadValue& bad : values) {
+    ExpectFifthSliceIsRefused(bad);
     std::vector<DicomFile> series = PhantomSeries();
-    series[4].Text(kind.tag, kind.vr, kind.value);
+    for (DicomFile& file : series) file.Text(bad.tag, bad.vr, bad.value);
     WriteSeries(series);
     EXPECT_THAT(Read(),
-                StatusIs(kInvalid, AllOf(HasSubstr("file 5 of the folder (instance number 5)"),
-                                         HasSubstr(kind.message))));
-    for (DicomFile& file : series) file.Text(kind.tag, kind.vr, kind.value);
-    WriteSeries(series);
-    EXPECT_THAT(Read(), StatusIs(kInvalid,
-                                 AllOf(HasSubstr("holds no CT slices"), HasSubstr(kind.message))));
+                StatusIs(kInvalid, AllOf(HasSubstr("holds no CT slices"), HasSubstr(bad.message))));
   }
 }
 
@@ -247,20 +255,13 @@ TEST_F(DicomVolumeTest, RoundedPositionsAreAccepted) {
 }
 
 TEST_F(DicomVolumeTest, SlicesThatAreNotOneVolumeAreRefused) {
-  const std::vector<Kind> kinds = {
+  const std::vector<BadValue> values = {
       {DicomFile::kOrientation, "DS", "0\\1\\0\\1\\0\\0", "in orientation"},
       {DicomFile::kPixelSpacing, "DS", "0.75\\0.55", "in pixel spacing"},
       {DicomFile::kRescaleSlope, "DS", "2", "in how values become HU"},
       {DicomFile::kRows, "US", std::string("\x0c\0", 2), "in size (12 x 12 instead of 12 x 10)"},
   };
-  for (const Kind& kind : kinds) {
-    std::vector<DicomFile> series = PhantomSeries();
-    series[4].Text(kind.tag, kind.vr, kind.value);
-    WriteSeries(series);
-    EXPECT_THAT(Read(),
-                StatusIs(kInvalid, AllOf(HasSubstr("file 5 of the folder (instance number 5)"),
-                                         HasSubstr(kind.message))));
-  }
+  for (const BadValue& bad : values) ExpectFifthSliceIsRefused(bad);
 }
 
 TEST_F(DicomVolumeTest, MissingTagsAreNamed) {
