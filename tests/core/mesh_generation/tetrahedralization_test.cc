@@ -5,7 +5,6 @@
 
 #include <limits>
 #include <numbers>
-#include <set>
 
 #include "core/mesh/surface_validation.h"
 #include "core/mesh/tet_quality.h"
@@ -15,6 +14,7 @@
 #include "tests/core/mesh_generation/surfaces.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
+#include "tests/testing/triangle_corners.h"
 
 namespace tissueform {
 namespace {
@@ -24,6 +24,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using tissueform::testing::BoxSurface;
+using tissueform::testing::Corners;
 using tissueform::testing::InsideOut;
 using tissueform::testing::SphereSurface;
 using tissueform::testing::StatusIs;
@@ -32,17 +33,6 @@ using tissueform::testing::VolumeInside;
 using tissueform::testing::WithHole;
 
 double Volume(const TetMesh& mesh) { return TetVolumes(mesh.positions(), mesh.tets()).sum(); }
-
-// The corners of triangles without regard to which comes first.
-std::set<std::array<int32_t, 3>> Corners(const TriangleIndices& triangles) {
-  std::set<std::array<int32_t, 3>> corners;
-  for (const auto& t : triangles.rowwise()) {
-    std::array<int32_t, 3> sorted = {t[0], t[1], t[2]};
-    std::sort(sorted.begin(), sorted.end());
-    corners.insert(sorted);
-  }
-  return corners;
-}
 
 TEST(TetrahedralizationTest, SphereIsFilledWithGoodTetsAndKeepsItsSurface) {
   const TriangleMesh sphere = SphereSurface({5, -3, 2}, 10, 8);

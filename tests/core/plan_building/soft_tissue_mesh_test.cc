@@ -4,17 +4,16 @@
 #include "core/plan_building/soft_tissue_mesh.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
-#include <set>
 #include <string>
 
 #include "core/mesh/tet_topology.h"
 #include "core/mesh/validation.h"
 #include "core/mesh_generation/surface_defects.h"
 #include "tests/testing/status_matchers.h"
+#include "tests/testing/triangle_corners.h"
 
 namespace tissueform {
 namespace {
@@ -22,6 +21,7 @@ namespace {
 using Eigen::Vector3d;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using tissueform::testing::Corners;
 using tissueform::testing::IsOk;
 using tissueform::testing::StatusIs;
 
@@ -69,16 +69,6 @@ void ExpectGoodMesh(const SoftTissueMesh& made, double spacing_mm) {
   EXPECT_LT(made.report.from_isosurface.mean_mm, 0.6 * spacing_mm);
   EXPECT_LT(made.report.from_isosurface.p99_mm, 2 * spacing_mm);
   EXPECT_THAT(CheckMeshable(FindSurfaceDefects(made.surface)), IsOk());
-}
-
-std::set<std::array<int32_t, 3>> Corners(const TriangleIndices& triangles) {
-  std::set<std::array<int32_t, 3>> corners;
-  for (const auto& t : triangles.rowwise()) {
-    std::array<int32_t, 3> sorted = {t[0], t[1], t[2]};
-    std::sort(sorted.begin(), sorted.end());
-    corners.insert(sorted);
-  }
-  return corners;
 }
 
 TEST(SoftTissueMeshTest, ShellIsFilledRoundItsCavity) {
