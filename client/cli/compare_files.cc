@@ -13,6 +13,7 @@
 #include "absl/strings/str_format.h"
 
 #include "client/cli/comparison_report.h"
+#include "client/cli/report_parts.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
 #include "core/mesh_io/tet_mesh_io.h"
@@ -85,7 +86,7 @@ void PrintJson(const CompareOptions& options, const FileComparison& comparison) 
       json["regions"][label] = DistancesToJson(distances);
     }
   }
-  PrintComparisonJson(json);
+  PrintJsonReport(json);
 }
 
 absl::Status Report(const CompareOptions& options, const FileComparison& comparison) {

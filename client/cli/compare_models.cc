@@ -15,6 +15,7 @@
 #include "absl/strings/str_format.h"
 
 #include "client/cli/comparison_report.h"
+#include "client/cli/report_parts.h"
 #include "client/cli/result_writer.h"
 #include "client/cli/stage_progress.h"
 #include "core/base/atomic_file.h"
@@ -199,7 +200,7 @@ void PrintJson(const CompareOptions& options, const ModelComparison& comparison)
   for (const ModelResult& result : comparison.results) {
     json["models"][result.model] = ResultToJson(result);
   }
-  PrintComparisonJson(json);
+  PrintJsonReport(json);
 }
 
 void PrintTables(const CompareOptions& options, const ModelComparison& comparison) {

@@ -3,7 +3,6 @@
 
 #include "client/cli/comparison_report.h"
 
-#include <iostream>
 #include <numeric>
 #include <utility>
 
@@ -69,10 +68,6 @@ void PrintDistances(const std::vector<RegionDistances>& regions) {
 OrderedJson DistancesToJson(const DistanceSummary& summary) {
   return {{"vertices", summary.count}, {"mean_mm", summary.mean_mm}, {"p50_mm", summary.p50_mm},
           {"p90_mm", summary.p90_mm},  {"p95_mm", summary.p95_mm},   {"max_mm", summary.max_mm}};
-}
-
-void PrintComparisonJson(const OrderedJson& json) {
-  std::cout << json.dump(2, ' ', false, OrderedJson::error_handler_t::replace) << '\n';
 }
 
 CsvTable DistanceTable(std::vector<std::string> leading) {

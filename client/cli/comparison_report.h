@@ -47,7 +47,6 @@ void PrintDistanceHeadline();
 void PrintDistances(const std::vector<RegionDistances>& regions);
 
 nlohmann::ordered_json DistancesToJson(const DistanceSummary& summary);
-void PrintComparisonJson(const nlohmann::ordered_json& json);
 
 // CSV: columns "region", "vertices" and the five figures, after those in `leading`.
 CsvTable DistanceTable(std::vector<std::string> leading);

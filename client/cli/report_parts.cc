@@ -68,9 +68,13 @@ OrderedJson DefectsJson(const std::vector<MeshDefect>& defects) {
   return json;
 }
 
+void PrintJsonReport(const OrderedJson& json) {
+  std::cout << json.dump(2, ' ', false, OrderedJson::error_handler_t::replace) << '\n';
+}
+
 void PrintReport(bool as_json, const std::string& text, const OrderedJson& json) {
   if (as_json) {
-    std::cout << json.dump(2, ' ', false, OrderedJson::error_handler_t::replace) << '\n';
+    PrintJsonReport(json);
   } else {
     std::cout << text;
   }

@@ -13,7 +13,7 @@
 
 namespace tissueform {
 
-// What the reports on meshes of tets and on surfaces have in common.
+// What reports have in common.
 
 // "anatomy (int32), normal (float32 x 3)", or "none".
 std::string ArraysText(const std::vector<Attribute>& attributes);
@@ -22,6 +22,9 @@ nlohmann::ordered_json ArraysJson(const std::vector<Attribute>& attributes);
 // One line a defect, or one that says that there is none.
 std::string DefectsText(const std::vector<MeshDefect>& defects);
 nlohmann::ordered_json DefectsJson(const std::vector<MeshDefect>& defects);
+
+// Prints a report for programs on stdout.
+void PrintJsonReport(const nlohmann::ordered_json& json);
 
 // Prints the one or the other on stdout.
 void PrintReport(bool as_json, const std::string& text, const nlohmann::ordered_json& json);
