@@ -21,7 +21,8 @@ struct CompanionCommand {
 inline constexpr CompanionCommand kRunCommand = {"run", "predict through a tissueform-server",
                                                  "tissueform-online"};
 inline constexpr CompanionCommand kDemoCommand = {
-    "demo", "drag a handle of a bundled mesh through a server, end to end", "tissueform-online"};
+    "demo", "drag the lower jaw of the bundled real head through a server, end to end",
+    "tissueform-online"};
 inline constexpr CompanionCommand kExperimentsCommand = {
     "experiments", "compute the paper's figures and table again, and the models' accuracy",
     "tissueform-experiments"};
