@@ -184,7 +184,7 @@ Json MeshJson(const PlanBuild& build, const PlanMeasures& measures) {
           {"smallest_dihedral_histogram_deg", HistogramJson(DihedralHistogram(measures))}};
 }
 
-Json DistanceJson(const DistanceSummary& distance) {
+Json DistanceJson(const SurfaceDistances& distance) {
   return {{"mean_mm", distance.mean_mm}, {"p99_mm", distance.p99_mm}, {"max_mm", distance.max_mm}};
 }
 
@@ -233,9 +233,7 @@ Json RegionsJson(const PlanBuild& build) {
     handles[build.segments[s].cut.name] = CountOf(regions.anatomy, kFirstSegment + s);
   }
   Json skin = Json::object();
-  for (const SkinRegion region :
-       {SkinRegion::kUpperLip, SkinRegion::kLowerLip, SkinRegion::kChin, SkinRegion::kNose,
-        SkinRegion::kLeftCheek, SkinRegion::kRightCheek}) {
+  for (const SkinRegion region : kNamedSkinRegions) {
     skin[std::string(SkinRegionName(region))] =
         CountOf(regions.skin_region, static_cast<size_t>(region));
   }

@@ -60,7 +60,7 @@ TetrahedralizationOptions Filling(const SoftTissueMeshOptions& options, double e
   return filling;
 }
 
-DistanceSummary Summarize(Eigen::VectorXd distances) {
+SurfaceDistances Summarize(Eigen::VectorXd distances) {
   std::sort(distances.begin(), distances.end());
   const auto rank = static_cast<Eigen::Index>(0.99 * static_cast<double>(distances.size() - 1));
   return {distances.mean(), distances[rank], distances[distances.size() - 1]};

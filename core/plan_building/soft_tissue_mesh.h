@@ -41,7 +41,7 @@ struct SoftTissueMeshOptions {
 };
 
 // How far points lie from a surface.
-struct DistanceSummary {
+struct SurfaceDistances {
   double mean_mm = 0;
   double p99_mm = 0;
   double max_mm = 0;
@@ -57,8 +57,8 @@ struct SoftTissueMeshReport {
   double volume_ratio = 0;     // of the mesh's volume to the grid's
   TetQualitySummary quality;
   Eigen::Index tets_below_3_deg = 0;  // smallest dihedral angle under 3 degrees
-  DistanceSummary to_isosurface;      // from the vertices of the mesh's boundary
-  DistanceSummary from_isosurface;    // of the isosurface's vertices to the mesh's boundary
+  SurfaceDistances to_isosurface;     // from the vertices of the mesh's boundary
+  SurfaceDistances from_isosurface;   // of the isosurface's vertices to the mesh's boundary
 };
 
 struct SoftTissueMesh {

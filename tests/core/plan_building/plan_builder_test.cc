@@ -5,14 +5,17 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <limits>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
 #include "core/deformation/deformation_quality.h"
+#include "core/mesh/skin_region.h"
 #include "core/mesh/validation.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "core/planning/plan_io.h"
+#include "core/planning/skin_places.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 
@@ -123,19 +126,14 @@ INSTANTIATE_TEST_SUITE_P(Plans, BundledHeadTest,
                          ::testing::Values("head", "head_maxilla", "head_chin"),
                          [](const auto& test) { return std::string(test.param); });
 
-// How far the foremost vertex of a region of the skin moves.
-double MovementOf(const PlanProblem& problem, const Positions& deformed, double region) {
-  const std::vector<double> of_vertex =
-      ToDoubles(*FindAttribute(problem.point_data, "skin_region"));
-  Eigen::Index foremost = -1;
-  for (Eigen::Index v = 0; v < problem.mesh->num_vertices(); ++v) {
-    const bool here = of_vertex[static_cast<size_t>(v)] == region;
-    if (here && (foremost < 0 ||
-                 problem.mesh->positions()(v, 1) < problem.mesh->positions()(foremost, 1))) {
-      foremost = v;
-    }
-  }
-  return (deformed.row(foremost) - problem.mesh->positions().row(foremost)).norm();
+// How far the foremost vertex of a place of the skin moves.
+double MovementOf(const PlanProblem& problem, const Positions& deformed, SkinRegion region) {
+  const auto places = SkinPlaces(problem.point_data);
+  const SkinPlace* place = places.ok() ? FindPlace(*places, SkinRegionName(region)) : nullptr;
+  if (place == nullptr) return std::numeric_limits<double>::quiet_NaN();
+  const Positions& rest = problem.mesh->positions();
+  const int32_t foremost = ForemostVertex(rest, place->vertices);
+  return (deformed.row(foremost) - rest.row(foremost)).norm();
 }
 
 TEST(BundledMandibleTest, ChinFollowsTheJawAndTheNoseDoesNot) {
@@ -148,11 +146,9 @@ TEST(BundledMandibleTest, ChinFollowsTheJawAndTheNoseDoesNot) {
         const auto deformer,
         CreateDeformer(*problem.mesh, problem.stiffness, problem.constraints, problem.deformer));
     ASSERT_OK_AND_ASSIGN(const Deformation answer, deformer->Deform(problem.poses));
-    constexpr double kChin = 3;
-    constexpr double kNose = 4;
-    EXPECT_GE(MovementOf(problem, answer.positions, kChin), 4);
-    EXPECT_LE(MovementOf(problem, answer.positions, kChin), 6.5);
-    EXPECT_LT(MovementOf(problem, answer.positions, kNose), 1);
+    EXPECT_GE(MovementOf(problem, answer.positions, SkinRegion::kChin), 4);
+    EXPECT_LE(MovementOf(problem, answer.positions, SkinRegion::kChin), 6.5);
+    EXPECT_LT(MovementOf(problem, answer.positions, SkinRegion::kNose), 1);
   }
 }
 
