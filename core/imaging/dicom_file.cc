@@ -10,6 +10,7 @@
 #include <gdcmReader.h>
 #include <limits>
 #include <sstream>
+#include <string_view>
 #include <type_traits>
 
 #include "absl/strings/ascii.h"
@@ -44,6 +45,7 @@ const gdcm::Tag kColumns(0x0028, 0x0011);
 const gdcm::Tag kPixelSpacing(0x0028, 0x0030);
 const gdcm::Tag kRescaleIntercept(0x0028, 0x1052);
 const gdcm::Tag kRescaleSlope(0x0028, 0x1053);
+const gdcm::Tag kLossyImageCompression(0x0028, 0x2110);
 const gdcm::Tag kPixelData(0x7fe0, 0x0010);
 
 std::string TextOf(const gdcm::DataSet& data, const gdcm::Tag& tag) {
@@ -152,13 +154,16 @@ absl::StatusOr<std::vector<double>> ValuesOf(const DicomHeader& header, const gd
   return std::vector<double>(values.begin(), values.end());
 }
 
-// GDCM passes over pixels that are missing at the end of a file.
-bool HoldsAllPixels(const DicomHeader& header, const gdcm::Image& image, size_t file_bytes) {
-  const gdcm::TransferSyntax syntax = image.GetTransferSyntax();
-  const bool compressed =
-      syntax.IsEncapsulated() || syntax == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian;
-  return compressed || (header.pixel_offset <= file_bytes &&
-                        file_bytes - header.pixel_offset >= image.GetBufferLength());
+// GDCM passes over pixels that are missing at the end of a file, and so does its JPEG decoder.
+bool HoldsAllPixels(const DicomHeader& header, const gdcm::Image& image,
+                    const std::string& contents) {
+  if (header.pixel_offset > contents.size()) return false;
+  if (image.GetTransferSyntax().IsEncapsulated()) {
+    // Sequence delimitation item (PS3.5, A.4): what compressed pixels end with.
+    constexpr std::string_view kEnd("\xfe\xff\xdd\xe0\0\0\0\0", 8);
+    return contents.find(kEnd, header.pixel_offset) != std::string::npos;
+  }
+  return contents.size() - header.pixel_offset >= image.GetBufferLength();
 }
 
 }  // namespace
@@ -186,6 +191,8 @@ std::string DescribeKind(const DicomHeader& header) {
       return "a multi-frame (enhanced) image, which is not read: export it as single slices";
     case DicomKind::kColour:
       return "a colour image";
+    case DicomKind::kDeflated:
+      return "a deflated file, which is not read: export it in another transfer syntax";
     case DicomKind::kNoImage:
       return "no image";
     case DicomKind::kDirectory:
@@ -199,10 +206,16 @@ std::optional<DicomHeader> ReadDicomHeader(const std::string& path) {
   reader.SetFileName(path.c_str());
   if (!reader.CanRead()) return std::nullopt;
   // A skipped tag is left unread: the stream stands where its value begins.
-  if (!reader.ReadUpToTag(kPixelData, {kPixelData})) return std::nullopt;
-  const gdcm::DataSet& data = reader.GetFile().GetDataSet();
+  const bool whole = reader.ReadUpToTag(kPixelData, {kPixelData});
   DicomHeader header;
   header.path = path;
+  if (reader.GetFile().GetHeader().GetDataSetTransferSyntax() ==
+      gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian) {
+    header.kind = DicomKind::kDeflated;  // GDCM reads some of them only
+    return header;
+  }
+  if (!whole) return std::nullopt;
+  const gdcm::DataSet& data = reader.GetFile().GetDataSet();
   header.pixel_offset = reader.GetStreamCurrentPosition();
   header.modality = TextOf(data, kModality).substr(0, 16);
   header.kind = KindOf(reader.GetFile(), header.modality);
@@ -211,6 +224,7 @@ std::optional<DicomHeader> ReadDicomHeader(const std::string& path) {
   header.instance_number = IntegerOf(data, kInstanceNumber);
   header.rescale_slope = NumberOf(data, kRescaleSlope);
   header.rescale_intercept = NumberOf(data, kRescaleIntercept);
+  header.was_lossy = TextOf(data, kLossyImageCompression) == "01";
   ReadGeometry(data, &header);
   return header;
 }
@@ -223,7 +237,7 @@ absl::StatusOr<std::vector<double>> DecodeDicomPixels(const DicomHeader& header,
   if (!reader.Read()) return CannotDecode(header, "it is cut off or damaged");
   const gdcm::Image& image = reader.GetImage();
   const gdcm::PixelFormat format = image.GetPixelFormat();
-  if (!HoldsAllPixels(header, image, contents.size())) {
+  if (!HoldsAllPixels(header, image, contents)) {
     return CannotDecode(header, "it is cut off");
   }
   switch (format.GetScalarType()) {

@@ -22,6 +22,7 @@ enum class DicomKind {
   kOtherModality,
   kMultiFrame,
   kColour,
+  kDeflated,   // its whole data set is compressed (1.2.840.10008.1.2.1.99)
   kNoImage,    // a report, a dose sheet
   kDirectory,  // DICOMDIR
 };
@@ -46,6 +47,7 @@ struct DicomHeader {
   std::optional<double> rescale_slope;
   std::optional<double> rescale_intercept;
 
+  bool was_lossy = false;   // compressed with loss at some time (0028,2110)
   size_t pixel_offset = 0;  // where in the file the pixels begin
 };
 

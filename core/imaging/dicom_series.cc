@@ -95,6 +95,11 @@ absl::StatusOr<DicomStack> ChooseSeries(const std::vector<DicomHeader>& files,
   DicomStack stack;
   stack.slices = *wanted.front();
   TF_RETURN_IF_ERROR(CheckKinds(stack.slices));
+  const auto lossy = std::count_if(stack.slices.begin(), stack.slices.end(),
+                                   [](const DicomHeader& slice) { return slice.was_lossy; });
+  if (lossy > 0) {
+    stack.notes.push_back(absl::StrCat(lossy, " slices were once compressed with loss"));
+  }
   std::erase(all, wanted.front());
   if (!all.empty()) stack.notes.push_back(absl::StrCat("left aside: ", DescribeAll(all)));
   return stack;
