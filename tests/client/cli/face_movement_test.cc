@@ -25,6 +25,7 @@ PlanProblem ProblemOf(const std::string& plan) {
 TEST(FaceMovementTest, HeadHasAllRegionsAndTheTongueNone) {
   ASSERT_OK_AND_ASSIGN(const auto regions, FaceRegions(ProblemOf("head_chin")));
   std::vector<std::string> names;
+  names.reserve(regions.size());
   for (const ComparedRegion& region : regions) names.push_back(region.name);
   EXPECT_THAT(names,
               ElementsAre("chin", "lower lip", "upper lip", "nose", "left cheek", "right cheek"));

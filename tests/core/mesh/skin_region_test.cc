@@ -23,6 +23,7 @@ TEST(SkinRegionTest, EveryRegionHasAName) {
 
 TEST(SkinRegionTest, NumbersAreThoseOfTheRecipeFormat) {
   std::vector<int> numbers;
+  numbers.reserve(kNamedSkinRegions.size());
   for (const SkinRegion region : kNamedSkinRegions) numbers.push_back(static_cast<int>(region));
   EXPECT_THAT(numbers, ElementsAre(1, 2, 3, 4, 5, 6));
 }

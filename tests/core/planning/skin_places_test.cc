@@ -35,6 +35,7 @@ TEST(SkinPlacesTest, LabelsBecomeNamedPlacesAndTheFaceIsAllOfThem) {
 TEST(SkinPlacesTest, PlacesComeInTheOrderOfTheirNumbersAndTheFaceLast) {
   ASSERT_OK_AND_ASSIGN(const auto places, SkinPlaces({Labels({6, 5, 4, 3, 2, 1, 0, 7})}));
   std::vector<std::string> names;
+  names.reserve(places.size());
   for (const SkinPlace& place : places) names.push_back(place.name);
   EXPECT_THAT(names, ElementsAre("upper_lip", "lower_lip", "chin", "nose", "cheek_left",
                                  "cheek_right", "face"));
