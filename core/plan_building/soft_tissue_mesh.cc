@@ -115,10 +115,13 @@ absl::StatusOr<SoftTissueMesh> MeshSoftTissue(const VoxelGrid<float>& heights,
   TF_RETURN_IF_ERROR(CheckOptions(options));
   TF_RETURN_IF_ERROR(Announce(options, "surface of the soft tissue"));
   TF_ASSIGN_OR_RETURN(const TriangleMesh isosurface, Isosurface(heights, options));
+  absl::Status stopped;  // by the caller, whatever the error
+  SoftTissueMeshOptions watched = options;
+  watched.on_stage = [&](absl::string_view stage) { return stopped = Announce(options, stage); };
   double shrinking = 1;
   for (int attempt = 1;; ++attempt, shrinking *= options.retry_factor) {
-    absl::StatusOr<SoftTissueMesh> made = Attempt(isosurface, options, shrinking);
-    const bool may_help = absl::IsInvalidArgument(made.status());
+    absl::StatusOr<SoftTissueMesh> made = Attempt(isosurface, watched, shrinking);
+    const bool may_help = stopped.ok() && absl::IsInvalidArgument(made.status());
     if (!made.ok() && may_help && attempt < options.max_attempts) continue;
     TF_RETURN_IF_ERROR(made.status());
     made->report.attempts = attempt;

@@ -123,6 +123,17 @@ TEST(SoftTissueMeshTest, StagesAreAnnouncedAndMayEndTheWork) {
                                   "filling the surface with tets"));
 }
 
+TEST(SoftTissueMeshTest, AnyErrorOfTheCallerEndsTheWork) {
+  int calls = 0;
+  SoftTissueMeshOptions options;
+  options.on_stage = [&](absl::string_view /*stage*/) {
+    return ++calls < 2 ? absl::OkStatus() : absl::InvalidArgumentError("no more");
+  };
+  EXPECT_THAT(MeshSoftTissue(Sampled(Shell), options),
+              StatusIs(absl::StatusCode::kInvalidArgument, "no more"));
+  EXPECT_EQ(calls, 2);
+}
+
 TEST(SoftTissueMeshTest, LimitsHoldAndAreNotRetried) {
   SoftTissueMeshOptions options;
   options.limits.max_memory_bytes = 1000;  // of the mesh that the child may send
