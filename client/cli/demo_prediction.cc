@@ -38,7 +38,7 @@ absl::StatusOr<std::vector<RegionDistances>> Differences(const PlanProblem& prob
   return DistancesByRegion(distances, regions);
 }
 
-OrderedJson ToJson(const Movement& movement) {
+OrderedJson MovementToJson(const Movement& movement) {
   return {{"total_mm", movement.total_mm}, {"forward_mm", movement.forward_mm}};
 }
 
@@ -76,8 +76,8 @@ void AddToJson(const DemoPrediction& prediction, OrderedJson* json) {
   OrderedJson& movement = (*json)["movement"] = OrderedJson::object();
   for (const RegionMovement& region : prediction.movement) {
     movement[region.name] = {{"vertices", region.vertices},
-                             {"foremost", ToJson(region.foremost)},
-                             {"mean", ToJson(region.mean)}};
+                             {"foremost", MovementToJson(region.foremost)},
+                             {"mean", MovementToJson(region.mean)}};
   }
   OrderedJson& difference = (*json)["difference"] = {{"model", prediction.other_model},
                                                      {"regions", OrderedJson::object()}};

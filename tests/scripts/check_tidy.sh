@@ -40,6 +40,7 @@ check_batch() {
   if tidy "$batch" > "$batch.log"; then
     return
   fi
+  echo "check_tidy.sh: $(basename "$batch") one by one, which takes minutes: $(head -n 1 "$batch.log")" >&2
   for file in "$@"; do
     tidy "$file" || outcome=1
   done

@@ -19,7 +19,7 @@ import re
 import shlex
 import sys
 
-MOST_FILES = 10
+MOST_FILES = 24
 
 # Names that a line at the left margin declares: tests, types, aliases, functions and constants.
 DECLARATIONS = [
