@@ -27,6 +27,7 @@
 #include "core/base/atomic_file.h"
 #include "core/base/parallel_for.h"
 #include "core/base/status_macros.h"
+#include "core/linear_solvers/blas_threads.h"
 #include "core/mesh_payload/sha256.h"
 #include "core/plan_building/plan_builder.h"
 
@@ -125,6 +126,9 @@ std::string Outcome(const PlanBuildArguments& arguments, const PlanBuild& build)
 
 absl::StatusOr<std::string> BuildInto(const PlanBuildArguments& arguments, const Recipe& recipe,
                                       const std::string& folder) {
+  // As deform does: the last digits would depend on their number, and with them what the trial of
+  // the planned move finds torn. Threads that wait for each other also cost more than they give.
+  SetBlasThreads(1);
   StageTimes times;
   std::unique_ptr<VirtualDisplay> display;
   if (!arguments.no_pictures) {
