@@ -62,7 +62,7 @@ function(tissueform_library name)
   endif()
 endfunction()
 
-# tissueform_binary(tissueform SOURCES main.cc DEPS client_cli)
+# tissueform_binary(tissueform SOURCES main.cc DEPS client_cli_shared)
 function(tissueform_binary name)
   cmake_parse_arguments(ARG "" "PRECOMPILED" "SOURCES;DEPS" ${ARGN})
   if(NOT ARG_PRECOMPILED)

@@ -4,13 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/bench_command.h"
-#include "client/cli/command_line.h"
-#include "client/cli/companion.h"
-#include "client/cli/compare_command.h"
-#include "client/cli/deform_command.h"
-#include "client/cli/mesh_command.h"
-#include "client/cli/plan_command.h"
+#include "client/cli/bench/bench_command.h"
+#include "client/cli/compare/compare_command.h"
+#include "client/cli/mesh/mesh_command.h"
+#include "client/cli/predict/deform_command.h"
+#include "client/cli/predict/plan_command.h"
+#include "client/cli/shared/command_line.h"
+#include "client/cli/shared/companion.h"
 
 int main(int argc, char** argv) {
   const std::vector<std::string> words(argv + 1, argv + argc);

@@ -12,12 +12,12 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "client/experiments/accuracy_case_list.h"
-#include "client/experiments/accuracy_figure.h"
-#include "client/experiments/accuracy_run.h"
-#include "client/experiments/accuracy_table.h"
+#include "client/accuracy/accuracy_case_list.h"
+#include "client/accuracy/accuracy_figure.h"
+#include "client/accuracy/accuracy_run.h"
+#include "client/accuracy/accuracy_table.h"
+#include "client/accuracy/movement_table.h"
 #include "client/experiments/locking_experiment.h"
-#include "client/experiments/movement_table.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
 #include "core/linear_solvers/blas_threads.h"

@@ -8,7 +8,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "client/experiments/boundary_surface.h"
+#include "client/accuracy/boundary_surface.h"
 #include "core/base/types.h"
 #include "core/deformation/gradient_field_deformer.h"
 #include "core/mesh/tet_mesh.h"

@@ -9,10 +9,10 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
-#include "client/experiments/bar_ends.h"
-#include "client/experiments/csv_table.h"
-#include "client/experiments/layered_block.h"
+#include "client/accuracy/bar_ends.h"
+#include "client/accuracy/layered_block.h"
 #include "client/rendering/figure.h"
+#include "core/base/csv_table.h"
 #include "core/base/status_macros.h"
 #include "core/deformation/elastic_system.h"
 #include "core/mesh/bar_mesh.h"

@@ -11,9 +11,9 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
-#include "client/experiments/bar_ends.h"
-#include "client/experiments/csv_table.h"
+#include "client/accuracy/bar_ends.h"
 #include "core/base/atomic_file.h"
+#include "core/base/csv_table.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/linear_solvers/dirichlet_system.h"

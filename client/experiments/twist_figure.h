@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "client/experiments/bar_twist.h"
-#include "client/experiments/csv_table.h"
 #include "client/rendering/chart.h"
 #include "client/rendering/scene.h"
+#include "core/base/csv_table.h"
 
 namespace tissueform {
 

@@ -8,9 +8,9 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "client/experiments/boundary_surface.h"
-#include "client/experiments/csv_table.h"
+#include "client/accuracy/boundary_surface.h"
 #include "client/rendering/figure.h"
+#include "core/base/csv_table.h"
 #include "core/base/status_macros.h"
 #include "core/deformation/deformation_quality.h"
 #include "core/deformation/harmonic_fields.h"

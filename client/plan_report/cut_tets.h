@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "client/rendering/scene.h"
-#include "core/imaging/plane.h"
+#include "core/anatomy/plane.h"
 #include "core/mesh/tet_mesh.h"
 
 namespace tissueform {

@@ -7,7 +7,7 @@
 
 #include "absl/status/status.h"
 
-#include "core/imaging/grid_operations.h"
+#include "core/anatomy/grid_operations.h"
 #include "core/plan_building/plan_builder.h"
 
 namespace tissueform {

@@ -10,9 +10,9 @@
 
 #include "client/plan_report/cut_tets.h"
 #include "client/plan_report/label_colours.h"
+#include "core/anatomy/itk_filters.h"
+#include "core/anatomy/surface_extraction.h"
 #include "core/base/status_macros.h"
-#include "core/imaging/itk_filters.h"
-#include "core/imaging/surface_extraction.h"
 
 namespace tissueform {
 namespace {

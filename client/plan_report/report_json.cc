@@ -10,7 +10,7 @@
 
 #include "client/plan_report/cautions.h"
 #include "client/plan_report/library_versions.h"
-#include "core/imaging/skin_regions.h"
+#include "core/anatomy/skin_regions.h"
 #include "core/planning/json_values.h"
 
 namespace tissueform {

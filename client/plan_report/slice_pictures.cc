@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "client/plan_report/label_colours.h"
-#include "core/imaging/grid_operations.h"
+#include "core/anatomy/grid_operations.h"
 
 namespace tissueform {
 namespace {

@@ -10,9 +10,9 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/anatomy/osteotomy.h"
 #include "core/base/status_macros.h"
 #include "core/deformation/create_deformer.h"
-#include "core/imaging/osteotomy.h"
 #include "core/mesh/tet_quality.h"
 
 namespace tissueform {

@@ -8,10 +8,10 @@
 
 #include "absl/strings/str_format.h"
 
+#include "core/anatomy/itk_filters.h"
+#include "core/anatomy/surface_extraction.h"
 #include "core/base/status_macros.h"
-#include "core/imaging/isotropic_resample.h"
-#include "core/imaging/itk_filters.h"
-#include "core/imaging/surface_extraction.h"
+#include "core/ct/isotropic_resample.h"
 #include "core/plan_building/contact_trial.h"
 
 namespace tissueform {

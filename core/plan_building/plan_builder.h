@@ -11,14 +11,14 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "core/imaging/bone_parts.h"
-#include "core/imaging/ct_volume.h"
-#include "core/imaging/grid_operations.h"
-#include "core/imaging/head_segmentation.h"
-#include "core/imaging/landmarks.h"
-#include "core/imaging/osteotomy.h"
-#include "core/imaging/soft_tissue.h"
-#include "core/imaging/tet_stiffness.h"
+#include "core/anatomy/bone_parts.h"
+#include "core/anatomy/grid_operations.h"
+#include "core/anatomy/head_segmentation.h"
+#include "core/anatomy/landmarks.h"
+#include "core/anatomy/osteotomy.h"
+#include "core/anatomy/soft_tissue.h"
+#include "core/anatomy/tet_stiffness.h"
+#include "core/ct/ct_volume.h"
 #include "core/plan_building/planning_regions.h"
 #include "core/plan_building/recipe.h"
 #include "core/plan_building/skin_distance.h"
@@ -66,8 +66,8 @@ struct PlanBuildOptions {
 
 // From a CT to a planning model, by the recipe.
 //
-// Errors: those of the stages (core/imaging, core/mesh_generation), each of which says what it
-// found and what to do.
+// Errors: those of the stages (core/ct, core/anatomy, core/mesh_generation), each of which says
+// what it found and what to do.
 absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& recipe,
                                     const PlanBuildOptions& options = {});
 

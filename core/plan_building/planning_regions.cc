@@ -11,11 +11,11 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/anatomy/grid_operations.h"
+#include "core/anatomy/itk_filters.h"
+#include "core/anatomy/osteotomy.h"
+#include "core/anatomy/skin_regions.h"
 #include "core/base/status_macros.h"
-#include "core/imaging/grid_operations.h"
-#include "core/imaging/itk_filters.h"
-#include "core/imaging/osteotomy.h"
-#include "core/imaging/skin_regions.h"
 
 namespace tissueform {
 namespace {

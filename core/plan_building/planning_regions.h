@@ -9,9 +9,9 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/anatomy/landmarks.h"
+#include "core/anatomy/soft_tissue.h"
 #include "core/constraints/handle_pose.h"
-#include "core/imaging/landmarks.h"
-#include "core/imaging/soft_tissue.h"
 #include "core/mesh/tet_mesh.h"
 
 namespace tissueform {

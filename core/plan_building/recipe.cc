@@ -14,9 +14,9 @@
 #include "nlohmann/json.hpp"
 
 #include "core/base/status_macros.h"
+#include "core/json/json_schema.h"
+#include "core/json/json_text.h"
 #include "core/plan_building/recipe_schema_text.h"
-#include "core/planning/json_schema.h"
-#include "core/planning/json_text.h"
 #include "core/planning/json_values.h"
 #include "core/planning/model_names.h"
 

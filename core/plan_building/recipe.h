@@ -10,14 +10,14 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/anatomy/head_segmentation.h"
+#include "core/anatomy/osteotomy.h"
+#include "core/anatomy/plane.h"
+#include "core/anatomy/soft_tissue.h"
+#include "core/anatomy/stiffness_table.h"
 #include "core/constraints/handle_pose.h"
+#include "core/ct/ct_volume_reader.h"
 #include "core/deformation/create_deformer.h"
-#include "core/imaging/ct_volume_reader.h"
-#include "core/imaging/head_segmentation.h"
-#include "core/imaging/osteotomy.h"
-#include "core/imaging/plane.h"
-#include "core/imaging/soft_tissue.h"
-#include "core/imaging/stiffness_table.h"
 
 namespace tissueform {
 

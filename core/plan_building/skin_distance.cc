@@ -10,7 +10,7 @@
 
 #include <Eigen/Geometry>
 
-#include "core/imaging/grid_operations.h"
+#include "core/anatomy/grid_operations.h"
 
 namespace tissueform {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/imaging/voxel_grid.h"
+#include "core/ct/voxel_grid.h"
 #include "core/mesh/triangle_mesh.h"
 
 namespace tissueform {

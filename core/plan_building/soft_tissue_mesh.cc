@@ -9,8 +9,8 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/anatomy/surface_extraction.h"
 #include "core/base/status_macros.h"
-#include "core/imaging/surface_extraction.h"
 #include "core/mesh/surface_parts.h"
 #include "core/mesh/tet_topology.h"
 #include "core/mesh_generation/surface_distance.h"

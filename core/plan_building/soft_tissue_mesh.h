@@ -11,7 +11,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/base/isolated_process.h"
-#include "core/imaging/voxel_grid.h"
+#include "core/ct/voxel_grid.h"
 #include "core/mesh/tet_mesh.h"
 #include "core/mesh/tet_quality.h"
 #include "core/mesh/triangle_mesh.h"

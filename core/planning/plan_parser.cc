@@ -9,7 +9,7 @@
 #include "nlohmann/json.hpp"
 
 #include "core/base/status_macros.h"
-#include "core/planning/json_text.h"
+#include "core/json/json_text.h"
 #include "core/planning/json_values.h"
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"

@@ -3,7 +3,7 @@
 
 #include "core/planning/plan_schema.h"
 
-#include "core/planning/json_schema.h"
+#include "core/json/json_schema.h"
 #include "core/planning/plan_schema_text.h"
 
 namespace tissueform {

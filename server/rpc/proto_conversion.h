@@ -15,7 +15,7 @@
 #include "core/constraints/handle_pose.h"
 #include "core/deformation/deformation_quality.h"
 #include "core/deformation/deformer.h"
-#include "core/deformation/vertex_response.h"
+#include "core/prepared_answers/vertex_response.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session.h"

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
-#include "core/deformation/linear_elastic_response.h"
-#include "core/deformation/response_basis.h"
+#include "core/prepared_answers/linear_elastic_response.h"
+#include "core/prepared_answers/response_basis.h"
 
 namespace tissueform {
 namespace {

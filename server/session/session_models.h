@@ -17,8 +17,8 @@
 #include "core/constraints/constraint_set.h"
 #include "core/deformation/create_deformer.h"
 #include "core/deformation/mesh_preparation.h"
-#include "core/deformation/vertex_response.h"
 #include "core/mesh/tet_mesh.h"
+#include "core/prepared_answers/vertex_response.h"
 #include "server/session/memory_budget.h"
 
 namespace tissueform {

@@ -17,7 +17,7 @@
 #include "nlohmann/json.hpp"
 #include <sys/wait.h>
 
-#include "client/cli/server_process.h"
+#include "client/cli/online/server_process.h"
 #include "client/cpp/tissueform_client.h"
 #include "client/rendering/virtual_display.h"
 #include "core/mesh/skin_region.h"

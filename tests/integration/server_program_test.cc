@@ -14,7 +14,7 @@
 #include "grpcpp/support/byte_buffer.h"
 #include "gtest/gtest.h"
 
-#include "client/cli/server_process.h"
+#include "client/cli/online/server_process.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/status_matchers.h"
 

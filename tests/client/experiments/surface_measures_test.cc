@@ -3,7 +3,7 @@
 
 #include "client/experiments/surface_measures.h"
 
-#include "client/experiments/boundary_surface.h"
+#include "client/accuracy/boundary_surface.h"
 #include "core/mesh/bar_mesh.h"
 #include "core/mesh/tet_topology.h"
 #include "tests/testing/status_matchers.h"

@@ -11,7 +11,7 @@
 #include "core/deformation/deformation_quality.h"
 #include "core/deformation/gradient_field_deformer.h"
 #include "core/deformation/rotation_fit.h"
-#include "tests/core/deformation/handle_problem.h"
+#include "tests/testing/handle_problem.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {

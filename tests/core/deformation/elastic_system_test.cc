@@ -7,7 +7,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "core/elasticity/elastic_stiffness.h"
-#include "tests/core/deformation/elastic_bar.h"
+#include "tests/testing/elastic_bar.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {

@@ -5,7 +5,7 @@
 
 #include "gtest/gtest.h"
 
-#include "tests/core/deformation/elastic_bar.h"
+#include "tests/testing/elastic_bar.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {

@@ -9,7 +9,7 @@
 #include "core/deformation/arap_deformer.h"
 #include "core/deformation/create_deformer.h"
 #include "core/deformation/gradient_field_deformer.h"
-#include "tests/core/deformation/handle_problem.h"
+#include "tests/testing/handle_problem.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {

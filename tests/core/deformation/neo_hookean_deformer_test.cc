@@ -10,7 +10,7 @@
 #include "core/deformation/deformation_quality.h"
 #include "core/deformation/linear_elastic_deformer.h"
 #include "core/elasticity/neo_hookean_energy.h"
-#include "tests/core/deformation/elastic_bar.h"
+#include "tests/testing/elastic_bar.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {

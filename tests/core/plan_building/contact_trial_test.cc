@@ -8,9 +8,9 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/anatomy/osteotomy.h"
 #include "core/deformation/create_deformer.h"
 #include "core/deformation/deformation_quality.h"
-#include "core/imaging/osteotomy.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 

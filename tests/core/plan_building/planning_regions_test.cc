@@ -9,7 +9,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "core/imaging/osteotomy.h"
+#include "core/anatomy/osteotomy.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 

@@ -1,0 +1,81 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/accuracy/accuracy_models.h"
+
+#include <memory>
+#include <utility>
+
+#include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
+#include "core/deformation/deformation_quality.h"
+#include "core/deformation/mesh_preparation.h"
+
+namespace tissueform {
+namespace {
+
+// Plenty: the fixed point is compared, not a number of steps.
+constexpr int kMaxEstimations = 200;
+constexpr double kNeoHookeanTolerance = 1e-6;
+
+DeformerOptions OptionsOf(const ModelVariant& variant) {
+  DeformerOptions options;
+  options.model = variant.model;
+  options.gradient_field.rotation = variant.rotation;
+  options.gradient_field.max_iterations = kMaxEstimations;
+  options.neo_hookean.tolerance = kNeoHookeanTolerance;
+  return options;
+}
+
+absl::StatusOr<std::shared_ptr<MeshPreparation>> Prepare(const AccuracyCase& problem,
+                                                         double poisson_ratio) {
+  PreparationOptions options;
+  options.poisson_ratio = poisson_ratio;
+  return MeshPreparation::Create(problem.mesh, problem.stiffness, problem.constraints,
+                                 std::move(options));
+}
+
+}  // namespace
+
+const std::vector<ModelVariant>& AllModelVariants() {
+  using enum DeformationModel;
+  static const auto* const kVariants = new std::vector<ModelVariant>{
+      {"plain_poisson", "plain Poisson", kGradientField, RotationMode::kNone, false},
+      {"gradient_field_propagated", "gradient field, propagated", kGradientField,
+       RotationMode::kPropagated, false},
+      {"gradient_field_estimated", "gradient field, estimated", kGradientField,
+       RotationMode::kEstimated, false},
+      {"arap", "ARAP", kArap, RotationMode::kPropagated, false},
+      {"linear_elastic", "linear elastic", kLinearElastic, RotationMode::kPropagated, true},
+      {"neo_hookean", "neo-Hookean", kNeoHookean, RotationMode::kPropagated, true},
+  };
+  return *kVariants;
+}
+
+absl::StatusOr<ModelAnswer> AnswerByModel(const ModelVariant& variant, const AccuracyCase& problem,
+                                          double poisson_ratio) {
+  const Stopwatch stopwatch;
+  TF_ASSIGN_OR_RETURN(const auto preparation, Prepare(problem, poisson_ratio));
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<Deformer> deformer,
+                      CreateDeformer(preparation, OptionsOf(variant)));
+  TF_ASSIGN_OR_RETURN(Deformation deformation, deformer->Deform(problem.poses));
+  const double seconds = stopwatch.Seconds();
+  const Eigen::Index inverted =
+      MeasureDeformation(problem.mesh, deformation.positions).inverted_tets;
+  return ModelAnswer{variant.name, std::move(deformation.positions), seconds, inverted,
+                     deformation.summary.converged};
+}
+
+absl::StatusOr<ModelAnswer> AnswerByCalculix(CalculixLaw law, const AccuracyCase& problem,
+                                             double poisson_ratio, const std::string& folder) {
+  TF_ASSIGN_OR_RETURN(
+      CalculixResult result,
+      RunCalculix({problem.mesh, problem.stiffness, poisson_ratio, problem.constraints,
+                   ConstrainedDisplacements(problem.mesh, problem.constraints, problem.poses), law},
+                  folder));
+  const Eigen::Index inverted = MeasureDeformation(problem.mesh, result.deformed).inverted_tets;
+  return ModelAnswer{law == CalculixLaw::kLinear ? "calculix_linear" : "calculix_neo_hookean",
+                     std::move(result.deformed), result.seconds, inverted, true};
+}
+
+}  // namespace tissueform

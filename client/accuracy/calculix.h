@@ -1,0 +1,38 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "client/accuracy/calculix_input.h"
+#include "core/base/types.h"
+
+namespace tissueform {
+
+// The independent finite elements that the elastic models are compared with: CalculiX, the program
+// ccx of Debian's package calculix-ccx.
+
+struct CalculixResult {
+  Positions deformed;  // #V by 3, mm; displacements come with seven digits
+  double seconds = 0;  // wall time of the program, reading and writing its files among it
+};
+
+// Solves the problem in a child process with one thread; its files (problem.inp, .dat, .log and
+// what else it writes) are left in `folder`, which must exist.
+//
+// Errors: InvalidArgument (an array of the wrong length), NotFound (no program ccx; the message
+// names the package), Internal with the program's own last word when it fails or ends before the
+// whole load is on, those of WriteFileAtomically.
+absl::StatusOr<CalculixResult> RunCalculix(const CalculixProblem& problem,
+                                           const std::string& folder);
+
+// The last block of displacements in the printed output (.dat), #V by 3, mm. Internal, saying what
+// is missing, when that does not hold every vertex at the end of the step.
+absl::StatusOr<Positions> ParseCalculixDisplacements(absl::string_view dat,
+                                                     Eigen::Index num_vertices);
+
+}  // namespace tissueform

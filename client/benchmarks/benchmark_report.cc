@@ -1,0 +1,143 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/benchmarks/benchmark_report.h"
+
+#include <fstream>
+#include <thread>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_split.h"
+#include "nlohmann/json.hpp"
+
+namespace tissueform::benchmarks {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string Processor() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    const std::vector<std::string> parts = absl::StrSplit(line, absl::MaxSplits(": ", 1));
+    if (absl::StartsWith(line, "model name") && parts.size() == 2) {
+      return parts[1];
+    }
+  }
+  return "unknown processor";
+}
+
+std::string Machine() {
+  return absl::StrCat(Processor(), ", ", std::thread::hardware_concurrency(), " cores");
+}
+
+Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+Json RowJson(const BenchmarkRow& row) {
+  Json json = {{"work", row.work},
+               {"mesh", row.mesh},
+               {"vertices", row.vertices},
+               {"tets", row.tets},
+               {"ours_seconds", row.ours_seconds},
+               {"peer", row.peer},
+               {"peer_seconds", OrNull(row.peer_seconds)},
+               {"ratio", OrNull(row.Ratio())},
+               {"bytes", row.bytes}};
+  if (row.solves > 0) {
+    json["solves"] = row.solves;
+  }
+  return json;
+}
+
+Json MemoryJson(const MemoryUse& memory) {
+  return {{"mesh", memory.mesh},
+          {"baseline_bytes", memory.baseline_bytes},
+          {"peak_bytes", memory.peak_bytes},
+          {"factor_bytes", memory.factor_bytes},
+          {"mesh_bytes", memory.mesh_bytes},
+          {"matrix_bytes", memory.matrix_bytes}};
+}
+
+std::string OrDash(const std::optional<double>& value, int digits) {
+  return value ? absl::StrFormat("%.*f", digits, *value) : "-";
+}
+
+double Mib(int64_t bytes) { return static_cast<double>(bytes) / (1024.0 * 1024.0); }
+
+}  // namespace
+
+std::optional<double> BenchmarkRow::Ratio() const {
+  return peer_seconds ? std::optional<double>(*peer_seconds / ours_seconds) : std::nullopt;
+}
+
+std::string ReportJson(const BenchmarkReport& report) {
+  Json json = {{"machine", Machine()},        {"compiler", TISSUEFORM_COMPILER},
+               {"commit", TISSUEFORM_COMMIT}, {"threads", report.threads},
+               {"blas_threads", 1},           {"repetitions", report.repetitions},
+               {"rows", Json::array()},       {"memory", Json::array()},
+               {"growth", Json::object()},    {"targets", Json::array()}};
+  for (const BenchmarkRow& row : report.rows) {
+    json["rows"].push_back(RowJson(row));
+  }
+  for (const MemoryUse& memory : report.memory) {
+    json["memory"].push_back(MemoryJson(memory));
+  }
+  for (const Growth& growth : report.growth) {
+    json["growth"][growth.work] = growth.exponent;
+  }
+  for (const Target& target : report.targets) {
+    json["targets"].push_back({{"requirement", target.requirement},
+                               {"figure", target.figure},
+                               {"reached", target.reached}});
+  }
+  return json.dump(2) + "\n";
+}
+
+std::string RowsHeading() {
+  return absl::StrFormat("%-28s %-10s %8s %9s %11s  %-22s %11s %7s %8s", "work", "mesh", "vertices",
+                         "tets", "ours [s]", "peer", "peer [s]", "ratio", "MiB");
+}
+
+std::string RowText(const BenchmarkRow& row) {
+  const std::string solves = row.solves > 0 ? absl::StrCat("  ", row.solves, " solves") : "";
+  const std::string mib = row.bytes > 0 ? absl::StrFormat("%.1f", Mib(row.bytes)) : "-";
+  return absl::StrFormat("%-28s %-10s %8d %9d %11.7f  %-22s %11s %7s %8s%s", row.work, row.mesh,
+                         row.vertices, row.tets, row.ours_seconds, row.peer,
+                         OrDash(row.peer_seconds, 6), OrDash(row.Ratio(), 2), mib, solves);
+}
+
+std::string MemoryText(const MemoryUse& memory) {
+  return absl::StrFormat(
+      "peak memory of a process of its own on %s: %.1f MiB (%.1f before it began); factor %.1f + "
+      "mesh %.1f + matrix %.1f",
+      memory.mesh, Mib(memory.peak_bytes), Mib(memory.baseline_bytes), Mib(memory.factor_bytes),
+      Mib(memory.mesh_bytes), Mib(memory.matrix_bytes));
+}
+
+std::string ClosingText(const BenchmarkReport& report) {
+  std::string text;
+  if (!report.growth.empty()) {
+    absl::StrAppend(&text,
+                    "\ngrowth: seconds ~ tets^exponent; frames: vertices of the answer^exponent\n");
+  }
+  for (const Growth& growth : report.growth) {
+    absl::StrAppend(&text, absl::StrFormat("  %-28s %5.2f\n", growth.work, growth.exponent));
+  }
+  if (!report.targets.empty()) {
+    absl::StrAppend(&text, "\ntargets\n");
+  }
+  for (const Target& target : report.targets) {
+    absl::StrAppend(&text, absl::StrFormat("  %-72s %8.3f  %s\n", target.requirement, target.figure,
+                                           target.reached ? "reached" : "missed"));
+  }
+  return text;
+}
+
+std::string CircumstancesText(const BenchmarkReport& report) {
+  return absl::StrCat(Machine(), "; ", TISSUEFORM_COMPILER, "; commit ", TISSUEFORM_COMMIT, "; ",
+                      report.threads, " threads, 1 BLAS thread; medians of ", report.repetitions,
+                      " interleaved repetitions");
+}
+
+}  // namespace tissueform::benchmarks

@@ -1,0 +1,67 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+#include "client/benchmarks/benchmark_report.h"
+#include "client/benchmarks/interleaved.h"
+#include "client/benchmarks/test_bars.h"
+#include "core/constraints/constraint_set.h"
+#include "core/constraints/handle_pose.h"
+#include "core/deformation/mesh_preparation.h"
+#include "core/prepared_answers/vertex_response.h"
+
+namespace tissueform::benchmarks {
+
+// What a drag frame costs at the skin (the boundary vertices) from prepared answers, beside the
+// back-substitution that it takes the place of.
+class FrameBenchmark {
+ public:
+  enum class Kind {
+    kBasis,              // gradient field, the bar's one handle
+    kBasisThreeHandles,  // gradient field, the handle cut in three
+    kElastic,            // linear elasticity, one handle
+  };
+
+  // Makes the answers once and checks that they lie within a millionth of the bar's diagonal of the
+  // direct ones. `bar` outlives the benchmark.
+  static absl::StatusOr<std::unique_ptr<FrameBenchmark>> Create(const TestBar& bar, Kind kind,
+                                                                int threads);
+
+  const std::vector<TimedWork>& work() const { return work_; }
+  std::vector<BenchmarkRow> Rows(const PartSeconds& medians) const;
+
+ private:
+  FrameBenchmark(const TestBar& bar, Kind kind) : bar_(bar), kind_(kind) {}
+
+  absl::Status Prepare(int threads);
+  absl::Status MakeResponse();
+  absl::Status CheckAnswer();
+  absl::StatusOr<Positions> DirectAnswer();
+  absl::StatusOr<Eigen::MatrixXd> BackSubstitute();
+  // What a session does for a frame: asks whether the poses are covered, bounds the error, answers.
+  absl::StatusOr<PartSeconds> AnswerFrame();
+  void AddWork();
+  std::string Name(const std::string& what) const;
+
+  const TestBar& bar_;
+  const Kind kind_;
+  std::vector<int32_t> skin_;
+  std::vector<HandlePose> poses_;
+  std::shared_ptr<MeshPreparation> preparation_;
+  std::unique_ptr<VertexResponse> response_;
+  Eigen::MatrixXd rhs_;     // of the back-substitution
+  Eigen::MatrixXd values_;  // at the constrained unknowns
+  FloatPositions frame_;
+  int64_t predicted_bytes_ = 0;
+  int frames_ = 0;
+  std::vector<TimedWork> work_;
+};
+
+}  // namespace tissueform::benchmarks

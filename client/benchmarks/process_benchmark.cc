@@ -1,0 +1,121 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/benchmarks/process_benchmark.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <filesystem>
+#include <system_error>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+
+#include "client/accuracy/calculix.h"
+#include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
+#include "core/mesh_io/tet_mesh_io.h"
+#include "core/planning/plan_io.h"
+
+namespace tissueform::benchmarks {
+namespace {
+
+constexpr double kAgreement = 1e-3;  // of the largest displacement
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder()
+      : path_((std::filesystem::temp_directory_path() / "tissueform-XXXXXX").string()) {
+    made_ = mkdtemp(path_.data()) != nullptr;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    if (made_) std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  bool made() const { return made_; }
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+  bool made_ = false;
+};
+
+std::string PlanPath(int number) {
+  return absl::StrCat(TISSUEFORM_SOURCE_DIR, "/tests/data/plans/", ProcessProblemName(number),
+                      "/plan.json");
+}
+
+absl::StatusOr<CalculixProblem> ProblemOf(int number) {
+  TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(PlanPath(number)));
+  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
+  return CalculixProblem{
+      .mesh = *problem.mesh,
+      .stiffness = problem.stiffness,
+      .poisson_ratio = plan.poisson_ratio,
+      .constraints = problem.constraints,
+      .displacements = ConstrainedDisplacements(*problem.mesh, problem.constraints, problem.poses),
+      .law = CalculixLaw::kNeoHookean};
+}
+
+absl::StatusOr<double> RunOurs(int number, const std::string& out, int threads) {
+  // The program of the build that this one belongs to; the names are ours, nothing to quote.
+  const std::string program =
+      (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "tissueform").string();
+  const std::string command =
+      absl::StrCat("'", program, "' deform '", PlanPath(number), "' --model neo_hookean --threads ",
+                   threads, " --out '", out, "' > '", out, ".log' 2>&1");
+  const Stopwatch stopwatch;
+  if (std::system(command.c_str()) != 0) {
+    return absl::InternalError(absl::StrCat("this failed: ", command));
+  }
+  return stopwatch.Seconds();
+}
+
+absl::Status CheckAgreement(const std::string& result, const TetMesh& rest,
+                            const Positions& reference) {
+  TF_ASSIGN_OR_RETURN(const TetMeshFile ours, ReadTetMesh(result));
+  const double moved = (reference - rest.positions()).rowwise().norm().maxCoeff();
+  const double off = (ours.mesh.positions() - reference).rowwise().norm().maxCoeff();
+  if (off <= kAgreement * moved) return absl::OkStatus();
+  return absl::InternalError(absl::StrCat("our answer lies ", off, " mm from CalculiX's"));
+}
+
+double Median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+}  // namespace
+
+std::string ProcessProblemName(int number) { return number == kBlock ? "block" : "tongue"; }
+
+absl::StatusOr<BenchmarkRow> MeasureAgainstCalculix(int number, int repetitions, int threads) {
+  TF_ASSIGN_OR_RETURN(const CalculixProblem problem, ProblemOf(number));
+  const TemporaryFolder folder;
+  if (!folder.made()) return absl::ErrnoToStatus(errno, "cannot make a temporary folder");
+  const std::string result = folder.path() + "/ours.vtu";
+  std::vector<double> ours;
+  std::vector<double> peers;
+  for (int i = 0; i < repetitions; ++i) {
+    TF_ASSIGN_OR_RETURN(const double seconds, RunOurs(number, result, threads));
+    TF_ASSIGN_OR_RETURN(const CalculixResult peer, RunCalculix(problem, folder.path()));
+    TF_RETURN_IF_ERROR(CheckAgreement(result, problem.mesh, peer.deformed));
+    ours.push_back(seconds);
+    peers.push_back(peer.seconds);
+  }
+  BenchmarkRow row;
+  row.work = "neo_hookean, process";
+  row.mesh = ProcessProblemName(number);
+  row.vertices = problem.mesh.num_vertices();
+  row.tets = problem.mesh.num_tets();
+  row.ours_seconds = Median(ours);
+  row.peer = "ccx";
+  row.peer_seconds = Median(peers);
+  return row;
+}
+
+}  // namespace tissueform::benchmarks

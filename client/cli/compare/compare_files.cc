@@ -1,0 +1,129 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/compare/compare_files.h"
+
+#include <cmath>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+#include "client/cli/compare/comparison_report.h"
+#include "client/cli/shared/report_parts.h"
+#include "core/base/atomic_file.h"
+#include "core/base/status_macros.h"
+#include "core/mesh_io/tet_mesh_io.h"
+#include "core/planning/array_lookup.h"
+
+namespace tissueform {
+namespace {
+
+using OrderedJson = nlohmann::ordered_json;
+
+struct FileComparison {
+  std::vector<RegionDistances> whole;   // "all", "skin"
+  std::vector<RegionDistances> labels;  // named by their value of the point array
+};
+
+absl::Status CheckOutputs(const CompareOptions& options) {
+  if (!options.out.empty()) TF_RETURN_IF_ERROR(CheckWritable(options.out));
+  if (!options.csv.empty()) TF_RETURN_IF_ERROR(CheckWritable(options.csv));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<TetMeshFile> ReadFiniteMesh(const std::string& path) {
+  TF_ASSIGN_OR_RETURN(TetMeshFile file, ReadTetMesh(path));
+  if (file.mesh.positions().allFinite()) return file;
+  return absl::InvalidArgumentError(absl::StrCat(
+      "mesh ", path, " has coordinates that are not finite; see tissueform mesh check"));
+}
+
+// One region for each label, in rising order.
+absl::StatusOr<std::vector<ComparedRegion>> LabelledRegions(const TetMeshFile& file,
+                                                            const CompareOptions& options) {
+  TF_ASSIGN_OR_RETURN(const std::vector<double> values,
+                      FindScalars(file.point_data, options.by, "point"));
+  std::map<int64_t, std::vector<int32_t>> vertices;
+  for (size_t v = 0; v < values.size(); ++v) {
+    if (values[v] != std::floor(values[v]) || std::abs(values[v]) > 1e15) {
+      return absl::InvalidArgumentError(absl::StrCat("point array \"", options.by, "\" of ",
+                                                     options.a, " holds ", values[v],
+                                                     "; labels are whole numbers"));
+    }
+    vertices[static_cast<int64_t>(values[v])].push_back(static_cast<int32_t>(v));
+  }
+  std::vector<ComparedRegion> regions;
+  regions.reserve(vertices.size());
+  for (auto& [label, of_label] : vertices) {
+    regions.push_back({absl::StrCat(label), std::move(of_label)});
+  }
+  return regions;
+}
+
+// "2" -> "anatomy = 2"
+std::vector<RegionDistances> AllRows(const CompareOptions& options,
+                                     const FileComparison& comparison) {
+  std::vector<RegionDistances> rows = comparison.whole;
+  for (const auto& [label, distances] : comparison.labels) {
+    rows.push_back({absl::StrCat(options.by, " = ", label), distances});
+  }
+  return rows;
+}
+
+void PrintJson(const CompareOptions& options, const FileComparison& comparison) {
+  OrderedJson json = {{"a", options.a}, {"b", options.b}};
+  for (const auto& [name, distances] : comparison.whole) {
+    json[name == "all" ? "overall" : name] = DistancesToJson(distances);
+  }
+  if (!options.by.empty()) {
+    json["by"] = options.by;
+    json["regions"] = OrderedJson::object();
+    for (const auto& [label, distances] : comparison.labels) {
+      json["regions"][label] = DistancesToJson(distances);
+    }
+  }
+  PrintJsonReport(json);
+}
+
+absl::Status Report(const CompareOptions& options, const FileComparison& comparison) {
+  const std::vector<RegionDistances> rows = AllRows(options, comparison);
+  if (!options.csv.empty()) {
+    CsvTable table = DistanceTable({});
+    AddDistanceRows({}, rows, &table);
+    TF_RETURN_IF_ERROR(table.WriteCsv(options.csv));
+  }
+  if (options.json) {
+    PrintJson(options, comparison);
+  } else {
+    absl::PrintF("distance in mm between vertices of %s and %s\n", options.a, options.b);
+    PrintDistanceHeadline();
+    PrintDistances(rows);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status CompareFiles(const CompareOptions& options) {
+  TF_RETURN_IF_ERROR(CheckOutputs(options));
+  TF_ASSIGN_OR_RETURN(TetMeshFile a, ReadFiniteMesh(options.a));
+  TF_ASSIGN_OR_RETURN(const TetMeshFile b, ReadFiniteMesh(options.b));
+  TF_ASSIGN_OR_RETURN(const Eigen::VectorXd distances,
+                      VertexDistances(a.mesh.positions(), b.mesh.positions()));
+  FileComparison comparison{DistancesByRegion(distances, WholeAndSkin(a.mesh)), {}};
+  if (!options.by.empty()) {
+    TF_ASSIGN_OR_RETURN(const std::vector<ComparedRegion> labels, LabelledRegions(a, options));
+    comparison.labels = DistancesByRegion(distances, labels);
+  }
+  if (!options.out.empty()) {
+    AddDifferenceArrays(a.mesh.positions(), b.mesh.positions(), &a.point_data);
+    TF_RETURN_IF_ERROR(WriteTetMesh(options.out, a));
+  }
+  return Report(options, comparison);
+}
+
+}  // namespace tissueform

@@ -1,0 +1,56 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "nlohmann/json.hpp"
+
+#include "core/base/csv_table.h"
+#include "core/base/types.h"
+#include "core/deformation/comparison.h"
+#include "core/mesh/attribute.h"
+#include "core/mesh/tet_mesh.h"
+
+namespace tissueform {
+
+// How far two results lie apart, by regions, as the command compare tells it.
+
+// Vertices that are told of together.
+struct ComparedRegion {
+  std::string name;  // "all", "skin", "anatomy = 2", "handle chin"
+  std::vector<int32_t> vertices;
+};
+
+struct RegionDistances {
+  std::string name;
+  DistanceSummary distances;
+};
+
+// "all" and "skin" (the vertices of the boundary) of a mesh.
+std::vector<ComparedRegion> WholeAndSkin(const TetMesh& mesh);
+
+// One for each region that is not empty, in their order. REQUIRES: vertices of `distances_mm`, #V.
+std::vector<RegionDistances> DistancesByRegion(const Eigen::VectorXd& distances_mm,
+                                               const std::vector<ComparedRegion>& regions);
+
+// The point arrays distance_mm and difference_mm (to minus from, three components), replacing
+// arrays of these names.
+void AddDifferenceArrays(const Positions& from, const Positions& to,
+                         std::vector<Attribute>* point_data);
+
+// Text: the headline of a table and a line of it for every region.
+void PrintDistanceHeadline();
+void PrintDistances(const std::vector<RegionDistances>& regions);
+
+nlohmann::ordered_json DistancesToJson(const DistanceSummary& summary);
+
+// CSV: columns "region", "vertices" and the five figures, after those in `leading`.
+CsvTable DistanceTable(std::vector<std::string> leading);
+void AddDistanceRows(const std::vector<std::string>& leading,
+                     const std::vector<RegionDistances>& regions, CsvTable* table);
+
+}  // namespace tissueform

@@ -1,0 +1,93 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/mesh/generation_report.h"
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+
+#include "client/cli/mesh/mesh_report.h"
+#include "client/cli/shared/report_parts.h"
+
+namespace tissueform {
+namespace {
+
+using OrderedJson = nlohmann::ordered_json;
+
+std::string PairsText(const SurfaceDefects& defects) {
+  return absl::StrCat(defects.num_intersecting_pairs, defects.found_all_pairs ? "" : " or more");
+}
+
+std::string SurfaceText(const GenerationReport& report) {
+  const SurfaceReport& surface = report.defects.report;
+  return absl::StrFormat(
+      "surface %s\n"
+      "  vertices           %10d\n"
+      "  triangles          %10d\n"
+      "  components         %10d\n"
+      "  intersecting pairs %10s\n"
+      "  enclosed volume    %10.4g mm^3 (0 where it is not closed)\n"
+      "%s",
+      report.surface, surface.num_vertices, surface.num_triangles, surface.num_components,
+      PairsText(report.defects), surface.enclosed_volume_mm3, DefectsText(report.defects.defects));
+}
+
+std::string RemeshingText(const GenerationReport& report) {
+  if (!report.remeshed) return "";
+  const RemeshedSurface& remeshed = *report.remeshed;
+  std::string text = absl::StrFormat("remeshed to edges of %g mm\n  triangles          %10d\n",
+                                     report.remesh_mm, remeshed.mesh.num_triangles());
+  if (!remeshed.repaired_pairs.empty()) {
+    absl::StrAppend(&text, "  repairs            intersecting pairs before each: ",
+                    absl::StrJoin(remeshed.repaired_pairs, ", "), "\n");
+  }
+  return text;
+}
+
+OrderedJson SurfaceJson(const GenerationReport& report) {
+  const SurfaceReport& surface = report.defects.report;
+  return {{"file", report.surface},
+          {"vertices", surface.num_vertices},
+          {"triangles", surface.num_triangles},
+          {"components", surface.num_components},
+          {"enclosed_volume_mm3", surface.enclosed_volume_mm3},
+          {"intersecting_pairs", report.defects.num_intersecting_pairs},
+          {"all_intersecting_pairs_found", report.defects.found_all_pairs},
+          {"defects", DefectsJson(report.defects.defects)}};
+}
+
+OrderedJson RemeshingJson(const GenerationReport& report) {
+  if (!report.remeshed) return nullptr;
+  return {{"edge_mm", report.remesh_mm},
+          {"vertices", report.remeshed->mesh.num_vertices()},
+          {"triangles", report.remeshed->mesh.num_triangles()},
+          {"repaired_pairs", report.remeshed->repaired_pairs}};
+}
+
+}  // namespace
+
+std::string GenerationReportText(const GenerationReport& report) {
+  std::string text = absl::StrCat(SurfaceText(report), RemeshingText(report));
+  if (!report.defect_file.empty()) {
+    absl::StrAppend(&text, "triangles by defect  ", report.defect_file, "\n");
+  }
+  if (!report.made) return absl::StrCat(text, "verdict: not filled\n");
+  return absl::StrCat(
+      text, MeshReportText(report.mesh, *report.made, ValidateTetMesh(report.made->mesh)));
+}
+
+OrderedJson GenerationReportJson(const GenerationReport& report) {
+  OrderedJson json = {{"filled", report.made.has_value()},
+                      {"surface", SurfaceJson(report)},
+                      {"remeshing", RemeshingJson(report)},
+                      {"defect_file", nullptr},
+                      {"mesh", nullptr}};
+  if (!report.defect_file.empty()) json["defect_file"] = report.defect_file;
+  if (report.made) {
+    json["mesh"] = MeshReportJson(report.mesh, *report.made, ValidateTetMesh(report.made->mesh));
+  }
+  return json;
+}
+
+}  // namespace tissueform

@@ -1,0 +1,14 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "client/cli/shared/command.h"
+
+namespace tissueform {
+
+// `mesh check MESH [--json]`: validation and quality report; fails when a deformer could not use
+// the mesh. `mesh generate`: see mesh_generate_command.h.
+void AddMeshCommand(CLI::App& app, CommandWork* work);
+
+}  // namespace tissueform

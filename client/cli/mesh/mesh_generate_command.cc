@@ -1,0 +1,239 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/mesh/mesh_generate_command.h"
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+
+#include "client/cli/mesh/generation_report.h"
+#include "client/cli/shared/option_checks.h"
+#include "client/cli/shared/report_parts.h"
+#include "client/cli/shared/stage_progress.h"
+#include "core/base/status_macros.h"
+#include "core/mesh_generation/tetrahedralization.h"
+#include "core/mesh_io/triangle_mesh_io.h"
+
+namespace tissueform {
+namespace {
+
+struct MeshGenerateOptions {
+  std::string surface;
+  std::string out;
+  std::string defects;
+  double remesh_mm = 0;
+  double edge_mm = 0;
+  bool split_surface = false;
+  std::vector<std::string> regions;
+  std::vector<std::string> holes;
+  TetrahedralizationOptions filling;
+  double max_memory_gib = 4;
+  bool json = false;
+};
+
+// "1,2,3" as numbers; empty when one is none.
+std::vector<double> Numbers(const std::string& text) {
+  std::vector<double> numbers;
+  for (const absl::string_view part : absl::StrSplit(text, ',')) {
+    if (!absl::SimpleAtod(part, &numbers.emplace_back())) return {};
+  }
+  return numbers;
+}
+
+CLI::Validator NumbersBetweenCommas(size_t least, size_t most, const char* form) {
+  const auto check = [=](std::string& text) {
+    const size_t count = Numbers(text).size();
+    return count >= least && count <= most
+               ? std::string()
+               : absl::StrCat(text, " is not of the form ", form, " (numbers, no spaces)");
+  };
+  return {check, form, form};
+}
+
+TetrahedralizationOptions Filling(const MeshGenerateOptions& options) {
+  TetrahedralizationOptions filling = options.filling;
+  filling.keep_surface = !options.split_surface;
+  filling.limits.max_memory_bytes =
+      static_cast<int64_t>(options.max_memory_gib * static_cast<double>(int64_t{1} << 30));
+  if (options.edge_mm > 0) filling.max_tet_volume_mm3 = RegularTetVolume(options.edge_mm);
+  for (const std::string& text : options.regions) {
+    const std::vector<double> n = Numbers(text);
+    filling.regions.push_back(
+        {Eigen::Vector3d(n[0], n[1], n[2]), static_cast<int32_t>(n[3]), n.size() > 4 ? n[4] : 0});
+  }
+  for (const std::string& text : options.holes) {
+    const std::vector<double> n = Numbers(text);
+    filling.holes_mm.emplace_back(n[0], n[1], n[2]);
+  }
+  return filling;
+}
+
+// Beside the mesh that there is not: face.vtu, face.defects.vtp.
+std::string DefectFile(const MeshGenerateOptions& options) {
+  if (!options.defects.empty()) return options.defects;
+  return std::filesystem::path(options.out).replace_extension(".defects.vtp").string();
+}
+
+absl::Status WriteDefects(const MeshGenerateOptions& options, const TriangleMesh& surface,
+                          GenerationReport* report) {
+  report->defect_file = DefectFile(options);
+  return WriteTriangleMesh(
+      report->defect_file,
+      {.mesh = surface, .point_data = {}, .cell_data = {FlawArray(report->defects)}});
+}
+
+// The surface that is filled: the one of the file, or a remeshed one.
+absl::StatusOr<TriangleMesh> SurfaceToFill(const MeshGenerateOptions& options,
+                                           const TriangleMesh& surface, GenerationReport* report) {
+  if (options.remesh_mm == 0) {
+    TF_RETURN_IF_ERROR(CheckMeshable(report->defects));
+    return surface;
+  }
+  const StageProgress progress("remeshing the surface");
+  RemeshingOptions remeshing;
+  remeshing.edge_mm = report->remesh_mm = options.remesh_mm;
+  TF_ASSIGN_OR_RETURN(report->remeshed, RemeshSurface(surface, remeshing));
+  return report->remeshed->mesh;
+}
+
+absl::StatusOr<TetMeshFile> Fill(const MeshGenerateOptions& options, const TriangleMesh& surface) {
+  const StageProgress progress("filling the surface with tets");
+  TF_ASSIGN_OR_RETURN(Tetrahedralization filled, Tetrahedralize(surface, Filling(options)));
+  TetMeshFile file{.mesh = std::move(filled.mesh), .point_data = {}, .cell_data = {}};
+  if (!filled.region_of_tet.empty()) {
+    file.cell_data.push_back({"region", 1, std::move(filled.region_of_tet)});
+  }
+  return file;
+}
+
+absl::StatusOr<TetMeshFile> Make(const MeshGenerateOptions& options, const TriangleMesh& surface,
+                                 GenerationReport* report) {
+  TF_ASSIGN_OR_RETURN(const TriangleMesh to_fill, SurfaceToFill(options, surface, report));
+  return Fill(options, to_fill);
+}
+
+absl::Status Refuse(const MeshGenerateOptions& options, const TriangleMesh& surface,
+                    const absl::Status& why, GenerationReport* report) {
+  std::string look;
+  if (!report->defects.can_be_meshed()) {
+    TF_RETURN_IF_ERROR(WriteDefects(options, surface, report));
+    look = absl::StrCat("; look at ", report->defect_file);
+  }
+  PrintReport(options.json, GenerationReportText(*report), GenerationReportJson(*report));
+  return {why.code(), absl::StrCat("surface ", options.surface, ": ", why.message(), look)};
+}
+
+SurfaceDefects LookForDefects(const TriangleMesh& surface) {
+  const StageProgress progress("looking for defects of the surface");
+  return FindSurfaceDefects(surface);
+}
+
+absl::Status RunMeshGenerate(const MeshGenerateOptions& options) {
+  TF_ASSIGN_OR_RETURN(const TriangleMeshFile file, ReadTriangleMesh(options.surface));
+  GenerationReport report{.surface = options.surface,
+                          .defects = LookForDefects(file.mesh),
+                          .defect_file = "",
+                          .remesh_mm = 0,
+                          .remeshed = {},
+                          .mesh = options.out,
+                          .made = {}};
+  absl::StatusOr<TetMeshFile> made = Make(options, file.mesh, &report);
+  if (!made.ok()) return Refuse(options, file.mesh, made.status(), &report);
+  TF_RETURN_IF_ERROR(WriteTetMesh(options.out, *made));
+  if (!options.defects.empty()) TF_RETURN_IF_ERROR(WriteDefects(options, file.mesh, &report));
+  report.made = std::move(*made);
+  PrintReport(options.json, GenerationReportText(report), GenerationReportJson(report));
+  return absl::OkStatus();
+}
+
+void AddQualityOptions(CLI::App* generate, MeshGenerateOptions* options) {
+  TetrahedralizationOptions& filling = options->filling;
+  generate
+      ->add_option("--remesh-mm", options->remesh_mm,
+                   "remesh the surface to edges of this length first")
+      ->check(CLI::PositiveNumber);
+  auto* edge = generate
+                   ->add_option("--edge-mm", options->edge_mm,
+                                "largest tets inside: those of a regular one with this edge")
+                   ->check(CLI::PositiveNumber);
+  generate
+      ->add_option("--max-volume-mm3", filling.max_tet_volume_mm3, "largest volume of a tet inside")
+      ->check(CLI::PositiveNumber)
+      ->excludes(edge);
+  generate
+      ->add_option("--radius-edge", filling.max_radius_edge_ratio,
+                   "circumradius over shortest edge that is tried for")
+      ->capture_default_str()
+      ->check(CLI::Range(1.1, 100.0));
+  generate
+      ->add_option("--min-dihedral-deg", filling.min_dihedral_deg,
+                   "smallest dihedral angle that is tried for")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 18.0));
+  generate->add_flag("--split-surface", options->split_surface,
+                     "let triangles of the surface be split, for better and smaller tets at it");
+}
+
+void AddPartOptions(CLI::App* generate, MeshGenerateOptions* options) {
+  generate
+      ->add_option("--region", options->regions,
+                   "the part round this point gets this number in the array `region`, and its own "
+                   "largest volume; may be repeated")
+      ->check(NumbersBetweenCommas(4, 5, "X,Y,Z,NUMBER[,VOLUME]"))
+      ->allow_extra_args(false);
+  generate
+      ->add_option("--hole", options->holes,
+                   "the part round this point stays empty, as cavities do; may be repeated")
+      ->check(NumbersBetweenCommas(3, 3, "X,Y,Z"))
+      ->allow_extra_args(false);
+  generate->add_option("--max-seconds", options->filling.limits.max_seconds, "for the tets")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 86400));
+  generate->add_option("--max-memory-gib", options->max_memory_gib, "for the tets")
+      ->capture_default_str()
+      ->check(CLI::Range(0.01, 1024.0));
+}
+
+constexpr char kFooter[] =
+    "The surface must be closed and must not go through itself. Where it is not so, the report "
+    "says\n"
+    "why, and the array `defect` of the .vtp file marks each triangle: 1 turned, 2 open edge,\n"
+    "3 edge of three or more triangles, 4 goes through another, 5 duplicate, 6 no area. Walls of\n"
+    "cavities face into them. The vertices of the surface come first in the mesh.\n"
+    "Examples:\n"
+    "  tissueform mesh generate tongue.obj --out tongue.vtu\n"
+    "  tissueform mesh generate face.stl --out face.vtu --remesh-mm 3 --edge-mm 5\n"
+    "  tissueform mesh generate jaw.ply --out jaw.vtu --region 0,12,4,1 --region 0,30,4,2,0.5\n"
+    "  tissueform mesh generate skull.obj --out skull.vtu --defects why.vtp --json\n"
+    "Exit code 0: filled. 1: the surface cannot be filled or read. 2: wrong use.";
+
+}  // namespace
+
+void AddMeshGenerateCommand(CLI::App& mesh, CommandWork* work) {
+  auto options = std::make_shared<MeshGenerateOptions>();
+  CLI::App* generate = mesh.add_subcommand("generate", "fill a closed surface with tets");
+  generate->add_option("SURFACE", options->surface, "triangles (.vtp .stl .ply .obj .off)")
+      ->required();
+  generate->add_option("--out", options->out, "the mesh that is written")
+      ->required()
+      ->check(VtuEnding());
+  AddQualityOptions(generate, options.get());
+  AddPartOptions(generate, options.get());
+  generate
+      ->add_option("--defects", options->defects,
+                   "where triangles with defects are marked; without it MESH.defects.vtp, when the "
+                   "surface is refused")
+      ->check(VtpEnding());
+  generate->add_flag("--json", options->json, "print the report as JSON");
+  generate->footer(kFooter);
+  generate->callback([options, work] { *work = [options] { return RunMeshGenerate(*options); }; });
+}
+
+}  // namespace tissueform

@@ -1,0 +1,14 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "client/cli/shared/command.h"
+
+namespace tissueform {
+
+// `mesh generate SURFACE --out MESH.vtu [...]`: tets in a closed surface, or the reason why there
+// are none, with a file to look at. Added to the command `mesh`.
+void AddMeshGenerateCommand(CLI::App& mesh, CommandWork* work);
+
+}  // namespace tissueform

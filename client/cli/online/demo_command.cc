@@ -1,0 +1,248 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/online/demo_command.h"
+
+#include <atomic>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <signal.h>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+
+#include "client/cli/online/demo_pictures.h"
+#include "client/cli/online/demo_prediction.h"
+#include "client/cli/online/demo_report.h"
+#include "client/cli/online/drag.h"
+#include "client/cli/online/face_movement.h"
+#include "client/cli/online/handle_words.h"
+#include "client/cli/online/plan_session.h"
+#include "client/cli/online/server_process.h"
+#include "client/cli/shared/companion.h"
+#include "client/cli/shared/demo_paths.h"
+#include "client/cli/shared/result_writer.h"
+#include "client/cpp/tissueform_client.h"
+#include "client/rendering/virtual_display.h"
+#include "core/base/atomic_file.h"
+#include "core/base/status_macros.h"
+#include "core/mesh/tet_topology.h"
+#include "core/mesh_io/triangle_mesh_io.h"
+#include "core/planning/coordinates.h"
+#include "core/planning/plan_io.h"
+
+namespace tissueform {
+namespace {
+
+constexpr std::chrono::seconds kServerStartDeadline{30};
+
+// How far beyond its plan the bundled head is dragged: 8 mm instead of 6.
+constexpr double kHeadReach = 4.0 / 3.0;
+
+struct DemoOptions {
+  std::string out = "out/demo";
+  std::string plan;
+  int port = 0;
+  bool no_browser = false;
+  DragOptions drag;
+
+  std::string Path(const std::string& name) const { return out + "/" + name; }
+  std::string ResultPath() const { return Path("result.vtu"); }
+  std::string SkinPath() const { return Path("skin.stl"); }
+  std::string FramesPath() const { return Path("frames.csv"); }
+  std::string SummaryPath() const { return Path("summary.json"); }
+};
+
+// Set by SIGINT and SIGTERM; the demo then ends by itself, and its server with it.
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "set in a signal handler");
+
+void CatchInterrupts() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { interrupted = true; };
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+absl::Status CheckNotInterrupted() {
+  return interrupted ? absl::CancelledError("interrupted") : absl::OkStatus();
+}
+
+absl::Status MakeFolder(const DemoOptions& options) {
+  std::error_code error;
+  std::filesystem::create_directories(options.out, error);
+  if (error) {
+    return absl::PermissionDeniedError(
+        absl::StrCat("cannot make the folder ", options.out, ": ", error.message()));
+  }
+  return CheckWritable(options.ResultPath());
+}
+
+// A plan with what is dragged: to the plan's pose, the bundled head farther.
+struct DemoCase {
+  Plan plan;
+  PlanProblem problem;
+  std::vector<ComparedRegion> face;
+};
+
+absl::StatusOr<DemoCase> ReadCase(const DemoOptions& options) {
+  TF_ASSIGN_OR_RETURN(const std::string path, FindDemoPlan(options.plan));
+  TF_ASSIGN_OR_RETURN(Plan plan, ReadPlan(path));
+  TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan));
+  TF_ASSIGN_OR_RETURN(std::vector<ComparedRegion> face, FaceRegions(problem));
+  if (options.plan.empty()) {
+    for (HandlePose& pose : problem.poses) pose = PartOfPose(pose, kHeadReach);
+  }
+  absl::PrintF("plan %s: %d vertices, %d tets\n", path, problem.mesh->num_vertices(),
+               problem.mesh->num_tets());
+  return DemoCase{std::move(plan), std::move(problem), std::move(face)};
+}
+
+double LargestDistance(const Positions& a, const Positions& b) {
+  return (a - b).rowwise().norm().maxCoeff();
+}
+
+absl::StatusOr<DragResult> Drag(const DemoOptions& options, const PlanProblem& problem,
+                                TissueformClient* client, const std::string& session) {
+  absl::PrintF("dragging: %s, over %g s at %g poses a second ...\n", MovesInWords(problem),
+               options.drag.seconds, options.drag.poses_per_second);
+  TF_ASSIGN_OR_RETURN(DragResult drag,
+                      RunDrag(client, session, NamedPoses(problem), options.drag, interrupted));
+  if (drag.frames.empty()) {
+    return absl::InternalError("the server answered no pose");
+  }
+  return drag;
+}
+
+// How exact the frames were, by other ways to the same answers.
+absl::Status CheckFrames(const PlanProblem& problem, const DragResult& drag,
+                         const Positions& deformed, TissueformClient* client,
+                         const std::string& session, DragSummary* summary) {
+  const int64_t count = problem.mesh->num_vertices();
+  TF_ASSIGN_OR_RETURN(const Positions last, DecodePositions(drag.last_positions, count));
+  TF_ASSIGN_OR_RETURN(const v1::DeformOnceResponse answer,
+                      client->DeformOnce(session, PartOfPoses(NamedPoses(problem), 0)));
+  TF_ASSIGN_OR_RETURN(const Positions rest, DecodePositions(answer.positions(), count));
+  summary->vertices = count;
+  summary->end_error_mm = LargestDistance(last, deformed);
+  summary->rest_error_mm = LargestDistance(rest, problem.mesh->positions());
+  return absl::OkStatus();
+}
+
+absl::Status WriteSkin(const std::string& path, const PlanProblem& problem,
+                       const Positions& deformed) {
+  Positions written = deformed;
+  SwapToOrFromLps(problem.written_in, &written);
+  TF_ASSIGN_OR_RETURN(TriangleMesh skin,
+                      TriangleMesh::Create(std::move(written), BoundaryFacets(*problem.mesh)));
+  return WriteTriangleMesh(path, {std::move(skin), {}, {}});
+}
+
+absl::Status WriteResults(const DemoOptions& options, const DemoCase& demo, const DragResult& drag,
+                          const DragSummary& summary, const DemoPrediction& prediction) {
+  TF_RETURN_IF_ERROR(WriteFramesCsv(options.FramesPath(), drag));
+  TF_RETURN_IF_ERROR(WriteSummaryJson(options.SummaryPath(), summary, prediction));
+  TF_RETURN_IF_ERROR(
+      WriteResult(options.ResultPath(), demo.plan, demo.problem, prediction.deformed));
+  TF_RETURN_IF_ERROR(WriteSkin(options.SkinPath(), demo.problem, prediction.deformed));
+  absl::PrintF("\nresults: %s and %s (the end of the drag), %s, %s\n", options.ResultPath(),
+               options.SkinPath(), options.FramesPath(), options.SummaryPath());
+  return absl::OkStatus();
+}
+
+// Pictures are a bonus: where they cannot be made the demo says so and has done its work.
+void DrawPictures(const DemoOptions& options, const PlanProblem& problem,
+                  const DemoPrediction& prediction, const absl::Status& display) {
+  absl::Status drawn = display;
+  if (drawn.ok()) {
+    drawn = DrawBeforeAndAfter({.mesh = *problem.mesh,
+                                .deformed = prediction.deformed,
+                                .move = prediction.move,
+                                .is_face = !prediction.movement.empty()},
+                               options.out);
+  }
+  if (drawn.ok()) {
+    absl::PrintF("pictures, before and after: %s in %s\n",
+                 absl::StrJoin(BeforeAndAfterPictures(), ", "), options.out);
+  } else {
+    absl::PrintF("no pictures: %s\n", drawn.message());
+  }
+}
+
+absl::Status DragAndPredict(const DemoOptions& options, const DemoCase& demo,
+                            TissueformClient* client, const absl::Status& display) {
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<PlanSession> session,
+                      PlanSession::Create(client, demo.problem));
+  const v1::Session& description = session->description();
+  absl::PrintF("session ready: %d free vertices, factorised in %.1f ms, %.1f MiB\n",
+               description.free_vertex_count(), description.seconds().factorise() * 1e3,
+               static_cast<double>(description.bytes_held()) / (1 << 20));
+  TF_RETURN_IF_ERROR(CheckNotInterrupted());
+  const std::string& name = description.name();
+  TF_ASSIGN_OR_RETURN(const DragResult drag, Drag(options, demo.problem, client, name));
+  TF_ASSIGN_OR_RETURN(const DemoPrediction prediction,
+                      PredictAtEnd(demo.problem, demo.face, client, name));
+  DragSummary summary = SummarizeDrag(drag);
+  TF_RETURN_IF_ERROR(CheckFrames(demo.problem, drag, prediction.deformed, client, name, &summary));
+  TF_RETURN_IF_ERROR(CheckNotInterrupted());
+  PrintDragSummary(summary);
+  PrintPrediction(prediction);
+  PrintInWords(summary, prediction);
+  TF_RETURN_IF_ERROR(WriteResults(options, demo, drag, summary, prediction));
+  DrawPictures(options, demo.problem, prediction, display);
+  return CheckNotInterrupted();
+}
+
+absl::Status RunDemo(const DemoOptions& options) {
+  CatchInterrupts();
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);  // progress is seen at once, also through a pipe
+  TF_RETURN_IF_ERROR(MakeFolder(options));
+  TF_ASSIGN_OR_RETURN(const DemoCase demo, ReadCase(options));
+
+  // Before the client: no thread of gRPC runs yet when the process forks.
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<ServerProcess> server,
+                      ServerProcess::Start(SiblingProgram("tissueform-server"),
+                                           {"--host", "127.0.0.1", "--port",
+                                            std::to_string(options.port), "--log-level", "warn"},
+                                           kServerStartDeadline));
+  absl::PrintF("tissueform-server listens on %s\n", server->address());
+  const absl::StatusOr<std::unique_ptr<VirtualDisplay>> display = VirtualDisplay::Open();
+  TF_RETURN_IF_ERROR(CheckNotInterrupted());
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client,
+                      TissueformClient::Connect(server->address(), {}));
+  return DragAndPredict(options, demo, client.get(), display.status());
+}
+
+}  // namespace
+
+void AddDemoCommand(CLI::App& app, CommandWork* work) {
+  auto options = std::make_shared<DemoOptions>();
+  CLI::App* command = app.add_subcommand(kDemoCommand.name, kDemoCommand.description);
+  command
+      ->add_option("--out", options->out,
+                   "folder for result.vtu, skin.stl, frames.csv, summary.json and pictures")
+      ->capture_default_str();
+  command->add_option("--plan", options->plan,
+                      "another plan than the bundled head; it is dragged to its own pose");
+  command->add_option("--seconds", options->drag.seconds, "how long the drag takes")
+      ->check(CLI::Range(0.1, 60.0))
+      ->capture_default_str();
+  command->add_option("--port", options->port, "port of the server; 0 takes a free one")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
+  command->add_flag("--no-browser", options->no_browser,
+                    "for scripts: never open a browser (this version opens none)");
+  command->footer(
+      "Starts the tissueform-server that lies beside this program on loopback and ends it again.\n"
+      "The lower jaw of the bundled head goes 8 mm forward, 2 more than its plan. Open front.png,\n"
+      "left.png and three_quarter.png, and result.vtu or skin.stl in ParaView or 3D Slicer.");
+  command->callback([options, work] { *work = [options] { return RunDemo(*options); }; });
+}
+
+}  // namespace tissueform

@@ -1,0 +1,110 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/online/drag.h"
+
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <thread>
+#include <utility>
+
+#include "core/base/mutex.h"
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double Milliseconds(Clock::duration duration) {
+  return std::chrono::duration<double, std::milli>(duration).count();
+}
+
+// When each pose was sent: written by the sender, read by the receiver.
+class SendTimes {
+ public:
+  explicit SendTimes(int64_t count) : times_(count) {}
+
+  void Set(uint64_t sequence, Clock::time_point time) {
+    MutexLock lock(mutex_);
+    times_[sequence] = time;
+  }
+  Clock::time_point Get(uint64_t sequence) const {
+    MutexLock lock(mutex_);
+    return times_[sequence];
+  }
+
+ private:
+  mutable Mutex mutex_;
+  std::vector<Clock::time_point> times_ ABSL_GUARDED_BY(mutex_);
+};
+
+void Receive(DeformStream* stream, Clock::time_point start, const SendTimes& send_times,
+             DragResult* result) {
+  while (std::optional<v1::DeformFrame> frame = stream->Receive()) {
+    const Clock::time_point now = Clock::now();
+    stream->Ack(*frame).IgnoreError();  // not needed once the sender has closed
+    result->frames.push_back({.sequence = frame->sequence(),
+                              .sent_ms = Milliseconds(send_times.Get(frame->sequence()) - start),
+                              .received_ms = Milliseconds(now - start),
+                              .solve_ms = frame->summary().solve_seconds() * 1e3,
+                              .coalesced_count = frame->coalesced_count()});
+    result->coalesced += frame->coalesced_count();
+    result->last_positions = std::move(*frame->mutable_positions());
+  }
+}
+
+}  // namespace
+
+HandlePose PartOfPose(const HandlePose& pose, double amount) {
+  HandlePose part = pose;
+  part.rotation_vector *= amount;
+  part.translation_mm *= amount;
+  part.scale = std::pow(pose.scale, amount);
+  return part;
+}
+
+std::vector<NamedPose> PartOfPoses(absl::Span<const NamedPose> poses, double amount) {
+  std::vector<NamedPose> parts;
+  for (const NamedPose& pose : poses) {
+    parts.push_back({pose.handle, PartOfPose(pose.pose, amount)});
+  }
+  return parts;
+}
+
+absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& session,
+                                   absl::Span<const NamedPose> poses, const DragOptions& options,
+                                   const std::atomic<bool>& interrupted) {
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<DeformStream> stream, client->OpenStream(session, {}));
+  const auto count = static_cast<int64_t>(options.seconds * options.poses_per_second);
+  const std::chrono::duration<double> interval(1 / options.poses_per_second);
+  SendTimes send_times(count);
+  DragResult result;
+  const Clock::time_point start = Clock::now();
+  std::thread receiver([&] { Receive(stream.get(), start, send_times, &result); });
+  absl::Status sent;
+  for (int64_t i = 0; i < count && sent.ok() && !interrupted; ++i) {
+    // Deadlines of their own: a late pose does not delay the ones after it.
+    std::this_thread::sleep_until(start +
+                                  std::chrono::duration_cast<Clock::duration>(interval * i));
+    const double amount =
+        (1 - std::cos(M_PI * static_cast<double>(i + 1) / static_cast<double>(count))) / 2;
+    send_times.Set(i, Clock::now());
+    sent = stream->SendPoses(i, PartOfPoses(poses, amount));
+    ++result.poses_sent;
+  }
+  if (interrupted) {
+    stream->Cancel();
+  }
+  stream->CloseSending();
+  receiver.join();
+  const absl::Status end = stream->Finish();
+  if (interrupted) {
+    return absl::CancelledError("interrupted");
+  }
+  TF_RETURN_IF_ERROR(end);
+  return result;
+}
+
+}  // namespace tissueform

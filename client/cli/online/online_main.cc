@@ -1,0 +1,15 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// The companion of `tissueform` that speaks with servers.
+
+#include "client/cli/online/demo_command.h"
+#include "client/cli/online/run_command.h"
+#include "client/cli/shared/command_line.h"
+
+int main(int argc, char** argv) {
+  return tissueform::RunCommandLine(argc, argv, [](CLI::App& app, tissueform::CommandWork* work) {
+    tissueform::AddRunCommand(app, work);
+    tissueform::AddDemoCommand(app, work);
+  });
+}

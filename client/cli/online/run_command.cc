@@ -1,0 +1,130 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/online/run_command.h"
+
+#include <memory>
+#include <string>
+
+#include "client/cli/online/plan_session.h"
+#include "client/cli/shared/companion.h"
+#include "client/cli/shared/option_checks.h"
+#include "client/cli/shared/result_writer.h"
+#include "client/cli/shared/stage_progress.h"
+#include "client/cli/shared/stats_json.h"
+#include "client/cpp/tissueform_client.h"
+#include "core/base/atomic_file.h"
+#include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
+#include "core/planning/plan_io.h"
+
+namespace tissueform {
+namespace {
+
+struct RunOptions {
+  std::string plan;
+  PlanReadOptions reading;
+  std::string server;
+  std::string out;
+  std::string stats;
+};
+
+PreparationSummary PreparationOf(const v1::Session& session) {
+  PreparationSummary preparation;
+  preparation.assemble_seconds = session.seconds().assemble();
+  preparation.analyse_seconds = session.seconds().analyse();
+  preparation.factorise_seconds = session.seconds().factorise();
+  preparation.prepare_seconds = session.seconds().prepare();
+  preparation.factor_bytes = session.factor_bytes();
+  preparation.bytes_held = session.bytes_held();
+  preparation.negative_weights = session.negative_weight_count();
+  preparation.harmonic_min = session.harmonic_min();
+  preparation.harmonic_max = session.harmonic_max();
+  return preparation;
+}
+
+void AddAnswer(const v1::DeformOnceResponse& answer, PredictionStats* stats) {
+  stats->solve.iterations = answer.summary().iterations();
+  stats->solve.converged = answer.summary().converged();
+  stats->solve.residual = answer.summary().residual();
+  stats->solve.changes_mm.assign(answer.summary().changes_mm().begin(),
+                                 answer.summary().changes_mm().end());
+  stats->solve.energies_nj.assign(answer.summary().energies_nj().begin(),
+                                  answer.summary().energies_nj().end());
+  stats->solve.load = answer.summary().load();
+  stats->solve.solve_seconds = answer.summary().solve_seconds();
+  stats->quality.inverted_tets = answer.quality().inverted_tet_count();
+  stats->quality.min_volume_ratio = answer.quality().min_volume_ratio();
+  stats->quality.max_volume_ratio = answer.quality().max_volume_ratio();
+  stats->quality.total_volume_ratio = answer.quality().total_volume_ratio();
+  stats->quality.worst_tet = answer.quality().worst_tet();
+  stats->quality.max_displacement_mm = answer.quality().max_displacement_mm();
+}
+
+// Fills `stats` as far as preparing and solving know it.
+absl::StatusOr<Positions> PredictOnServer(const RunOptions& options, const PlanProblem& problem,
+                                          PredictionStats* stats) {
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client,
+                      TissueformClient::Connect(options.server, {}));
+  std::unique_ptr<PlanSession> session;
+  {
+    const StageProgress progress("uploading and preparing the session");
+    TF_ASSIGN_OR_RETURN(session, PlanSession::Create(client.get(), problem));
+  }
+  const StageProgress progress("solving");
+  TF_ASSIGN_OR_RETURN(const v1::DeformOnceResponse answer,
+                      client->DeformOnce(session->description().name(), NamedPoses(problem)));
+  stats->preparation = PreparationOf(session->description());
+  AddAnswer(answer, stats);
+  return DecodePositions(answer.positions(), problem.mesh->num_vertices());
+}
+
+absl::StatusOr<PlanProblem> ReadProblem(const Plan& plan, double* seconds) {
+  const StageProgress progress("reading and checking the mesh");
+  const Stopwatch stopwatch;
+  absl::StatusOr<PlanProblem> problem = ResolvePlan(plan);
+  *seconds = stopwatch.Seconds();
+  return problem;
+}
+
+absl::Status Run(const RunOptions& options) {
+  TF_RETURN_IF_ERROR(CheckWritable(options.out));
+  if (!options.stats.empty()) TF_RETURN_IF_ERROR(CheckWritable(options.stats));
+  TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan, options.reading));
+  double read_seconds = 0;
+  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ReadProblem(plan, &read_seconds));
+  PredictionStats stats = StatsOf(problem);
+  stats.read_seconds = read_seconds;
+  TF_ASSIGN_OR_RETURN(const Positions deformed, PredictOnServer(options, problem, &stats));
+  TF_RETURN_IF_ERROR(WriteResult(options.out, plan, problem, deformed));
+  if (!options.stats.empty()) TF_RETURN_IF_ERROR(WriteStats(options.stats, stats));
+  PrintOutcome(options.out, stats);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddRunCommand(CLI::App& app, CommandWork* work) {
+  auto options = std::make_shared<RunOptions>();
+  CLI::App* command = app.add_subcommand(kRunCommand.name, kRunCommand.description);
+  command->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
+  command->add_option("--server", options->server, "where the server listens")
+      ->required()
+      ->type_name("HOST:PORT");
+  command
+      ->add_option("--out", options->out,
+                   "the deformed mesh to write, with point array displacement_mm")
+      ->required()
+      ->check(VtuEnding());
+  command->add_option("--stats", options->stats,
+                      "also write counts, times and quality to this JSON file");
+  AddAllowOutside(command, &options->reading);
+  command->footer(
+      "Example, in two terminals:\n"
+      "  tissueform-server --port 50051\n"
+      "  tissueform run plan.json --server localhost:50051 --out after.vtu\n"
+      "The server keeps the mesh for the next run; the session is deleted at the end.");
+  command->callback([options, work] { *work = [options] { return Run(*options); }; });
+}
+
+}  // namespace tissueform

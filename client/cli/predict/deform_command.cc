@@ -1,0 +1,119 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/predict/deform_command.h"
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "client/cli/shared/option_checks.h"
+#include "client/cli/shared/result_writer.h"
+#include "client/cli/shared/stage_progress.h"
+#include "client/cli/shared/stats_json.h"
+#include "core/base/atomic_file.h"
+#include "core/base/parallel_for.h"
+#include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
+#include "core/linear_solvers/blas_threads.h"
+#include "core/planning/model_names.h"
+#include "core/planning/plan_io.h"
+
+namespace tissueform {
+namespace {
+
+struct DeformOptions {
+  std::string plan;
+  PlanReadOptions reading;
+  std::string out;
+  std::string model;
+  std::string stats;
+  int threads = AvailableProcessors();
+};
+
+absl::Status CheckOutputs(const DeformOptions& options) {
+  TF_RETURN_IF_ERROR(CheckWritable(options.out));
+  return options.stats.empty() ? absl::OkStatus() : CheckWritable(options.stats);
+}
+
+absl::StatusOr<Plan> ReadChosenPlan(const DeformOptions& options) {
+  TF_ASSIGN_OR_RETURN(Plan plan, ReadPlan(options.plan, options.reading));
+  if (!options.model.empty()) {
+    TF_ASSIGN_OR_RETURN(plan.model, ModelFromName(options.model));
+  }
+  return plan;
+}
+
+absl::StatusOr<PlanProblem> ResolveWithProgress(const Plan& plan, double* seconds) {
+  const StageProgress progress("reading and checking the mesh");
+  const Stopwatch stopwatch;
+  absl::StatusOr<PlanProblem> problem = ResolvePlan(plan);
+  *seconds = stopwatch.Seconds();
+  if (problem.ok()) problem->deformer.gradient_field.compute_residual = true;
+  return problem;
+}
+
+// Fills `stats` as far as preparing and solving know it.
+absl::StatusOr<Positions> Predict(const PlanProblem& problem, PredictionStats* stats) {
+  std::unique_ptr<Deformer> deformer;
+  {
+    const StageProgress progress("preparing the deformer");
+    TF_ASSIGN_OR_RETURN(deformer, CreateDeformer(*problem.mesh, problem.stiffness,
+                                                 problem.constraints, problem.deformer));
+  }
+  const StageProgress progress("solving");
+  TF_ASSIGN_OR_RETURN(Deformation deformation, deformer->Deform(problem.poses));
+  stats->preparation = deformer->preparation();
+  stats->solve = deformation.summary;
+  stats->quality = MeasureDeformation(*problem.mesh, deformation.positions);
+  return std::move(deformation.positions);
+}
+
+absl::Status RunDeform(const DeformOptions& options) {
+  TF_RETURN_IF_ERROR(CheckOutputs(options));
+  TF_ASSIGN_OR_RETURN(const Plan plan, ReadChosenPlan(options));
+  double read_seconds = 0;
+  TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolveWithProgress(plan, &read_seconds));
+  problem.deformer.preparation.threads = options.threads;
+  // On purpose one: more make a factorisation faster, but the last digits of the answer would
+  // depend on how many there are (docs/performance.md).
+  SetBlasThreads(1);
+  PredictionStats stats = StatsOf(problem);
+  stats.read_seconds = read_seconds;
+  TF_ASSIGN_OR_RETURN(const Positions deformed, Predict(problem, &stats));
+  TF_RETURN_IF_ERROR(WriteResult(options.out, plan, problem, deformed));
+  if (!options.stats.empty()) TF_RETURN_IF_ERROR(WriteStats(options.stats, stats));
+  PrintOutcome(options.out, stats);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddDeformCommand(CLI::App& app, CommandWork* work) {
+  auto options = std::make_shared<DeformOptions>();
+  CLI::App* command = app.add_subcommand("deform", "predict in this process, without a server");
+  command->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
+  command
+      ->add_option("--out", options->out,
+                   "the deformed mesh to write, with point array displacement_mm")
+      ->required()
+      ->check(VtuEnding());
+  command->add_option("--model", options->model, "use this model instead of the plan's")
+      ->check(CLI::IsMember(KnownModelNames()));
+  command->add_option("--stats", options->stats,
+                      "also write counts, times and quality to this JSON file");
+  command
+      ->add_option("--threads", options->threads,
+                   "threads to compute with; the answer does not depend on it")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  AddAllowOutside(command, &options->reading);
+  command->footer(
+      "Examples:\n"
+      "  tissueform deform plan.json --out after.vtu\n"
+      "  tissueform deform plan.json --out after.vtu --stats stats.json\n"
+      "Open after.vtu in ParaView or 3D Slicer; displacement_mm is how far each vertex moved.");
+  command->callback([options, work] { *work = [options] { return RunDeform(*options); }; });
+}
+
+}  // namespace tissueform

@@ -1,0 +1,81 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/predict/plan_command.h"
+
+#include <memory>
+#include <numbers>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+#include "client/cli/shared/companion.h"
+#include "client/cli/shared/option_checks.h"
+#include "core/base/status_macros.h"
+#include "core/planning/model_names.h"
+#include "core/planning/plan_io.h"
+
+namespace tissueform {
+namespace {
+
+std::string DescribePose(const HandlePose& pose) {
+  const double degrees = pose.rotation_vector.norm() * 180.0 / std::numbers::pi;
+  return absl::StrFormat("moves %.3g mm, turns %.4g degrees, scale %.4g",
+                         pose.translation_mm.norm(), degrees, pose.scale);
+}
+
+void PrintPlan(const std::string& path, const Plan& plan, const PlanProblem& problem) {
+  absl::PrintF("plan   %s\n", path);
+  absl::PrintF("  mesh       %s: %d vertices, %d tets, %s\n", plan.mesh_path,
+               problem.mesh->num_vertices(), problem.mesh->num_tets(),
+               plan.coordinate_system == CoordinateSystem::kRas ? "RAS" : "LPS");
+  absl::PrintF("  stiffness  %.6g to %.6g Pa\n", problem.stiffness.minCoeff(),
+               problem.stiffness.maxCoeff());
+  absl::PrintF("  fixed      %d vertices\n", problem.constraints.fixed().size());
+  for (size_t h = 0; h < plan.handles.size(); ++h) {
+    const HandleRegion& region = problem.constraints.handles()[h];
+    absl::PrintF("  handle     %s: %d vertices, %s\n", region.name, region.vertices.size(),
+                 DescribePose(problem.poses[h]));
+  }
+  absl::PrintF("  model      %s, rotation %s\n", ModelName(plan.model),
+               RotationModeName(plan.gradient_field.rotation));
+  absl::PrintF("the plan is ready: tissueform deform %s --out after.vtu\n", path);
+}
+
+struct PlanCheckOptions {
+  std::string plan;
+  PlanReadOptions reading;
+};
+
+absl::Status RunPlanCheck(const PlanCheckOptions& options) {
+  TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan, options.reading));
+  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
+  PrintPlan(options.plan, plan, problem);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddPlanCommand(CLI::App& app, const std::vector<std::string>& words, CommandWork* work) {
+  CLI::App* plan = app.add_subcommand("plan", "work on plan files");
+  plan->footer(
+      "Examples:\n"
+      "  tissueform plan build --ct series/ --recipe recipe.json --out head\n"
+      "  tissueform plan check head/plan.json");
+  AddCompanionCommand(*plan, kPlanBuildCommand, words, work);
+
+  auto options = std::make_shared<PlanCheckOptions>();
+  CLI::App* check =
+      plan->add_subcommand("check", "check a plan with its mesh and say what it asks for");
+  check->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
+  AddAllowOutside(check, &options->reading);
+  check->footer(
+      "Example:\n"
+      "  tissueform plan check plan.json\n"
+      "Exit code 0: the plan can be run. 1: it cannot; the line on stderr names the key and what "
+      "to do.");
+  check->callback([options, work] { *work = [options] { return RunPlanCheck(*options); }; });
+}
+
+}  // namespace tissueform

@@ -1,0 +1,41 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/shared/companion.h"
+
+#include <cerrno>
+#include <unistd.h>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+#include "client/cli/shared/demo_paths.h"
+
+namespace tissueform {
+
+void AddCompanionCommand(CLI::App& app, const CompanionCommand& companion,
+                         std::vector<std::string> words, CommandWork* work) {
+  CLI::App* command = app.add_subcommand(companion.name, companion.description);
+  command->prefix_command();
+  command->set_help_flag();
+  command->callback([program = std::string(companion.program), words = std::move(words), work] {
+    *work = [program, words] { return BecomeProgram(program, words); };
+  });
+}
+
+absl::Status BecomeProgram(const std::string& name, std::vector<std::string> arguments) {
+  std::string program = SiblingProgram(name);
+  if (access(program.c_str(), X_OK) != 0) {
+    return absl::NotFoundError(absl::StrCat("no program ", program, "; build it (target ", name,
+                                            ") or install it beside tissueform"));
+  }
+  std::vector<char*> words = {program.data()};
+  for (std::string& argument : arguments) {
+    words.push_back(argument.data());
+  }
+  words.push_back(nullptr);
+  execv(program.c_str(), words.data());
+  return absl::ErrnoToStatus(errno, absl::StrCat("cannot start ", program));
+}
+
+}  // namespace tissueform

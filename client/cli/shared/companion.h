@@ -1,0 +1,41 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/cli/shared/command.h"
+
+namespace tissueform {
+
+// A command whose work another program does, which lies beside `tissueform`: loading the libraries
+// that only few commands need (gRPC, VTK's rendering, ITK) takes longer than most predictions.
+struct CompanionCommand {
+  const char* name;
+  const char* description;
+  const char* program;  // tissueform-NAME
+};
+
+inline constexpr CompanionCommand kRunCommand = {"run", "predict through a tissueform-server",
+                                                 "tissueform-online"};
+inline constexpr CompanionCommand kDemoCommand = {
+    "demo", "drag the lower jaw of the bundled real head through a server, end to end",
+    "tissueform-online"};
+inline constexpr CompanionCommand kExperimentsCommand = {
+    "experiments", "compute the paper's figures and table again, and the models' accuracy",
+    "tissueform-experiments"};
+inline constexpr CompanionCommand kPlanBuildCommand = {  // of `plan`
+    "build", "make a plan from a CT of a head", "tissueform-plan-build"};
+
+// Adds the command to `app`, which may be a command itself (`plan`); all that follows its name,
+// --help too, is left to the companion, which is given the words of this process's command line.
+void AddCompanionCommand(CLI::App& app, const CompanionCommand& companion,
+                         std::vector<std::string> words, CommandWork* work);
+
+// Becomes the program of that name in the folder of this one, with `arguments`. Returns only when
+// it cannot be started: NotFound, or what the system says.
+absl::Status BecomeProgram(const std::string& name, std::vector<std::string> arguments);
+
+}  // namespace tissueform

@@ -1,0 +1,49 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/shared/demo_paths.h"
+
+#include <filesystem>
+#include <system_error>
+
+#include "absl/strings/str_cat.h"
+
+namespace tissueform {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path ProgramFolder() {
+  std::error_code error;
+  return fs::read_symlink("/proc/self/exe", error).parent_path();
+}
+
+}  // namespace
+
+std::string SiblingProgram(const std::string& name) { return (ProgramFolder() / name).string(); }
+
+absl::StatusOr<std::string> FindBundledPlan(const std::string& name) {
+  const fs::path source_tree = TISSUEFORM_SOURCE_DIR;
+  for (const fs::path& folder : {ProgramFolder().parent_path() / "share/tissueform/plans",
+                                 source_tree / "tests/data/plans"}) {
+    const fs::path plan = folder / name / "plan.json";
+    std::error_code error;
+    if (fs::is_regular_file(plan, error)) {
+      return plan.string();
+    }
+  }
+  return absl::NotFoundError(
+      absl::StrCat("the bundled plan \"", name, "\" is neither installed nor in the source tree"));
+}
+
+absl::StatusOr<std::string> FindDemoPlan(const std::string& chosen) {
+  if (!chosen.empty()) {
+    return chosen;
+  }
+  const absl::StatusOr<std::string> head = FindBundledPlan("head");
+  if (head.ok()) return head;
+  return absl::NotFoundError(
+      absl::StrCat(absl::string_view(head.status().message()), "; give one with --plan"));
+}
+
+}  // namespace tissueform

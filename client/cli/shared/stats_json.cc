@@ -1,0 +1,111 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/shared/stats_json.h"
+
+#include <cstdio>
+
+#include "absl/strings/str_format.h"
+
+#include "client/cli/shared/version.h"
+#include "core/base/atomic_file.h"
+#include "core/mesh_io/tet_mesh_io.h"
+#include "core/planning/model_names.h"
+
+namespace tissueform {
+namespace {
+
+using OrderedJson = nlohmann::ordered_json;
+
+OrderedJson CountsToJson(const PredictionStats& stats) {
+  return {{"vertices", stats.vertices},
+          {"tets", stats.tets},
+          {"fixed_vertices", stats.fixed_vertices},
+          {"handle_vertices", stats.handle_vertices},
+          {"free_vertices", stats.free_vertices}};
+}
+
+OrderedJson SecondsToJson(const PredictionStats& stats) {
+  return {{"read", stats.read_seconds},
+          {"assemble", stats.preparation.assemble_seconds},
+          {"analyse", stats.preparation.analyse_seconds},
+          {"factorise", stats.preparation.factorise_seconds},
+          {"prepare", stats.preparation.prepare_seconds},
+          {"solve", stats.solve.solve_seconds}};
+}
+
+OrderedJson QualityToJson(const PredictionStats& stats) {
+  return {{"inverted_tets", stats.quality.inverted_tets},
+          {"worst_tet", stats.quality.worst_tet},
+          {"volume_ratio_min", stats.quality.min_volume_ratio},
+          {"volume_ratio_max", stats.quality.max_volume_ratio},
+          {"volume_ratio_total", stats.quality.total_volume_ratio},
+          {"max_displacement_mm", stats.quality.max_displacement_mm},
+          {"negative_weights", stats.preparation.negative_weights},
+          {"harmonic_min", stats.preparation.harmonic_min},
+          {"harmonic_max", stats.preparation.harmonic_max}};
+}
+
+}  // namespace
+
+PredictionStats StatsOf(const PlanProblem& problem) {
+  PredictionStats stats;
+  stats.model = ModelName(problem.deformer.model);
+  stats.rotation = RotationModeName(problem.deformer.gradient_field.rotation);
+  stats.poisson_ratio = problem.deformer.preparation.poisson_ratio;
+  stats.vertices = problem.mesh->num_vertices();
+  stats.tets = problem.mesh->num_tets();
+  const auto constrained = static_cast<Eigen::Index>(problem.constraints.constrained().size());
+  stats.fixed_vertices = static_cast<Eigen::Index>(problem.constraints.fixed().size());
+  stats.handle_vertices = constrained - stats.fixed_vertices;
+  stats.free_vertices = stats.vertices - constrained;
+  return stats;
+}
+
+OrderedJson StatsToJson(const PredictionStats& stats) {
+  return {{"format", "tissueform-stats"},
+          {"version", kVersion},
+          {"model", stats.model},
+          {"rotation", stats.rotation},
+          {"poisson_ratio", stats.poisson_ratio},
+          {"counts", CountsToJson(stats)},
+          {"seconds", SecondsToJson(stats)},
+          {"iterations", stats.solve.iterations},
+          {"residual", stats.solve.residual},
+          {"converged", stats.solve.converged},
+          {"changes_mm", stats.solve.changes_mm},
+          {"energies_nj", stats.solve.energies_nj},
+          {"load", stats.solve.load},
+          {"bytes_held", stats.preparation.bytes_held},
+          {"quality", QualityToJson(stats)},
+          {"notice", kNotMedicalDeviceNotice}};
+}
+
+void PrintOutcome(const std::string& out, const PredictionStats& stats) {
+  const DeformationQuality& quality = stats.quality;
+  absl::PrintF("%s: %d vertices, largest displacement %.3f mm, volume x %.4f, %d inverted tets\n",
+               out, stats.vertices, quality.max_displacement_mm, quality.total_volume_ratio,
+               quality.inverted_tets);
+  if (quality.inverted_tets > 0) {
+    absl::FPrintF(stderr,
+                  "warning: tets are inverted, the worst is tet %d (volume x %.3g); move less, or "
+                  "use neo_hookean\n",
+                  quality.worst_tet, quality.min_volume_ratio);
+  }
+  if (stats.solve.load < 1) {
+    absl::FPrintF(stderr,
+                  "warning: only %.0f %% of the movement was reached; the file holds that state\n",
+                  100 * stats.solve.load);
+  } else if (!stats.solve.converged) {
+    absl::FPrintF(stderr,
+                  "warning: not converged after %d iterations (residual %.2g); the file holds the "
+                  "best state\n",
+                  stats.solve.iterations, stats.solve.residual);
+  }
+}
+
+absl::Status WriteStats(const std::string& path, const PredictionStats& stats) {
+  return WriteFileAtomically(path, StatsToJson(stats).dump(2) + "\n");
+}
+
+}  // namespace tissueform

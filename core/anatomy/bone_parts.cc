@@ -1,0 +1,237 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/anatomy/bone_parts.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_format.h"
+
+#include "core/anatomy/bone_pieces.h"
+#include "core/anatomy/itk_filters.h"
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+constexpr double kSmallestUpperTeethMm3 = 400;
+constexpr double kFaceDepthMm = 50;  // from the foremost bone of the head to the chin
+
+struct Markers {
+  Pieces pieces;
+  int32_t mandible = 0;
+  int16_t threshold_hu = 0;
+
+  const PieceShape& shape() const { return pieces.shapes[static_cast<size_t>(mandible) - 1]; }
+};
+
+// The mandible as a piece of its own, at the lowest threshold at which there is one.
+std::optional<Markers> FindMarkers(const HeadSegmentation& head, const DentalCut* cut) {
+  for (int hu = kLowestMarkerHu; hu <= kHighestMarkerHu; hu += kMarkerStepHu) {
+    Markers markers;
+    markers.pieces = DensePieces(head, hu, cut);
+    markers.mandible = FindMandible(markers.pieces);
+    markers.threshold_hu = static_cast<int16_t>(hu);
+    if (markers.mandible != 0) return markers;
+  }
+  return std::nullopt;
+}
+
+absl::Status NoLowerJaw() {
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "no lower jaw in view: above none of the thresholds %d to %d HU is there a piece of bone "
+      "shaped "
+      "like one (an arch 70 to 150 mm wide, open behind); the CT must reach from under the chin to "
+      "above the jaw joints",
+      kLowestMarkerHu, kHighestMarkerHu));
+}
+
+absl::Status CheckInView(const PieceShape& mandible, const GridGeometry& geometry) {
+  const double above_mm = mandible.low_mm.z() - geometry.origin_mm.z();
+  if (above_mm > 0.5 * geometry.spacing_mm) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "the lower jaw is cut off by the lower border of the image at z = %.1f mm; the "
+      "CT must reach below the chin",
+      geometry.origin_mm.z()));
+}
+
+// `chin_z_mm` is the lowest, `front_mm` the foremost of the lower jaw.
+DentalBox BoxOfTeeth(double middle_mm, double front_mm, double chin_z_mm) {
+  return {{middle_mm - 38, front_mm - 10, chin_z_mm + 20},
+          {middle_mm + 38, front_mm + 55, chin_z_mm + 78}};
+}
+
+DentalBox BoxOfTeeth(const PieceShape& mandible) {
+  DentalBox box = BoxOfTeeth((mandible.low_mm.x() + mandible.high_mm.x()) / 2, mandible.low_mm.y(),
+                             mandible.low_mm.z());
+  box.high_mm.z() = std::min(box.high_mm.z(), mandible.high_mm.z());
+  return box;
+}
+
+// Where the lower jaw hangs together with the cranium at every threshold: over the lowest bone of
+// the face's front.
+DentalBox BoxOfTeeth(const LabelGrid& bone) {
+  const VoxelBox box = BoundingBox(bone);
+  const Eigen::Vector3d low = bone.geometry.Centre(box.first[0], box.first[1], box.first[2]);
+  const Eigen::Vector3d high = bone.geometry.Centre(box.last[0], box.last[1], box.last[2]);
+  Eigen::Vector3d chin = high;
+  ForEachVoxel(bone, [&](size_t, const Eigen::Vector3d& place) {
+    const bool front = place.y() < low.y() + kFaceDepthMm;
+    if (front && place.z() < chin.z()) chin = place;
+  });
+  return BoxOfTeeth((low.x() + high.x()) / 2, low.y() + 10, chin.z());
+}
+
+// Whether the piece holds teeth on the far side of the plane: those of the upper jaw.
+bool HoldsUpperTeeth(const Markers& markers, const DentalCut& cut) {
+  int64_t voxels = 0;
+  const LabelGrid mask = markers.pieces.components.Mask(markers.mandible);
+  ForEachVoxel(mask, [&](size_t, const Eigen::Vector3d& place) {
+    if (cut.box.Contains(place) && cut.plane.HeightMm(place) > mask.geometry.spacing_mm) ++voxels;
+  });
+  return static_cast<double>(voxels) * VoxelVolumeMm3(mask.geometry) > kSmallestUpperTeethMm3;
+}
+
+bool ReachesOverJoint(const PieceShape& piece, const PieceShape& mandible) {
+  return piece.high_mm.z() > mandible.high_mm.z() + 10;
+}
+
+uint8_t PartOf(const PieceShape& piece, const PieceShape& mandible) {
+  if (ReachesOverJoint(piece, mandible)) return kCranium;
+  const bool behind = piece.centre_mm.y() > mandible.high_mm.y() - 10;
+  const bool in_the_neck = piece.high_mm.z() < mandible.low_mm.z() + 0.4 * mandible.extent_mm().z();
+  return behind || in_the_neck ? kSpine : kCranium;
+}
+
+// Pieces at a threshold, not lower than the mandible's, at which the cranium does not hang together
+// with the spine: it ends above the middle of the mandible. Those of the mandible's threshold when
+// there is none.
+Pieces PiecesWithoutNeck(const HeadSegmentation& head, const Markers& markers,
+                         const DentalCut* cut) {
+  const double end_mm = markers.shape().low_mm.z() + 0.45 * markers.shape().extent_mm().z();
+  for (int hu = markers.threshold_hu; hu <= kHighestMarkerHu; hu += kMarkerStepHu) {
+    Pieces pieces = DensePieces(head, hu, cut);
+    const auto hangs_together = [&](const PieceShape& piece) {
+      return piece.low_mm.z() < end_mm && ReachesOverJoint(piece, markers.shape());
+    };
+    if (std::none_of(pieces.shapes.begin(), pieces.shapes.end(), hangs_together)) return pieces;
+  }
+  return markers.pieces;
+}
+
+// One label for every piece; the mandible's own marker goes first.
+LabelGrid MarkerLabels(const Markers& markers, const Pieces& others) {
+  std::vector<uint8_t> part = {0};
+  for (const PieceShape& piece : others.shapes) part.push_back(PartOf(piece, markers.shape()));
+  LabelGrid labels(markers.pieces.components.labels.geometry);
+  for (size_t i = 0; i < labels.values.size(); ++i) {
+    const bool mandible = markers.pieces.components.labels.values[i] == markers.mandible;
+    labels.values[i] =
+        mandible ? kMandible : part[static_cast<size_t>(others.components.labels.values[i])];
+  }
+  return labels;
+}
+
+// The watershed reaches bone that touches no marker (the hyoid) only through what is no bone, and
+// from anywhere: its place says what it is.
+void RelabelUnmarked(const LabelGrid& bone, const LabelGrid& markers, const PieceShape& mandible,
+                     LabelGrid* labels) {
+  Pieces pieces;
+  pieces.components = LabelComponents(bone, Neighbours::kFaces);
+  pieces.shapes = MeasurePieces(pieces.components);
+  std::vector<bool> marked(pieces.shapes.size() + 1, false);
+  for (size_t i = 0; i < markers.values.size(); ++i) {
+    if (markers.values[i] != 0) {
+      marked[static_cast<size_t>(pieces.components.labels.values[i])] = true;
+    }
+  }
+  for (size_t i = 0; i < labels->values.size(); ++i) {
+    const auto piece = static_cast<size_t>(pieces.components.labels.values[i]);
+    if (piece != 0 && !marked[piece])
+      labels->values[i] = PartOf(pieces.shapes[piece - 1], mandible);
+  }
+}
+
+LabelGrid GrowMarkers(const HeadSegmentation& head, const LabelGrid& markers) {
+  VoxelGrid<int16_t> height(head.hu.geometry);
+  for (size_t i = 0; i < height.values.size(); ++i) {
+    height.values[i] = static_cast<int16_t>(-head.hu.values[i]);
+  }
+  return WatershedFromMarkers(height, markers, head.bone);
+}
+
+// Of the faces of the mandible's voxels toward other labels, the share toward no bone.
+double ShownBorder(const LabelGrid& labels) {
+  int64_t shown = 0;
+  int64_t decided = 0;
+  const std::array<int, 3>& size = labels.geometry.size;
+  const auto count = [&](uint8_t a, uint8_t b) {
+    if ((a == kMandible) == (b == kMandible)) return;
+    ++(a == 0 || b == 0 ? shown : decided);
+  };
+  for (int z = 0; z + 1 < size[2]; ++z) {
+    for (int y = 0; y + 1 < size[1]; ++y) {
+      for (int x = 0; x + 1 < size[0]; ++x) {
+        const uint8_t label = labels.At(x, y, z);
+        count(label, labels.At(x + 1, y, z));
+        count(label, labels.At(x, y + 1, z));
+        count(label, labels.At(x, y, z + 1));
+      }
+    }
+  }
+  return static_cast<double>(shown) / static_cast<double>(std::max<int64_t>(1, shown + decided));
+}
+
+// The cut to use, or nothing when the jaws are pieces of their own without one. `uncut` is where
+// they are.
+std::optional<DentalCut> ChooseCut(const HeadSegmentation& head,
+                                   const std::optional<Markers>& uncut,
+                                   const std::optional<Plane>& given_cut, BoneParts* result) {
+  const DentalBox box = uncut.has_value() ? BoxOfTeeth(uncut->shape()) : BoxOfTeeth(head.bone);
+  const std::optional<OcclusalCut> occlusal = given_cut.has_value()
+                                                  ? MeasureOcclusalCut(head.hu, box, *given_cut)
+                                                  : FindOcclusalCut(head.hu, box);
+  if (!occlusal.has_value()) return std::nullopt;
+  result->occlusal_plane = occlusal->plane;
+  result->occlusal_clearance = occlusal->clearance;
+  const DentalCut cut = {occlusal->plane, box};
+  if (given_cut.has_value()) {
+    result->separation = JawSeparation::kGivenCut;
+    return cut;
+  }
+  if (uncut.has_value() && !HoldsUpperTeeth(*uncut, cut)) return std::nullopt;
+  result->separation = JawSeparation::kAutomaticCut;
+  return cut;
+}
+
+}  // namespace
+
+absl::StatusOr<BoneParts> SeparateBoneParts(const HeadSegmentation& head,
+                                            const std::optional<Plane>& given_cut,
+                                            const StageFunction& tell) {
+  TellStage(tell, "looking for the lower jaw", 0);
+  BoneParts result;
+  std::optional<Markers> found = FindMarkers(head, nullptr);
+  const std::optional<DentalCut> cut = ChooseCut(head, found, given_cut, &result);
+  if (cut.has_value()) {
+    TellStage(tell, "cutting between the teeth", 0.3);
+    found = FindMarkers(head, &*cut);
+  }
+  if (!found.has_value()) return NoLowerJaw();
+  const Markers& markers = *found;
+  TF_RETURN_IF_ERROR(CheckInView(markers.shape(), head.hu.geometry));
+  TellStage(tell, "growing the parts of the bone", 0.5);
+  result.marker_hu = markers.threshold_hu;
+  const DentalCut* const used_cut = cut.has_value() ? &*cut : nullptr;
+  const LabelGrid seeds = MarkerLabels(markers, PiecesWithoutNeck(head, markers, used_cut));
+  result.labels = GrowMarkers(head, seeds);
+  RelabelUnmarked(head.bone, seeds, markers.shape(), &result.labels);
+  result.confidence = ShownBorder(result.labels);
+  return result;
+}
+
+}  // namespace tissueform

@@ -1,0 +1,47 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+
+#include "absl/status/statusor.h"
+
+#include "core/anatomy/grid_operations.h"
+#include "core/ct/voxel_grid.h"
+
+namespace tissueform {
+
+struct HeadSegmentationOptions {
+  // Half-way between air (-1000) and skin (about 0): where a scanner's blur leaves the surface.
+  int16_t tissue_above_hu = -500;
+  int16_t bone_above_hu = 250;
+  // Tubes, cords and sheets that are thinner than twice this are no head.
+  double opening_radius_mm = 4;
+  double smallest_bone_mm3 = 150;
+};
+
+// What is head and what of it is bone. All grids have one geometry: the CT's voxels round the head.
+struct HeadSegmentation {
+  // The CT with everything that is not head (tubes, cords, head rest) replaced by air: its surface
+  // at `tissue_above_hu` is that of the head and of its cavities.
+  HuGrid hu;
+  LabelGrid head;  // tissue and bone, without airway, sinuses and the open mouth
+  LabelGrid bone;  // subset of the head
+  HeadSegmentationOptions options;
+
+  double removed_mm3 = 0;  // tissue that was taken away: tubes, cords, head rest
+  double bare_fraction =
+      0;  // of the outer surface: nearer than 2.5 mm to bone; a living head 0..0.1
+};
+
+// Finds the largest body of tissue, opened by a ball so that what only touches it falls off, and
+// its bone.
+//
+// Errors: InvalidArgument when there is too little tissue or bone for a head, or when no soft
+// tissue covers the bone (a skull, a phantom).
+absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
+                                             const HeadSegmentationOptions& options = {},
+                                             const StageFunction& tell = nullptr);
+
+}  // namespace tissueform

@@ -1,0 +1,248 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/anatomy/jaw_landmarks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <tuple>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include <Eigen/Geometry>
+
+#include "core/anatomy/grid_operations.h"
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+using Places = std::vector<Eigen::Vector3d>;
+
+const Eigen::Vector3d kFront(0, -1, 0);
+const Eigen::Vector3d kUp(0, 0, 1);
+const Eigen::Vector3d kDown(0, 0, -1);
+
+constexpr double kMidlineMm = 8;  // half the width of what counts as the midline
+
+Places PlacesOf(const LabelGrid& parts, uint8_t part) {
+  Places places;
+  ForEachVoxel(parts, [&](size_t index, const Eigen::Vector3d& place) {
+    if (parts.values[index] == part) places.push_back(place);
+  });
+  return places;
+}
+
+template <typename Predicate>
+Places Where(const Places& places, Predicate keep) {
+  Places kept;
+  std::copy_if(places.begin(), places.end(), std::back_inserter(kept), keep);
+  return kept;
+}
+
+// The mean of the places that lie within a millimetre of the farthest along `direction`, so that
+// one voxel more or less does not move it.
+absl::Status Farthest(const Places& places, const Eigen::Vector3d& direction,
+                      absl::string_view name, Eigen::Vector3d* found) {
+  if (places.empty()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        name, " is not in view, or the bone there is below the threshold; check the CT's extent"));
+  }
+  double farthest = -std::numeric_limits<double>::max();
+  for (const Eigen::Vector3d& place : places) farthest = std::max(farthest, direction.dot(place));
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0;
+  for (const Eigen::Vector3d& place : places) {
+    if (direction.dot(place) < farthest - 1) continue;
+    sum += place;
+    ++count;
+  }
+  *found = sum / count;
+  return absl::OkStatus();
+}
+
+class JawLandmarkFinder {
+ public:
+  JawLandmarkFinder(const LabelGrid& parts, Landmarks* landmarks)
+      : mandible_(PlacesOf(parts, kMandible)),
+        cranium_(PlacesOf(parts, kCranium)),
+        landmarks_(*landmarks) {}
+
+  absl::Status FindAll() {
+    TF_RETURN_IF_ERROR(FindLowerIncisor());
+    TF_RETURN_IF_ERROR(FindTeeth());
+    FindTeethPlanes();
+    TF_RETURN_IF_ERROR(FindLastUpperTooth());
+    TF_RETURN_IF_ERROR(FindChin());
+    TF_RETURN_IF_ERROR(FindSide(1, &LeftAndRight::left));
+    TF_RETURN_IF_ERROR(FindSide(-1, &LeftAndRight::right));
+    return FindNasalFloor();
+  }
+
+ private:
+  double Lateral(const Eigen::Vector3d& p) const { return landmarks_.midsagittal.HeightMm(p); }
+  bool InMidline(const Eigen::Vector3d& p) const { return std::abs(Lateral(p)) < kMidlineMm; }
+
+  // First along the patient's axes.
+  absl::Status FindLowerIncisor() {
+    const Places midline = Where(mandible_, [&](const auto& p) { return InMidline(p); });
+    Landmarks& l = landmarks_;
+    TF_RETURN_IF_ERROR(Farthest(midline, kDown, "the chin", &l.menton));
+    TF_RETURN_IF_ERROR(Farthest(midline, kFront, "the chin's front", &l.pogonion));
+    // Streaks of metal fillings reach from the molars to the midline, but not to its front.
+    const double foremost_mm = l.pogonion.y();
+    const Places front = Where(midline, [&](const auto& p) { return p.y() < foremost_mm + 18; });
+    return Farthest(front, kUp, "the lower front teeth", &l.lower_incisor);
+  }
+
+  // Then along those of the lower teeth: heads lie tilted, and mouths are open.
+  absl::Status FindChin() {
+    Landmarks& l = landmarks_;
+    const Eigen::Vector3d up = l.lower_teeth.normal;
+    const Eigen::Vector3d front = l.ForwardOf(l.lower_teeth);
+    const Places midline = Where(mandible_, [&](const auto& p) { return InMidline(p); });
+    TF_RETURN_IF_ERROR(Farthest(midline, -up, "the chin", &l.menton));
+    const double middle_mm = 0.45 * up.dot(l.lower_incisor - l.menton);
+    const Places chin =
+        Where(midline, [&](const auto& p) { return up.dot(p - l.menton) < middle_mm; });
+    return Farthest(chin, front, "the chin's front", &l.pogonion);
+  }
+
+  // Upper front teeth lie over and not far from the lower ones; molars behind on either side,
+  // nearer to the midline than the rami.
+  absl::Status FindTeeth() {
+    Landmarks& l = landmarks_;
+    const Eigen::Vector3d front = l.lower_incisor;
+    const Places upper_front = Where(cranium_, [&](const auto& p) {
+      return InMidline(p) && std::abs(p.y() - front.y()) < 18 && p.z() > front.z() - 8 &&
+             p.z() < front.z() + 45;
+    });
+    TF_RETURN_IF_ERROR(Farthest(upper_front, kDown, "the upper front teeth", &l.upper_incisor));
+    for (const double side : {1.0, -1.0}) {
+      const auto in_molars = [&](const Eigen::Vector3d& incisor) {
+        return [=, this](const Eigen::Vector3d& p) {
+          const double lateral = side * Lateral(p);
+          const double behind = p.y() - incisor.y();
+          return lateral > 12 && lateral < 32 && behind > 25 && behind < 36 &&
+                 std::abs(p.z() - incisor.z()) < 25;
+        };
+      };
+      const auto member = side > 0 ? &LeftAndRight::left : &LeftAndRight::right;
+      TF_RETURN_IF_ERROR(Farthest(Where(mandible_, in_molars(l.lower_incisor)), kUp,
+                                  "a lower molar", &(l.lower_molar.*member)));
+      TF_RETURN_IF_ERROR(Farthest(Where(cranium_, in_molars(l.upper_incisor)), kDown,
+                                  "an upper molar", &(l.upper_molar.*member)));
+    }
+    return absl::OkStatus();
+  }
+
+  // Through the incisor and the middle of the molars, square to the midline: a molar more or less
+  // on one side would tilt it.
+  Plane ThroughTeeth(const Eigen::Vector3d& incisor, const LeftAndRight& molar) const {
+    const Eigen::Vector3d molars = (molar.left + molar.right) / 2;
+    const Eigen::Vector3d& left = landmarks_.midsagittal.normal;
+    return {(incisor + 2 * molars) / 3, left.cross(molars - incisor).normalized()};
+  }
+
+  void FindTeethPlanes() {
+    Landmarks& l = landmarks_;
+    l.lower_teeth = ThroughTeeth(l.lower_incisor, l.lower_molar);
+    l.upper_teeth = ThroughTeeth(l.upper_incisor, l.upper_molar);
+    l.occlusal.point_mm = (l.lower_teeth.point_mm + l.upper_teeth.point_mm) / 2;
+    l.occlusal.normal = (l.lower_teeth.normal + l.upper_teeth.normal).normalized();
+  }
+
+  // At the height of the crowns, under the pterygoid plates.
+  absl::Status FindLastUpperTooth() {
+    Landmarks& l = landmarks_;
+    const Eigen::Vector3d back = -l.ForwardOf(l.upper_teeth);
+    const Places crowns = Where(cranium_, [&](const auto& p) {
+      const double lateral = std::abs(Lateral(p));
+      const double height = l.upper_teeth.HeightMm(p);
+      const double behind = back.dot(p - l.upper_incisor);
+      return lateral > 12 && lateral < 36 && height > -3 && height < 5 && behind < 62;
+    });
+    return Farthest(crowns, back, "the last upper tooth", &l.last_upper_tooth);
+  }
+
+  absl::Status FindSide(double side, Eigen::Vector3d LeftAndRight::*member) {
+    Landmarks& l = landmarks_;
+    const Places half = Where(mandible_, [&](const auto& p) { return side * Lateral(p) > 20; });
+    const Eigen::Vector3d back_and_down = -(l.lower_teeth.normal + l.ForwardOf(l.lower_teeth));
+    TF_RETURN_IF_ERROR(
+        Farthest(half, back_and_down.normalized(), "the angle of the jaw", &(l.gonion.*member)));
+    const Places ramus = Where(half, [&](const auto& p) {
+      const double height = l.lower_teeth.HeightMm(p);
+      // Beside the molars, whose crowns and metal streaks reach over the plane too.
+      return height > 3 && height < 5 && side * Lateral(p) > 32 && p.y() > l.lower_incisor.y() + 25;
+    });
+    TF_RETURN_IF_ERROR(Farthest(ramus, kFront, "the front of the ramus", &(l.ramus_front.*member)));
+    return FindCondyle(half, &(l.condyle.*member));
+  }
+
+  // Of the ramus's two tips the rear one; the front one is the coronoid process.
+  static absl::Status FindCondyle(const Places& half, Eigen::Vector3d* found) {
+    double low = std::numeric_limits<double>::max();
+    double high = -low;
+    for (const Eigen::Vector3d& p : half) {
+      low = std::min(low, p.z());
+      high = std::max(high, p.z());
+    }
+    const Places upper =
+        Where(half, [=](const auto& p) { return p.z() > low + 0.7 * (high - low); });
+    double front = std::numeric_limits<double>::max();
+    double back = -front;
+    for (const Eigen::Vector3d& p : upper) {
+      front = std::min(front, p.y());
+      back = std::max(back, p.y());
+    }
+    const Places rear = Where(upper, [=](const auto& p) { return p.y() > (front + back) / 2; });
+    return Farthest(rear, kUp, "a jaw joint", found);
+  }
+
+  // Over each place of the palate the top of the first bone; the middle one of those heights.
+  absl::Status FindNasalFloor() {
+    Landmarks& l = landmarks_;
+    const Eigen::Vector3d front = l.upper_incisor;
+    Places palate = Where(cranium_, [&](const auto& p) {
+      const double behind = p.y() - front.y();
+      return InMidline(p) && behind > 15 && behind < 30 && p.z() > front.z() &&
+             p.z() < front.z() + 45;
+    });
+    Places tops;
+    const auto column_then_height = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+      return std::make_tuple(a.x(), a.y(), a.z()) < std::make_tuple(b.x(), b.y(), b.z());
+    };
+    std::sort(palate.begin(), palate.end(), column_then_height);
+    for (size_t i = 0; i < palate.size(); ++i) {
+      const bool first_of_column = i == 0 || palate[i].head<2>() != palate[i - 1].head<2>();
+      if (!first_of_column) continue;
+      size_t top = i;
+      while (top + 1 < palate.size() && (palate[top + 1] - palate[top]).norm() < kThinGapMm) ++top;
+      tops.push_back(palate[top]);
+    }
+    if (tops.empty()) return Farthest(tops, kUp, "the hard palate", &l.nasal_floor);
+    const auto middle = tops.begin() + static_cast<int64_t>(tops.size() / 2);
+    std::nth_element(tops.begin(), middle, tops.end(),
+                     [](const auto& a, const auto& b) { return a.z() < b.z(); });
+    l.nasal_floor = *middle;
+    return absl::OkStatus();
+  }
+
+  static constexpr double kThinGapMm = 3;
+
+  Places mandible_;
+  Places cranium_;
+  Landmarks& landmarks_;
+};
+
+}  // namespace
+
+absl::Status FindJawLandmarks(const LabelGrid& parts, Landmarks* landmarks) {
+  return JawLandmarkFinder(parts, landmarks).FindAll();
+}
+
+}  // namespace tissueform

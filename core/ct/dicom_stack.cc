@@ -1,0 +1,219 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/ct/dicom_stack.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include <Eigen/Geometry>
+
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+constexpr size_t kLeastSlices = 8;
+constexpr double kSameDirection = 1e-3;
+constexpr double kSamePositionMm = 0.01;
+constexpr double kPositionToleranceMm = 0.1;  // positions are rounded when they are written
+constexpr double kLeastSpacingMm = 0.05;
+constexpr double kMostSpacingMm = 10;
+constexpr double kMostTiltDeg = 35;
+constexpr double kUprightDeg = 0.05;
+
+const char* MissingTag(const DicomHeader& slice) {
+  if (!slice.position_mm) return "position (ImagePositionPatient)";
+  if (!slice.row_direction) return "orientation (ImageOrientationPatient)";
+  if (!slice.pixel_spacing_mm) return "pixel spacing (PixelSpacing)";
+  return nullptr;
+}
+
+absl::Status CheckRescale(const DicomHeader& slice, bool has_offset) {
+  const bool stated = slice.rescale_slope || slice.rescale_intercept;
+  if (stated && has_offset) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        NameOf(slice), " states how its values become HU (RescaleIntercept ",
+        slice.rescale_intercept.value_or(0), "); take \"hu_offset\" out of the recipe"));
+  }
+  if (stated && slice.rescale_intercept && slice.rescale_slope.value_or(1) != 0) {
+    return absl::OkStatus();
+  }
+  if (!stated && has_offset) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      NameOf(slice), " does not say how its values become HU (RescaleSlope, RescaleIntercept)",
+      stated ? "" : "; state \"hu_offset\" in the recipe"));
+}
+
+absl::Status CheckTags(const std::vector<DicomHeader>& slices, bool has_offset) {
+  for (const DicomHeader& slice : slices) {
+    if (const char* const missing = MissingTag(slice)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(NameOf(slice), " has no usable ", missing, ": it cannot be placed"));
+    }
+    TF_RETURN_IF_ERROR(CheckRescale(slice, has_offset));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Differs(const DicomHeader& slice, const DicomHeader& first, absl::string_view what) {
+  return absl::InvalidArgumentError(absl::StrCat(NameOf(slice), " differs from ", NameOf(first),
+                                                 " in ", what, ": they are not one volume"));
+}
+
+absl::Status CheckAlike(const std::vector<DicomHeader>& slices) {
+  const DicomHeader& first = slices.front();
+  for (const DicomHeader& slice : slices) {
+    if (slice.rows != first.rows || slice.columns != first.columns) {
+      return Differs(slice, first,
+                     absl::StrCat("size (", slice.columns, " x ", slice.rows, " instead of ",
+                                  first.columns, " x ", first.rows, ")"));
+    }
+    if ((*slice.row_direction - *first.row_direction).norm() > kSameDirection ||
+        (*slice.column_direction - *first.column_direction).norm() > kSameDirection) {
+      return Differs(slice, first, "orientation");
+    }
+    if (!slice.pixel_spacing_mm->isApprox(*first.pixel_spacing_mm, kSameDirection)) {
+      return Differs(slice, first, "pixel spacing");
+    }
+    if (slice.rescale_slope != first.rescale_slope ||
+        slice.rescale_intercept != first.rescale_intercept) {
+      return Differs(slice, first, "how values become HU (RescaleSlope, RescaleIntercept)");
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckPlane(const DicomHeader& slice) {
+  const Eigen::Vector3d& row = *slice.row_direction;
+  const Eigen::Vector3d& column = *slice.column_direction;
+  if (std::abs(row.norm() - 1) > kSameDirection || std::abs(column.norm() - 1) > kSameDirection ||
+      std::abs(row.dot(column)) > kSameDirection) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        NameOf(slice), " has an orientation that is not two directions square to each other"));
+  }
+  const Eigen::Vector2d& spacing = *slice.pixel_spacing_mm;
+  if (!(spacing.minCoeff() >= kLeastSpacingMm && spacing.maxCoeff() <= kMostSpacingMm)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(NameOf(slice), " has pixels of ", spacing[1], " x ", spacing[0],
+                     " mm; between ", kLeastSpacingMm, " and ", kMostSpacingMm, " mm are read"));
+  }
+  return absl::OkStatus();
+}
+
+std::string Place(const DicomHeader& slice) {
+  const Eigen::Vector3d& position = *slice.position_mm;
+  return absl::StrFormat("%s at (%.2f, %.2f, %.2f) mm", NameOf(slice), position[0], position[1],
+                         position[2]);
+}
+
+void SortAlong(const Eigen::Vector3d& normal, std::vector<DicomHeader>* slices) {
+  std::sort(slices->begin(), slices->end(), [&](const DicomHeader& a, const DicomHeader& b) {
+    const double height_a = a.position_mm->dot(normal);
+    const double height_b = b.position_mm->dot(normal);
+    return height_a != height_b ? height_a < height_b : a.file_number < b.file_number;
+  });
+}
+
+std::vector<double> Gaps(const std::vector<DicomHeader>& slices) {
+  std::vector<double> gaps;
+  for (size_t i = 1; i < slices.size(); ++i) {
+    gaps.push_back((*slices[i].position_mm - *slices[i - 1].position_mm).norm());
+  }
+  return gaps;
+}
+
+double Median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+absl::Status CheckGaps(const std::vector<DicomHeader>& slices) {
+  const std::vector<double> gaps = Gaps(slices);
+  const double usual = Median(gaps);
+  for (size_t i = 0; i < gaps.size(); ++i) {
+    const std::string between =
+        absl::StrCat("between ", Place(slices[i]), " and ", Place(slices[i + 1]));
+    if (gaps[i] < kSamePositionMm) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          NameOf(slices[i]), " and ", Place(slices[i + 1]),
+          " lie at the same place: the folder holds a slice twice, or two phases of a scan"));
+    }
+    if (std::abs(gaps[i] - usual) <= kPositionToleranceMm) continue;
+    const double missing = std::round(gaps[i] / usual) - 1;
+    if (missing >= 1 && std::abs(gaps[i] - (missing + 1) * usual) <= kPositionToleranceMm) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("%.0f slice%s missing %s: they are %.2f mm apart, the others %.2f mm",
+                          missing, missing > 1 ? "s are" : " is", between, gaps[i], usual));
+    }
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "the slices lie unevenly: %.2f mm %s, usually %.2f mm", gaps[i], between, usual));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckOnLine(const std::vector<DicomHeader>& slices, const Eigen::Vector3d& step) {
+  for (size_t i = 0; i < slices.size(); ++i) {
+    const Eigen::Vector3d expected = *slices.front().position_mm + static_cast<double>(i) * step;
+    const double off_mm = (*slices[i].position_mm - expected).norm();
+    if (off_mm > kPositionToleranceMm) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("the slices lie unevenly: %s is %.2f mm off the even spacing of %.3f mm",
+                          Place(slices[i]), off_mm, step.norm()));
+    }
+  }
+  return absl::OkStatus();
+}
+
+double TiltDeg(const Eigen::Vector3d& row, const Eigen::Vector3d& normal,
+               const Eigen::Vector3d& step) {
+  const double angle = std::atan2(row.dot(step.cross(normal)), step.dot(normal)) * 180 / M_PI;
+  return std::abs(angle) < kUprightDeg ? 0 : angle;
+}
+
+absl::Status CheckStep(const Eigen::Vector3d& step, const Eigen::Vector3d& normal) {
+  if (!(step.norm() >= kLeastSpacingMm && step.norm() <= kMostSpacingMm)) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("the slices are %.3f mm apart; between %.2f and %.0f mm are read",
+                        step.norm(), kLeastSpacingMm, kMostSpacingMm));
+  }
+  const double angle_deg = std::acos(std::min(1.0, step.normalized().dot(normal))) * 180 / M_PI;
+  if (angle_deg > kMostTiltDeg) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "the slices are stacked %.1f degrees off their normal, which no gantry tilt explains",
+        angle_deg));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status ArrangeStack(bool has_offset, DicomStack* stack) {
+  std::vector<DicomHeader>& slices = stack->slices;
+  TF_RETURN_IF_ERROR(CheckTags(slices, has_offset));
+  TF_RETURN_IF_ERROR(CheckAlike(slices));
+  TF_RETURN_IF_ERROR(CheckPlane(slices.front()));
+  if (slices.size() < kLeastSlices) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "the series has ", slices.size(), " slices; a volume needs at least ", kLeastSlices));
+  }
+  const Eigen::Vector3d row = slices.front().row_direction->normalized();
+  const Eigen::Vector3d column = slices.front().column_direction->normalized();
+  const Eigen::Vector3d normal = row.cross(column);
+  SortAlong(normal, &slices);
+  TF_RETURN_IF_ERROR(CheckGaps(slices));
+  const Eigen::Vector3d step = (*slices.back().position_mm - *slices.front().position_mm) /
+                               static_cast<double>(slices.size() - 1);
+  TF_RETURN_IF_ERROR(CheckOnLine(slices, step));
+  TF_RETURN_IF_ERROR(CheckStep(step, normal));
+  const Eigen::Vector2d& pixel = *slices.front().pixel_spacing_mm;
+  stack->spacing_mm = {pixel[1], pixel[0], step.norm()};
+  stack->direction << row, column, step.normalized();
+  stack->gantry_tilt_deg = TiltDeg(row, normal, step);
+  return absl::OkStatus();
+}
+
+}  // namespace tissueform

@@ -1,0 +1,170 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/ct/isotropic_resample.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "core/base/parallel_for.h"
+
+namespace tissueform {
+namespace {
+
+constexpr int16_t kAir = -1024;
+constexpr double kLeastSpacingMm = 0.1;
+constexpr double kMostSpacingMm = 10;
+constexpr int kMostSamples = 8;
+constexpr double kRounding = 1e-6;  // of a voxel
+
+using Samples = std::array<int, 3>;
+
+// Box of the volume's voxels, upright in the patient.
+Eigen::AlignedBox3d BoxOf(const CtVolume& volume) {
+  const Eigen::Matrix3d steps = volume.StepsMm();
+  Eigen::AlignedBox3d box;
+  for (int corner = 0; corner < 8; ++corner) {
+    Eigen::Vector3d index;
+    for (int axis = 0; axis < 3; ++axis) {
+      const bool far = ((corner >> axis) & 1) != 0;
+      index[axis] = far ? volume.size[static_cast<size_t>(axis)] - 0.5 : -0.5;
+    }
+    box.extend(volume.origin_mm + steps * index);
+  }
+  return box;
+}
+
+GridGeometry GridOver(const Eigen::AlignedBox3d& box, double spacing_mm) {
+  GridGeometry grid;
+  grid.spacing_mm = spacing_mm;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double count = std::max(1.0, std::round(box.sizes()[axis] / spacing_mm));
+    grid.size[static_cast<size_t>(axis)] = static_cast<int>(std::min(count, 1e6));
+    grid.origin_mm[axis] = box.center()[axis] - (count - 1) / 2 * spacing_mm;
+  }
+  return grid;
+}
+
+Samples SamplesPerVoxel(const Eigen::Matrix3d& to_index, double spacing_mm) {
+  Samples samples{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const double source_voxels = to_index.col(axis).cwiseAbs().maxCoeff() * spacing_mm;
+    samples[static_cast<size_t>(axis)] =
+        std::clamp(static_cast<int>(std::ceil(source_voxels - kRounding)), 1, kMostSamples);
+  }
+  return samples;
+}
+
+// The two neighbours of a place along one axis, and how much the upper one weighs.
+struct Neighbours {
+  int lower = 0;
+  int upper = 0;
+  double weight = 0;
+};
+
+bool FindNeighbours(double place, int size, Neighbours* neighbours) {
+  if (!(place >= -0.5 - kRounding && place <= size - 0.5 + kRounding)) return false;
+  const double inside = std::clamp(place, 0.0, static_cast<double>(size - 1));
+  neighbours->lower = std::min(static_cast<int>(inside), std::max(0, size - 2));
+  neighbours->upper = std::min(neighbours->lower + 1, size - 1);
+  neighbours->weight = inside - neighbours->lower;
+  return true;
+}
+
+class Sampler {
+ public:
+  Sampler(const CtVolume& volume, const GridGeometry& grid)
+      : volume_(volume),
+        to_index_(volume.StepsMm().inverse()),
+        start_(to_index_ * (grid.origin_mm - volume.origin_mm)),
+        steps_(to_index_ * grid.spacing_mm),
+        samples_(SamplesPerVoxel(to_index_, grid.spacing_mm)) {}
+
+  // Mean over voxel (x, y, z) of the grid, of the samples that lie in the volume.
+  int16_t Mean(int x, int y, int z) const {
+    double sum = 0;
+    int count = 0;
+    for (int c = 0; c < samples_[2]; ++c) {
+      for (int b = 0; b < samples_[1]; ++b) {
+        for (int a = 0; a < samples_[0]; ++a) {
+          const Eigen::Vector3d place(x + Offset(a, 0), y + Offset(b, 1), z + Offset(c, 2));
+          count += AddSample(start_ + steps_ * place, &sum) ? 1 : 0;
+        }
+      }
+    }
+    return count == 0 ? kAir : static_cast<int16_t>(std::lround(sum / count));
+  }
+
+ private:
+  double Offset(int sample, size_t axis) const { return (sample + 0.5) / samples_[axis] - 0.5; }
+
+  double AlongRow(const Neighbours& i, int j, int k) const {
+    return (1 - i.weight) * volume_.At(i.lower, j, k) + i.weight * volume_.At(i.upper, j, k);
+  }
+
+  bool AddSample(const Eigen::Vector3d& index, double* sum) const {
+    Neighbours i;
+    Neighbours j;
+    Neighbours k;
+    if (!FindNeighbours(index[0], volume_.size[0], &i) ||
+        !FindNeighbours(index[1], volume_.size[1], &j) ||
+        !FindNeighbours(index[2], volume_.size[2], &k)) {
+      return false;
+    }
+    const double below =
+        (1 - j.weight) * AlongRow(i, j.lower, k.lower) + j.weight * AlongRow(i, j.upper, k.lower);
+    const double above =
+        (1 - j.weight) * AlongRow(i, j.lower, k.upper) + j.weight * AlongRow(i, j.upper, k.upper);
+    *sum += (1 - k.weight) * below + k.weight * above;
+    return true;
+  }
+
+  const CtVolume& volume_;
+  Eigen::Matrix3d to_index_;
+  Eigen::Vector3d start_;  // place of the grid's first voxel in the volume
+  Eigen::Matrix3d steps_;  // from one voxel of the grid to the next, in voxels of the volume
+  Samples samples_;
+};
+
+absl::Status CheckRequest(const Eigen::AlignedBox3d& box, double spacing_mm, int64_t max_bytes) {
+  if (!(spacing_mm >= kLeastSpacingMm && spacing_mm <= kMostSpacingMm)) {
+    return absl::InvalidArgumentError(absl::StrCat("a spacing of ", spacing_mm, " mm is not in [",
+                                                   kLeastSpacingMm, ", ", kMostSpacingMm, "] mm"));
+  }
+  const Eigen::Vector3d counts = (box.sizes() / spacing_mm).array().round().max(1.0);
+  const double bytes = counts.prod() * sizeof(int16_t);
+  if (!(bytes <= static_cast<double>(max_bytes)) || counts.maxCoeff() > 1e6) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "the volume at a spacing of ", spacing_mm, " mm needs ", bytes,
+        " bytes of memory; at most ", max_bytes, " are given: choose a larger spacing"));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<HuGrid> ResampleIsotropic(const CtVolume& volume, double spacing_mm,
+                                         const ResampleOptions& options) {
+  const Eigen::AlignedBox3d box = BoxOf(volume);
+  const absl::Status possible = CheckRequest(box, spacing_mm, options.max_bytes);
+  if (!possible.ok()) return possible;
+  HuGrid grid(GridOver(box, spacing_mm));
+  const Sampler sampler(volume, grid.geometry);
+  const auto [size_x, size_y, size_z] = grid.geometry.size;
+  const auto fill = [&grid, &sampler, size_x = size_x, size_y = size_y](Eigen::Index begin,
+                                                                        Eigen::Index end) {
+    for (int z = static_cast<int>(begin); z < end; ++z) {
+      for (int y = 0; y < size_y; ++y) {
+        for (int x = 0; x < size_x; ++x) grid.At(x, y, z) = sampler.Mean(x, y, z);
+      }
+    }
+  };
+  ParallelFor(options.threads, size_z, 1, fill);
+  return grid;
+}
+
+}  // namespace tissueform

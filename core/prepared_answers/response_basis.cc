@@ -1,0 +1,275 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/prepared_answers/response_basis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "core/deformation/deformation_checks.h"
+#include "core/deformation/harmonic_fields.h"
+#include "core/prepared_answers/panel_response.h"
+#include "core/prepared_answers/rotation_expansion.h"
+#include "core/prepared_answers/term_responses.h"
+
+namespace tissueform {
+namespace {
+
+// Polynomials that are solved for in one pass over the factor.
+constexpr Eigen::Index kTermsPerPass = 6;
+// Degrees that are expanded beyond those that are answered with: they tell the truncation error.
+constexpr int kGuardDegrees = 2;
+constexpr int kColumnsPerHandle = 4;
+// Measured over test meshes; see PlannedErrorMm.
+constexpr double kPlannedGain = 0.5;
+// Responses fall with the degree; this allows for those of the second guard degree, which are not
+// measured, not doing so.
+constexpr double kGainAllowance = 1.5;
+
+absl::Status CheckOptions(const ResponseBasisOptions& options) {
+  TF_RETURN_IF_ERROR(CheckTolerance(options.tolerance_mm));
+  if (!std::isfinite(options.max_rotation_rad) || options.max_rotation_rad <= 0) {
+    return absl::InvalidArgumentError(absl::StrCat("max_rotation_rad is ", options.max_rotation_rad,
+                                                   "; it must be a positive number"));
+  }
+  if (!(options.max_scale_change >= 0 && options.max_scale_change < 1)) {
+    return absl::InvalidArgumentError(absl::StrCat("max_scale_change is ", options.max_scale_change,
+                                                   "; it must be at least 0 and below 1"));
+  }
+  return absl::OkStatus();
+}
+
+// Of the bound at the edge of the prepared range. With the rotation vectors of two handles opposed
+// the field turns by twice the range between them; r is half of what it turns by, and the
+// coefficients of degree n of a turning by r cos(t) are 2 J_n(r) <= 2 (r / 2)^n / n!. What a
+// polynomial of degree n moves a vertex by is some part of the mesh's size over n.
+double PlannedErrorMm(double size_mm, size_t num_handles, int degree,
+                      const ResponseBasisOptions& options) {
+  const double half_turn = (num_handles > 1 ? 1.0 : 0.5) * options.max_rotation_rad;
+  const int n = degree + 1;
+  const double factor = std::pow(half_turn / 2, n - 1) / std::tgamma(n + 1);
+  const double coefficient =
+      2 * factor * ((1 + options.max_scale_change) * half_turn / 2 + options.max_scale_change * n);
+  const double polynomials_of_degree =
+      static_cast<double>(SimplexPolynomials::NumTerms(static_cast<int>(num_handles) - 1, n));
+  return kPlannedGain * size_mm * coefficient * polynomials_of_degree / n;
+}
+
+ResponseBasisPlan PlanOfDegree(int degree, size_t num_handles, Eigen::Index num_vertices) {
+  const int k = static_cast<int>(num_handles);
+  ResponseBasisPlan plan;
+  plan.degree = degree;
+  plan.num_terms =
+      static_cast<int>(3 * SimplexPolynomials::NumTerms(k, degree)) + kColumnsPerHandle * k;
+  plan.bytes =
+      PanelResponse::BytesNeeded(num_vertices, PanelResponse::Rows::kVertices, plan.num_terms) +
+      RotationExpansion::BytesNeeded(k, degree + kGuardDegrees);
+  return plan;
+}
+
+bool SamePoses(absl::Span<const HandlePose> a, absl::Span<const HandlePose> b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const HandlePose& p, const HandlePose& q) {
+                      return p.rotation_vector == q.rotation_vector && p.pivot_mm == q.pivot_mm &&
+                             p.translation_mm == q.translation_mm && p.scale == q.scale;
+                    });
+}
+
+class ResponseBasis : public VertexResponse {
+ public:
+  ResponseBasis(const ResponseBasisPlan& plan, const ResponseBasisOptions& options,
+                const SimplexDomain& domain, Positions rest)
+      : options_(options),
+        num_polynomials_(
+            SimplexPolynomials::NumTerms(static_cast<int>(domain.dimension()), plan.degree)),
+        degree_(plan.degree),
+        domain_(domain),
+        expansion_(domain, plan.degree + kGuardDegrees),
+        panel_(std::move(rest), PanelResponse::Rows::kVertices, plan.num_terms) {}
+
+  absl::Status Prepare(const std::vector<int32_t>& vertices, MeshPreparation* preparation) {
+    TF_RETURN_IF_ERROR(PrepareHandles(vertices, preparation));
+    return PreparePolynomials(vertices, preparation);
+  }
+
+  double ErrorBoundMm(absl::Span<const HandlePose> poses) override {
+    Expand(poses);
+    return TruncationBoundMm(poses) + panel_.RoundingBoundMm(factors_);
+  }
+
+  bool Covers(absl::Span<const HandlePose> poses) override {
+    constexpr double kSlack = 1 + 1e-9;  // the edge of the range belongs to it
+    return std::all_of(poses.begin(), poses.end(),
+                       [this](const HandlePose& pose) {
+                         return pose.rotation_vector.norm() <= options_.max_rotation_rad * kSlack &&
+                                std::abs(pose.scale - 1) <=
+                                    options_.max_scale_change + (kSlack - 1);
+                       }) &&
+           ErrorBoundMm(poses) <= options_.tolerance_mm;
+  }
+
+  void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) override {
+    Expand(poses);
+    panel_.Evaluate(factors_, positions);
+  }
+
+  Eigen::Index num_vertices() const override { return panel_.num_vertices(); }
+  int num_terms() const override { return static_cast<int>(panel_.num_columns()); }
+  int64_t bytes_held() const override {
+    return panel_.bytes_held() + expansion_.bytes_held() +
+           (guard_gains_.size() + 3 * static_cast<Eigen::Index>(origins_.size())) *
+               static_cast<int64_t>(sizeof(double));
+  }
+
+ private:
+  // Small ones first: high degrees before low ones, handles last.
+  Eigen::Index ColumnOfPolynomial(Eigen::Index n) const { return 3 * (num_polynomials_ - 1 - n); }
+  Eigen::Index ColumnOfHandle(size_t h) const {
+    return 3 * num_polynomials_ + kColumnsPerHandle * static_cast<Eigen::Index>(h);
+  }
+
+  absl::Status PrepareHandles(const std::vector<int32_t>& vertices, MeshPreparation* preparation) {
+    TF_ASSIGN_OR_RETURN(const PreparedLaplacian* laplacian, preparation->Laplacian());
+    const std::vector<HandleRegion>& handles = preparation->constraints().handles();
+    for (size_t h = 0; h < handles.size(); ++h) {
+      const Positions& rest = preparation->mesh().positions();
+      origins_.emplace_back(rest(handles[h].vertices, Eigen::all).colwise().mean());
+      TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd X,
+                          HandleResponse(static_cast<int>(h), origins_.back(), preparation));
+      for (Eigen::Index axis = 0; axis < 3; ++axis) {
+        panel_.SetColumn(ColumnOfHandle(h) + axis, X(vertices, axis));
+      }
+      panel_.SetColumn(ColumnOfHandle(h) + 3,
+                       laplacian->harmonic(vertices, static_cast<Eigen::Index>(h)));
+    }
+    return absl::OkStatus();
+  }
+
+  // Columns up to degree_, gains one degree further. Of every pass only the chosen rows are kept.
+  absl::Status PreparePolynomials(const std::vector<int32_t>& vertices,
+                                  MeshPreparation* preparation) {
+    const SimplexPolynomials& polynomials = expansion_.polynomials();
+    const Eigen::Index measured =
+        SimplexPolynomials::NumTerms(polynomials.dimension(), degree_ + 1);
+    guard_gains_.setZero(measured - num_polynomials_);
+    for (Eigen::Index first = 0; first < measured; first += kTermsPerPass) {
+      const Eigen::Index count = std::min(kTermsPerPass, measured - first);
+      TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd responses,
+                          TermResponses(domain_, polynomials, first, count, preparation));
+      for (Eigen::Index n = first; n < first + count; ++n) {
+        const Positions chosen = responses.middleCols<3>(3 * (n - first))(vertices, Eigen::all);
+        const double gain = chosen.rowwise().norm().maxCoeff();
+        largest_gain_ = std::max(largest_gain_, gain);
+        if (n >= num_polynomials_) {
+          guard_gains_[n - num_polynomials_] = gain;
+          continue;
+        }
+        for (Eigen::Index axis = 0; axis < 3; ++axis) {
+          panel_.SetColumn(ColumnOfPolynomial(n) + axis, chosen.col(axis));
+        }
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  // Brings coefficients_ and factors_ to `poses`. Asking whether poses are covered and then for
+  // their answer expands once.
+  void Expand(absl::Span<const HandlePose> poses) {
+    if (!poses_.empty() && SamePoses(poses, poses_)) {
+      return;
+    }
+    poses_.assign(poses.begin(), poses.end());
+    coefficients_ = expansion_.Expand(poses);
+    factors_.resize(panel_.num_columns(), 3);
+    for (Eigen::Index n = 0; n < num_polynomials_; ++n) {
+      // Row-major C seen column-major is its transpose.
+      factors_.middleRows<3>(ColumnOfPolynomial(n)) =
+          Eigen::Map<const Eigen::Matrix3d>(coefficients_.row(n).data());
+    }
+    for (size_t h = 0; h < poses.size(); ++h) {
+      const HandlePose& pose = poses[h];
+      const Eigen::Matrix3d turn =
+          pose.scale * RotationMatrix(pose.rotation_vector) - Eigen::Matrix3d::Identity();
+      factors_.middleRows<3>(ColumnOfHandle(h)) = turn.transpose();
+      factors_.row(ColumnOfHandle(h) + 3) =
+          turn * (origins_[h] - pose.pivot_mm) + pose.translation_mm;
+    }
+  }
+
+  double TruncationBoundMm(absl::Span<const HandlePose> poses) const {
+    const Eigen::Index guards = guard_gains_.size();
+    if (guards == 0) {
+      return 0;
+    }
+    const Eigen::VectorXd sizes = coefficients_.rowwise().norm();
+    const Eigen::Index unmeasured = sizes.size() - num_polynomials_ - guards;
+    return sizes.segment(num_polynomials_, guards).dot(guard_gains_) +
+           kGainAllowance * guard_gains_.maxCoeff() * sizes.tail(unmeasured).sum() +
+           largest_gain_ * expansion_.RemainderBound(poses, degree_ + kGuardDegrees);
+  }
+
+  // Constant after Prepare.
+  const ResponseBasisOptions options_;
+  const Eigen::Index num_polynomials_;
+  const int degree_;
+  const SimplexDomain domain_;
+  const RotationExpansion expansion_;  // with the guard degrees
+  PanelResponse panel_;
+  std::vector<Eigen::Vector3d> origins_;  // o_h
+  // Largest displacement that a polynomial of degree degree_ + 1 gives a chosen vertex, each; and
+  // that any one does, mm.
+  Eigen::VectorXd guard_gains_;
+  double largest_gain_ = 0;
+
+  // Of the last poses.
+  std::vector<HandlePose> poses_;
+  ExpansionCoefficients coefficients_;
+  Eigen::MatrixXd factors_;
+};
+
+}  // namespace
+
+absl::StatusOr<ResponseBasisPlan> PlanResponseBasis(const MeshPreparation& preparation,
+                                                    Eigen::Index num_vertices,
+                                                    const ResponseBasisOptions& options) {
+  TF_RETURN_IF_ERROR(CheckOptions(options));
+  const size_t num_handles = preparation.constraints().handles().size();
+  const double size_mm = preparation.mesh().BoundingBoxDiagonal();
+  for (int degree = 1;; ++degree) {
+    if (SimplexPolynomials::NumTerms(static_cast<int>(num_handles), degree) >
+        kMostResponsePolynomials) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("a response basis for ", num_handles, " handles, ", options.max_rotation_rad,
+                       " rad and ", options.tolerance_mm, " mm would need more than ",
+                       kMostResponsePolynomials, " polynomials; prepare a smaller range"));
+    }
+    if (PlannedErrorMm(size_mm, num_handles, degree, options) <= options.tolerance_mm) {
+      return PlanOfDegree(degree, num_handles, num_vertices);
+    }
+  }
+}
+
+absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponseBasis(
+    const std::shared_ptr<MeshPreparation>& preparation, const std::vector<int32_t>& vertices,
+    const ResponseBasisOptions& options) {
+  TF_RETURN_IF_ERROR(CheckChosenVertices(vertices, preparation->mesh().num_vertices()));
+  TF_ASSIGN_OR_RETURN(
+      const ResponseBasisPlan plan,
+      PlanResponseBasis(*preparation, static_cast<Eigen::Index>(vertices.size()), options));
+  if (options.admission) {
+    TF_RETURN_IF_ERROR(options.admission(plan.bytes));
+  }
+  TF_ASSIGN_OR_RETURN(const PreparedLaplacian* laplacian, preparation->Laplacian());
+  auto basis = std::make_unique<ResponseBasis>(
+      plan, options,
+      EnclosingSimplex(SampleAtBarycentres(preparation->elements().cells, laplacian->harmonic)),
+      preparation->mesh().positions()(vertices, Eigen::all));
+  TF_RETURN_IF_ERROR(basis->Prepare(vertices, preparation.get()));
+  return basis;
+}
+
+}  // namespace tissueform

@@ -1,0 +1,204 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <fstream>
+
+#include "nlohmann/json.hpp"
+
+#include "core/mesh_io/tet_mesh_io.h"
+#include "tests/testing/bar_mesh.h"
+#include "tests/testing/meshes.h"
+#include "tests/testing/run_tissueform.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform::testing {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class DeformTest : public CliTest {
+ protected:
+  // The bundled plan of the bar, to be changed.
+  static nlohmann::json BarPlan() {
+    std::ifstream stream(TestDataPath("plans/bar/plan.json"));
+    return nlohmann::json::parse(stream);
+  }
+
+  Positions Displacements(const TetMeshFile& file) const {
+    const Attribute* array = FindAttribute(file.point_data, "displacement_mm");
+    if (array == nullptr) return {};
+    EXPECT_EQ(array->components, 3);
+    EXPECT_TRUE(std::holds_alternative<std::vector<double>>(array->values));
+    const std::vector<double> values = ToDoubles(*array);
+    return Eigen::Map<const Positions>(values.data(), static_cast<Eigen::Index>(values.size() / 3),
+                                       3);
+  }
+};
+
+TEST_F(DeformTest, BarMeshOfThePlanIsWhatItsToolMakes) {
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile file, ReadTetMesh(TestDataPath("plans/bar/bar.vtu")));
+  const TetMeshFile made = BarMeshOfPlan();
+  EXPECT_EQ(file.mesh.positions(), made.mesh.positions());
+  EXPECT_EQ(file.mesh.tets(), made.mesh.tets());
+  EXPECT_TRUE(file.point_data.at(0).values == made.point_data.at(0).values);
+  EXPECT_TRUE(file.cell_data.at(0).values == made.cell_data.at(0).values);
+  EXPECT_TRUE(file.cell_data.at(1).values == made.cell_data.at(1).values);
+}
+
+TEST_F(DeformTest, BlockMeshOfThePlanIsWhatItsToolMakes) {
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile file, ReadTetMesh(TestDataPath("plans/block/block.vtu")));
+  const TetMeshFile made = BlockMeshOfPlan();
+  EXPECT_EQ(file.mesh.positions(), made.mesh.positions());
+  EXPECT_EQ(file.mesh.tets(), made.mesh.tets());
+  EXPECT_TRUE(file.point_data.at(0).values == made.point_data.at(0).values);
+  EXPECT_TRUE(file.cell_data.at(0).values == made.cell_data.at(0).values);
+}
+
+TEST_F(DeformTest, EveryModelWritesStrainsAndKeepsTheHandleWhereItIsPut) {
+  std::vector<Positions> results;
+  for (const std::string model : {"gradient_field", "arap", "linear_elastic", "neo_hookean"}) {
+    ASSERT_THAT(Run({"deform", TestDataPath("plans/bar/plan.json"), "--out", model + ".vtu",
+                     "--model", model, "--stats", model + ".json"}),
+                Succeeds());
+    ASSERT_OK_AND_ASSIGN(const TetMeshFile result, ReadTetMesh(Path(model + ".vtu")));
+    const Attribute* strain = FindAttribute(result.cell_data, "principal_strain");
+    ASSERT_NE(strain, nullptr);
+    EXPECT_EQ(strain->components, 3);
+    EXPECT_EQ(FindAttribute(result.cell_data, "von_mises_stress_pa") != nullptr,
+              model == "linear_elastic");
+    const auto stats = nlohmann::json::parse(Read(model + ".json"));
+    EXPECT_EQ(stats["model"], model);
+    EXPECT_EQ(stats["converged"], true);
+    EXPECT_EQ(stats["load"], 1);
+    EXPECT_EQ(stats["poisson_ratio"], 0.45);
+    results.push_back(result.mesh.positions());
+  }
+  for (size_t i = 1; i < results.size(); ++i) {
+    EXPECT_TRUE(results[i].bottomRows(25) == results[0].bottomRows(25)) << "the handle";
+    EXPECT_GT((results[i] - results[0]).rowwise().norm().maxCoeff(), 0.1) << "another model";
+  }
+}
+
+TEST_F(DeformTest, ATetThatIsInvertedIsToldOf) {
+  nlohmann::json plan = BarPlan();
+  plan["handles"][0]["pose"] = {{"translation_mm", {0, 0, -70}}};
+  std::filesystem::copy_file(TestDataPath("plans/bar/bar.vtu"), Path("bar.vtu"));
+  Write("plan.json", plan.dump());
+  const ProcessResult result = Run({"deform", "plan.json", "--out", "out.vtu"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("inverted, the worst is tet "));
+}
+
+TEST_F(DeformTest, AMovementThatCannotBeReachedIsToldOf) {
+  nlohmann::json plan = BarPlan();
+  plan["handles"][0]["pose"] = {{"translation_mm", {0, 0, -70}}};
+  plan["model"] = "neo_hookean";
+  std::filesystem::copy_file(TestDataPath("plans/bar/bar.vtu"), Path("bar.vtu"));
+  Write("plan.json", plan.dump());
+  const ProcessResult result =
+      Run({"deform", "plan.json", "--out", "out.vtu", "--stats", "stats.json"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("% of the movement was reached"));
+  const auto stats = nlohmann::json::parse(Read("stats.json"));
+  EXPECT_LT(stats["load"].get<double>(), 1);
+  EXPECT_EQ(stats["quality"]["inverted_tets"], 0);
+}
+
+TEST_F(DeformTest, ResultIsTheRestShapePlusItsDisplacement) {
+  ASSERT_THAT(Run({"deform", TestDataPath("plans/bar/plan.json"), "--out", "out.vtu"}), Succeeds());
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile result, ReadTetMesh(Path("out.vtu")));
+  const TetMeshFile rest = BarMeshOfPlan();
+  const Positions displacements = Displacements(result);
+  ASSERT_EQ(displacements.rows(), rest.mesh.num_vertices());
+  EXPECT_LT((rest.mesh.positions() + displacements - result.mesh.positions()).cwiseAbs().maxCoeff(),
+            1e-12);
+  EXPECT_EQ(result.mesh.tets(), rest.mesh.tets());
+  EXPECT_TRUE(displacements.topRows(25).isZero(0)) << "fixed layer";
+  EXPECT_GT(displacements.bottomRows(25).rowwise().norm().minCoeff(), 0.1) << "handle";
+  EXPECT_THAT(Files(), ElementsAre("out.vtu"));
+}
+
+TEST_F(DeformTest, InputArraysAreKeptWithTheirTypesAndAnOldDisplacementIsReplaced) {
+  TetMeshFile bar = BarMeshOfPlan();
+  bar.point_data.push_back(
+      {"displacement_mm", 1, std::vector<float>(static_cast<size_t>(bar.mesh.num_vertices()), 7)});
+  ASSERT_THAT(WriteTetMesh(Path("bar.vtu"), bar), IsOk());
+  Write("plan.json", BarPlan().dump());
+  ASSERT_THAT(Run({"deform", "plan.json", "--out", "out.vtu"}), Succeeds());
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile result, ReadTetMesh(Path("out.vtu")));
+  EXPECT_EQ(result.point_data.size(), 2U);
+  EXPECT_EQ(Displacements(result).rows(), bar.mesh.num_vertices());
+  for (const char* name : {"youngs_modulus_pa", "material"}) {
+    ASSERT_NE(FindAttribute(result.cell_data, name), nullptr);
+    EXPECT_TRUE(FindAttribute(result.cell_data, name)->values ==
+                FindAttribute(bar.cell_data, name)->values);
+  }
+  EXPECT_TRUE(FindAttribute(result.point_data, "anatomy")->values == bar.point_data[0].values);
+}
+
+TEST_F(DeformTest, RasPlanGivesTheLpsResultWrittenInRas) {
+  TetMeshFile bar = BarMeshOfPlan();
+  Positions positions = bar.mesh.positions();
+  positions.leftCols<2>() *= -1;
+  ASSERT_OK_AND_ASSIGN(bar.mesh, TetMesh::Create(positions, bar.mesh.tets()));
+  ASSERT_THAT(WriteTetMesh(Path("bar.vtu"), bar), IsOk());
+  nlohmann::json plan = BarPlan();
+  plan["coordinate_system"] = "RAS";
+  plan["handles"][0]["pose"]["pivot_mm"] = {-10, -10, 60};
+  plan["handles"][0]["pose"]["translation_mm"] = {0, 6, 0};
+  Write("plan.json", plan.dump());
+  ASSERT_THAT(Run({"deform", "plan.json", "--out", "ras.vtu"}), Succeeds());
+  ASSERT_THAT(Run({"deform", TestDataPath("plans/bar/plan.json"), "--out", "lps.vtu"}), Succeeds());
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile ras, ReadTetMesh(Path("ras.vtu")));
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile lps, ReadTetMesh(Path("lps.vtu")));
+  const Eigen::Array3d signs(-1, -1, 1);
+  const auto to_lps = [&signs](const Positions& p) {
+    return Positions((p.array().rowwise() * signs.transpose()).matrix());
+  };
+  EXPECT_LT((to_lps(ras.mesh.positions()) - lps.mesh.positions()).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((to_lps(Displacements(ras)) - Displacements(lps)).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+TEST_F(DeformTest, StatsTellCountsTimesAndQuality) {
+  ASSERT_THAT(Run({"deform", TestDataPath("plans/tongue/plan.json"), "--out", "out.vtu", "--stats",
+                   "stats.json"}),
+              Succeeds());
+  const nlohmann::json stats = nlohmann::json::parse(Read("stats.json"));
+  EXPECT_EQ(stats["model"], "gradient_field");
+  EXPECT_EQ(stats["counts"]["vertices"], 2238);
+  EXPECT_EQ(stats["counts"]["tets"], 10980);
+  EXPECT_EQ(stats["counts"]["free_vertices"].get<int>() +
+                stats["counts"]["fixed_vertices"].get<int>() +
+                stats["counts"]["handle_vertices"].get<int>(),
+            2238);
+  for (const char* stage : {"read", "assemble", "analyse", "factorise", "prepare", "solve"}) {
+    EXPECT_GE(stats["seconds"][stage].get<double>(), 0) << stage;
+  }
+  EXPECT_EQ(stats["converged"], true);
+  EXPECT_LT(stats["residual"].get<double>(), 1e-10);
+  EXPECT_GT(stats["bytes_held"].get<int64_t>(), 0);
+  EXPECT_EQ(stats["quality"]["inverted_tets"], 0);
+  EXPECT_LE(stats["quality"]["volume_ratio_min"].get<double>(), 1);
+  EXPECT_THAT(stats["notice"].get<std::string>(), HasSubstr("not a medical device"));
+  EXPECT_THAT(Files(), ElementsAre("out.vtu", "stats.json"));
+}
+
+TEST_F(DeformTest, NamedModelReplacesThatOfThePlan) {
+  EXPECT_THAT(Run({"deform", TestDataPath("plans/bar/plan.json"), "--out", "out.vtu", "--model",
+                   "gradient_field"}),
+              Succeeds());
+  EXPECT_THAT(
+      Run({"deform", TestDataPath("plans/bar/plan.json"), "--out", "no.vtu", "--model", "jelly"}),
+      FailsWith(2, HasSubstr("jelly")));
+  EXPECT_THAT(Files(), ElementsAre("out.vtu"));
+}
+
+TEST_F(DeformTest, PlanCheckSaysWhatIsAskedFor) {
+  const ProcessResult result = Run({"plan", "check", TestDataPath("plans/bar/plan.json")});
+  EXPECT_THAT(result, Succeeds());
+  EXPECT_THAT(result.out, HasSubstr("top: 25 vertices, moves 6 mm, turns 45 degrees"));
+}
+
+}  // namespace
+}  // namespace tissueform::testing

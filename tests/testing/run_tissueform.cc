@@ -1,0 +1,108 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "tests/testing/run_tissueform.h"
+
+#include <algorithm>
+#include <csignal>
+#include <fcntl.h>
+#include <fstream>
+#include <iterator>
+#include <regex>
+#include <sstream>
+#include <unistd.h>
+
+#include <sys/resource.h>
+#include <sys/wait.h>
+
+#include "tests/testing/meshes.h"
+
+namespace tissueform::testing {
+namespace {
+
+std::string Slurp(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+// Without the lines of StageTimes, and those of StageProgress, which come when a machine is slow
+// and not otherwise.
+std::string WithoutProgress(const std::string& err) {
+  static const std::regex kProgress(
+      "[a-z0-9_ ]+( \\.\\.\\.|: [0-9]+\\.[0-9] s)|\\[ *[0-9]+ % +[0-9]+\\.[0-9] s\\] .+");
+  std::istringstream lines(err);
+  std::string kept;
+  for (std::string line; std::getline(lines, line);) {
+    if (!std::regex_match(line, kProgress)) kept += line + "\n";
+  }
+  return kept;
+}
+
+void Redirect(int descriptor, const std::filesystem::path& path) {
+  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  dup2(file, descriptor);
+}
+
+void LimitFileSize(int64_t max_file_bytes) {
+  if (max_file_bytes < 0) return;
+  std::signal(SIGXFSZ, SIG_IGN);  // so that write() fails instead of ending the program
+  const rlimit limit{static_cast<rlim_t>(max_file_bytes), static_cast<rlim_t>(max_file_bytes)};
+  setrlimit(RLIMIT_FSIZE, &limit);
+}
+
+}  // namespace
+
+ProcessResult RunTissueform(const std::vector<std::string>& arguments,
+                            const std::filesystem::path& folder, int64_t max_file_bytes) {
+  std::vector<char*> argv = {const_cast<char*>(TISSUEFORM_BINARY)};
+  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+  argv.push_back(nullptr);
+  const std::filesystem::path out = folder.string() + ".stdout";
+  const std::filesystem::path err = folder.string() + ".stderr";
+  const pid_t child = fork();
+  if (child == 0) {
+    Redirect(STDOUT_FILENO, out);
+    Redirect(STDERR_FILENO, err);
+    LimitFileSize(max_file_bytes);
+    if (chdir(folder.c_str()) == 0) execv(TISSUEFORM_BINARY, argv.data());
+    _exit(127);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  ProcessResult result{WIFEXITED(status) ? WEXITSTATUS(status) : -1, Slurp(out),
+                       WithoutProgress(Slurp(err))};
+  std::filesystem::remove(out);
+  std::filesystem::remove(err);
+  return result;
+}
+
+void CliTest::SetUp() {
+  const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+  folder_ = std::filesystem::path(::testing::TempDir()) / "client_cli_test" /
+            (std::string(info->test_suite_name()) + "." + info->name());
+  std::filesystem::remove_all(folder_);
+  std::filesystem::create_directories(folder_);
+}
+
+void CliTest::TearDown() { std::filesystem::remove_all(folder_); }
+
+void CliTest::Write(const std::string& name, const std::string& contents) const {
+  std::ofstream(folder_ / name, std::ios::binary) << contents;
+}
+
+std::string CliTest::Read(const std::string& name) const { return Slurp(folder_ / name); }
+
+std::vector<std::string> CliTest::Files() const {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
+    names.push_back(entry.path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+void CliTest::WriteBar() const {
+  std::filesystem::copy_file(TestDataPath("plans/bar/bar.vtu"), folder_ / "bar.vtu");
+}
+
+}  // namespace tissueform::testing
