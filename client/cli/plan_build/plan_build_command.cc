@@ -16,7 +16,7 @@
 #include "nlohmann/json.hpp"
 #include <sys/resource.h>
 
-#include "client/cli/plan_build/atomic_folder.h"
+#include "client/cli/plan_build/folder_worker.h"
 #include "client/cli/plan_build/stage_times.h"
 #include "client/cli/shared/companion.h"
 #include "client/cli/shared/version.h"
@@ -25,6 +25,7 @@
 #include "client/plan_report/plan_report.h"
 #include "client/rendering/virtual_display.h"
 #include "core/base/atomic_file.h"
+#include "core/base/atomic_folder.h"
 #include "core/base/parallel_for.h"
 #include "core/base/status_macros.h"
 #include "core/linear_solvers/blas_threads.h"

@@ -11,13 +11,6 @@
 
 namespace tissueform {
 
-// OK when FillFolderAtomically can begin: `folder` is empty or not there yet, is not the current
-// folder, and lies in a folder in which this process may write. Asked before long work.
-//
-// Errors: AlreadyExists (it holds something, or is a file), NotFound (no folder around it),
-// FailedPrecondition (the current folder), PermissionDenied.
-absl::Status CheckFillable(const std::string& folder);
-
 // Fills a folder, all or nothing. `work` runs in a child process and writes into a temporary folder
 // beside it (.NAME.partial-XXXXXX), which gets the name at the end. When `work` fails or crashes
 // nothing is left, neither the folder nor the temporary one. Returns what `work` returns: a text
