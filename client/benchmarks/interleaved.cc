@@ -3,26 +3,15 @@
 
 #include "client/benchmarks/interleaved.h"
 
-#include <algorithm>
-#include <cstddef>
-
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 
 #include "benchmark/benchmark.h"
+#include "core/base/percentiles.h"
 #include "core/base/stopwatch.h"
 
 namespace tissueform::benchmarks {
 namespace {
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1) {
-    return *middle;
-  }
-  return (*middle + *std::max_element(values.begin(), middle)) / 2;
-}
 
 // Collects the counters of all repetitions instead of printing them.
 class MedianReporter : public benchmark::BenchmarkReporter {

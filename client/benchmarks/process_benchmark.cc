@@ -3,7 +3,6 @@
 
 #include "client/benchmarks/process_benchmark.h"
 
-#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <filesystem>
@@ -13,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "client/accuracy/calculix.h"
+#include "core/base/percentiles.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/mesh_io/tet_mesh_io.h"
@@ -82,11 +82,6 @@ absl::Status CheckAgreement(const std::string& result, const TetMesh& rest,
   const double off = (ours.mesh.positions() - reference).rowwise().norm().maxCoeff();
   if (off <= kAgreement * moved) return absl::OkStatus();
   return absl::InternalError(absl::StrCat("our answer lies ", off, " mm from CalculiX's"));
-}
-
-double Median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
 }
 
 }  // namespace

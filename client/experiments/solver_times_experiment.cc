@@ -3,7 +3,6 @@
 
 #include "client/experiments/solver_times_experiment.h"
 
-#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "client/accuracy/bar_ends.h"
 #include "core/base/atomic_file.h"
 #include "core/base/csv_table.h"
+#include "core/base/percentiles.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/linear_solvers/dirichlet_system.h"
@@ -38,12 +38,6 @@ constexpr SourceRow kSource[] = {{"Test 1", {10, 10, 20}, 0.094, 0.016},
                                  {"Test 3", {15, 25, 30}, 5.031, 0.234},
                                  {"Test 4", {20, 20, 50}, 7.375, 0.406},
                                  {"Test 5", {25, 25, 50}, 16.797, 0.838}};
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::string Seconds(double seconds) { return absl::StrFormat("%.4f", seconds); }
 

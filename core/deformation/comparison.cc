@@ -4,21 +4,13 @@
 #include "core/deformation/comparison.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/percentiles.h"
+
 namespace tissueform {
-namespace {
-
-// Nearest rank: the smallest value that at least `percent` of all values do not exceed.
-double Percentile(const std::vector<double>& sorted, double percent) {
-  const double rank = std::ceil(percent / 100.0 * static_cast<double>(sorted.size()));
-  return sorted[static_cast<size_t>(std::max(rank, 1.0)) - 1];
-}
-
-}  // namespace
 
 absl::StatusOr<Eigen::VectorXd> VertexDistances(const Positions& a, const Positions& b) {
   if (a.rows() != b.rows()) {
@@ -35,9 +27,9 @@ DistanceSummary SummarizeDistances(std::vector<double> distances_mm) {
   summary.count = static_cast<Eigen::Index>(distances_mm.size());
   summary.mean_mm = std::accumulate(distances_mm.begin(), distances_mm.end(), 0.0) /
                     static_cast<double>(distances_mm.size());
-  summary.p50_mm = Percentile(distances_mm, 50);
-  summary.p90_mm = Percentile(distances_mm, 90);
-  summary.p95_mm = Percentile(distances_mm, 95);
+  summary.p50_mm = PercentileOfRising(distances_mm, 50);
+  summary.p90_mm = PercentileOfRising(distances_mm, 90);
+  summary.p95_mm = PercentileOfRising(distances_mm, 95);
   summary.max_mm = distances_mm.back();
   return summary;
 }

@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 
 #include "core/anatomy/grid_operations.h"
+#include "core/base/percentiles.h"
 
 namespace tissueform {
 namespace {
@@ -51,9 +52,9 @@ void Summarize(SkinDistance* distance) {
   std::vector<double> sorted = distance->mm;
   if (sorted.empty()) return;
   std::sort(sorted.begin(), sorted.end());
-  const auto count = static_cast<double>(sorted.size());
-  distance->mean_mm = std::accumulate(sorted.begin(), sorted.end(), 0.0) / count;
-  distance->p99_mm = sorted[static_cast<size_t>(std::ceil(0.99 * count)) - 1];
+  distance->mean_mm =
+      std::accumulate(sorted.begin(), sorted.end(), 0.0) / static_cast<double>(sorted.size());
+  distance->p99_mm = PercentileOfRising(sorted, 99);
   distance->max_mm = sorted.back();
 }
 

@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/anatomy/surface_extraction.h"
+#include "core/base/percentiles.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/surface_parts.h"
 #include "core/mesh/tet_topology.h"
@@ -62,8 +63,10 @@ TetrahedralizationOptions Filling(const SoftTissueMeshOptions& options, double e
 
 SurfaceDistances Summarize(Eigen::VectorXd distances) {
   std::sort(distances.begin(), distances.end());
-  const auto rank = static_cast<Eigen::Index>(0.99 * static_cast<double>(distances.size() - 1));
-  return {distances.mean(), distances[rank], distances[distances.size() - 1]};
+  return {
+      .mean_mm = distances.mean(),
+      .p99_mm = PercentileOfRising({distances.data(), static_cast<size_t>(distances.size())}, 99),
+      .max_mm = distances[distances.size() - 1]};
 }
 
 Eigen::Index CountBelow(const TetMesh& mesh, double degrees) {

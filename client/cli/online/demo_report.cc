@@ -3,15 +3,13 @@
 
 #include "client/cli/online/demo_report.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "nlohmann/json.hpp"
 
 #include "client/cli/shared/version.h"
 #include "core/base/atomic_file.h"
+#include "core/base/percentiles.h"
 #include "core/mesh_io/tet_mesh_io.h"
 
 namespace tissueform {
@@ -66,14 +64,6 @@ void PrintDifferenceInWords(const DemoPrediction& prediction) {
 }
 
 }  // namespace
-
-double Percentile(std::vector<double> values, double percent) {
-  const auto rank =
-      static_cast<size_t>(std::ceil(percent / 100 * static_cast<double>(values.size())));
-  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(std::max<size_t>(rank, 1) - 1);
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
-}
 
 DragSummary SummarizeDrag(const DragResult& drag) {
   std::vector<double> latencies;

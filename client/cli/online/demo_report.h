@@ -13,9 +13,6 @@
 
 namespace tissueform {
 
-// Nearest-rank percentile, 0 < percent <= 100. REQUIRES: at least one value.
-double Percentile(std::vector<double> values, double percent);
-
 // A drag in numbers.
 struct DragSummary {
   int64_t vertices = 0;
