@@ -3,8 +3,8 @@
 
 #include "core/ct/ct_volume_pipe.h"
 
-#include "core/base/pipe_stream.h"
 #include "core/base/status_macros.h"
+#include "core/process/pipe_stream.h"
 
 namespace tissueform {
 namespace {

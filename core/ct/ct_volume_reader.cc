@@ -8,13 +8,13 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "core/base/isolated_process.h"
 #include "core/base/status_macros.h"
 #include "core/ct/ct_volume_pipe.h"
 #include "core/ct/dicom_volume_reader.h"
 #include "core/ct/hu_check.h"
 #include "core/ct/patient_axes.h"
 #include "core/ct/volume_file_reader.h"
+#include "core/process/isolated_process.h"
 
 namespace tissueform {
 namespace {

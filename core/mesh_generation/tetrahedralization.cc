@@ -9,13 +9,13 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "core/base/pipe_stream.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/orientation.h"
 #include "core/mesh/tet_quality.h"
 #include "core/mesh_generation/cavities.h"
 #include "core/mesh_generation/surface_defects.h"
 #include "core/mesh_generation/tetgen_adaptor.h"
+#include "core/process/pipe_stream.h"
 
 namespace tissueform {
 namespace {

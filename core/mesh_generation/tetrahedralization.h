@@ -8,9 +8,9 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/base/isolated_process.h"
 #include "core/mesh/tet_mesh.h"
 #include "core/mesh/triangle_mesh.h"
+#include "core/process/isolated_process.h"
 
 namespace tissueform {
 

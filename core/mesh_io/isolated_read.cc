@@ -3,9 +3,9 @@
 
 #include "core/mesh_io/isolated_read.h"
 
-#include "core/base/isolated_process.h"
 #include "core/base/status_macros.h"
 #include "core/mesh_io/raw_mesh_pipe.h"
+#include "core/process/isolated_process.h"
 
 namespace tissueform {
 namespace {

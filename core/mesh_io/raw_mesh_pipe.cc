@@ -7,8 +7,8 @@
 #include <utility>
 #include <variant>
 
-#include "core/base/pipe_stream.h"
 #include "core/base/status_macros.h"
+#include "core/process/pipe_stream.h"
 
 namespace tissueform {
 namespace {

@@ -10,12 +10,12 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
-#include "core/base/isolated_process.h"
 #include "core/ct/voxel_grid.h"
 #include "core/mesh/tet_mesh.h"
 #include "core/mesh/tet_quality.h"
 #include "core/mesh/triangle_mesh.h"
 #include "core/mesh_generation/surface_remeshing.h"
+#include "core/process/isolated_process.h"
 
 namespace tissueform {
 

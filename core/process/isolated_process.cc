@@ -1,46 +1,18 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/base/isolated_process.h"
+#include "core/process/isolated_process.h"
 
 #include <cerrno>
 #include <csignal>
-#include <exception>
 #include <fcntl.h>
-#include <fstream>
-#include <new>
 #include <unistd.h>
 
 #include "absl/strings/str_cat.h"
-#include <sys/resource.h>
 #include <sys/wait.h>
 
 namespace tissueform {
 namespace {
-
-// AddressSanitizer reserves terabytes of addresses for itself, which a limit would forbid.
-#if defined(__SANITIZE_ADDRESS__)
-constexpr bool kLimitsMemory = false;
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-constexpr bool kLimitsMemory = false;
-#else
-constexpr bool kLimitsMemory = true;
-#endif
-#else
-constexpr bool kLimitsMemory = true;
-#endif
-
-void SetLimit(int resource, int64_t value) {
-  const rlimit limit{static_cast<rlim_t>(value), static_cast<rlim_t>(value)};
-  setrlimit(static_cast<__rlimit_resource>(resource), &limit);
-}
-
-int64_t AddressSpaceBytes() {
-  int64_t pages = 0;
-  std::ifstream("/proc/self/statm") >> pages;
-  return pages * sysconf(_SC_PAGESIZE);
-}
 
 void Silence() {
   const int nowhere = open("/dev/null", O_RDWR | O_CLOEXEC);
@@ -49,22 +21,18 @@ void Silence() {
   }
 }
 
-void BindToLimits(const IsolationLimits& limits) {
+void ForgetSignalHandlers() {
   for (const int signal_number : {SIGSEGV, SIGBUS, SIGFPE, SIGABRT, SIGTERM, SIGINT}) {
     std::signal(signal_number, SIG_DFL);
   }
-  std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
-  SetLimit(RLIMIT_CORE, 0);
-  SetLimit(RLIMIT_FSIZE, 0);
-  SetLimit(RLIMIT_CPU, limits.max_seconds);
-  if (kLimitsMemory) SetLimit(RLIMIT_AS, AddressSpaceBytes() + limits.max_memory_bytes);
 }
 
 // Never returns: nothing of the parent's state may be torn down twice.
 [[noreturn]] void RunChild(int to_parent, const IsolationLimits& limits,
                            const std::function<bool(int descriptor)>& work) {
   Silence();
+  ForgetSignalHandlers();
   BindToLimits(limits);
   const bool sent = work(to_parent);
   _exit(sent ? 0 : 1);
@@ -87,22 +55,6 @@ absl::Status ExplainEnd(absl::string_view what, int status, const IsolationLimit
 }
 
 }  // namespace
-
-absl::Status WithoutExceptions(absl::string_view what, const IsolationLimits& limits,
-                               const std::function<absl::Status()>& work) {
-  try {
-    return work();
-  } catch (const std::bad_alloc&) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat(what, " needs more than ", limits.max_memory_bytes, " bytes of memory"));
-  } catch (const std::exception& exception) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("the library gave up while ", what, " (", exception.what(), ")"));
-  } catch (...) {  // TetGen throws numbers
-    return absl::InvalidArgumentError(
-        absl::StrCat("the library gave up while ", what, "; it is damaged"));
-  }
-}
 
 absl::Status RunIsolated(absl::string_view what, const IsolationLimits& limits,
                          const std::function<bool(int descriptor)>& work,

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/base/isolated_process.h"
+#include "core/process/isolated_process.h"
 
 #include <csignal>
 #include <functional>
@@ -11,7 +11,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "core/base/pipe_stream.h"
+#include "core/process/pipe_stream.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/base/pipe_stream.h"
+#include "core/process/pipe_stream.h"
 
 #include <fcntl.h>
 #include <unistd.h>

@@ -1,19 +1,32 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/base/pipe_stream.h"
+#include "core/process/pipe_stream.h"
 
 #include <cerrno>
 #include <unistd.h>
+
+#include <sys/socket.h>
 
 #include "core/base/status_macros.h"
 
 namespace tissueform {
 
+namespace {
+
+// A socket whose other end is closed would raise SIGPIPE and end the program; for a pipe, which
+// only helper programs write to, they ignore that signal themselves.
+ssize_t WriteSome(int descriptor, const char* data, size_t size) {
+  const ssize_t sent = send(descriptor, data, size, MSG_NOSIGNAL);
+  return sent < 0 && errno == ENOTSOCK ? write(descriptor, data, size) : sent;
+}
+
+}  // namespace
+
 void PipeSender::Bytes(const void* data, size_t size) {
   const char* next = static_cast<const char*>(data);
   while (ok_ && size > 0) {
-    const ssize_t written = write(descriptor_, next, size);
+    const ssize_t written = WriteSome(descriptor_, next, size);
     if (written < 0 && errno == EINTR) continue;
     ok_ = written > 0;
     next += ok_ ? written : 0;

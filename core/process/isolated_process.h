@@ -3,24 +3,14 @@
 
 #pragma once
 
-#include <cstdint>
 #include <functional>
 
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 
+#include "core/process/helper_program.h"
+
 namespace tissueform {
-
-// What a child process may use before it is stopped.
-struct IsolationLimits {
-  int64_t max_memory_bytes = int64_t{16} << 30;  // beyond what this process has now
-  int max_seconds = 600;                         // of processor time
-};
-
-// Calls `work` without letting an exception out: InvalidArgument where a library gave up (`what`
-// says what was tried, "reading it"), ResourceExhausted where there was no memory.
-absl::Status WithoutExceptions(absl::string_view what, const IsolationLimits& limits,
-                               const std::function<absl::Status()>& work);
 
 // Runs `work` in a child process of its own: libraries that read files or mesh surfaces crash,
 // loop, print and end the program on damaged input, and some know one state for the whole process.

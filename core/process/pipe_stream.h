@@ -13,8 +13,9 @@
 
 namespace tissueform {
 
-// Writes what a child process has made into the pipe that RunIsolated gives it. After the first
-// failure, which means that the reader has gone away, nothing more is written.
+// Writes values to another process, through a socket or a pipe. After the first failure, which
+// means that the reader has gone away, nothing more is written. Writing to a socket never raises
+// SIGPIPE.
 class PipeSender {
  public:
   explicit PipeSender(int descriptor) : descriptor_(descriptor) {}
