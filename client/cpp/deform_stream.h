@@ -14,8 +14,8 @@
 #include "grpcpp/client_context.h"
 #include "grpcpp/support/sync_stream.h"
 
-#include "client/cpp/client_messages.h"
 #include "core/base/mutex.h"
+#include "proto/conversion/geometry_conversion.h"
 #include "tissueform/v1/deform_service.grpc.pb.h"
 
 namespace tissueform {

@@ -11,6 +11,7 @@
 
 #include "client/cpp/client_status.h"
 #include "core/base/status_macros.h"
+#include "proto/conversion/mesh_conversion.h"
 
 namespace tissueform {
 namespace {
@@ -93,7 +94,7 @@ absl::StatusOr<v1::Mesh> TissueformClient::UploadMesh(const TetMesh& mesh,
   grpc::ClientContext context;
   SetDeadline(&context);
   v1::GetMeshRequest request;
-  request.set_name(absl::StrCat("meshes/", sha256));
+  request.set_name(MeshName(sha256));
   v1::Mesh known;
   const grpc::Status status = meshes_->GetMesh(&context, request, &known);
   if (status.ok()) {
@@ -112,13 +113,7 @@ absl::StatusOr<v1::Mesh> TissueformClient::SendMesh(const MeshPayloadView& paylo
   v1::UploadMeshResponse response;
   const auto writer = meshes_->UploadMesh(&context, &response);
   v1::UploadMeshRequest request;
-  v1::MeshHeader* header = request.mutable_header();
-  header->set_vertex_count(payload.shape.num_vertices);
-  header->set_tet_count(payload.shape.num_tets);
-  header->mutable_cell_arrays()->Add(payload.shape.cell_arrays.begin(),
-                                     payload.shape.cell_arrays.end());
-  header->set_total_bytes(payload.shape.TotalBytes());
-  header->set_sha256(sha256);
+  *request.mutable_header() = ToProto(payload.shape, sha256);
   if (writer->Write(request)) {
     WriteChunks(payload, writer.get());
   }

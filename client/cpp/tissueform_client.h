@@ -13,10 +13,12 @@
 #include "absl/types/span.h"
 #include "grpcpp/channel.h"
 
-#include "client/cpp/client_messages.h"
 #include "client/cpp/deform_stream.h"
 #include "core/mesh/tet_mesh.h"
 #include "core/mesh_payload/mesh_payload.h"
+#include "proto/conversion/geometry_conversion.h"
+#include "proto/conversion/model_conversion.h"
+#include "proto/conversion/session_conversion.h"
 #include "tissueform/v1/deform_service.grpc.pb.h"
 #include "tissueform/v1/mesh_service.grpc.pb.h"
 #include "tissueform/v1/session_service.grpc.pb.h"

@@ -14,6 +14,9 @@ namespace tissueform {
 // a vertex lie side by side, as they do in messages and files.
 using Positions = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
+// Positions as they are sent to clients: the rounding is far below what an answer means.
+using FloatPositions = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
 // Vertex indices of tetrahedra, #T by 4, 0-based. A tet is positive when
 // det(v1 - v0, v2 - v0, v3 - v0) > 0.
 using TetIndices = Eigen::Matrix<int32_t, Eigen::Dynamic, 4, Eigen::RowMajor>;

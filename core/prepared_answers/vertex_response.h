@@ -12,9 +12,6 @@
 
 namespace tissueform {
 
-// Positions of chosen vertices as they are sent to clients, #selected by 3, mm.
-using FloatPositions = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
-
 // Answers of a linear-in-its-columns model at chosen vertices without a back-substitution: a small
 // dense product of prepared columns with coefficients that depend on the poses only (the response
 // basis of the gradient field, the 12 columns a handle of linear elasticity). Single precision.

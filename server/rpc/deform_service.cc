@@ -9,9 +9,11 @@
 
 #include "core/base/status_macros.h"
 #include "core/deformation/deformation_quality.h"
+#include "proto/conversion/answer_conversion.h"
+#include "proto/conversion/geometry_conversion.h"
+#include "proto/conversion/model_conversion.h"
+#include "proto/conversion/session_conversion.h"
 #include "server/rpc/deform_stream.h"
-#include "server/rpc/model_conversion.h"
-#include "server/rpc/proto_conversion.h"
 
 namespace tissueform {
 namespace {
@@ -32,7 +34,9 @@ absl::StatusOr<DeformOnceJob> ReadRequest(const v1::DeformOnceRequest& request,
   TF_ASSIGN_OR_RETURN(job.session, registry->Find(id));
   TF_ASSIGN_OR_RETURN(job.model, ToModel(request.model(), job.session->model()));
   TF_ASSIGN_OR_RETURN(job.poses, ToPoses(request.poses(), job.session->constraints()));
-  TF_ASSIGN_OR_RETURN(job.choice, ToVertexChoice(request.vertices(), job.session->mesh()));
+  TF_ASSIGN_OR_RETURN(job.choice,
+                      ToVertexChoice(request.vertices(), job.session->mesh().mesh.num_vertices(),
+                                     job.session->mesh().skin));
   return job;
 }
 

@@ -11,7 +11,9 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "server/rpc/model_conversion.h"
+#include "proto/conversion/answer_conversion.h"
+#include "proto/conversion/model_conversion.h"
+#include "proto/conversion/session_conversion.h"
 
 namespace tissueform {
 namespace {
@@ -137,7 +139,9 @@ absl::Status DeformStreamReactor::TakeConfiguration(const v1::DeformConfiguratio
     max_unacked_ = configuration.max_unacked();
   }
   TF_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, registry_->Find(id));
-  TF_ASSIGN_OR_RETURN(choice_, ToVertexChoice(configuration.vertices(), session->mesh()));
+  TF_ASSIGN_OR_RETURN(choice_,
+                      ToVertexChoice(configuration.vertices(), session->mesh().mesh.num_vertices(),
+                                     session->mesh().skin));
   TF_RETURN_IF_ERROR(ReadAnswers(configuration, *session));
   session_ = std::move(session);
   if (response_request_.has_value() || model_ != session_->model()) {

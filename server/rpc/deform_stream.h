@@ -15,9 +15,9 @@
 
 #include "core/base/mutex.h"
 #include "core/constraints/handle_pose.h"
+#include "proto/conversion/geometry_conversion.h"
 #include "server/rpc/call_scope.h"
 #include "server/rpc/deform_streams.h"
-#include "server/rpc/proto_conversion.h"
 #include "server/session/limits.h"
 #include "server/session/session.h"
 #include "server/session/session_registry.h"

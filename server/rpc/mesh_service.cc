@@ -4,8 +4,9 @@
 #include "server/rpc/mesh_service.h"
 
 #include "core/base/status_macros.h"
+#include "proto/conversion/mesh_conversion.h"
 #include "server/rpc/mesh_upload_stream.h"
-#include "server/rpc/proto_conversion.h"
+#include "server/rpc/resource_conversion.h"
 
 namespace tissueform {
 namespace {

@@ -8,7 +8,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "server/rpc/proto_conversion.h"
+#include "server/rpc/resource_conversion.h"
 
 namespace tissueform {
 

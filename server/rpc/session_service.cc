@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
-#include "server/rpc/proto_conversion.h"
+#include "proto/conversion/mesh_conversion.h"
+#include "proto/conversion/session_conversion.h"
+#include "server/rpc/resource_conversion.h"
 
 namespace tissueform {
 namespace {

@@ -35,9 +35,9 @@ class EstimatedStreamTest : public ServiceTest {
     auto mesh = client_->UploadMesh(problem_.mesh, problem_.CellArrays());
     ASSERT_THAT(mesh, IsOk());
     SessionRequest request = problem_.Request(mesh->name());
-    request.gradient_field.set_rotation_mode(v1::ROTATION_MODE_ESTIMATED);
-    request.gradient_field.set_max_iterations(200);
-    request.gradient_field.set_tolerance_mm(kToleranceMm);
+    request.gradient_field.rotation = RotationMode::kEstimated;
+    request.gradient_field.max_iterations = 200;
+    request.gradient_field.tolerance_mm = kToleranceMm;
     auto session = client_->CreateSession(request);
     ASSERT_THAT(session, IsOk());
     session_ = *session;
@@ -161,17 +161,22 @@ TEST_F(EstimatedStreamTest, SettingsOutOfRangeAreRefused) {
   auto mesh = client_->UploadMesh(problem_.mesh, problem_.CellArrays());
   ASSERT_THAT(mesh, IsOk());
   SessionRequest request = problem_.Request(mesh->name());
-  request.gradient_field.set_max_iterations(1'000'000);
+  request.gradient_field.max_iterations = 1'000'000;
   EXPECT_THAT(client_->CreateSession(request),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("max_iterations")));
-  request.gradient_field.set_max_iterations(10);
-  request.gradient_field.set_tolerance_mm(-1);
+  request.gradient_field.max_iterations = 10;
+  request.gradient_field.tolerance_mm = -1;
   EXPECT_THAT(client_->CreateSession(request),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("tolerance_mm")));
-  request.gradient_field.set_tolerance_mm(1);
-  request.gradient_field.set_guidance(static_cast<v1::Guidance>(9));
-  EXPECT_THAT(client_->CreateSession(request),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("guidance")));
+  request.gradient_field.tolerance_mm = 1;
+  v1::CreateSessionRequest unknown = ToProto(request);
+  unknown.mutable_gradient_field()->set_guidance(static_cast<v1::Guidance>(9));
+  const auto stub = v1::SessionService::NewStub(OwnChannel());
+  grpc::ClientContext context;
+  v1::Session session;
+  const grpc::Status refusal = stub->CreateSession(&context, unknown, &session);
+  EXPECT_EQ(refusal.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(refusal.error_message(), HasSubstr("guidance"));
 }
 
 }  // namespace

@@ -101,7 +101,7 @@ TEST_F(ModelsTest, OneSessionAnswersWithEveryModel) {
 }
 
 TEST_F(ModelsTest, ASessionsOwnModelIsToldBack) {
-  request_.model = v1::DEFORMATION_MODEL_NEO_HOOKEAN;
+  request_.model = DeformationModel::kNeoHookean;
   ASSERT_OK_AND_ASSIGN(const v1::Session session, client_->CreateSession(request_));
   EXPECT_EQ(session.model(), v1::DEFORMATION_MODEL_NEO_HOOKEAN);
   EXPECT_EQ(session.poisson_ratio(), kPoissonRatio);
@@ -203,7 +203,7 @@ TEST_F(ModelsTest, PoissonsRatioOutOfRangeIsRefused) {
                 StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("Poisson")));
   }
   request_.poisson_ratio = 0.5 - 1e-13;
-  request_.model = v1::DEFORMATION_MODEL_LINEAR_ELASTIC;
+  request_.model = DeformationModel::kLinearElastic;
   EXPECT_THAT(client_->CreateSession(request_).status(),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("condition")));
 }

@@ -110,7 +110,7 @@ TEST_F(SessionsTest, UniformStiffnessAndPlainPoisson) {
   ASSERT_OK_AND_ASSIGN(const v1::Mesh mesh, client->UploadMesh(problem.mesh, {}));
   SessionRequest request = problem.Request(mesh.name());
   request.stiffness = 15'000.0;
-  request.gradient_field.set_rotation_mode(v1::ROTATION_MODE_NONE);
+  request.gradient_field.rotation = RotationMode::kNone;
   ASSERT_OK_AND_ASSIGN(const v1::Session session, client->CreateSession(request));
   EXPECT_EQ(session.gradient_field().rotation_mode(), v1::ROTATION_MODE_NONE);
   EXPECT_THAT(client->DeformOnce(session.name(), TopPose(SomePose(1))), IsOk());
@@ -125,7 +125,7 @@ TEST_F(SessionsTest, ARepeatedRequestIdGivesTheSameSession) {
   ASSERT_OK_AND_ASSIGN(const v1::Session first, client->CreateSession(request));
   ASSERT_OK_AND_ASSIGN(const v1::Session again, client->CreateSession(request));
   EXPECT_EQ(first.name(), again.name());
-  request.gradient_field.set_rotation_mode(v1::ROTATION_MODE_NONE);
+  request.gradient_field.rotation = RotationMode::kNone;
   EXPECT_THAT(client->CreateSession(request),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("request_id")));
 }

@@ -12,44 +12,7 @@ namespace {
 
 constexpr char kStiffnessArray[] = "youngs_modulus_pa";
 
-v1::RotationMode ToProto(RotationMode mode) {
-  switch (mode) {
-    case RotationMode::kPropagated:
-      return v1::ROTATION_MODE_PROPAGATED;
-    case RotationMode::kEstimated:
-      return v1::ROTATION_MODE_ESTIMATED;
-    case RotationMode::kNone:
-      break;
-  }
-  return v1::ROTATION_MODE_NONE;
-}
-
-v1::GradientFieldSettings ToProto(const GradientFieldOptions& options) {
-  v1::GradientFieldSettings proto;
-  proto.set_rotation_mode(ToProto(options.rotation));
-  proto.set_guidance(options.guidance == Guidance::kUniform ? v1::GUIDANCE_UNIFORM
-                                                            : v1::GUIDANCE_COTANGENT);
-  proto.set_blend(options.blend == BlendMap::kLinear ? v1::BLEND_MAP_LINEAR : v1::BLEND_MAP_COSINE);
-  proto.set_max_iterations(options.max_iterations);
-  proto.set_tolerance_mm(options.tolerance_mm);
-  return proto;
-}
-
 }  // namespace
-
-v1::DeformationModel ToProto(DeformationModel model) {
-  switch (model) {
-    case DeformationModel::kGradientField:
-      break;
-    case DeformationModel::kArap:
-      return v1::DEFORMATION_MODEL_ARAP;
-    case DeformationModel::kLinearElastic:
-      return v1::DEFORMATION_MODEL_LINEAR_ELASTIC;
-    case DeformationModel::kNeoHookean:
-      return v1::DEFORMATION_MODEL_NEO_HOOKEAN;
-  }
-  return v1::DEFORMATION_MODEL_GRADIENT_FIELD;
-}
 
 absl::StatusOr<std::unique_ptr<PlanSession>> PlanSession::Create(TissueformClient* client,
                                                                  const PlanProblem& problem) {
@@ -60,9 +23,9 @@ absl::StatusOr<std::unique_ptr<PlanSession>> PlanSession::Create(TissueformClien
   request.stiffness = kStiffnessArray;
   request.fixed = problem.constraints.fixed();
   request.handles = problem.constraints.handles();
-  request.model = ToProto(problem.deformer.model);
+  request.model = problem.deformer.model;
   request.poisson_ratio = problem.deformer.preparation.poisson_ratio;
-  request.gradient_field = ToProto(problem.deformer.gradient_field);
+  request.gradient_field = problem.deformer.gradient_field;
   TF_ASSIGN_OR_RETURN(v1::Session description, client->CreateSession(request));
   return std::unique_ptr<PlanSession>(new PlanSession(client, std::move(description)));
 }

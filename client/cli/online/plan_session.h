@@ -35,9 +35,6 @@ class PlanSession {
   const v1::Session description_;
 };
 
-// The model as the service names it.
-v1::DeformationModel ToProto(DeformationModel model);
-
 // The poses of the plan with the names of their handles.
 std::vector<NamedPose> NamedPoses(const PlanProblem& problem);
 

@@ -17,6 +17,7 @@
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/planning/plan_io.h"
+#include "proto/conversion/answer_conversion.h"
 
 namespace tissueform {
 namespace {
@@ -28,38 +29,6 @@ struct RunOptions {
   std::string out;
   std::string stats;
 };
-
-PreparationSummary PreparationOf(const v1::Session& session) {
-  PreparationSummary preparation;
-  preparation.assemble_seconds = session.seconds().assemble();
-  preparation.analyse_seconds = session.seconds().analyse();
-  preparation.factorise_seconds = session.seconds().factorise();
-  preparation.prepare_seconds = session.seconds().prepare();
-  preparation.factor_bytes = session.factor_bytes();
-  preparation.bytes_held = session.bytes_held();
-  preparation.negative_weights = session.negative_weight_count();
-  preparation.harmonic_min = session.harmonic_min();
-  preparation.harmonic_max = session.harmonic_max();
-  return preparation;
-}
-
-void AddAnswer(const v1::DeformOnceResponse& answer, PredictionStats* stats) {
-  stats->solve.iterations = answer.summary().iterations();
-  stats->solve.converged = answer.summary().converged();
-  stats->solve.residual = answer.summary().residual();
-  stats->solve.changes_mm.assign(answer.summary().changes_mm().begin(),
-                                 answer.summary().changes_mm().end());
-  stats->solve.energies_nj.assign(answer.summary().energies_nj().begin(),
-                                  answer.summary().energies_nj().end());
-  stats->solve.load = answer.summary().load();
-  stats->solve.solve_seconds = answer.summary().solve_seconds();
-  stats->quality.inverted_tets = answer.quality().inverted_tet_count();
-  stats->quality.min_volume_ratio = answer.quality().min_volume_ratio();
-  stats->quality.max_volume_ratio = answer.quality().max_volume_ratio();
-  stats->quality.total_volume_ratio = answer.quality().total_volume_ratio();
-  stats->quality.worst_tet = answer.quality().worst_tet();
-  stats->quality.max_displacement_mm = answer.quality().max_displacement_mm();
-}
 
 // Fills `stats` as far as preparing and solving know it.
 absl::StatusOr<Positions> PredictOnServer(const RunOptions& options, const PlanProblem& problem,
@@ -74,8 +43,9 @@ absl::StatusOr<Positions> PredictOnServer(const RunOptions& options, const PlanP
   const StageProgress progress("solving");
   TF_ASSIGN_OR_RETURN(const v1::DeformOnceResponse answer,
                       client->DeformOnce(session->description().name(), NamedPoses(problem)));
-  stats->preparation = PreparationOf(session->description());
-  AddAnswer(answer, stats);
+  stats->preparation = ToPreparationSummary(session->description());
+  stats->solve = ToSolveSummary(answer.summary());
+  stats->quality = ToDeformationQuality(answer.quality());
   return DecodePositions(answer.positions(), problem.mesh->num_vertices());
 }
 

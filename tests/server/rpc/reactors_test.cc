@@ -12,9 +12,9 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "proto/conversion/session_conversion.h"
 #include "server/rpc/deform_service.h"
 #include "server/rpc/mesh_service.h"
-#include "server/rpc/proto_conversion.h"
 #include "server/rpc/session_service.h"
 #include "tests/server/rpc/fake_calls.h"
 #include "tests/testing/meshes.h"

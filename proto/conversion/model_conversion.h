@@ -6,7 +6,6 @@
 #include "absl/status/statusor.h"
 
 #include "core/deformation/create_deformer.h"
-#include "server/session/limits.h"
 #include "tissueform/v1/session.pb.h"
 
 namespace tissueform {
@@ -19,10 +18,10 @@ v1::DeformationModel ToProto(DeformationModel model);
 // Settings of the gradient field as the client asks for them; what belongs to the server keeps its
 // default.
 //
-// Errors: InvalidArgument for a value that this server does not know or a number over its limit.
-// Numbers that are out of range for the model are refused by the model.
+// Errors: InvalidArgument for a value that this server does not know or more than
+// `max_iterations`. Numbers that are out of range for the model are refused by the model.
 absl::StatusOr<GradientFieldOptions> ToGradientFieldOptions(
-    const v1::GradientFieldSettings& settings, const ServiceLimits& limits);
+    const v1::GradientFieldSettings& settings, int max_iterations);
 
 v1::GradientFieldSettings ToProto(const GradientFieldOptions& options);
 

@@ -1,12 +1,11 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/rpc/proto_conversion.h"
+#include "proto/conversion/geometry_conversion.h"
 
 #include <array>
 #include <cstring>
 #include <limits>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -23,14 +22,13 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::tissueform::testing::Bar;
 using ::tissueform::testing::BarEnds;
-using ::tissueform::testing::IsOk;
 using ::tissueform::testing::StatusIs;
 
 constexpr absl::StatusCode kInvalid = absl::StatusCode::kInvalidArgument;
 
-std::shared_ptr<const StoredMesh> StoredBar() {
-  return std::make_shared<const StoredMesh>(
-      StoredMesh{{}, std::string(64, 'a'), Bar({2, 2, 3}), {}, {0, 1, 2}});
+// On a mesh of 36 vertices.
+absl::StatusOr<VertexChoice> Choose(const v1::VertexSelection& selection) {
+  return ToVertexChoice(selection, 36, {0, 1, 2});
 }
 
 v1::HandlePose PoseOf(const std::string& handle) {
@@ -39,24 +37,34 @@ v1::HandlePose PoseOf(const std::string& handle) {
   return pose;
 }
 
-TEST(ProtoConversionTest, NamesOfResourcesAreStrict) {
-  const std::string digest(64, 'a');
-  ASSERT_OK_AND_ASSIGN(const std::string parsed, ParseMeshName("meshes/" + digest));
-  EXPECT_EQ(parsed, digest);
-  for (const std::string name : {"", "meshes/", "meshes/abc", "sessions/abc"}) {
-    EXPECT_THAT(ParseMeshName(name), StatusIs(kInvalid, HasSubstr("name of a mesh")));
-  }
-  EXPECT_THAT(ParseMeshName("meshes/" + std::string(64, 'A')),
-              StatusIs(kInvalid, HasSubstr("mesh")));
-  ASSERT_OK_AND_ASSIGN(const std::string id, ParseSessionName("sessions/0aZ"));
-  EXPECT_EQ(id, "0aZ");
-  for (const std::string name : {"", "sessions/", "sessions/a/b", "sessions/a b", "0aZ"}) {
-    EXPECT_THAT(ParseSessionName(name), StatusIs(kInvalid, HasSubstr("name of a session")));
-  }
-  EXPECT_FALSE(ParseSessionName("sessions/" + std::string(65, 'a')).ok());
+TEST(GeometryConversionTest, EveryPartOfAPoseArrives) {
+  const v1::HandlePose proto = ToProto(NamedPose{"chin",
+                                                 {.rotation_vector = {1, 2, 3},
+                                                  .pivot_mm = {4, 5, 6},
+                                                  .translation_mm = {7, 8, 9},
+                                                  .scale = 1.5}});
+  EXPECT_EQ(proto.handle(), "chin");
+  EXPECT_EQ(proto.rotation_vector().y(), 2);
+  EXPECT_EQ(proto.pivot_mm().x(), 4);
+  EXPECT_EQ(proto.translation_mm().z(), 9);
+  EXPECT_EQ(proto.scale(), 1.5);
 }
 
-TEST(ProtoConversionTest, PosesComeInTheOrderOfTheConstraints) {
+TEST(GeometryConversionTest, APoseSurvivesTheJourney) {
+  const NamedPose pose{"chin",
+                       {.rotation_vector = {1, 2, 3},
+                        .pivot_mm = {4, 5, 6},
+                        .translation_mm = {7, 8, 9},
+                        .scale = 1.5}};
+  const NamedPose back = ToNamedPose(ToProto(pose));
+  EXPECT_EQ(back.handle, pose.handle);
+  EXPECT_EQ(back.pose.rotation_vector, pose.pose.rotation_vector);
+  EXPECT_EQ(back.pose.pivot_mm, pose.pose.pivot_mm);
+  EXPECT_EQ(back.pose.translation_mm, pose.pose.translation_mm);
+  EXPECT_EQ(back.pose.scale, pose.pose.scale);
+}
+
+TEST(GeometryConversionTest, PosesComeInTheOrderOfTheConstraints) {
   const TetMesh bar = Bar({2, 2, 3});
   ASSERT_OK_AND_ASSIGN(const ConstraintSet constraints,
                        ConstraintSet::Create(bar, {0}, {{"a", {1}}, {"b", {2}}}));
@@ -73,7 +81,7 @@ TEST(ProtoConversionTest, PosesComeInTheOrderOfTheConstraints) {
   EXPECT_EQ(result[1].scale, 2);
 }
 
-TEST(ProtoConversionTest, IllegalPosesAreRefusedByName) {
+TEST(GeometryConversionTest, IllegalPosesAreRefusedByName) {
   const ConstraintSet constraints = BarEnds(Bar({2, 2, 3}));
   const auto refused = [&](auto change, const char* text) {
     google::protobuf::RepeatedPtrField<v1::HandlePose> poses;
@@ -94,27 +102,33 @@ TEST(ProtoConversionTest, IllegalPosesAreRefusedByName) {
   refused([](auto& poses) { poses[0].mutable_rotation_vector()->set_y(-kInfinity); }, "rotation");
 }
 
-TEST(ProtoConversionTest, VertexChoices) {
-  const auto mesh = StoredBar();
+TEST(GeometryConversionTest, SelectionsOfVertices) {
+  using Kind = AnswerVertices::Kind;
+  EXPECT_TRUE(ToProto(AnswerVertices{}).has_all());
+  EXPECT_TRUE(ToProto(AnswerVertices{.kind = Kind::kSkin, .list = {}}).has_skin());
+  EXPECT_THAT(ToProto(AnswerVertices{.kind = Kind::kList, .list = {4, 2}}).list().vertices(),
+              ElementsAre(4, 2));
+}
+
+TEST(GeometryConversionTest, VertexChoices) {
   v1::VertexSelection selection;
-  ASSERT_OK_AND_ASSIGN(VertexChoice choice, ToVertexChoice(selection, *mesh));
+  ASSERT_OK_AND_ASSIGN(VertexChoice choice, Choose(selection));
   EXPECT_TRUE(choice.all);
   selection.mutable_skin();
-  ASSERT_OK_AND_ASSIGN(choice, ToVertexChoice(selection, *mesh));
+  ASSERT_OK_AND_ASSIGN(choice, Choose(selection));
   EXPECT_THAT(choice.vertices, ElementsAre(0, 1, 2));
   selection.mutable_list()->add_vertices(5);
   selection.mutable_list()->add_vertices(3);
-  ASSERT_OK_AND_ASSIGN(choice, ToVertexChoice(selection, *mesh));
+  ASSERT_OK_AND_ASSIGN(choice, Choose(selection));
   EXPECT_FALSE(choice.all);
   EXPECT_THAT(choice.vertices, ElementsAre(5, 3));
 }
 
-TEST(ProtoConversionTest, ListsOfVerticesThatCannotBeAreRefused) {
-  const auto mesh = StoredBar();
+TEST(GeometryConversionTest, ListsOfVerticesThatCannotBeAreRefused) {
   const auto refused = [&](const std::vector<int32_t>& vertices, const char* text) {
     v1::VertexSelection selection;
     selection.mutable_list()->mutable_vertices()->Add(vertices.begin(), vertices.end());
-    EXPECT_THAT(ToVertexChoice(selection, *mesh), StatusIs(kInvalid, HasSubstr(text)));
+    EXPECT_THAT(Choose(selection), StatusIs(kInvalid, HasSubstr(text)));
   };
   refused({}, "empty");
   refused({0, -1}, "vertex -1");
@@ -123,7 +137,7 @@ TEST(ProtoConversionTest, ListsOfVerticesThatCannotBeAreRefused) {
   refused(std::vector<int32_t>(37, 0), "37");
 }
 
-TEST(ProtoConversionTest, PositionsAreFloat32VertexAfterVertex) {
+TEST(GeometryConversionTest, PositionsAreFloat32VertexAfterVertex) {
   Positions positions(2, 3);
   positions << 1, 2, 3, 4.5, -5, 6;
   std::array<float, 6> values{};
@@ -135,54 +149,21 @@ TEST(ProtoConversionTest, PositionsAreFloat32VertexAfterVertex) {
   EXPECT_EQ(second, all.substr(12));
 }
 
-TEST(ProtoConversionTest, SessionRequestsAreChecked) {
-  const auto mesh = StoredBar();
-  const ServiceLimits limits;
-  v1::CreateSessionRequest good;
-  good.mutable_stiffness()->set_uniform_pa(1000);
-  good.add_handles()->set_name("top");
-  EXPECT_THAT(ToSessionSpec(good, mesh, limits), IsOk());
-  const auto refused = [&](auto change, const char* text) {
-    v1::CreateSessionRequest request = good;
-    change(request);
-    EXPECT_THAT(ToSessionSpec(request, mesh, limits), StatusIs(kInvalid, HasSubstr(text)));
-  };
-  refused([](auto& request) { request.clear_stiffness(); }, "stiffness");
-  refused([](auto& request) { request.set_model(static_cast<v1::DeformationModel>(77)); }, "77");
-  refused(
-      [](auto& request) {
-        request.mutable_gradient_field()->set_rotation_mode(static_cast<v1::RotationMode>(78));
-      },
-      "78");
-  refused([](auto& request) { request.set_request_id(std::string(65, 'x')); }, "request_id");
-  refused([](auto& request) { request.mutable_handles(0)->set_name(std::string(129, 'x')); },
-          "129 bytes");
-  refused(
-      [](auto& request) {
-        while (request.handles_size() < 257) request.add_handles();
-      },
-      "257");
-  refused(
-      [](auto& request) {
-        while (request.fixed_vertices_size() < 37) request.add_fixed_vertices(0);
-      },
-      "fixed_vertices lists 37");
-  refused(
-      [](auto& request) {
-        while (request.handles(0).vertices_size() < 37) request.mutable_handles(0)->add_vertices(0);
-      },
-      "handle 0 lists 37");
+TEST(GeometryConversionTest, PositionsAreDecodedFromFloat32) {
+  const float values[] = {1, 2, 3, 4, 5, 6.5F};
+  const std::string bytes(reinterpret_cast<const char*>(values), sizeof(values));
+  ASSERT_OK_AND_ASSIGN(const Positions positions, DecodePositions(bytes, 2));
+  EXPECT_EQ(positions(0, 1), 2);
+  EXPECT_EQ(positions(1, 2), 6.5);
+  EXPECT_THAT(DecodePositions(bytes, 3),
+              StatusIs(absl::StatusCode::kInternal, HasSubstr("24 bytes for 3 vertices")));
 }
 
-TEST(ProtoConversionTest, TheFingerprintIgnoresTheRequestIdAndNothingElse) {
-  v1::CreateSessionRequest request;
-  request.set_mesh("meshes/a");
-  request.set_request_id("one");
-  v1::CreateSessionRequest other = request;
-  other.set_request_id("two");
-  EXPECT_EQ(RequestFingerprint(request), RequestFingerprint(other));
-  other.add_fixed_vertices(0);
-  EXPECT_NE(RequestFingerprint(request), RequestFingerprint(other));
+TEST(GeometryConversionTest, AnUnknownEncodingIsRefused) {
+  EXPECT_TRUE(CheckEncoding(v1::POSITION_ENCODING_UNSPECIFIED).ok());
+  EXPECT_TRUE(CheckEncoding(v1::POSITION_ENCODING_FLOAT32).ok());
+  EXPECT_THAT(CheckEncoding(static_cast<v1::PositionEncoding>(7)),
+              StatusIs(kInvalid, HasSubstr("encoding 7")));
 }
 
 }  // namespace

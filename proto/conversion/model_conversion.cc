@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/rpc/model_conversion.h"
+#include "proto/conversion/model_conversion.h"
 
 #include "absl/strings/str_cat.h"
 
@@ -60,7 +60,7 @@ v1::DeformationModel ToProto(DeformationModel model) {
 }
 
 absl::StatusOr<GradientFieldOptions> ToGradientFieldOptions(
-    const v1::GradientFieldSettings& settings, const ServiceLimits& limits) {
+    const v1::GradientFieldSettings& settings, int max_iterations) {
   GradientFieldOptions options;
   TF_ASSIGN_OR_RETURN(options.rotation, ToRotationMode(settings.rotation_mode()));
   if (settings.guidance() > v1::GUIDANCE_UNIFORM || settings.guidance() < 0) {
@@ -77,10 +77,9 @@ absl::StatusOr<GradientFieldOptions> ToGradientFieldOptions(
   if (settings.has_max_iterations()) {
     options.max_iterations = settings.max_iterations();
   }
-  if (options.max_iterations > limits.max_iterations) {
+  if (options.max_iterations > max_iterations) {
     return absl::InvalidArgumentError(absl::StrCat("max_iterations is ", options.max_iterations,
-                                                   "; ask for ", limits.max_iterations,
-                                                   " at most"));
+                                                   "; ask for ", max_iterations, " at most"));
   }
   if (settings.has_tolerance_mm()) {
     options.tolerance_mm = settings.tolerance_mm();

@@ -1,0 +1,86 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "proto/conversion/answer_conversion.h"
+
+namespace tissueform {
+
+v1::SolveSummary ToProto(const SolveSummary& summary) {
+  v1::SolveSummary proto;
+  proto.set_solve_seconds(summary.solve_seconds);
+  proto.set_iterations(summary.iterations);
+  proto.set_converged(summary.converged);
+  proto.set_residual(summary.residual);
+  proto.mutable_changes_mm()->Add(summary.changes_mm.begin(), summary.changes_mm.end());
+  proto.set_cancelled(summary.cancelled);
+  proto.mutable_energies_nj()->Add(summary.energies_nj.begin(), summary.energies_nj.end());
+  proto.set_load(summary.load);
+  proto.set_prepared(summary.prepared);
+  proto.set_error_bound_mm(summary.error_bound_mm);
+  return proto;
+}
+
+SolveSummary ToSolveSummary(const v1::SolveSummary& proto) {
+  SolveSummary summary;
+  summary.solve_seconds = proto.solve_seconds();
+  summary.iterations = proto.iterations();
+  summary.converged = proto.converged();
+  summary.residual = proto.residual();
+  summary.changes_mm = {proto.changes_mm().begin(), proto.changes_mm().end()};
+  summary.cancelled = proto.cancelled();
+  summary.energies_nj = {proto.energies_nj().begin(), proto.energies_nj().end()};
+  summary.load = proto.load();
+  summary.prepared = proto.prepared();
+  summary.error_bound_mm = proto.error_bound_mm();
+  return summary;
+}
+
+v1::DeformationQuality ToProto(const DeformationQuality& quality) {
+  v1::DeformationQuality proto;
+  proto.set_inverted_tet_count(quality.inverted_tets);
+  proto.set_min_volume_ratio(quality.min_volume_ratio);
+  proto.set_max_volume_ratio(quality.max_volume_ratio);
+  proto.set_total_volume_ratio(quality.total_volume_ratio);
+  proto.set_worst_tet(quality.worst_tet);
+  proto.set_max_displacement_mm(quality.max_displacement_mm);
+  return proto;
+}
+
+DeformationQuality ToDeformationQuality(const v1::DeformationQuality& proto) {
+  DeformationQuality quality;
+  quality.inverted_tets = proto.inverted_tet_count();
+  quality.min_volume_ratio = proto.min_volume_ratio();
+  quality.max_volume_ratio = proto.max_volume_ratio();
+  quality.total_volume_ratio = proto.total_volume_ratio();
+  quality.worst_tet = proto.worst_tet();
+  quality.max_displacement_mm = proto.max_displacement_mm();
+  return quality;
+}
+
+void SetPreparation(const PreparationSummary& preparation, v1::Session* session) {
+  session->set_bytes_held(preparation.bytes_held);
+  session->set_factor_bytes(preparation.factor_bytes);
+  session->mutable_seconds()->set_assemble(preparation.assemble_seconds);
+  session->mutable_seconds()->set_analyse(preparation.analyse_seconds);
+  session->mutable_seconds()->set_factorise(preparation.factorise_seconds);
+  session->mutable_seconds()->set_prepare(preparation.prepare_seconds);
+  session->set_negative_weight_count(preparation.negative_weights);
+  session->set_harmonic_min(preparation.harmonic_min);
+  session->set_harmonic_max(preparation.harmonic_max);
+}
+
+PreparationSummary ToPreparationSummary(const v1::Session& session) {
+  PreparationSummary preparation;
+  preparation.assemble_seconds = session.seconds().assemble();
+  preparation.analyse_seconds = session.seconds().analyse();
+  preparation.factorise_seconds = session.seconds().factorise();
+  preparation.prepare_seconds = session.seconds().prepare();
+  preparation.factor_bytes = session.factor_bytes();
+  preparation.bytes_held = session.bytes_held();
+  preparation.negative_weights = session.negative_weight_count();
+  preparation.harmonic_min = session.harmonic_min();
+  preparation.harmonic_max = session.harmonic_max();
+  return preparation;
+}
+
+}  // namespace tissueform

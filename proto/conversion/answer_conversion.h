@@ -1,0 +1,24 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "core/deformation/deformation_quality.h"
+#include "core/deformation/deformer.h"
+#include "tissueform/v1/deform_service.pb.h"
+#include "tissueform/v1/session.pb.h"
+
+// What is told of an answer and of a preparation, beside the positions; every field both ways.
+namespace tissueform {
+
+v1::SolveSummary ToProto(const SolveSummary& summary);
+SolveSummary ToSolveSummary(const v1::SolveSummary& summary);
+
+v1::DeformationQuality ToProto(const DeformationQuality& quality);
+DeformationQuality ToDeformationQuality(const v1::DeformationQuality& quality);
+
+// The fields of `session` that tell of its preparation. bytes_held is that of the whole session.
+void SetPreparation(const PreparationSummary& preparation, v1::Session* session);
+PreparationSummary ToPreparationSummary(const v1::Session& session);
+
+}  // namespace tissueform

@@ -1,0 +1,30 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <memory>
+
+#include "absl/status/statusor.h"
+
+#include "server/session/limits.h"
+#include "server/session/mesh_catalog.h"
+#include "server/session/session.h"
+#include "tissueform/v1/mesh.pb.h"
+#include "tissueform/v1/mesh_service.pb.h"
+#include "tissueform/v1/session.pb.h"
+#include "tissueform/v1/session_service.pb.h"
+
+// The server's own resources as messages; everything else is converted by proto/conversion.
+namespace tissueform {
+
+MeshAnnouncement ToAnnouncement(const v1::MeshHeader& header);
+v1::Mesh ToProto(const StoredMesh& mesh);
+
+// Errors: those of ToSessionRequest.
+absl::StatusOr<SessionSpec> ToSessionSpec(const v1::CreateSessionRequest& request,
+                                          std::shared_ptr<const StoredMesh> mesh,
+                                          const ServiceLimits& limits);
+v1::Session ToProto(const Session& session);
+
+}  // namespace tissueform
