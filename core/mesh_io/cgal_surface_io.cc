@@ -10,6 +10,7 @@
 #include <sstream>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include <CGAL/IO/OBJ.h>
 #include <CGAL/IO/OFF.h>
 #include <CGAL/IO/PLY.h>
@@ -19,6 +20,7 @@
 #include "core/base/status_macros.h"
 #include "core/mesh_io/isolated_read.h"
 #include "core/mesh_io/polygon_fan.h"
+#include "core/mesh_io/tet_mesh_io.h"
 
 namespace tissueform {
 namespace {
@@ -79,6 +81,23 @@ std::string StlHeader() {
   return header;
 }
 
+// As a comment where the format has them: behind the first line of OFF and the first two of PLY,
+// which some readers take at their places.
+std::string WithNotice(std::string contents, MeshFormat format) {
+  const size_t first_line_end = contents.find('\n') + 1;
+  switch (format) {
+    case MeshFormat::kStl:
+      return contents.replace(0, kStlHeaderBytes, StlHeader());
+    case MeshFormat::kPly:
+      return contents.insert(contents.find('\n', first_line_end) + 1,
+                             absl::StrCat("comment ", kNotMedicalDeviceNotice, "\n"));
+    case MeshFormat::kOff:
+      return contents.insert(first_line_end, absl::StrCat("# ", kNotMedicalDeviceNotice, "\n"));
+    default:
+      return contents.insert(0, absl::StrCat("# ", kNotMedicalDeviceNotice, "\n"));
+  }
+}
+
 bool WriteSoup(const Soup& soup, MeshFormat format, std::ostream& stream) {
   const auto exactly =
       CGAL::parameters::stream_precision(std::numeric_limits<double>::max_digits10);
@@ -106,9 +125,7 @@ absl::StatusOr<std::string> SurfaceFileContents(const TriangleMesh& mesh, MeshFo
   if (!WriteSoup(ToSoup(mesh), format, stream)) {
     return absl::InternalError("CGAL cannot write the surface");
   }
-  std::string contents = stream.str();
-  if (format == MeshFormat::kStl) contents.replace(0, kStlHeaderBytes, StlHeader());
-  return contents;
+  return WithNotice(stream.str(), format);
 }
 
 }  // namespace tissueform

@@ -39,6 +39,11 @@ bool IsSection(vtkXMLDataElement* element) {
          std::strcmp(element->GetName(), "CellData") == 0;
 }
 
+bool IsFieldData(vtkXMLDataElement* array) {
+  return array->GetParent() != nullptr &&
+         std::strcmp(array->GetParent()->GetName(), "FieldData") == 0;
+}
+
 }  // namespace
 
 vtkStandardNewMacro(TetGridReader);
@@ -137,7 +142,9 @@ int TetGridReader::ReadArrayValues(vtkXMLDataElement* element, vtkIdType array_i
     return Refuse(
         absl::StrCat("array \"", NameOf(element), "\" holds fewer values than the header says"));
   }
-  if (vtkDataArray::SafeDownCast(array) == nullptr || count == 0) return 1;
+  // Field data belong to no vertex and no tet, so that no count can be wrong, and VTK first asks
+  // for one value of each of their arrays, in search of a time.
+  if (IsFieldData(element) || vtkDataArray::SafeDownCast(array) == nullptr || count == 0) return 1;
   if (HasSurplus(element, array->GetDataType(), count)) {
     return Refuse(absl::StrCat("array \"", NameOf(element),
                                "\" holds more values than the header says (", count, ")"));

@@ -41,8 +41,9 @@ absl::StatusOr<TetMeshFile> ReadTetMesh(const std::string& path, const MeshReadL
 // The files that ReadTetMesh reads for `path`: it and, for TetGen's pairs, the other one.
 std::vector<std::string> FilesOfTetMesh(const std::string& path);
 
-// Writes a .vtu with appended, zlib-compressed binary arrays. Positions are written as doubles. The
-// file carries the field "notice" with kNotMedicalDeviceNotice.
+// Writes a .vtu that is well-formed XML, its arrays appended in base64 and compressed by zlib,
+// which VTK, ParaView and meshio open. Positions are written as doubles. The file carries
+// kNotMedicalDeviceNotice as a comment and as the field "notice", an array of bytes.
 //
 // Writes beside `path` and renames at the end: when anything fails an old file stays as it was and
 // no partial file is left.

@@ -12,11 +12,12 @@
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkSmartPointer.h>
-#include <vtkStringArray.h>
 #include <vtkTypeTraits.h>
+#include <vtkUnsignedCharArray.h>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
+#include "absl/strings/string_view.h"
 
 #include "core/base/status_macros.h"
 #include "core/mesh_io/attribute_name.h"
@@ -59,11 +60,23 @@ vtkSmartPointer<vtkDataArray> ToVtk(const Attribute& attribute) {
       attribute.values);
 }
 
+// As the codes of its letters: VTK has arrays of strings, but meshio stops at a file that holds
+// one.
 void AddNotice(vtkPointSet* data) {
-  vtkNew<vtkStringArray> notice;
+  constexpr absl::string_view kLetters = kNotMedicalDeviceNotice;
+  vtkNew<vtkUnsignedCharArray> notice;
   notice->SetName("notice");
-  notice->InsertNextValue(kNotMedicalDeviceNotice);
+  notice->SetNumberOfTuples(static_cast<vtkIdType>(kLetters.size()));
+  std::memcpy(notice->GetPointer(0), kLetters.data(), kLetters.size());
   data->GetFieldData()->AddArray(notice);
+}
+
+// The same for somebody who looks into the file, where VTK's writer can put none.
+std::string WithNoticeAsComment(std::string xml) {
+  const size_t end_of_declaration = xml.find("?>\n");
+  if (end_of_declaration == xml.npos) return xml;
+  return xml.insert(end_of_declaration + 3,
+                    absl::StrCat("<!-- ", kNotMedicalDeviceNotice, " -->\n"));
 }
 
 }  // namespace
@@ -98,8 +111,12 @@ void AddPointsAndArrays(const Positions& positions, const std::vector<Attribute>
 absl::StatusOr<std::string> SerializeWith(vtkXMLWriter* writer, vtkPointSet* data) {
   VtkErrorScope errors;
   writer->SetInputData(data);
+  // In base64: raw bytes would take a quarter less, but such a file is no XML, and meshio 5.0,
+  // which puts it together anew by its offsets, takes one array for another where an old offset and
+  // a new one happen to be equal. At the end: inside its element VTK notes the range of an array,
+  // and its own reader refuses that note where a value is infinite.
   writer->SetDataModeToAppended();
-  writer->EncodeAppendedDataOff();
+  writer->EncodeAppendedDataOn();
   writer->SetCompressorTypeToZLib();
   // The fastest: files grow by a few per cent, higher levels take longer than many predictions.
   writer->SetCompressionLevel(1);
@@ -108,7 +125,7 @@ absl::StatusOr<std::string> SerializeWith(vtkXMLWriter* writer, vtkPointSet* dat
   if (written == 0 || writer->GetErrorCode() != 0 || !errors.first_error().empty()) {
     return absl::InternalError(absl::StrCat("VTK's writer failed (", errors.first_error(), ")"));
   }
-  return writer->GetOutputString();
+  return WithNoticeAsComment(writer->GetOutputString());
 }
 
 }  // namespace tissueform

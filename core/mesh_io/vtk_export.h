@@ -21,12 +21,12 @@ namespace tissueform {
 // OK when every array has `num_tuples` tuples and a legal name of its own.
 absl::Status CheckAttributes(const std::vector<Attribute>& attributes, Eigen::Index num_tuples);
 
-// Gives `data` the points, the arrays and the field "notice".
+// Gives `data` the points, the arrays and the field "notice": one byte for each letter.
 void AddPointsAndArrays(const Positions& positions, const std::vector<Attribute>& point_data,
                         const std::vector<Attribute>& cell_data, vtkPointSet* data);
 
-// The whole file as a text, appended and compressed by zlib, so that the disk is touched in one
-// place only, which is not VTK's.
+// The whole file as a text: XML with the arrays at its end, in base64 and compressed by zlib, and
+// the notice once more as a comment. The disk is touched in one place only, which is not VTK's.
 absl::StatusOr<std::string> SerializeWith(vtkXMLWriter* writer, vtkPointSet* data);
 
 }  // namespace tissueform

@@ -72,7 +72,7 @@ class DamagedMeshTest : public ::testing::Test {
     return Read(contents);
   }
 
-  // A file as this program writes it: compressed, appended, several blocks.
+  // A file as this program writes it: compressed, several blocks.
   std::string CompressedBar() {
     const TetMesh bar = Bar({8, 8, 16}, 1.0, 0.1);
     const std::vector<double> pa(static_cast<size_t>(bar.num_tets()), 3000);
@@ -94,6 +94,16 @@ TEST_F(DamagedMeshTest, TheUndamagedTextIsRead) {
   EXPECT_EQ(file.mesh.num_tets(), 1);
   EXPECT_EQ(file.point_data.size(), 1U);
   EXPECT_EQ(file.cell_data.size(), 1U);
+}
+
+TEST_F(DamagedMeshTest, FieldDataOfAnyLengthAreNoDamage) {
+  ASSERT_OK_AND_ASSIGN(
+      const TetMeshFile file,
+      ReadWith("<UnstructuredGrid>",
+               R"(<UnstructuredGrid><FieldData><DataArray type="Float64" Name="TimeValue"
+NumberOfTuples="1" format="ascii">0.5</DataArray><DataArray type="Int32" Name="three"
+NumberOfTuples="3" format="ascii">7 8 9</DataArray></FieldData>)"));
+  EXPECT_EQ(file.mesh.num_tets(), 1);
 }
 
 TEST_F(DamagedMeshTest, MissingFileIsNotFound) {

@@ -74,6 +74,10 @@ TEST_P(EverySurfaceFormatTest, SurfaceComesBack) {
   EXPECT_EQ(file.split_polygons, 0);
 }
 
+TEST_P(EverySurfaceFormatTest, SaysThatItIsNoMedicalDevice) {
+  EXPECT_THAT(Written(GetParam()), HasSubstr("not a medical device"));
+}
+
 TEST_P(EverySurfaceFormatTest, TruncatedAnywhereIsRefusedOrHoldsOnlyWholeFaces) {
   const std::string whole = Written(GetParam());
   int refused = 0;

@@ -17,6 +17,7 @@
 namespace tissueform {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using tissueform::testing::Bar;
@@ -143,7 +144,19 @@ TEST_F(TetMeshIoTest, ReadsAsciiFilesOfOtherPrograms) {
 
 TEST_F(TetMeshIoTest, EveryFileCarriesTheNotice) {
   ASSERT_THAT(WriteTetMesh(Path("tet.vtu"), OnlyMesh(SingleTet())), IsOk());
-  EXPECT_THAT(Slurp(Path("tet.vtu")), HasSubstr("Name=\"notice\""));
+  EXPECT_THAT(Slurp(Path("tet.vtu")), AllOf(HasSubstr("Name=\"notice\""),
+                                            HasSubstr("<!-- Tissueform research software, not "
+                                                      "a medical device")));
+}
+
+// As it was written once: arrays in raw bytes at the end, the notice a string among them.
+TEST_F(TetMeshIoTest, FilesOfEarlierVersionsAreRead) {
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile old, ReadTetMesh(TestDataPath("meshes/appended/bar.vtu")));
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile now, ReadTetMesh(TestDataPath("plans/bar/bar.vtu")));
+  EXPECT_EQ(old.mesh.positions(), now.mesh.positions());
+  EXPECT_EQ(old.mesh.tets(), now.mesh.tets());
+  ExpectEqual(old.point_data, now.point_data);
+  ExpectEqual(old.cell_data, now.cell_data);
 }
 
 TEST_F(TetMeshIoTest, WritingTheSameMeshTwiceGivesTheSameBytes) {
