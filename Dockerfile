@@ -11,14 +11,14 @@ COPY deploy /src/deploy
 WORKDIR /src
 RUN deploy/install_packages.sh build && rm -rf /var/lib/apt/lists/*
 COPY . .
-RUN deploy/build.sh release tissueform-server
+RUN deploy/build.sh release tissueform-server && cmake --install build/release --component server --prefix /opt/tissueform
 
 FROM debian:12-slim
 COPY deploy/install_packages.sh deploy/packages.txt /tmp/tissueform/deploy/
 RUN /tmp/tissueform/deploy/install_packages.sh run \
     && rm -rf /tmp/tissueform /var/lib/apt/lists/* \
     && useradd --system --no-create-home --shell /usr/sbin/nologin tissueform
-COPY --from=builder /src/build/release/bin/tissueform-server /usr/local/bin/
+COPY --from=builder /opt/tissueform/ /usr/local/
 USER tissueform
 EXPOSE 50051
 STOPSIGNAL SIGTERM

@@ -13,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "nlohmann/json.hpp"
 
+#include "client/cli/shared/demo_paths.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform::benchmarks {
@@ -23,9 +24,8 @@ struct ClosePipe {
 };
 
 absl::StatusOr<std::string> ProbeProgram() {
+  std::string program = SiblingProgram("tissueform-memory-probe");
   std::error_code error;
-  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
-  std::string program = self.parent_path() / "tissueform-memory-probe";
   if (!std::filesystem::is_regular_file(program, error)) {
     return absl::NotFoundError(
         absl::StrCat("no program ", program, "; build it (target tissueform-memory-probe)"));

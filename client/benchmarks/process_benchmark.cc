@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "client/accuracy/calculix.h"
+#include "client/cli/shared/demo_paths.h"
 #include "core/base/percentiles.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
@@ -44,13 +45,8 @@ class TemporaryFolder {
   bool made_ = false;
 };
 
-std::string PlanPath(int number) {
-  return absl::StrCat(TISSUEFORM_SOURCE_DIR, "/tests/data/plans/", ProcessProblemName(number),
-                      "/plan.json");
-}
-
-absl::StatusOr<CalculixProblem> ProblemOf(int number) {
-  TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(PlanPath(number)));
+absl::StatusOr<CalculixProblem> ProblemOf(const std::string& path) {
+  TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(path));
   TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
   return CalculixProblem{
       .mesh = *problem.mesh,
@@ -61,13 +57,10 @@ absl::StatusOr<CalculixProblem> ProblemOf(int number) {
       .law = CalculixLaw::kNeoHookean};
 }
 
-absl::StatusOr<double> RunOurs(int number, const std::string& out, int threads) {
-  // The program of the build that this one belongs to; the names are ours, nothing to quote.
-  const std::string program =
-      (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "tissueform").string();
-  const std::string command =
-      absl::StrCat("'", program, "' deform '", PlanPath(number), "' --model neo_hookean --threads ",
-                   threads, " --out '", out, "' > '", out, ".log' 2>&1");
+absl::StatusOr<double> RunOurs(const std::string& plan, const std::string& out, int threads) {
+  const std::string command = absl::StrCat("'", SiblingProgram("tissueform"), "' deform '", plan,
+                                           "' --model neo_hookean --threads ", threads, " --out '",
+                                           out, "' > '", out, ".log' 2>&1");
   const Stopwatch stopwatch;
   if (std::system(command.c_str()) != 0) {
     return absl::InternalError(absl::StrCat("this failed: ", command));
@@ -89,14 +82,15 @@ absl::Status CheckAgreement(const std::string& result, const TetMesh& rest,
 std::string ProcessProblemName(int number) { return number == kBlock ? "block" : "tongue"; }
 
 absl::StatusOr<BenchmarkRow> MeasureAgainstCalculix(int number, int repetitions, int threads) {
-  TF_ASSIGN_OR_RETURN(const CalculixProblem problem, ProblemOf(number));
+  TF_ASSIGN_OR_RETURN(const std::string plan, FindBundledPlan(ProcessProblemName(number)));
+  TF_ASSIGN_OR_RETURN(const CalculixProblem problem, ProblemOf(plan));
   const TemporaryFolder folder;
   if (!folder.made()) return absl::ErrnoToStatus(errno, "cannot make a temporary folder");
   const std::string result = folder.path() + "/ours.vtu";
   std::vector<double> ours;
   std::vector<double> peers;
   for (int i = 0; i < repetitions; ++i) {
-    TF_ASSIGN_OR_RETURN(const double seconds, RunOurs(number, result, threads));
+    TF_ASSIGN_OR_RETURN(const double seconds, RunOurs(plan, result, threads));
     TF_ASSIGN_OR_RETURN(const CalculixResult peer, RunCalculix(problem, folder.path()));
     TF_RETURN_IF_ERROR(CheckAgreement(result, problem.mesh, peer.deformed));
     ours.push_back(seconds);

@@ -23,17 +23,12 @@ fs::path ProgramFolder() {
 std::string SiblingProgram(const std::string& name) { return (ProgramFolder() / name).string(); }
 
 absl::StatusOr<std::string> FindBundledPlan(const std::string& name) {
-  const fs::path source_tree = TISSUEFORM_SOURCE_DIR;
-  for (const fs::path& folder : {ProgramFolder().parent_path() / "share/tissueform/plans",
-                                 source_tree / "tests/data/plans"}) {
-    const fs::path plan = folder / name / "plan.json";
-    std::error_code error;
-    if (fs::is_regular_file(plan, error)) {
-      return plan.string();
-    }
-  }
-  return absl::NotFoundError(
-      absl::StrCat("the bundled plan \"", name, "\" is neither installed nor in the source tree"));
+  const fs::path plan =
+      ProgramFolder().parent_path() / "share/tissueform/plans" / name / "plan.json";
+  std::error_code error;
+  if (fs::is_regular_file(plan, error)) return plan.string();
+  return absl::NotFoundError(absl::StrCat("the bundled plan \"", name,
+                                          "\" is not where it is installed (", plan.string(), ")"));
 }
 
 absl::StatusOr<std::string> FindDemoPlan(const std::string& chosen) {
