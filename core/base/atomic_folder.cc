@@ -28,9 +28,9 @@ fs::path Resolved(const std::string& folder) {
 }
 
 absl::Status CannotMake(int error_number, const fs::path& goal) {
-  return absl::ErrnoToStatus(
-      error_number, absl::StrCat("cannot make a folder beside ", goal.string(),
-                                 "; check permissions and free space"));
+  return absl::ErrnoToStatus(error_number,
+                             absl::StrCat("cannot make a folder beside ", goal.string(),
+                                          "; check permissions and free space"));
 }
 
 }  // namespace

@@ -80,7 +80,7 @@ absl::StatusOr<Ends> OpenAnswer() {
 }
 
 absl::StatusOr<Ends> OpenFile(const std::string& path, bool is_input) {
-  const int flags = is_input ? O_RDONLY : O_WRONLY | O_CREAT | O_TRUNC;
+  const int flags = is_input ? O_RDONLY : O_WRONLY | O_CREAT | O_TRUNC | O_APPEND;
   Ends ends{Descriptor(open(path.c_str(), flags | O_CLOEXEC, 0666)), {}};
   if (ends.child.number() < 0) return SystemError(absl::StrCat("cannot open ", path));
   return ends;

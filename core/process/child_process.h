@@ -26,7 +26,8 @@ struct ChildStream {
   static ChildStream Null() { return {Kind::kNull, {}}; }
   // To this process; not for stderr.
   static ChildStream Pipe() { return {Kind::kPipe, {}}; }
-  // Read where it is the input, otherwise written from its beginning.
+  // Read where it is the input, otherwise written from its beginning; output and errors may name
+  // the same file.
   static ChildStream File(std::string path) { return {Kind::kFile, std::move(path)}; }
 
   Kind kind = Kind::kInherited;

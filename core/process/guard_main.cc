@@ -1,0 +1,117 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// tissueform-guard GRACE_MS PROGRAM [ARGUMENT]...
+//
+// Runs a program that is not ours, and so cannot watch a pipe itself, until it ends or standard
+// input does (guarded_program.h starts it). It has one thread and links nothing: fork is harmless
+// here, and PR_SET_PDEATHSIG means what one would think, because the thread that forks ends with
+// the process.
+
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fcntl.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <sys/prctl.h>
+#include <sys/signalfd.h>
+#include <sys/wait.h>
+
+namespace {
+
+constexpr int kWrongUse = 2;
+constexpr int kCannotStart = 126;
+constexpr int kNoSuchProgram = 127;
+
+void ReplaceByNothing(int descriptor, int flags) {
+  const int nothing = open("/dev/null", flags | O_CLOEXEC);
+  dup2(nothing, descriptor);
+  close(nothing);
+}
+
+// In the child, between fork and exec.
+[[noreturn]] void Become(char** words, pid_t guard, const sigset_t& former) {
+  setpgid(0, 0);
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != guard) _exit(kCannotStart);  // which ended before prctl
+  ReplaceByNothing(STDIN_FILENO, O_RDONLY);
+  sigprocmask(SIG_SETMASK, &former, nullptr);
+  execvp(words[0], words);
+  const int error = errno;
+  std::fprintf(stderr, "tissueform-guard: cannot start %s: %s\n", words[0], std::strerror(error));
+  _exit(error == ENOENT ? kNoSuchProgram : kCannotStart);
+}
+
+// The exit code as a shell tells it; -1 while the program runs. What the program leaves behind is
+// killed before it is reaped, for until then nobody else can get its number, and not asked to end: a
+// shell's child that is asked before its exec may forget it with the shell's handlers.
+int ExitCodeOf(pid_t program) {
+  siginfo_t info{};
+  if (waitid(P_PID, program, &info, WEXITED | WNOWAIT | WNOHANG) != 0 || info.si_pid == 0) {
+    return -1;
+  }
+  kill(-program, SIGKILL);
+  int status = 0;
+  waitpid(program, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+bool HasEnded(int input) {
+  char ignored[64];
+  const ssize_t count = read(input, ignored, sizeof(ignored));
+  return count == 0 || (count < 0 && errno != EINTR && errno != EAGAIN);
+}
+
+// Waits for the end of the program, and passes on to its group what asks for it: the end of
+// standard input, or a signal.
+int Watch(pid_t program, int signals, int grace_ms) {
+  pollfd watched[] = {{signals, POLLIN, 0}, {STDIN_FILENO, POLLIN, 0}};
+  bool asked = false;
+  for (;;) {
+    if (poll(watched, asked ? 1 : 2, asked ? grace_ms : -1) == 0) kill(-program, SIGKILL);
+    signalfd_siginfo arrived{};
+    bool ask = false;
+    if (watched[0].revents != 0 && read(signals, &arrived, sizeof(arrived)) > 0) {
+      const int code = ExitCodeOf(program);
+      if (code >= 0) return code;
+      ask = arrived.ssi_signo != SIGCHLD;
+    }
+    if (!asked && watched[1].revents != 0 && HasEnded(STDIN_FILENO)) ask = true;
+    if (ask) {
+      asked = true;
+      kill(-program, SIGTERM);
+    }
+    watched[0].revents = watched[1].revents = 0;
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  char* end = nullptr;
+  const long grace_ms = argc < 3 ? -1 : std::strtol(argv[1], &end, 10);
+  if (grace_ms < 0 || grace_ms > 3600 * 1000 || *end != '\0') {
+    std::fprintf(stderr, "use: tissueform-guard GRACE_MS PROGRAM [ARGUMENT]...\n");
+    return kWrongUse;
+  }
+  sigset_t signals;
+  sigset_t former;
+  sigemptyset(&signals);
+  for (const int number : {SIGCHLD, SIGTERM, SIGINT, SIGHUP}) sigaddset(&signals, number);
+  sigprocmask(SIG_BLOCK, &signals, &former);
+  const int arriving = signalfd(-1, &signals, SFD_CLOEXEC);
+  const pid_t guard = getpid();
+  const pid_t program = fork();
+  if (program < 0 || arriving < 0) {
+    std::perror("tissueform-guard");
+    return kCannotStart;
+  }
+  if (program == 0) Become(argv + 2, guard, former);
+  setpgid(program, program);  // whoever of the two is first
+  ReplaceByNothing(STDOUT_FILENO, O_WRONLY);  // whose end is the program's alone
+  return Watch(program, arriving, static_cast<int>(grace_ms));
+}
