@@ -5,6 +5,9 @@
 # its thread count is set per job (core/linear_solvers/blas_threads.h) and because the reference BLAS
 # that CHOLMOD would otherwise pick up is many times slower.
 
+if(TARGET CHOLMOD::CHOLMOD)
+  return()
+endif()
 find_path(CHOLMOD_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
 find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
 find_path(OPENBLAS_INCLUDE_DIR openblas_config.h

@@ -83,6 +83,8 @@ function(_tissueform_dependencies out)
       list(APPEND lines "find_dependency(Threads)")
     elseif(library MATCHES "^nlohmann_json::")
       list(APPEND lines "find_dependency(nlohmann_json CONFIG)")
+    elseif(library MATCHES "^CHOLMOD::")
+      list(APPEND lines "include(\"\${CMAKE_CURRENT_LIST_DIR}/FindCholmod.cmake\")")
     else()
       message(FATAL_ERROR "the client library links ${library}: say in cmake/TissueformInstall.cmake where that is found")
     endif()
@@ -121,6 +123,7 @@ function(tissueform_install_library name)
   write_basic_package_version_file("${PROJECT_BINARY_DIR}/tissueform-config-version.cmake"
     COMPATIBILITY SameMinorVersion)
   install(FILES "${PROJECT_BINARY_DIR}/tissueform-config.cmake" "${PROJECT_BINARY_DIR}/tissueform-config-version.cmake"
+                "${PROJECT_SOURCE_DIR}/cmake/FindCholmod.cmake"
           DESTINATION "${TISSUEFORM_INSTALL_CMAKE}")
 endfunction()
 
