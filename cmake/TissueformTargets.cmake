@@ -79,6 +79,16 @@ function(tissueform_binary name)
   endif()
 endfunction()
 
+# tissueform_helper(tissueform-mesh-reader SOURCES main.cc DEPS core_process)
+#
+# A program that only programs of ours start (core/process/helper_call.h). Who calls it needs it at run time:
+# add_dependencies(LIBRARY HELPER), so the helper must not link that library. It links what it uses and no more,
+# because loading shared libraries is most of what a call costs.
+function(tissueform_helper name)
+  tissueform_binary(${name} INSTALL libexec ${ARGN})
+  target_link_options(${name} PRIVATE -Wl,--as-needed)
+endfunction()
+
 # tissueform_test(core_mesh SOURCES tet_mesh_test.cc DEPS core_mesh LABELS server)
 #
 # One test program a folder, named core_mesh_test; ctest sees every test of it by itself. The targets tests-server

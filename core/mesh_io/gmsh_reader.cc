@@ -12,10 +12,9 @@
 #include "absl/strings/string_view.h"
 
 #include "core/base/status_macros.h"
-#include "core/mesh_io/gmsh_model.h"
-#include "core/mesh_io/isolated_read.h"
-#include "core/mesh_io/medit_check.h"
 #include "core/mesh_io/plain_names.h"
+#include "core/mesh_io/row_counts.h"
+#include "core/mesh_readers/mesh_reader_call.h"
 
 namespace tissueform {
 namespace {
@@ -60,27 +59,27 @@ std::string Renumber(absl::string_view text) {
 }
 
 absl::StatusOr<RawMesh> ReadUnderPlainName(const PlainNames& names, absl::string_view name,
-                                           bool is_medit, const MeshReadLimits& limits) {
-  const std::string path = names.Path(name);
-  return ReadIsolated(limits, [&] { return ReadGmshModel(path, is_medit); });
+                                           CheckedMeshFile file, const IsolationLimits& limits) {
+  file.path = names.Path(name);
+  return CallMeshReader(kGmshReaderProgram, file, limits);
 }
 
 }  // namespace
 
-absl::StatusOr<RawMesh> ReadGmsh(const CheckedMeshFile& file, const MeshReadLimits& limits) {
+absl::StatusOr<RawMesh> ReadGmsh(const CheckedMeshFile& file, const IsolationLimits& limits) {
   TF_ASSIGN_OR_RETURN(const PlainNames names, PlainNames::Create());
   if (file.format == MeshFormat::kMedit) {
     TF_RETURN_IF_ERROR(CheckMeditLines(file.path));
     TF_RETURN_IF_ERROR(names.Link(file.path, "a.mesh"));
-    return ReadUnderPlainName(names, "a.mesh", true, limits);
+    return ReadUnderPlainName(names, "a.mesh", file, limits);
   }
   TF_RETURN_IF_ERROR(names.Link(file.path, "a.msh"));
-  absl::StatusOr<RawMesh> mesh = ReadUnderPlainName(names, "a.msh", false, limits);
+  absl::StatusOr<RawMesh> mesh = ReadUnderPlainName(names, "a.msh", file, limits);
   if (!absl::IsFailedPrecondition(mesh.status())) return mesh;
   const std::string text = Slurp(file.path);
   if (!CanRenumber(text)) return absl::InvalidArgumentError(mesh.status().message());
   TF_RETURN_IF_ERROR(names.Write("b.msh", Renumber(text)));
-  return ReadUnderPlainName(names, "b.msh", false, limits);
+  return ReadUnderPlainName(names, "b.msh", file, limits);
 }
 
 }  // namespace tissueform

@@ -5,13 +5,13 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/mesh_io/mesh_format.h"
-#include "core/mesh_io/mesh_read_limits.h"
-#include "core/mesh_io/raw_mesh.h"
+#include "core/mesh_readers/raw_mesh.h"
+#include "core/process/helper_program.h"
 
 namespace tissueform {
 
-// Gmsh's .msh (2.2, 4.1, ASCII or binary) and MEDIT's .mesh, both through Gmsh's library.
+// Gmsh's .msh (2.2, 4.1, ASCII or binary) and MEDIT's .mesh, both through Gmsh's library in a
+// helper program.
 //
 // Tets come in the order of their numbers, which is that of the file in practice; vertices in the
 // order of theirs, without those that no tet uses. Kept as cell data: of .msh "gmsh_entity",
@@ -22,6 +22,6 @@ namespace tissueform {
 //
 // REQUIRES: one of these two formats.
 // Errors: InvalidArgument, ResourceExhausted, without the name of the file.
-absl::StatusOr<RawMesh> ReadGmsh(const CheckedMeshFile& file, const MeshReadLimits& limits);
+absl::StatusOr<RawMesh> ReadGmsh(const CheckedMeshFile& file, const IsolationLimits& limits);
 
 }  // namespace tissueform

@@ -3,42 +3,49 @@
 
 #include "core/mesh_io/isolated_read.h"
 
+#include <filesystem>
+#include <string>
+
+#include "absl/strings/ascii.h"
+
 #include "core/base/status_macros.h"
-#include "core/mesh_io/raw_mesh_pipe.h"
-#include "core/process/isolated_process.h"
+#include "core/mesh_io/gmsh_reader.h"
+#include "core/mesh_io/mesh_format.h"
+#include "core/mesh_io/plain_names.h"
+#include "core/mesh_io/row_counts.h"
+#include "core/mesh_readers/mesh_reader_call.h"
 
 namespace tissueform {
 namespace {
 
-constexpr char kWhat[] = "reading it";
-
-absl::StatusOr<RawMesh> ReadWithoutExceptions(
-    const IsolationLimits& limits, const std::function<absl::StatusOr<RawMesh>()>& read) {
-  absl::StatusOr<RawMesh> mesh = absl::InternalError("not read");
-  const absl::Status status = WithoutExceptions(kWhat, limits, [&] {
-    mesh = read();
-    return mesh.status();
-  });
-  if (!status.ok()) return status;
-  return mesh;
+absl::StatusOr<RawMesh> ReadTetgenPair(const CheckedMeshFile& file, const IsolationLimits& limits) {
+  TF_ASSIGN_OR_RETURN(const PlainNames names, PlainNames::Create());
+  CheckedMeshFile linked = file;
+  linked.path = names.Path("mesh");
+  for (const std::string& path : {file.path, TetgenPartner(file.path)}) {
+    TF_RETURN_IF_ERROR(CheckTetgenRows(path));
+    const std::string ending =
+        absl::AsciiStrToLower(std::filesystem::path(path).extension().string());
+    TF_RETURN_IF_ERROR(names.Link(path, "mesh" + ending));
+  }
+  return CallMeshReader(kMeshReaderProgram, linked, limits);
 }
 
 }  // namespace
 
-absl::StatusOr<RawMesh> ReadIsolated(const MeshReadLimits& limits,
-                                     const std::function<absl::StatusOr<RawMesh>()>& read) {
+absl::StatusOr<RawMesh> ReadIsolated(const CheckedMeshFile& file, const MeshReadLimits& limits) {
   const IsolationLimits isolation{limits.max_memory_bytes, limits.max_seconds};
-  absl::StatusOr<RawMesh> mesh = absl::InternalError("not received");
-  TF_RETURN_IF_ERROR(RunIsolated(
-      kWhat, isolation,
-      [&](int descriptor) {
-        return SendRawMesh(descriptor, ReadWithoutExceptions(isolation, read));
-      },
-      [&](int descriptor) {
-        mesh = ReceiveRawMesh(descriptor, limits.max_memory_bytes);
-        return mesh.status();
-      }));
-  return mesh;
+  switch (file.format) {
+    case MeshFormat::kGmsh:
+    case MeshFormat::kMedit:
+      return ReadGmsh(file, isolation);
+    case MeshFormat::kTetgen:
+      return ReadTetgenPair(file, isolation);
+    case MeshFormat::kStl:
+      return CallMeshReader(kStlReaderProgram, file, isolation);
+    default:
+      return CallMeshReader(kMeshReaderProgram, file, isolation);
+  }
 }
 
 }  // namespace tissueform

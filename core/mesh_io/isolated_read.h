@@ -3,25 +3,19 @@
 
 #pragma once
 
-#include <functional>
-
 #include "absl/status/statusor.h"
 
 #include "core/mesh_io/mesh_read_limits.h"
-#include "core/mesh_io/raw_mesh.h"
+#include "core/mesh_readers/raw_mesh.h"
 
 namespace tissueform {
 
-// Runs `read` in a child process of its own and hands its result over: file libraries crash, loop,
-// print and end the program on damaged files, and Gmsh knows one state for the whole process. The
-// child is bound to the limits (memory beyond what this process has now, processor time), cannot
-// write files, and what it prints is lost. Internal to core/mesh_io.
+// Reads a file of any format but .vtu in a helper program (core/mesh_readers): file libraries
+// crash, loop, print and end the program on damaged files, and Gmsh knows one state for the whole
+// process. The helper is bound to the limits (memory beyond what it begins with, processor time)
+// and cannot write files. Any thread may call it. Internal to core/mesh_io.
 //
-// Errors: those of `read`; InvalidArgument when the child ended without a result; ResourceExhausted
-// when a limit stopped it; Internal when there can be no child.
-//
-// REQUIRES: `read` needs no other thread of this process and no lock that one may hold.
-absl::StatusOr<RawMesh> ReadIsolated(const MeshReadLimits& limits,
-                                     const std::function<absl::StatusOr<RawMesh>()>& read);
+// Errors, without the name of the file: those of CallMeshReader.
+absl::StatusOr<RawMesh> ReadIsolated(const CheckedMeshFile& file, const MeshReadLimits& limits);
 
 }  // namespace tissueform

@@ -10,22 +10,14 @@
 #include "absl/strings/string_view.h"
 
 #include "core/mesh_io/mesh_read_limits.h"
+#include "core/mesh_readers/raw_mesh.h"
 
 namespace tissueform {
-
-enum class MeshFormat { kVtu, kLegacyVtk, kGmsh, kMedit, kTetgen, kStl, kPly, kObj, kOff, kVtp };
 
 enum class MeshKind { kTets, kTriangles };
 
 // The surface format that the ending of `path` names; InvalidArgument for any other ending.
 absl::StatusOr<MeshFormat> SurfaceFormatOfPath(const std::string& path);
-
-// A file that may be given to a library.
-struct CheckedMeshFile {
-  std::string path;
-  MeshFormat format = MeshFormat::kVtu;
-  int64_t bytes = 0;
-};
 
 // Finds the format by the ending, in any case, and checks what can be told without a library: the
 // file is there, is a file, is within the limits, begins as its format does and, where the format

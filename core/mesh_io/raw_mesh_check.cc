@@ -9,7 +9,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/mesh/index_check.h"
-#include "core/mesh_io/attribute_name.h"
+#include "core/mesh_readers/raw_mesh.h"
 
 namespace tissueform {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "absl/status/status.h"
 
-#include "core/mesh_io/raw_mesh.h"
+#include "core/mesh_readers/raw_mesh.h"
 
 namespace tissueform {
 

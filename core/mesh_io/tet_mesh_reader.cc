@@ -8,31 +8,18 @@
 
 #include "core/base/status_macros.h"
 #include "core/mesh/orientation.h"
-#include "core/mesh_io/gmsh_reader.h"
-#include "core/mesh_io/legacy_vtk_reader.h"
+#include "core/mesh_io/isolated_read.h"
 #include "core/mesh_io/mesh_format.h"
 #include "core/mesh_io/raw_mesh_check.h"
 #include "core/mesh_io/tet_mesh_io.h"
-#include "core/mesh_io/tetgen_reader.h"
-#include "core/mesh_io/vtu_reader.h"
+#include "core/mesh_readers/vtu_reader.h"
 
 namespace tissueform {
 namespace {
 
 absl::StatusOr<RawMesh> ReadRaw(const CheckedMeshFile& file, const MeshReadLimits& limits) {
-  switch (file.format) {
-    case MeshFormat::kVtu:
-      return ReadVtu(file, limits);
-    case MeshFormat::kLegacyVtk:
-      return ReadLegacyVtk(file, limits);
-    case MeshFormat::kGmsh:
-    case MeshFormat::kMedit:
-      return ReadGmsh(file, limits);
-    case MeshFormat::kTetgen:
-      return ReadTetgen(file, limits);
-    default:
-      return absl::InternalError("a surface format was taken for one of tets");
-  }
+  if (file.format == MeshFormat::kVtu) return ReadVtu(file, limits.max_memory_bytes);
+  return ReadIsolated(file, limits);
 }
 
 absl::StatusOr<TetMeshFile> ToTetMeshFile(RawMesh raw) {

@@ -11,24 +11,14 @@
 
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
-#include "core/mesh_io/cgal_surface_io.h"
+#include "core/mesh_io/isolated_read.h"
 #include "core/mesh_io/mesh_format.h"
 #include "core/mesh_io/raw_mesh_check.h"
-#include "core/mesh_io/vtk_surface_reader.h"
+#include "core/mesh_io/surface_writer.h"
 #include "core/mesh_io/vtp_writer.h"
 
 namespace tissueform {
 namespace {
-
-absl::StatusOr<RawMesh> ReadRaw(const CheckedMeshFile& file, const MeshReadLimits& limits) {
-  switch (file.format) {
-    case MeshFormat::kObj:
-    case MeshFormat::kOff:
-      return ReadCgalSurface(file, limits);
-    default:
-      return ReadVtkSurface(file, limits);
-  }
-}
 
 absl::StatusOr<TriangleMeshFile> ToTriangleMeshFile(RawMesh raw) {
   TF_RETURN_IF_ERROR(CheckRawMesh(raw));
@@ -56,7 +46,7 @@ absl::StatusOr<TriangleMeshFile> ReadTriangleMesh(const std::string& path,
   TF_ASSIGN_OR_RETURN(const CheckedMeshFile file,
                       CheckMeshFile(path, MeshKind::kTriangles, limits));
   try {
-    absl::StatusOr<RawMesh> raw = ReadRaw(file, limits);
+    absl::StatusOr<RawMesh> raw = ReadIsolated(file, limits);
     if (!raw.ok()) return WithMeshName(path, raw.status());
     absl::StatusOr<TriangleMeshFile> mesh = ToTriangleMeshFile(*std::move(raw));
     if (!mesh.ok()) return WithMeshName(path, mesh.status());

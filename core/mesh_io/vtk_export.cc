@@ -20,9 +20,9 @@
 #include "absl/strings/string_view.h"
 
 #include "core/base/status_macros.h"
-#include "core/mesh_io/attribute_name.h"
 #include "core/mesh_io/tet_mesh_io.h"
-#include "core/mesh_io/vtk_error_scope.h"
+#include "core/mesh_readers/raw_mesh.h"
+#include "core/mesh_readers/vtk_error_scope.h"
 
 namespace tissueform {
 namespace {
