@@ -38,7 +38,8 @@ absl::StatusOr<TriangleMeshFile> ReadTriangleMesh(const std::string& path,
 // Writes the format that the ending names: .vtp (with all arrays), .ply .obj .off as text, or .stl
 // in binary form, single precision; all but .vtp must have no arrays, because they would be lost
 // (InvalidArgument). "Not a medical device" stands in the header of .stl, in a comment of the
-// others. Coordinates come back exactly, except from .stl. All or nothing, as WriteTetMesh.
+// others. Coordinates come back exactly, except from .stl and, because VTK reads it in single
+// precision, from .ply. All or nothing, as WriteTetMesh.
 absl::Status WriteTriangleMesh(const std::string& path, const TriangleMeshFile& file);
 
 }  // namespace tissueform
