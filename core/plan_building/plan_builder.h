@@ -23,6 +23,7 @@
 #include "core/plan_building/recipe.h"
 #include "core/plan_building/skin_distance.h"
 #include "core/plan_building/soft_tissue_mesh.h"
+#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 
@@ -78,5 +79,10 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
 //   segments/NAME.stl   the pieces of bone
 // The same build gives the same bytes. Errors: those of writing files.
 absl::Status WritePlan(const PlanBuild& build, const std::string& folder);
+
+// What ReadPlan and ResolvePlan make of these files, without the files: for deformers and sessions.
+// Equal to the last bit: positions, tets, arrays, stiffness, regions, poses. Errors: those of
+// ResolvePlan.
+absl::StatusOr<PlanProblem> ToPlanProblem(const PlanBuild& build);
 
 }  // namespace tissueform

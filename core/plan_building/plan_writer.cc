@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <system_error>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "nlohmann/json.hpp"
@@ -14,6 +15,7 @@
 #include "core/plan_building/plan_builder.h"
 #include "core/planning/json_values.h"
 #include "core/planning/model_names.h"
+#include "core/planning/plan_io.h"
 
 namespace tissueform {
 namespace {
@@ -21,8 +23,10 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr char kMeshFile[] = "head.vtu";
+constexpr char kAnatomyArray[] = "anatomy";
+constexpr char kStiffnessArray[] = "youngs_modulus_pa";
 
-Json Equals(size_t label) { return {{"point_data", "anatomy"}, {"equals", label}}; }
+Json Equals(size_t label) { return {{"point_data", kAnatomyArray}, {"equals", label}}; }
 
 std::string PlanJson(const PlanBuild& build) {
   Json plan = {{"format", "tissueform-plan"},
@@ -30,7 +34,7 @@ std::string PlanJson(const PlanBuild& build) {
                {"unit", "mm"},
                {"coordinate_system", "LPS"},
                {"mesh", kMeshFile},
-               {"stiffness", {{"cell_data", "youngs_modulus_pa"}}},
+               {"stiffness", {{"cell_data", kStiffnessArray}}},
                {"poisson_ratio", build.recipe.poisson_ratio},
                {"fixed", Equals(kFixedBone)},
                {"model", ModelName(build.recipe.model)}};
@@ -42,15 +46,37 @@ std::string PlanJson(const PlanBuild& build) {
   return plan.dump(2) + "\n";
 }
 
+VertexSelector SelectLabel(size_t label) {
+  return {SelectByPointData{kAnatomyArray, static_cast<double>(label)}};
+}
+
+// PlanJson, read.
+Plan PlanOf(const PlanBuild& build) {
+  Plan plan;
+  plan.mesh_path = kMeshFile;
+  plan.stiffness = StiffnessFromCellData{kStiffnessArray};
+  plan.poisson_ratio = build.recipe.poisson_ratio;
+  plan.fixed = SelectLabel(kFixedBone);
+  for (size_t s = 0; s < build.segments.size(); ++s) {
+    // A plan says degrees. Radians do not come back from them to the last bit, so that the pose
+    // goes through the words of the plan here, too.
+    plan.handles.push_back({.name = build.segments[s].cut.name,
+                            .region = SelectLabel(kFirstSegment + s),
+                            .pose = PoseFromJson(ToJson(build.segments[s].pose))});
+  }
+  plan.model = build.recipe.model;
+  return plan;
+}
+
 TetMeshFile MeshFile(const PlanBuild& build) {
   const TetStiffness& stiffness = build.stiffness;
   return {.mesh = build.mesh->mesh,
-          .point_data = {{"anatomy", 1, build.regions.anatomy},
+          .point_data = {{kAnatomyArray, 1, build.regions.anatomy},
                          {"skin_region", 1, build.regions.skin_region}},
           .cell_data = {{"mean_hu", 1, stiffness.mean_hu},
                         {"voxels", 1, stiffness.voxels},
                         {"tissue", 1, stiffness.tissue},
-                        {"youngs_modulus_pa", 1, stiffness.youngs_modulus_pa}}};
+                        {kStiffnessArray, 1, stiffness.youngs_modulus_pa}}};
 }
 
 absl::Status WriteSegments(const PlanBuild& build, const std::filesystem::path& folder) {
@@ -75,6 +101,10 @@ absl::Status WritePlan(const PlanBuild& build, const std::string& folder) {
   TF_RETURN_IF_ERROR(WriteTetMesh((root / kMeshFile).string(), MeshFile(build)));
   TF_RETURN_IF_ERROR(WriteSegments(build, root / "segments"));
   return WriteFileAtomically((root / "plan.json").string(), PlanJson(build));
+}
+
+absl::StatusOr<PlanProblem> ToPlanProblem(const PlanBuild& build) {
+  return ResolvePlan(PlanOf(build), MeshFile(build));
 }
 
 }  // namespace tissueform

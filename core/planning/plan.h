@@ -3,25 +3,20 @@
 
 #pragma once
 
-#include <memory>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "core/constraints/constraint_set.h"
 #include "core/constraints/handle_pose.h"
 #include "core/deformation/create_deformer.h"
-#include "core/mesh/attribute.h"
-#include "core/mesh/tet_mesh.h"
+#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 
 // The plan file, word for word (docs/plan-format.md): what is predicted. Nothing here depends on a
 // mesh yet; numbers are in the plan's own coordinate system.
-
-enum class CoordinateSystem { kLps, kRas };
 
 // One of the selectors of a plan: vertices by number, by the value of a point array, inside a
 // closed box, or the union of others.
@@ -72,19 +67,6 @@ struct Plan {
   std::vector<PlannedHandle> handles;
   DeformationModel model = DeformationModel::kGradientField;
   GradientFieldOptions gradient_field;  // what the plan says; the rest keeps its defaults
-};
-
-// A plan put upon its mesh: all that a deformer or a session needs. Everything is in LPS, whatever
-// the plan's own coordinate system was.
-struct PlanProblem {
-  std::shared_ptr<const TetMesh> mesh;
-  std::vector<Attribute> point_data;  // of the mesh file, kept for the result
-  std::vector<Attribute> cell_data;
-  CoordinateSystem written_in = CoordinateSystem::kLps;  // in which results are written back
-  Eigen::VectorXd stiffness;                             // #T, Pa
-  ConstraintSet constraints;
-  std::vector<HandlePose> poses;  // one per handle of `constraints`
-  DeformerOptions deformer;
 };
 
 }  // namespace tissueform

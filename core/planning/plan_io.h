@@ -8,7 +8,9 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/mesh_io/tet_mesh_io.h"
 #include "core/planning/plan.h"
+#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 
@@ -41,5 +43,9 @@ absl::StatusOr<Plan> ParsePlan(std::string_view json, const std::string& folder,
 // missing array, a value without stiffness, stiffness <= 0, an empty selection (the message names
 // the handle or "fixed").
 absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan);
+
+// The same upon a mesh that is in memory, in the plan's own coordinate system: no file is read, and
+// plan.mesh_path only stands for the mesh in messages.
+absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, TetMeshFile file);
 
 }  // namespace tissueform

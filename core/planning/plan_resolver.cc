@@ -8,19 +8,18 @@
 #include "core/base/status_macros.h"
 #include "core/mesh/validation.h"
 #include "core/mesh_io/tet_mesh_io.h"
-#include "core/planning/coordinates.h"
 #include "core/planning/plan_io.h"
 #include "core/planning/selector.h"
 #include "core/planning/stiffness.h"
+#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 namespace {
 
-absl::StatusOr<TetMeshFile> ReadUsableMesh(const std::string& path) {
-  TF_ASSIGN_OR_RETURN(TetMeshFile file, ReadTetMesh(path));
-  const absl::Status usable = CheckTetMesh(file.mesh);
-  if (usable.ok()) return file;
-  return absl::Status(usable.code(), absl::StrCat("mesh ", path, ": ", usable.message()));
+absl::Status CheckUsable(const std::string& name, const TetMesh& mesh) {
+  const absl::Status usable = CheckTetMesh(mesh);
+  if (usable.ok()) return usable;
+  return absl::Status(usable.code(), absl::StrCat("mesh ", name, ": ", usable.message()));
 }
 
 absl::StatusOr<ConstraintSet> ResolveRegions(const Plan& plan, const TetMeshFile& file) {
@@ -62,7 +61,12 @@ absl::StatusOr<std::shared_ptr<const TetMesh>> ToLps(CoordinateSystem system, co
 }  // namespace
 
 absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan) {
-  TF_ASSIGN_OR_RETURN(TetMeshFile file, ReadUsableMesh(plan.mesh_path));
+  TF_ASSIGN_OR_RETURN(TetMeshFile file, ReadTetMesh(plan.mesh_path));
+  return ResolvePlan(plan, std::move(file));
+}
+
+absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, TetMeshFile file) {
+  TF_RETURN_IF_ERROR(CheckUsable(plan.mesh_path, file.mesh));
   TF_ASSIGN_OR_RETURN(Eigen::VectorXd stiffness,
                       ResolveStiffness(plan.stiffness, file.mesh.num_tets(), file.cell_data));
   TF_ASSIGN_OR_RETURN(ConstraintSet constraints, ResolveRegions(plan, file));
@@ -72,7 +76,7 @@ absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan) {
   DeformerOptions deformer;
   deformer.model = plan.model;
   deformer.preparation.poisson_ratio = plan.poisson_ratio;
-  deformer.preparation.mesh_is_usable = true;  // ReadUsableMesh
+  deformer.preparation.mesh_is_usable = true;  // CheckUsable
   deformer.gradient_field = plan.gradient_field;
   return PlanProblem{.mesh = std::move(mesh),
                      .point_data = std::move(file.point_data),

@@ -95,4 +95,10 @@ absl::StatusOr<std::vector<int32_t>> ResolveSelector(const VertexSelector& selec
   return selection;
 }
 
+SelectBox SwapToOrFromLps(CoordinateSystem system, const SelectBox& box) {
+  const Eigen::Vector3d a = SignsToLps(system).cwiseProduct(box.min_mm);
+  const Eigen::Vector3d b = SignsToLps(system).cwiseProduct(box.max_mm);
+  return {a.cwiseMin(b), a.cwiseMax(b)};
+}
+
 }  // namespace tissueform

@@ -30,4 +30,7 @@ absl::StatusOr<std::vector<int32_t>> ResolveSelector(const VertexSelector& selec
                                                      const SelectionSource& source,
                                                      const std::string& region);
 
+// The same box from `system` in LPS or back: min and max change places where the sign does.
+SelectBox SwapToOrFromLps(CoordinateSystem system, const SelectBox& box);
+
 }  // namespace tissueform

@@ -25,8 +25,8 @@
 #include "core/deformation/deformation_quality.h"
 #include "core/deformation/mesh_preparation.h"
 #include "core/linear_solvers/blas_threads.h"
-#include "core/planning/coordinates.h"
 #include "core/planning/model_names.h"
+#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 namespace {

@@ -34,8 +34,8 @@
 #include "core/base/status_macros.h"
 #include "core/mesh/tet_topology.h"
 #include "core/mesh_io/triangle_mesh_io.h"
-#include "core/planning/coordinates.h"
 #include "core/planning/plan_io.h"
+#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 namespace {

@@ -12,7 +12,7 @@
 #include "client/cli/compare/comparison_report.h"
 #include "client/cli/online/face_movement.h"
 #include "client/cpp/tissueform_client.h"
-#include "core/planning/plan.h"
+#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 

@@ -11,7 +11,7 @@
 
 #include "client/cli/compare/comparison_report.h"
 #include "core/base/types.h"
-#include "core/planning/plan.h"
+#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 

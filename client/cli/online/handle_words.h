@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "core/planning/plan.h"
+#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 

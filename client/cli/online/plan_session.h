@@ -10,7 +10,7 @@
 #include "absl/status/statusor.h"
 
 #include "client/cpp/tissueform_client.h"
-#include "core/planning/plan.h"
+#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 

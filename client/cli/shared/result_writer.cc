@@ -14,7 +14,6 @@
 #include "core/elasticity/tet_strain.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "core/operators/piecewise_linear_elements.h"
-#include "core/planning/coordinates.h"
 
 namespace tissueform {
 namespace {

@@ -9,6 +9,7 @@
 
 #include "core/base/types.h"
 #include "core/planning/plan.h"
+#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 

@@ -10,7 +10,7 @@
 
 #include "core/deformation/deformation_quality.h"
 #include "core/deformation/deformer.h"
-#include "core/planning/plan.h"
+#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 

@@ -82,6 +82,58 @@ TEST(PlanBuilderTest, BundledHeadBecomesAUsablePlan) {
   std::filesystem::remove_all(folder);
 }
 
+void ExpectSameArrays(const std::vector<Attribute>& a, const std::vector<Attribute>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].name, b[i].name);
+    EXPECT_EQ(a[i].components, b[i].components);
+    EXPECT_EQ(a[i].values, b[i].values) << a[i].name;  // type and every bit
+  }
+}
+
+TEST(PlanBuilderTest, ProblemOfABuildEqualsThatOfItsFilesToTheLastBit) {
+  Recipe recipe = CoarseRecipe();
+  // An angle that does not come back from degrees to the last bit.
+  recipe.segments[0].pose.rotation_vector = {0.1, -0.03, 0.007};
+  recipe.segments[0].pose.pivot_mm = {1.0 / 3, 2.0 / 7, -40.1};
+  recipe.segments[0].pose.scale = 1.01;
+  recipe.poisson_ratio = 0.43;
+  recipe.model = DeformationModel::kLinearElastic;
+  ASSERT_OK_AND_ASSIGN(const PlanBuild build, BuildPlan(BundledCt(), recipe));
+  ASSERT_OK_AND_ASSIGN(const PlanProblem direct, ToPlanProblem(build));
+
+  const std::string folder = ::testing::TempDir() + "plan_problem_test";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  ASSERT_THAT(WritePlan(build, folder), IsOk());
+  ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(folder + "/plan.json"));
+  ASSERT_OK_AND_ASSIGN(const PlanProblem read, ResolvePlan(plan));
+  std::filesystem::remove_all(folder);
+
+  EXPECT_EQ(direct.mesh->positions(), read.mesh->positions());
+  EXPECT_EQ(direct.mesh->tets(), read.mesh->tets());
+  EXPECT_EQ(direct.stiffness, read.stiffness);
+  EXPECT_EQ(direct.written_in, read.written_in);
+  ExpectSameArrays(direct.point_data, read.point_data);
+  ExpectSameArrays(direct.cell_data, read.cell_data);
+  EXPECT_EQ(direct.constraints.fixed(), read.constraints.fixed());
+  ASSERT_EQ(direct.constraints.handles().size(), 1U);
+  ASSERT_EQ(read.constraints.handles().size(), 1U);
+  EXPECT_EQ(direct.constraints.handles()[0].name, read.constraints.handles()[0].name);
+  EXPECT_EQ(direct.constraints.handles()[0].vertices, read.constraints.handles()[0].vertices);
+  ASSERT_EQ(direct.poses.size(), 1U);
+  ASSERT_EQ(read.poses.size(), 1U);
+  EXPECT_EQ(direct.poses[0].rotation_vector, read.poses[0].rotation_vector);
+  EXPECT_EQ(direct.poses[0].pivot_mm, read.poses[0].pivot_mm);
+  EXPECT_EQ(direct.poses[0].translation_mm, read.poses[0].translation_mm);
+  EXPECT_EQ(direct.poses[0].scale, read.poses[0].scale);
+  EXPECT_EQ(direct.deformer.model, read.deformer.model);
+  EXPECT_EQ(direct.deformer.preparation.poisson_ratio, read.deformer.preparation.poisson_ratio);
+  EXPECT_EQ(direct.deformer.gradient_field.rotation, read.deformer.gradient_field.rotation);
+  EXPECT_EQ(direct.deformer.gradient_field.max_iterations,
+            read.deformer.gradient_field.max_iterations);
+}
+
 TEST(PlanBuilderTest, FirstErrorIsTold) {
   Recipe recipe = CoarseRecipe();
   recipe.ct.hu_offset.reset();

@@ -8,8 +8,8 @@
 
 #include "core/deformation/create_deformer.h"
 #include "core/mesh_io/tet_mesh_io.h"
-#include "core/planning/coordinates.h"
 #include "core/planning/plan_io.h"
+#include "core/planning/selector.h"
 #include "tests/core/planning/plan_text.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
@@ -238,27 +238,6 @@ TEST_F(PlanResolverTest, RasPlanGivesTheSamePredictionAsItsLpsTwin) {
   ASSERT_OK_AND_ASSIGN(const Deformation from_lps, twin_deformer->Deform(twin.poses));
   EXPECT_LT((from_ras.positions - from_lps.positions).cwiseAbs().maxCoeff(), 1e-12);
   EXPECT_EQ(ras.written_in, CoordinateSystem::kRas);
-}
-
-TEST(CoordinatesTest, PoseInRasMovesAPointAsItsTwinInLpsDoes) {
-  const HandlePose ras{.rotation_vector = {0.3, -1.2, 2.0},
-                       .pivot_mm = {1, 2, 3},
-                       .translation_mm = {-4, 5, 6},
-                       .scale = 1.5};
-  const Eigen::Vector3d signs(-1, -1, 1);
-  const Eigen::Vector3d point(7, -8, 9);
-  const Eigen::Vector3d in_lps =
-      ApplyPose(SwapToOrFromLps(CoordinateSystem::kRas, ras), signs.cwiseProduct(point));
-  EXPECT_TRUE(signs.cwiseProduct(in_lps).isApprox(ApplyPose(ras, point), 1e-14));
-}
-
-TEST(CoordinatesTest, SwappingTwiceChangesNothing) {
-  Positions positions = Bar({1, 1, 1}).positions();
-  const Positions before = positions;
-  SwapToOrFromLps(CoordinateSystem::kRas, &positions);
-  EXPECT_NE(positions, before);
-  SwapToOrFromLps(CoordinateSystem::kRas, &positions);
-  EXPECT_EQ(positions, before);
 }
 
 TEST(CoordinatesTest, BoxKeepsMinBelowMax) {
