@@ -149,13 +149,14 @@ class ArapDeformer : public Deformer {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Deformer>> CreateArapDeformer(
-    std::shared_ptr<MeshPreparation> preparation, const ArapOptions& options) {
+    std::shared_ptr<MeshPreparation> preparation, const ArapOptions& options,
+    const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(CheckIteration(options.max_iterations, options.tolerance_mm));
   if (options.acceleration_depth < 0) {
     return absl::InvalidArgumentError(absl::StrCat(
         "acceleration_depth is ", options.acceleration_depth, "; it must not be negative"));
   }
-  TF_ASSIGN_OR_RETURN(const PreparedLaplacian* laplacian, preparation->Laplacian());
+  TF_ASSIGN_OR_RETURN(const PreparedLaplacian* laplacian, preparation->Laplacian(cancellation));
   return std::make_unique<ArapDeformer>(std::move(preparation), *laplacian, options);
 }
 

@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/base/cancellation.h"
 #include "core/deformation/deformer.h"
 #include "core/deformation/mesh_preparation.h"
 
@@ -36,6 +37,7 @@ struct ArapOptions {
 //
 // Errors: InvalidArgument (an option out of range), those of MeshPreparation::Laplacian.
 absl::StatusOr<std::unique_ptr<Deformer>> CreateArapDeformer(
-    std::shared_ptr<MeshPreparation> preparation, const ArapOptions& options);
+    std::shared_ptr<MeshPreparation> preparation, const ArapOptions& options,
+    const Cancellation& cancellation = {});
 
 }  // namespace tissueform

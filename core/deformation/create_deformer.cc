@@ -10,28 +10,30 @@ namespace tissueform {
 namespace {
 
 absl::StatusOr<std::unique_ptr<Deformer>> CreateGradientField(
-    const std::shared_ptr<MeshPreparation>& preparation, GradientFieldOptions options) {
+    const std::shared_ptr<MeshPreparation>& preparation, GradientFieldOptions options,
+    const Cancellation& cancellation) {
   options.backend = preparation->options().backend;
   options.admission = preparation->options().admission;
   options.threads = preparation->options().threads;
-  return CreateGradientFieldDeformer(preparation, options);
+  return CreateGradientFieldDeformer(preparation, options, cancellation);
 }
 
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Deformer>> CreateDeformer(
-    const std::shared_ptr<MeshPreparation>& preparation, const DeformerOptions& options) {
+    const std::shared_ptr<MeshPreparation>& preparation, const DeformerOptions& options,
+    const Cancellation& cancellation) {
   switch (options.model) {
     case DeformationModel::kGradientField:
       break;
     case DeformationModel::kArap:
-      return CreateArapDeformer(preparation, options.arap);
+      return CreateArapDeformer(preparation, options.arap, cancellation);
     case DeformationModel::kLinearElastic:
-      return CreateLinearElasticDeformer(preparation);
+      return CreateLinearElasticDeformer(preparation, cancellation);
     case DeformationModel::kNeoHookean:
-      return CreateNeoHookeanDeformer(preparation, options.neo_hookean);
+      return CreateNeoHookeanDeformer(preparation, options.neo_hookean, cancellation);
   }
-  return CreateGradientField(preparation, options.gradient_field);
+  return CreateGradientField(preparation, options.gradient_field, cancellation);
 }
 
 absl::StatusOr<std::unique_ptr<Deformer>> CreateDeformer(const TetMesh& mesh,

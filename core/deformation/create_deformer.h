@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/base/cancellation.h"
 #include "core/constraints/constraint_set.h"
 #include "core/deformation/arap_deformer.h"
 #include "core/deformation/deformer.h"
@@ -30,11 +31,12 @@ struct DeformerOptions {
 };
 
 // The one switch over models. Models made from one preparation share what it holds;
-// `options.preparation` is not read.
+// `options.preparation` is not read. `cancellation` is asked between the stages.
 //
-// Errors: those of the model's own Create function.
+// Errors: those of the model's own Create function; Cancelled.
 absl::StatusOr<std::unique_ptr<Deformer>> CreateDeformer(
-    const std::shared_ptr<MeshPreparation>& preparation, const DeformerOptions& options);
+    const std::shared_ptr<MeshPreparation>& preparation, const DeformerOptions& options,
+    const Cancellation& cancellation = {});
 
 // One model with a preparation of its own. `stiffness` is Young's modulus per tet in Pa, #T,
 // positive.

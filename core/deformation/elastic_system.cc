@@ -81,7 +81,7 @@ Eigen::MatrixXd AffineMotions(const TetMesh& mesh, const ConstraintSet& constrai
 
 absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
     const TetMesh& mesh, const Eigen::VectorXd& stiffness, const ConstraintSet& constraints,
-    const ElasticSystemOptions& options) {
+    const ElasticSystemOptions& options, const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(CheckPoissonRatio(options.poisson_ratio));
   auto elastic = absl::WrapUnique(new ElasticSystem());
   elastic->origin_ =
@@ -97,20 +97,22 @@ absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
         elastic->system_,
         DirichletSystem::Create(
             K, ConstrainedUnknowns(constraints),
-            {.backend = options.backend, .admission = options.admission, .unknowns_per_node = 3}));
+            {.backend = options.backend, .admission = options.admission, .unknowns_per_node = 3},
+            cancellation));
   }
   TF_ASSIGN_OR_RETURN(const double of_system,
                       elastic->system_->EstimateCondition(kConditionIterations));
   elastic->condition_estimate_ = std::max(of_system, VolumeToShear(options.poisson_ratio));
   TF_RETURN_IF_ERROR(CheckCondition(elastic->condition_estimate_, options.poisson_ratio));
   stopwatch.Restart();
-  TF_RETURN_IF_ERROR(elastic->PrepareResponses(mesh, constraints, options.admission));
+  TF_RETURN_IF_ERROR(elastic->PrepareResponses(mesh, constraints, options.admission, cancellation));
   elastic->response_seconds_ = stopwatch.Seconds();
   return elastic;
 }
 
 absl::Status ElasticSystem::PrepareResponses(const TetMesh& mesh, const ConstraintSet& constraints,
-                                             const FactorAdmission& admission) {
+                                             const FactorAdmission& admission,
+                                             const Cancellation& cancellation) {
   const Eigen::Index rows = 3 * mesh.num_vertices();
   const auto handles = static_cast<int>(constraints.handles().size());
   if (admission) {
@@ -119,6 +121,7 @@ absl::Status ElasticSystem::PrepareResponses(const TetMesh& mesh, const Constrai
   }
   response_columns_.resize(rows, Eigen::Index{kColumnsPerHandle} * handles);
   for (int h = 0; h < handles; ++h) {
+    TF_RETURN_IF_ERROR(cancellation.Check());
     TF_ASSIGN_OR_RETURN(
         response_columns_.middleCols(Eigen::Index{kColumnsPerHandle} * h, kColumnsPerHandle),
         system_->Solve({}, AffineMotions(mesh, constraints, h, origin_)));

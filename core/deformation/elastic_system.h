@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
 
+#include "core/base/cancellation.h"
 #include "core/constraints/constraint_set.h"
 #include "core/constraints/handle_pose.h"
 #include "core/linear_solvers/dirichlet_system.h"
@@ -38,11 +39,10 @@ class ElasticSystem {
   //
   // Errors: InvalidArgument (Poisson's ratio outside [0, 0.5), or so near 0.5 that the system is
   // unusable: said with the condition estimate), FailedPrecondition (not positive definite),
-  // ResourceExhausted, or what the admission says.
-  static absl::StatusOr<std::unique_ptr<ElasticSystem>> Create(const TetMesh& mesh,
-                                                               const Eigen::VectorXd& stiffness,
-                                                               const ConstraintSet& constraints,
-                                                               const ElasticSystemOptions& options);
+  // ResourceExhausted, Cancelled, or what the admission says.
+  static absl::StatusOr<std::unique_ptr<ElasticSystem>> Create(
+      const TetMesh& mesh, const Eigen::VectorXd& stiffness, const ConstraintSet& constraints,
+      const ElasticSystemOptions& options, const Cancellation& cancellation = {});
 
   // Displacements, 3 #V by 12 #handles. Column 12 h + 4 i + j is the equilibrium when vertex v of
   // handle h is displaced by x_j(v) along axis i (x_j = x, y, z relative to origin(), and 1 for
@@ -75,7 +75,7 @@ class ElasticSystem {
   ElasticSystem() = default;
 
   absl::Status PrepareResponses(const TetMesh& mesh, const ConstraintSet& constraints,
-                                const FactorAdmission& admission);
+                                const FactorAdmission& admission, const Cancellation& cancellation);
 
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   Eigen::MatrixXd response_columns_;

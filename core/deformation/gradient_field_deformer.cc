@@ -42,14 +42,14 @@ class GradientFieldDeformer : public Deformer {
         laplacian_(parts_.laplacian->system.get()),
         options_(std::move(options)) {}
 
-  absl::Status Prepare() {
+  absl::Status Prepare(const Cancellation& cancellation) {
     preparation_.assemble_seconds = parts_.laplacian->assemble_seconds;
     preparation_.negative_weights = parts_.laplacian->negative_weights;
     const FactorizationSummary& factorization = laplacian_->factorization();
     preparation_.analyse_seconds = factorization.analyse_seconds;
     preparation_.factorise_seconds = factorization.factorise_seconds;
     preparation_.factor_bytes = factorization.factor_bytes;
-    TF_RETURN_IF_ERROR(PrepareHarmonicFields());
+    TF_RETURN_IF_ERROR(PrepareHarmonicFields(cancellation));
     preparation_.own_bytes = DoublesHeld() * static_cast<int64_t>(sizeof(double));
     preparation_.bytes_held = parts_.bytes + preparation_.own_bytes;
     return absl::OkStatus();
@@ -96,7 +96,7 @@ class GradientFieldDeformer : public Deformer {
     return kinds * CellTransforms::ColsAtCompileTime * elements_.num_cells();
   }
 
-  absl::Status PrepareHarmonicFields() {
+  absl::Status PrepareHarmonicFields(const Cancellation& cancellation) {
     const Stopwatch stopwatch;
     if (options_.guidance == Guidance::kUniform) {
       // Its factor is given back as soon as the fields are known.
@@ -104,7 +104,8 @@ class GradientFieldDeformer : public Deformer {
           const auto uniform,
           DirichletSystem::Create(
               UniformLaplacian(elements_.cells, elements_.num_vertices(), options_.threads),
-              parts_.constraints.constrained(), {options_.backend, options_.admission}));
+              parts_.constraints.constrained(), {options_.backend, options_.admission},
+              cancellation));
       TF_ASSIGN_OR_RETURN(uniform_harmonic_,
                           ComputeHarmonicFields(parts_.constraints, uniform.get()));
     }
@@ -222,9 +223,10 @@ struct PreparedSurface {
 };
 
 absl::StatusOr<std::unique_ptr<Deformer>> CreateFromParts(SharedParts parts,
-                                                          const GradientFieldOptions& options) {
+                                                          const GradientFieldOptions& options,
+                                                          const Cancellation& cancellation) {
   auto deformer = std::make_unique<GradientFieldDeformer>(std::move(parts), options);
-  TF_RETURN_IF_ERROR(deformer->Prepare());
+  TF_RETURN_IF_ERROR(deformer->Prepare(cancellation));
   return deformer;
 }
 
@@ -244,14 +246,15 @@ absl::StatusOr<std::unique_ptr<Deformer>> CreateGradientFieldDeformer(
 }
 
 absl::StatusOr<std::unique_ptr<Deformer>> CreateGradientFieldDeformer(
-    std::shared_ptr<MeshPreparation> preparation, const GradientFieldOptions& options) {
+    std::shared_ptr<MeshPreparation> preparation, const GradientFieldOptions& options,
+    const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(CheckIteration(options.max_iterations, options.tolerance_mm));
-  TF_ASSIGN_OR_RETURN(PreparedLaplacian * laplacian, preparation->Laplacian());
+  TF_ASSIGN_OR_RETURN(PreparedLaplacian * laplacian, preparation->Laplacian(cancellation));
   const MeshPreparation& shared = *preparation;
   return CreateFromParts(
       {std::move(preparation), shared.elements(), shared.vertex_cells(), shared.stiffness(),
        shared.constraints(), laplacian, shared.laplacian_bytes()},
-      options);
+      options, cancellation);
 }
 
 absl::StatusOr<std::unique_ptr<Deformer>> CreateSurfaceGradientFieldDeformer(
@@ -271,7 +274,7 @@ absl::StatusOr<std::unique_ptr<Deformer>> CreateSurfaceGradientFieldDeformer(
   surface->laplacian->assemble_seconds = assemble_seconds;
   return CreateFromParts({surface, surface->elements, surface->vertex_cells, surface->stiffness,
                           surface->constraints, surface->laplacian.get(), surface->bytes_held()},
-                         options);
+                         options, {});
 }
 
 }  // namespace tissueform

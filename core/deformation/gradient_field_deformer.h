@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/base/cancellation.h"
 #include "core/constraints/constraint_set.h"
 #include "core/deformation/deformer.h"
 #include "core/deformation/mesh_preparation.h"
@@ -67,7 +68,8 @@ absl::StatusOr<std::unique_ptr<Deformer>> CreateGradientFieldDeformer(
 // models. `options.backend`, `admission` and `threads` are those of the preparation; only the
 // second factor of uniform guidance asks options.admission.
 absl::StatusOr<std::unique_ptr<Deformer>> CreateGradientFieldDeformer(
-    std::shared_ptr<MeshPreparation> preparation, const GradientFieldOptions& options);
+    std::shared_ptr<MeshPreparation> preparation, const GradientFieldOptions& options,
+    const Cancellation& cancellation = {});
 
 // The same on a surface with the cotangent weights of Eq. 13: what the source compares volumes with
 // (Figs. 1b, 2e to h, 5c). The surface may be open; triangles without area are refused.

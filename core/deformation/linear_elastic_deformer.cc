@@ -68,8 +68,8 @@ class LinearElasticDeformer : public Deformer {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Deformer>> CreateLinearElasticDeformer(
-    std::shared_ptr<MeshPreparation> preparation) {
-  TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic());
+    std::shared_ptr<MeshPreparation> preparation, const Cancellation& cancellation) {
+  TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic(cancellation));
   return std::make_unique<LinearElasticDeformer>(std::move(preparation), *elastic);
 }
 

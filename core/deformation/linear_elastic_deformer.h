@@ -8,6 +8,7 @@
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
 
+#include "core/base/cancellation.h"
 #include "core/deformation/deformer.h"
 #include "core/deformation/mesh_preparation.h"
 
@@ -20,7 +21,7 @@ namespace tissueform {
 //
 // Errors: those of MeshPreparation::Elastic.
 absl::StatusOr<std::unique_ptr<Deformer>> CreateLinearElasticDeformer(
-    std::shared_ptr<MeshPreparation> preparation);
+    std::shared_ptr<MeshPreparation> preparation, const Cancellation& cancellation = {});
 
 // The same answer by back-substitution with the prescribed displacements, which the columns are
 // checked against and compared with in speed. The residual is that of the linear system.

@@ -27,11 +27,11 @@ int64_t BytesOf(const Eigen::MatrixXd& matrix) {
 
 absl::StatusOr<std::unique_ptr<PreparedLaplacian>> PrepareLaplacian(
     const SparseMatrix& L, const ConstraintSet& constraints,
-    const DirichletSystem::Options& options) {
+    const DirichletSystem::Options& options, const Cancellation& cancellation) {
   auto laplacian = std::make_unique<PreparedLaplacian>();
   laplacian->negative_weights = CountNegativeWeights(L);
   TF_ASSIGN_OR_RETURN(laplacian->system,
-                      DirichletSystem::Create(L, constraints.constrained(), options));
+                      DirichletSystem::Create(L, constraints.constrained(), options, cancellation));
   const Stopwatch stopwatch;
   TF_ASSIGN_OR_RETURN(laplacian->harmonic,
                       ComputeHarmonicFields(constraints, laplacian->system.get()));
@@ -62,13 +62,14 @@ MeshPreparation::MeshPreparation(const TetMesh& mesh, Eigen::VectorXd stiffness,
       elements_(ElementsOf(mesh)),
       vertex_cells_(elements_.cells, elements_.num_vertices()) {}
 
-absl::StatusOr<PreparedLaplacian*> MeshPreparation::Laplacian() {
+absl::StatusOr<PreparedLaplacian*> MeshPreparation::Laplacian(const Cancellation& cancellation) {
   if (laplacian_ == nullptr) {
     const Stopwatch stopwatch;
     const SparseMatrix L = CotangentLaplacian(mesh_, stiffness_, options_.threads);
     const double assemble_seconds = stopwatch.Seconds();
-    TF_ASSIGN_OR_RETURN(laplacian_,
-                        PrepareLaplacian(L, constraints_, {options_.backend, options_.admission}));
+    TF_ASSIGN_OR_RETURN(
+        laplacian_,
+        PrepareLaplacian(L, constraints_, {options_.backend, options_.admission}, cancellation));
     laplacian_->assemble_seconds = assemble_seconds;
   }
   return laplacian_.get();

@@ -8,6 +8,7 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/base/cancellation.h"
 #include "core/constraints/constraint_set.h"
 #include "core/deformation/elastic_system.h"
 #include "core/linear_solvers/dirichlet_system.h"
@@ -42,11 +43,11 @@ struct PreparedLaplacian {
 };
 
 // Factorises L and computes the harmonic fields; assemble_seconds is left to the caller, who made
-// L. Errors: FailedPrecondition (not positive definite), ResourceExhausted, or what the admission
-// says.
+// L. Errors: FailedPrecondition (not positive definite), ResourceExhausted, Cancelled, or what the
+// admission says.
 absl::StatusOr<std::unique_ptr<PreparedLaplacian>> PrepareLaplacian(
     const SparseMatrix& L, const ConstraintSet& constraints,
-    const DirichletSystem::Options& options);
+    const DirichletSystem::Options& options, const Cancellation& cancellation = {});
 
 // What the models on one mesh, one stiffness and one constraint set share: operators, orderings and
 // factors. Each is made when a model first asks for it and never again, so switching the model does
@@ -69,10 +70,11 @@ class MeshPreparation {
   const PiecewiseLinearElements& elements() const { return elements_; }  // measures: volumes
   const VertexCells& vertex_cells() const { return vertex_cells_; }
 
-  // Errors: FailedPrecondition (not positive definite), ResourceExhausted, or what the admission
-  // says. After an error the call may be repeated. The pointers live as long as the preparation.
-  absl::StatusOr<PreparedLaplacian*> Laplacian();
-  absl::StatusOr<ElasticSystem*> Elastic();
+  // Errors: FailedPrecondition (not positive definite), ResourceExhausted, Cancelled, or what the
+  // admission says. After an error the call may be repeated. The pointers live as long as the
+  // preparation.
+  absl::StatusOr<PreparedLaplacian*> Laplacian(const Cancellation& cancellation = {});
+  absl::StatusOr<ElasticSystem*> Elastic(const Cancellation& cancellation = {});
 
   bool has_laplacian() const { return laplacian_ != nullptr; }
   bool has_elastic() const { return elastic_ != nullptr; }

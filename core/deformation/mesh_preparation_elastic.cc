@@ -6,11 +6,12 @@
 
 namespace tissueform {
 
-absl::StatusOr<ElasticSystem*> MeshPreparation::Elastic() {
+absl::StatusOr<ElasticSystem*> MeshPreparation::Elastic(const Cancellation& cancellation) {
   if (elastic_ == nullptr) {
     TF_ASSIGN_OR_RETURN(elastic_, ElasticSystem::Create(mesh_, stiffness_, constraints_,
                                                         {options_.poisson_ratio, options_.backend,
-                                                         options_.admission, options_.threads}));
+                                                         options_.admission, options_.threads},
+                                                        cancellation));
   }
   return elastic_.get();
 }

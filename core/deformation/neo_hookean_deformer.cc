@@ -271,9 +271,11 @@ class NeoHookeanDeformer : public Deformer {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Deformer>> CreateNeoHookeanDeformer(
-    std::shared_ptr<MeshPreparation> preparation, const NeoHookeanOptions& options) {
+    std::shared_ptr<MeshPreparation> preparation, const NeoHookeanOptions& options,
+    const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(CheckOptions(options));
-  TF_ASSIGN_OR_RETURN(ElasticSystem * elastic, preparation->Elastic());
+  TF_ASSIGN_OR_RETURN(ElasticSystem * elastic, preparation->Elastic(cancellation));
+  TF_RETURN_IF_ERROR(cancellation.Check());
   if (const FactorAdmission& admission = preparation->options().admission) {
     TF_RETURN_IF_ERROR(admission(BytesNeeded(*preparation, *elastic, options)));
   }

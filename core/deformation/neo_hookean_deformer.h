@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/base/cancellation.h"
 #include "core/deformation/deformer.h"
 #include "core/deformation/mesh_preparation.h"
 
@@ -38,6 +39,7 @@ struct NeoHookeanOptions {
 // Errors: InvalidArgument (an option out of range), those of MeshPreparation::Elastic, or what the
 // admission says.
 absl::StatusOr<std::unique_ptr<Deformer>> CreateNeoHookeanDeformer(
-    std::shared_ptr<MeshPreparation> preparation, const NeoHookeanOptions& options);
+    std::shared_ptr<MeshPreparation> preparation, const NeoHookeanOptions& options,
+    const Cancellation& cancellation = {});
 
 }  // namespace tissueform

@@ -77,7 +77,8 @@ int64_t BytesOf(const SparseMatrix& matrix) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<DirichletSystem>> DirichletSystem::Create(
-    const SparseMatrix& K, const std::vector<int32_t>& prescribed, const Options& options) {
+    const SparseMatrix& K, const std::vector<int32_t>& prescribed, const Options& options,
+    const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(CheckPrescribed(K, prescribed));
   auto system = absl::WrapUnique(new DirichletSystem());
   system->size_ = K.rows();
@@ -103,11 +104,13 @@ absl::StatusOr<std::unique_ptr<DirichletSystem>> DirichletSystem::Create(
     return system;
   }
 
+  TF_RETURN_IF_ERROR(cancellation.Check());
   system->cholesky_ = CreateSparseCholesky(options.backend, options.unknowns_per_node);
   Stopwatch stopwatch;
   TF_RETURN_IF_ERROR(system->cholesky_->Analyze(system->free_free_));
   system->factorization_.analyse_seconds = stopwatch.Restart();
   system->factorization_.factor_bytes = system->cholesky_->factor_bytes();
+  TF_RETURN_IF_ERROR(cancellation.Check());
   if (options.admission) {
     TF_RETURN_IF_ERROR(options.admission(system->factorization_.factor_bytes));
   }

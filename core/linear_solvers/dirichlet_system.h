@@ -11,6 +11,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/base/cancellation.h"
 #include "core/base/types.h"
 #include "core/linear_solvers/sparse_cholesky.h"
 
@@ -25,7 +26,7 @@ struct FactorizationSummary {
 
 // Called after the symbolic analysis with the bytes that the numeric factor will need and before
 // they are allocated. An error stops the preparation and is returned as it is: the place where a
-// memory budget says no.
+// memory budget says no. (Whether anybody still waits is asked of a Cancellation.)
 using FactorAdmission = std::function<absl::Status(int64_t factor_bytes)>;
 
 // K x = b with prescribed values at some unknowns (Liao et al. 2009, Eq. 7): rows and columns of
@@ -46,9 +47,10 @@ class DirichletSystem {
   // keep the value zero unless prescribed.
   //
   // Errors: InvalidArgument (index out of range), FailedPrecondition (free block not positive
-  // definite), ResourceExhausted, or what the admission says.
+  // definite), ResourceExhausted, Cancelled, or what the admission says.
   static absl::StatusOr<std::unique_ptr<DirichletSystem>> Create(
-      const SparseMatrix& K, const std::vector<int32_t>& prescribed, const Options& options);
+      const SparseMatrix& K, const std::vector<int32_t>& prescribed, const Options& options,
+      const Cancellation& cancellation = {});
 
   // Solves for k right-hand sides in one pass. `rhs` is n by k (rows of prescribed unknowns are not
   // read) or has no rows, which stands for zero; `values` is #prescribed by k, in the order of

@@ -68,14 +68,15 @@ int64_t LinearElasticResponseBytes(const MeshPreparation& preparation, Eigen::In
 
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateLinearElasticResponse(
     const std::shared_ptr<MeshPreparation>& preparation, const std::vector<int32_t>& vertices,
-    const LinearElasticResponseOptions& options) {
+    const LinearElasticResponseOptions& options, const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(CheckTolerance(options.tolerance_mm));
   TF_RETURN_IF_ERROR(CheckChosenVertices(vertices, preparation->mesh().num_vertices()));
+  TF_RETURN_IF_ERROR(cancellation.Check());
   if (options.admission) {
     TF_RETURN_IF_ERROR(options.admission(
         LinearElasticResponseBytes(*preparation, static_cast<Eigen::Index>(vertices.size()))));
   }
-  TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic());
+  TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic(cancellation));
   return std::make_unique<LinearElasticResponse>(preparation, *elastic, vertices,
                                                  options.tolerance_mm);
 }

@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/base/cancellation.h"
 #include "core/deformation/mesh_preparation.h"
 #include "core/prepared_answers/vertex_response.h"
 
@@ -37,6 +38,6 @@ int64_t LinearElasticResponseBytes(const MeshPreparation& preparation, Eigen::In
 // allocated.
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateLinearElasticResponse(
     const std::shared_ptr<MeshPreparation>& preparation, const std::vector<int32_t>& vertices,
-    const LinearElasticResponseOptions& options);
+    const LinearElasticResponseOptions& options, const Cancellation& cancellation = {});
 
 }  // namespace tissueform

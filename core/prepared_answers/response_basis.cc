@@ -91,9 +91,10 @@ class ResponseBasis : public VertexResponse {
         expansion_(domain, plan.degree + kGuardDegrees),
         panel_(std::move(rest), PanelResponse::Rows::kVertices, plan.num_terms) {}
 
-  absl::Status Prepare(const std::vector<int32_t>& vertices, MeshPreparation* preparation) {
+  absl::Status Prepare(const std::vector<int32_t>& vertices, MeshPreparation* preparation,
+                       const Cancellation& cancellation) {
     TF_RETURN_IF_ERROR(PrepareHandles(vertices, preparation));
-    return PreparePolynomials(vertices, preparation);
+    return PreparePolynomials(vertices, preparation, cancellation);
   }
 
   double ErrorBoundMm(absl::Span<const HandlePose> poses) override {
@@ -151,12 +152,13 @@ class ResponseBasis : public VertexResponse {
 
   // Columns up to degree_, gains one degree further. Of every pass only the chosen rows are kept.
   absl::Status PreparePolynomials(const std::vector<int32_t>& vertices,
-                                  MeshPreparation* preparation) {
+                                  MeshPreparation* preparation, const Cancellation& cancellation) {
     const SimplexPolynomials& polynomials = expansion_.polynomials();
     const Eigen::Index measured =
         SimplexPolynomials::NumTerms(polynomials.dimension(), degree_ + 1);
     guard_gains_.setZero(measured - num_polynomials_);
     for (Eigen::Index first = 0; first < measured; first += kTermsPerPass) {
+      TF_RETURN_IF_ERROR(cancellation.Check());
       const Eigen::Index count = std::min(kTermsPerPass, measured - first);
       TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd responses,
                           TermResponses(domain_, polynomials, first, count, preparation));
@@ -255,20 +257,21 @@ absl::StatusOr<ResponseBasisPlan> PlanResponseBasis(const MeshPreparation& prepa
 
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponseBasis(
     const std::shared_ptr<MeshPreparation>& preparation, const std::vector<int32_t>& vertices,
-    const ResponseBasisOptions& options) {
+    const ResponseBasisOptions& options, const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(CheckChosenVertices(vertices, preparation->mesh().num_vertices()));
   TF_ASSIGN_OR_RETURN(
       const ResponseBasisPlan plan,
       PlanResponseBasis(*preparation, static_cast<Eigen::Index>(vertices.size()), options));
+  TF_RETURN_IF_ERROR(cancellation.Check());
   if (options.admission) {
     TF_RETURN_IF_ERROR(options.admission(plan.bytes));
   }
-  TF_ASSIGN_OR_RETURN(const PreparedLaplacian* laplacian, preparation->Laplacian());
+  TF_ASSIGN_OR_RETURN(const PreparedLaplacian* laplacian, preparation->Laplacian(cancellation));
   auto basis = std::make_unique<ResponseBasis>(
       plan, options,
       EnclosingSimplex(SampleAtBarycentres(preparation->elements().cells, laplacian->harmonic)),
       preparation->mesh().positions()(vertices, Eigen::all));
-  TF_RETURN_IF_ERROR(basis->Prepare(vertices, preparation.get()));
+  TF_RETURN_IF_ERROR(basis->Prepare(vertices, preparation.get(), cancellation));
   return basis;
 }
 

@@ -10,6 +10,7 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/base/cancellation.h"
 #include "core/deformation/mesh_preparation.h"
 #include "core/prepared_answers/vertex_response.h"
 
@@ -57,6 +58,6 @@ absl::StatusOr<ResponseBasisPlan> PlanResponseBasis(const MeshPreparation& prepa
 // outside [0, #V), no vertex); what the admission says, before anything is allocated.
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponseBasis(
     const std::shared_ptr<MeshPreparation>& preparation, const std::vector<int32_t>& vertices,
-    const ResponseBasisOptions& options);
+    const ResponseBasisOptions& options, const Cancellation& cancellation = {});
 
 }  // namespace tissueform

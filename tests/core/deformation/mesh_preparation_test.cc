@@ -96,6 +96,34 @@ TEST_F(MeshPreparationTest, RefusedFactorMayBeAskedForAgain) {
   EXPECT_THAT(preparation->Laplacian(), IsOk());
 }
 
+TEST_F(MeshPreparationTest, ACancelledPreparationStopsAtItsNextStageAndMayBeAskedForAgain) {
+  int stages = 0;
+  const auto preparation = Prepare();
+  for (int stop_at = 1;; ++stop_at) {
+    stages = 0;
+    const Cancellation cancellation([&] { return ++stages == stop_at; });
+    const absl::Status status = preparation->Elastic(cancellation).status();
+    if (status.ok()) break;
+    EXPECT_THAT(status, StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
+    EXPECT_EQ(stages, stop_at) << "nobody is asked again";
+    EXPECT_FALSE(preparation->has_elastic());
+  }
+  EXPECT_GE(stages, 3) << "before the analysis, before the factor, before the columns";
+}
+
+TEST_F(MeshPreparationTest, EveryModelCanBeCancelledBeforeItsFactor) {
+  for (const DeformationModel model :
+       {DeformationModel::kGradientField, DeformationModel::kArap, DeformationModel::kLinearElastic,
+        DeformationModel::kNeoHookean}) {
+    const auto preparation = Prepare();
+    DeformerOptions options;
+    options.model = model;
+    EXPECT_THAT(CreateDeformer(preparation, options, Cancellation([] { return true; })),
+                StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
+    EXPECT_FALSE(preparation->has_laplacian() || preparation->has_elastic());
+  }
+}
+
 TEST_F(MeshPreparationTest, UnusableInputIsRefused) {
   const ConstraintSet constraints = testing::StackedHandles(mesh_, 1);
   const Eigen::VectorXd stiffness = testing::MixedStiffness(mesh_.num_tets());
