@@ -3,11 +3,28 @@
 
 #include "server/rpc/call_scope.h"
 
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/ascii.h"
 #include "spdlog/spdlog.h"
 
 #include "server/rpc/status_conversion.h"
+#include "server/session/random_id.h"
 
 namespace tissueform {
+namespace {
+
+constexpr size_t kMaxRequestIdBytes = 64;
+
+std::string_view RequestIdHeader(const grpc::CallbackServerContext* context) {
+  if (context == nullptr) return {};
+  const auto found = context->client_metadata().find(kRequestIdHeader);
+  if (found == context->client_metadata().end()) return {};
+  return {found->second.data(), found->second.size()};
+}
+
+}  // namespace
 
 bool ServiceGate::WaitUntilIdle(std::chrono::steady_clock::time_point deadline) {
   MutexLock lock(mutex_);
@@ -31,8 +48,20 @@ void ServiceGate::Leave() {
   }
 }
 
-CallScope::CallScope(std::string_view method, CallKind kind, ServiceGate* gate)
-    : method_(method), gate_(gate), start_(std::chrono::steady_clock::now()) {
+std::string RequestIdOr(std::string_view from_client) {
+  const bool well_formed = !from_client.empty() && from_client.size() <= kMaxRequestIdBytes &&
+                           std::all_of(from_client.begin(), from_client.end(), [](unsigned char c) {
+                             return absl::ascii_isalnum(c) || c == '-' || c == '_' || c == '.';
+                           });
+  return well_formed ? std::string(from_client) : RandomId();
+}
+
+CallScope::CallScope(const grpc::CallbackServerContext* context, std::string_view method,
+                     CallKind kind, ServiceGate* gate)
+    : method_(method),
+      gate_(gate),
+      start_(std::chrono::steady_clock::now()),
+      request_id_(RequestIdOr(RequestIdHeader(context))) {
   gate_->Enter();
   if (kind == CallKind::kNewWork && gate_->draining()) {
     admission_ = absl::UnavailableError(
@@ -40,15 +69,29 @@ CallScope::CallScope(std::string_view method, CallKind kind, ServiceGate* gate)
   }
 }
 
-grpc::Status CallScope::End(const absl::Status& outcome) const {
+CallScope::CallScope(CallScope&& other) noexcept
+    : method_(other.method_),
+      gate_(std::exchange(other.gate_, nullptr)),
+      start_(other.start_),
+      principal_(std::move(other.principal_)),
+      request_id_(std::move(other.request_id_)),
+      admission_(std::move(other.admission_)) {}
+
+CallScope::~CallScope() {
+  if (gate_ == nullptr) return;
+  spdlog::warn("{} was left without an outcome, request {}", method_, request_id_);
+  gate_->Leave();
+}
+
+grpc::Status CallScope::End(const absl::Status& outcome) {
   const std::chrono::duration<double, std::milli> elapsed =
       std::chrono::steady_clock::now() - start_;
   const auto level = outcome.ok() || outcome.code() == absl::StatusCode::kCancelled
                          ? spdlog::level::debug
                          : spdlog::level::info;
-  spdlog::log(level, "{} {} {:.1f} ms", method_, absl::StatusCodeToString(outcome.code()),
-              elapsed.count());
-  gate_->Leave();
+  spdlog::log(level, "{} {} {:.1f} ms, request {}", method_,
+              absl::StatusCodeToString(outcome.code()), elapsed.count(), request_id_);
+  std::exchange(gate_, nullptr)->Leave();
   return ToGrpcStatus(outcome);
 }
 

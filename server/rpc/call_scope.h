@@ -5,12 +5,15 @@
 
 #include <atomic>
 #include <chrono>
+#include <string>
 #include <string_view>
 
 #include "absl/status/status.h"
+#include "grpcpp/support/server_callback.h"
 #include "grpcpp/support/status.h"
 
 #include "core/base/mutex.h"
+#include "server/auth/principal.h"
 
 namespace tissueform {
 
@@ -42,27 +45,44 @@ enum class CallKind {
   kUpkeep,   // looks or tidies up: always welcome
 };
 
+// The header in which a client may send an id of its own for a call, so that it finds the call in
+// the server's log.
+inline constexpr char kRequestIdHeader[] = "x-request-id";
+
+// `from_client` where it is well formed (1 to 64 letters, digits, "-", "_" or "."), else a new one:
+// what goes to the log must not carry anything else.
+std::string RequestIdOr(std::string_view from_client);
+
 // The common beginning and end of every rpc: made first, asked for its admission, ended once with
-// the outcome. Copies stand for the same call. The place where a caller is authenticated.
+// the outcome. The place where a caller is authenticated.
 //
-// Logs method, code and duration, and nothing that came from the client: names and messages may
-// identify a patient. One thread at a time.
+// Logs method, code, duration and request id, and nothing else that came from the client: names and
+// messages may identify a patient. One thread at a time.
 class CallScope {
  public:
-  // `method` ("MeshService.GetMesh") must outlive the scope.
-  // `gate` must outlive it too.
-  CallScope(std::string_view method, CallKind kind, ServiceGate* gate);
+  // `method` ("MeshService.GetMesh") and `gate` must outlive the scope. `context` is read here and
+  // not kept; null where there is no network: a call without headers.
+  CallScope(const grpc::CallbackServerContext* context, std::string_view method, CallKind kind,
+            ServiceGate* gate);
+  // Of a scope that was not ended: the call is over all the same, and the log says so.
+  ~CallScope();
+  CallScope(CallScope&& other) noexcept;
+  CallScope& operator=(CallScope&&) = delete;
 
   // OK, or why the call is not served: Unavailable.
   const absl::Status& admission() const { return admission_; }
+  const Principal& principal() const { return principal_; }
+  const std::string& request_id() const { return request_id_; }
 
   // What the rpc is finished with. Call it once.
-  grpc::Status End(const absl::Status& outcome) const;
+  grpc::Status End(const absl::Status& outcome);
 
  private:
   std::string_view method_;
-  ServiceGate* gate_;
+  ServiceGate* gate_;  // null once ended, or moved from
   std::chrono::steady_clock::time_point start_;
+  Principal principal_;
+  std::string request_id_;
   absl::Status admission_;
 };
 

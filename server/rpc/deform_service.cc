@@ -45,12 +45,14 @@ absl::Status ClientHasCancelled() {
 }
 
 // On the session's strand.
-absl::Status Run(const DeformOnceJob& job, const CancelledFunction& cancelled,
+absl::Status Run(const DeformOnceJob& job, const Cancellation& cancellation,
                  v1::DeformOnceResponse* response) {
-  if (cancelled()) return ClientHasCancelled();
-  TF_RETURN_IF_ERROR(job.session->PrepareModel(job.model, cancelled));
+  if (cancellation.requested()) return ClientHasCancelled();
+  TF_RETURN_IF_ERROR(job.session->PrepareModel(job.model, cancellation));
   DeformControl control;
-  control.on_progress = [&cancelled](const Deformation& /*so_far*/) { return !cancelled(); };
+  control.on_progress = [&cancellation](const Deformation& /*so_far*/) {
+    return !cancellation.requested();
+  };
   TF_ASSIGN_OR_RETURN(const Deformation deformation,
                       job.session->Deform(job.model, job.poses, control));
   if (deformation.summary.cancelled) return ClientHasCancelled();
@@ -66,27 +68,29 @@ absl::Status Run(const DeformOnceJob& job, const CancelledFunction& cancelled,
 grpc::ServerUnaryReactor* DeformService::DeformOnce(grpc::CallbackServerContext* context,
                                                     const v1::DeformOnceRequest* request,
                                                     v1::DeformOnceResponse* response) {
-  const CallScope scope("DeformService.DeformOnce", CallKind::kNewWork, gate_);
+  auto scope =
+      std::make_shared<CallScope>(context, "DeformService.DeformOnce", CallKind::kNewWork, gate_);
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  absl::StatusOr<DeformOnceJob> job = scope.admission().ok()
+  absl::StatusOr<DeformOnceJob> job = scope->admission().ok()
                                           ? ReadRequest(*request, registry_)
-                                          : absl::StatusOr<DeformOnceJob>(scope.admission());
+                                          : absl::StatusOr<DeformOnceJob>(scope->admission());
   if (!job.ok()) {
-    reactor->Finish(scope.End(job.status()));
+    reactor->Finish(scope->End(job.status()));
     return reactor;
   }
   Strand& strand = job->session->strand();
   strand.Post([reactor, response, scope, context, job = *std::move(job)] {
-    reactor->Finish(scope.End(Run(
-        job, [context] { return context->IsCancelled(); }, response)));
+    reactor->Finish(
+        scope->End(Run(job, Cancellation([context] { return context->IsCancelled(); }), response)));
   });
   return reactor;
 }
 
 grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* DeformService::Deform(
-    grpc::CallbackServerContext* /*context*/) {
-  return new DeformStreamReactor(CallScope("DeformService.Deform", CallKind::kNewWork, gate_),
-                                 limits_, registry_, streams_);
+    grpc::CallbackServerContext* context) {
+  return new DeformStreamReactor(
+      CallScope(context, "DeformService.Deform", CallKind::kNewWork, gate_), limits_, registry_,
+      streams_);
 }
 
 }  // namespace tissueform

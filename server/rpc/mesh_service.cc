@@ -18,15 +18,16 @@ absl::Status NoSuchMesh() {
 }  // namespace
 
 grpc::ServerReadReactor<v1::UploadMeshRequest>* MeshService::UploadMesh(
-    grpc::CallbackServerContext* /*context*/, v1::UploadMeshResponse* response) {
-  return new MeshUploadStream(CallScope("MeshService.UploadMesh", CallKind::kNewWork, gate_),
-                              catalog_, pool_, response);
+    grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) {
+  return new MeshUploadStream(
+      CallScope(context, "MeshService.UploadMesh", CallKind::kNewWork, gate_), catalog_, pool_,
+      response);
 }
 
 grpc::ServerUnaryReactor* MeshService::GetMesh(grpc::CallbackServerContext* context,
                                                const v1::GetMeshRequest* request,
                                                v1::Mesh* response) {
-  const CallScope scope("MeshService.GetMesh", CallKind::kUpkeep, gate_);
+  CallScope scope(context, "MeshService.GetMesh", CallKind::kUpkeep, gate_);
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   reactor->Finish(
       scope.End(scope.admission().ok() ? FindMesh(*request, response) : scope.admission()));
@@ -36,7 +37,7 @@ grpc::ServerUnaryReactor* MeshService::GetMesh(grpc::CallbackServerContext* cont
 grpc::ServerUnaryReactor* MeshService::DeleteMesh(grpc::CallbackServerContext* context,
                                                   const v1::DeleteMeshRequest* request,
                                                   google::protobuf::Empty* /*response*/) {
-  const CallScope scope("MeshService.DeleteMesh", CallKind::kUpkeep, gate_);
+  CallScope scope(context, "MeshService.DeleteMesh", CallKind::kUpkeep, gate_);
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   reactor->Finish(scope.End(scope.admission().ok() ? RemoveMesh(*request) : scope.admission()));
   return reactor;

@@ -12,9 +12,9 @@
 
 namespace tissueform {
 
-MeshUploadStream::MeshUploadStream(const CallScope& scope, MeshCatalog* catalog, WorkerPool* pool,
+MeshUploadStream::MeshUploadStream(CallScope scope, MeshCatalog* catalog, WorkerPool* pool,
                                    v1::UploadMeshResponse* response)
-    : scope_(scope), catalog_(catalog), pool_(pool), response_(response) {
+    : scope_(std::move(scope)), catalog_(catalog), pool_(pool), response_(response) {
   if (scope_.admission().ok()) {
     StartRead(&request_);
   } else {

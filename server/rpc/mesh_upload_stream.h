@@ -21,7 +21,7 @@ namespace tissueform {
 class MeshUploadStream : public grpc::ServerReadReactor<v1::UploadMeshRequest> {
  public:
   // `response` belongs to gRPC and lives as long as the call.
-  MeshUploadStream(const CallScope& scope, MeshCatalog* catalog, WorkerPool* pool,
+  MeshUploadStream(CallScope scope, MeshCatalog* catalog, WorkerPool* pool,
                    v1::UploadMeshResponse* response);
 
   void OnReadDone(bool ok) override;
@@ -35,7 +35,7 @@ class MeshUploadStream : public grpc::ServerReadReactor<v1::UploadMeshRequest> {
   // Gives back the memory first, so that it is free when the client hears of the end.
   void End(const absl::Status& outcome);
 
-  const CallScope scope_;
+  CallScope scope_;
   MeshCatalog* const catalog_;
   WorkerPool* const pool_;
   v1::UploadMeshResponse* const response_;

@@ -18,8 +18,8 @@ namespace {
 // One CreateSession call. Deletes itself when gRPC is done with it.
 class CreateSessionCall : public grpc::ServerUnaryReactor {
  public:
-  CreateSessionCall(const CallScope& scope, SessionRegistry* registry, v1::Session* response)
-      : scope_(scope), registry_(registry), response_(response) {}
+  CreateSessionCall(CallScope scope, SessionRegistry* registry, v1::Session* response)
+      : scope_(std::move(scope)), registry_(registry), response_(response) {}
 
   void Start(SessionSpec spec, const RequestKey& key) {
     registry_->Create(std::move(spec), key, cancelled_,
@@ -46,7 +46,7 @@ class CreateSessionCall : public grpc::ServerUnaryReactor {
   }
 
  private:
-  const CallScope scope_;
+  CallScope scope_;
   SessionRegistry* const registry_;
   v1::Session* const response_;
   const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
@@ -55,14 +55,14 @@ class CreateSessionCall : public grpc::ServerUnaryReactor {
 
 }  // namespace
 
-grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext* /*context*/,
+grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext* context,
                                                         const v1::CreateSessionRequest* request,
                                                         v1::Session* response) {
-  const CallScope scope("SessionService.CreateSession", CallKind::kNewWork, gate_);
-  auto* call = new CreateSessionCall(scope, registry_, response);
+  CallScope scope(context, "SessionService.CreateSession", CallKind::kNewWork, gate_);
   absl::StatusOr<SessionSpec> spec = scope.admission().ok()
                                          ? ReadRequest(*request)
                                          : absl::StatusOr<SessionSpec>(scope.admission());
+  auto* call = new CreateSessionCall(std::move(scope), registry_, response);
   if (spec.ok()) {
     call->Start(*std::move(spec), {request->request_id(), RequestFingerprint(*request)});
   } else {
@@ -74,7 +74,7 @@ grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerCont
 grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext* context,
                                                      const v1::GetSessionRequest* request,
                                                      v1::Session* response) {
-  const CallScope scope("SessionService.GetSession", CallKind::kUpkeep, gate_);
+  CallScope scope(context, "SessionService.GetSession", CallKind::kUpkeep, gate_);
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   reactor->Finish(
       scope.End(scope.admission().ok() ? FindSession(*request, response) : scope.admission()));
@@ -84,17 +84,18 @@ grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext
 grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerContext* context,
                                                         const v1::DeleteSessionRequest* request,
                                                         google::protobuf::Empty* /*response*/) {
-  const CallScope scope("SessionService.DeleteSession", CallKind::kUpkeep, gate_);
+  auto scope = std::make_shared<CallScope>(context, "SessionService.DeleteSession",
+                                           CallKind::kUpkeep, gate_);
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<std::string> id = scope.admission().ok()
+  const absl::StatusOr<std::string> id = scope->admission().ok()
                                              ? ParseSessionName(request->name())
-                                             : absl::StatusOr<std::string>(scope.admission());
+                                             : absl::StatusOr<std::string>(scope->admission());
   if (!id.ok()) {
-    reactor->Finish(scope.End(id.status()));
+    reactor->Finish(scope->End(id.status()));
     return reactor;
   }
   registry_->Delete(
-      *id, [reactor, scope](const absl::Status& status) { reactor->Finish(scope.End(status)); });
+      *id, [reactor, scope](const absl::Status& status) { reactor->Finish(scope->End(status)); });
   return reactor;
 }
 

@@ -134,8 +134,8 @@ absl::Status MeshUpload::Write(int64_t offset, absl::string_view data, bool fini
   return absl::OkStatus();
 }
 
-MeshCatalog::MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget)
-    : limits_(limits), budget_(budget) {}
+MeshCatalog::MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget, const Clock* clock)
+    : limits_(limits), budget_(budget), clock_(clock) {}
 
 absl::StatusOr<std::unique_ptr<MeshUpload>> MeshCatalog::StartUpload(
     MeshAnnouncement announcement) {
@@ -174,7 +174,7 @@ absl::StatusOr<std::shared_ptr<const StoredMesh>> MeshCatalog::Finish(
   if (entry.mesh == nullptr) {
     entry.mesh = std::move(stored);
   }
-  entry.last_used = std::chrono::steady_clock::now();
+  entry.last_used = clock_->Now();
   return entry.mesh;
 }
 
@@ -184,7 +184,7 @@ std::shared_ptr<const StoredMesh> MeshCatalog::Find(const std::string& sha256) {
   if (found == meshes_.end()) {
     return nullptr;
   }
-  found->second.last_used = std::chrono::steady_clock::now();
+  found->second.last_used = clock_->Now();
   return found->second.mesh;
 }
 
@@ -203,7 +203,7 @@ bool MeshCatalog::Remove(const std::string& sha256) {
 int MeshCatalog::RemoveIdle() {
   std::vector<std::shared_ptr<const StoredMesh>> removed;  // destroyed after the lock is released
   MutexLock lock(mutex_);
-  const auto cutoff = std::chrono::steady_clock::now() - limits_.session_idle_ttl;
+  const auto cutoff = clock_->Now() - limits_.session_idle_ttl;
   for (auto entry = meshes_.begin(); entry != meshes_.end();) {
     // New users come through this map alone: with one reference nobody can gain another now.
     if (entry->second.mesh.use_count() == 1 && entry->second.last_used <= cutoff) {

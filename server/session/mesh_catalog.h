@@ -3,7 +3,6 @@
 
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -17,6 +16,7 @@
 #include "core/base/mutex.h"
 #include "core/mesh/tet_mesh.h"
 #include "core/mesh_payload/mesh_payload.h"
+#include "server/session/clock.h"
 #include "server/session/limits.h"
 #include "server/session/memory_budget.h"
 
@@ -69,8 +69,9 @@ class MeshUpload {
 // Thread-safe.
 class MeshCatalog {
  public:
-  // `budget` must outlive the catalog and all its meshes.
-  MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget);
+  // `budget` must outlive the catalog and all its meshes, `clock` the catalog.
+  MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget,
+              const Clock* clock = Clock::System());
 
   // Checks what is announced and reserves memory for it.
   //
@@ -98,12 +99,13 @@ class MeshCatalog {
  private:
   struct Entry {
     std::shared_ptr<const StoredMesh> mesh;
-    std::chrono::steady_clock::time_point last_used;
+    Clock::TimePoint last_used;
   };
 
   // Constant.
   const ServiceLimits limits_;
   MemoryBudget* const budget_;
+  const Clock* const clock_;
 
   Mutex mutex_;
   std::map<std::string, Entry, std::less<>> meshes_ ABSL_GUARDED_BY(mutex_);

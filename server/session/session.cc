@@ -28,31 +28,35 @@ absl::StatusOr<Eigen::VectorXd> ResolveStiffness(const SessionSpec& spec) {
 
 }  // namespace
 
-Session::Session(std::string id, SessionSpec spec, ConstraintSet constraints, WorkerPool* pool)
-    : id_(std::move(id)),
+Session::Session(std::string id, SessionSpec spec, ConstraintSet constraints, WorkerPool* pool,
+                 const Clock* clock)
+    : clock_(clock),
+      id_(std::move(id)),
       mesh_(std::move(spec.mesh)),
       constraints_(std::move(constraints)),
       model_(spec.model),
       poisson_ratio_(spec.poisson_ratio),
       gradient_field_(spec.gradient_field),
       strand_(pool),
-      last_used_(std::chrono::steady_clock::now()) {}
+      last_used_(clock->Now()) {}
 
 absl::StatusOr<std::shared_ptr<Session>> Session::Create(std::string id, SessionSpec spec,
                                                          MemoryBudget* budget, WorkerPool* pool,
-                                                         const CancelledFunction& cancelled) {
+                                                         const Clock* clock,
+                                                         const Cancellation& cancellation) {
+  TF_RETURN_IF_ERROR(cancellation.Check());
   TF_ASSIGN_OR_RETURN(
       ConstraintSet constraints,
       ConstraintSet::Create(spec.mesh->mesh, std::move(spec.fixed), std::move(spec.handles)));
   TF_ASSIGN_OR_RETURN(const Eigen::VectorXd stiffness, ResolveStiffness(spec));
   std::shared_ptr<Session> session(
-      new Session(std::move(id), std::move(spec), std::move(constraints), pool));
-  TF_RETURN_IF_ERROR(session->Prepare(stiffness, budget, cancelled));
+      new Session(std::move(id), std::move(spec), std::move(constraints), pool, clock));
+  TF_RETURN_IF_ERROR(session->Prepare(stiffness, budget, cancellation));
   return session;
 }
 
 absl::Status Session::Prepare(const Eigen::VectorXd& stiffness, MemoryBudget* budget,
-                              const CancelledFunction& cancelled) {
+                              const Cancellation& cancellation) {
   DeformerOptions options;
   options.model = model_;
   options.preparation.poisson_ratio = poisson_ratio_;
@@ -62,7 +66,7 @@ absl::Status Session::Prepare(const Eigen::VectorXd& stiffness, MemoryBudget* bu
   options.gradient_field.compute_residual = true;
   models_ = std::make_unique<SessionModels>(std::move(options), budget);
   TF_RETURN_IF_ERROR(models_->Begin(mesh_->mesh, stiffness, constraints_));
-  TF_ASSIGN_OR_RETURN(const Deformer* deformer, models_->Prepare(model_, cancelled));
+  TF_ASSIGN_OR_RETURN(const Deformer* deformer, models_->Prepare(model_, cancellation));
   preparation_ = deformer->preparation();
   bytes_held_ = models_->bytes_held();
   Touch();
@@ -74,17 +78,17 @@ absl::Status Session::CheckOpen() const {
   return absl::NotFoundError(absl::StrCat("sessions/", id_, " has been deleted; create it again"));
 }
 
-absl::Status Session::PrepareModel(DeformationModel model, const CancelledFunction& cancelled) {
+absl::Status Session::PrepareModel(DeformationModel model, const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(CheckOpen());
-  const absl::Status status = models_->Prepare(model, cancelled).status();
+  const absl::Status status = models_->Prepare(model, cancellation).status();
   bytes_held_ = models_->bytes_held();
   return status;
 }
 
 absl::StatusOr<VertexResponse*> Session::PrepareResponse(const ResponseRequest& request,
-                                                         const CancelledFunction& cancelled) {
+                                                         const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(CheckOpen());
-  absl::StatusOr<VertexResponse*> response = models_->PrepareResponse(request, cancelled);
+  absl::StatusOr<VertexResponse*> response = models_->PrepareResponse(request, cancellation);
   bytes_held_ = models_->bytes_held();
   return response;
 }
@@ -94,7 +98,7 @@ absl::StatusOr<Deformation> Session::Deform(DeformationModel model,
                                             const DeformControl& control) {
   Touch();
   TF_RETURN_IF_ERROR(CheckOpen());
-  const absl::StatusOr<Deformer*> deformer = models_->Prepare(model, [] { return false; });
+  const absl::StatusOr<Deformer*> deformer = models_->Prepare(model, {});
   bytes_held_ = models_->bytes_held();
   TF_RETURN_IF_ERROR(deformer.status());
   return (*deformer)->Deform(poses, control);
@@ -104,8 +108,7 @@ absl::StatusOr<std::optional<PreparedAnswer>> Session::Respond(const ResponseReq
                                                                absl::Span<const HandlePose> poses) {
   Touch();
   const Stopwatch stopwatch;
-  TF_ASSIGN_OR_RETURN(VertexResponse* const response,
-                      PrepareResponse(request, [] { return false; }));
+  TF_ASSIGN_OR_RETURN(VertexResponse* const response, PrepareResponse(request, {}));
   if (!response->Covers(poses)) return std::optional<PreparedAnswer>();
   PreparedAnswer answer;
   response->Evaluate(poses, &answer.positions);

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -17,10 +16,12 @@
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
 
+#include "core/base/cancellation.h"
 #include "core/constraints/constraint_set.h"
 #include "core/constraints/handle_pose.h"
 #include "core/deformation/create_deformer.h"
 #include "core/deformation/deformer.h"
+#include "server/session/clock.h"
 #include "server/session/memory_budget.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session_models.h"
@@ -49,13 +50,14 @@ struct PreparedAnswer {
 // everything else is constant and may be read from any thread.
 class Session {
  public:
-  // Factorises: call it on a worker. `budget` and `pool` must outlive the session.
+  // Factorises: call it on a worker. `budget`, `pool` and `clock` must outlive the session.
   //
   // Errors: InvalidArgument (regions, stiffness), FailedPrecondition (not positive definite),
   // ResourceExhausted (no room), Cancelled.
   static absl::StatusOr<std::shared_ptr<Session>> Create(std::string id, SessionSpec spec,
                                                          MemoryBudget* budget, WorkerPool* pool,
-                                                         const CancelledFunction& cancelled);
+                                                         const Clock* clock,
+                                                         const Cancellation& cancellation);
 
   const std::string& id() const { return id_; }
   const StoredMesh& mesh() const { return *mesh_; }
@@ -73,9 +75,9 @@ class Session {
   // not factorised again.
   //
   // Errors: those of SessionModels::Prepare, NotFound (the session was closed).
-  absl::Status PrepareModel(DeformationModel model, const CancelledFunction& cancelled);
+  absl::Status PrepareModel(DeformationModel model, const Cancellation& cancellation);
   absl::StatusOr<VertexResponse*> PrepareResponse(const ResponseRequest& request,
-                                                  const CancelledFunction& cancelled);
+                                                  const Cancellation& cancellation);
 
   // On the strand only. `poses` has one entry per handle, in the order of the constraints.
   //
@@ -93,17 +95,19 @@ class Session {
   void Close();
 
   // Any thread. When somebody last did something with the session.
-  void Touch() { last_used_ = std::chrono::steady_clock::now(); }
-  std::chrono::steady_clock::time_point last_used() const { return last_used_; }
+  void Touch() { last_used_ = clock_->Now(); }
+  Clock::TimePoint last_used() const { return last_used_; }
 
  private:
-  Session(std::string id, SessionSpec spec, ConstraintSet constraints, WorkerPool* pool);
+  Session(std::string id, SessionSpec spec, ConstraintSet constraints, WorkerPool* pool,
+          const Clock* clock);
 
   absl::Status Prepare(const Eigen::VectorXd& stiffness, MemoryBudget* budget,
-                       const CancelledFunction& cancelled);
+                       const Cancellation& cancellation);
   absl::Status CheckOpen() const;
 
   // Constant after Create.
+  const Clock* const clock_;
   const std::string id_;
   const std::shared_ptr<const StoredMesh> mesh_;
   const ConstraintSet constraints_;
@@ -115,7 +119,7 @@ class Session {
   // Self-synchronised.
   Strand strand_;
   std::atomic<int64_t> bytes_held_ = 0;
-  std::atomic<std::chrono::steady_clock::time_point> last_used_;
+  std::atomic<Clock::TimePoint> last_used_;
 
   // The strand's.
   std::unique_ptr<SessionModels> models_;  // null once closed

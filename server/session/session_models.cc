@@ -41,21 +41,6 @@ bool IsElastic(DeformationModel model) {
   return model == DeformationModel::kLinearElastic || model == DeformationModel::kNeoHookean;
 }
 
-// Sets a pointer for as long as a call lasts.
-class ScopedCancelled {
- public:
-  ScopedCancelled(const CancelledFunction** slot, const CancelledFunction& cancelled)
-      : slot_(slot) {
-    *slot_ = &cancelled;
-  }
-  ~ScopedCancelled() { *slot_ = nullptr; }
-  ScopedCancelled(const ScopedCancelled&) = delete;
-  ScopedCancelled& operator=(const ScopedCancelled&) = delete;
-
- private:
-  const CancelledFunction** const slot_;
-};
-
 }  // namespace
 
 SessionModels::SessionModels(DeformerOptions options, MemoryBudget* budget)
@@ -76,11 +61,11 @@ absl::Status SessionModels::Begin(const TetMesh& mesh, const Eigen::VectorXd& st
 }
 
 absl::StatusOr<Deformer*> SessionModels::Prepare(DeformationModel model,
-                                                 const CancelledFunction& cancelled) {
+                                                 const Cancellation& cancellation) {
   if (const auto found = deformers_.find(model); found != deformers_.end()) {
     return found->second.get();
   }
-  const ScopedCancelled scope(&cancelled_, cancelled);
+  TF_RETURN_IF_ERROR(cancellation.Check());
   const TetMesh& mesh = preparation_->mesh();
   const bool makes_elastic = IsElastic(model) && !preparation_->has_elastic();
   if (makes_elastic) {
@@ -92,7 +77,8 @@ absl::StatusOr<Deformer*> SessionModels::Prepare(DeformationModel model,
   }
   DeformerOptions options = options_;
   options.model = model;
-  absl::StatusOr<std::unique_ptr<Deformer>> deformer = CreateDeformer(preparation_, options);
+  absl::StatusOr<std::unique_ptr<Deformer>> deformer =
+      CreateDeformer(preparation_, options, cancellation);
   if (!deformer.ok()) {
     Settle().IgnoreError();  // less than before
     return deformer.status();
@@ -107,7 +93,7 @@ absl::StatusOr<Deformer*> SessionModels::Prepare(DeformationModel model,
 }
 
 absl::StatusOr<VertexResponse*> SessionModels::PrepareResponse(const ResponseRequest& request,
-                                                               const CancelledFunction& cancelled) {
+                                                               const Cancellation& cancellation) {
   const auto found =
       std::find_if(responses_.begin(), responses_.end(),
                    [&request](const auto& prepared) { return prepared.request == request; });
@@ -115,11 +101,10 @@ absl::StatusOr<VertexResponse*> SessionModels::PrepareResponse(const ResponseReq
     responses_.splice(responses_.begin(), responses_, found);
     return responses_.front().response.get();
   }
-  TF_RETURN_IF_ERROR(Prepare(request.model, cancelled).status());
+  TF_RETURN_IF_ERROR(Prepare(request.model, cancellation).status());
   while (responses_.size() >= kMostResponses) responses_.pop_back();
   TF_RETURN_IF_ERROR(Settle());
-  const ScopedCancelled scope(&cancelled_, cancelled);
-  absl::StatusOr<std::unique_ptr<VertexResponse>> response = CreateResponse(request);
+  absl::StatusOr<std::unique_ptr<VertexResponse>> response = CreateResponse(request, cancellation);
   if (!response.ok()) {
     Settle().IgnoreError();  // less than before
     return response.status();
@@ -133,12 +118,12 @@ absl::StatusOr<VertexResponse*> SessionModels::PrepareResponse(const ResponseReq
 }
 
 absl::StatusOr<std::unique_ptr<VertexResponse>> SessionModels::CreateResponse(
-    const ResponseRequest& request) {
+    const ResponseRequest& request, const Cancellation& cancellation) {
   const FactorAdmission admission = [this](int64_t bytes) { return Admit(bytes); };
   if (request.model == DeformationModel::kLinearElastic) {
     return CreateLinearElasticResponse(
         preparation_, request.vertices,
-        {.tolerance_mm = request.tolerance_mm, .admission = admission});
+        {.tolerance_mm = request.tolerance_mm, .admission = admission}, cancellation);
   }
   if (request.model == DeformationModel::kGradientField &&
       options_.gradient_field.rotation == RotationMode::kPropagated &&
@@ -146,7 +131,8 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> SessionModels::CreateResponse(
     return CreateResponseBasis(preparation_, request.vertices,
                                {.tolerance_mm = request.tolerance_mm,
                                 .max_rotation_rad = request.max_rotation_rad,
-                                .admission = admission});
+                                .admission = admission},
+                               cancellation);
   }
   return absl::InvalidArgumentError(
       "only gradient_field with propagated rotations and cotangent guidance, and linear_elastic, "
@@ -154,9 +140,6 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> SessionModels::CreateResponse(
 }
 
 absl::Status SessionModels::Admit(int64_t more_bytes) {
-  if (cancelled_ != nullptr && (*cancelled_)()) {
-    return absl::CancelledError("the client has cancelled the call");
-  }
   return reservation_.Resize(reservation_.bytes() + more_bytes,
                              "matrix factor or prepared answers");
 }

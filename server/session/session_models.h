@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <list>
 #include <map>
 #include <memory>
@@ -14,6 +13,7 @@
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
 
+#include "core/base/cancellation.h"
 #include "core/constraints/constraint_set.h"
 #include "core/deformation/create_deformer.h"
 #include "core/deformation/mesh_preparation.h"
@@ -22,9 +22,6 @@
 #include "server/session/memory_budget.h"
 
 namespace tissueform {
-
-// Asked now and then during long work.
-using CancelledFunction = std::function<bool()>;
 
 // Answers at chosen vertices that are to be prepared, see VertexResponse.
 struct ResponseRequest {
@@ -54,7 +51,7 @@ class SessionModels {
   // Makes the model unless it exists. REQUIRES: Begin succeeded.
   //
   // Errors: those of CreateDeformer; ResourceExhausted; Cancelled.
-  absl::StatusOr<Deformer*> Prepare(DeformationModel model, const CancelledFunction& cancelled);
+  absl::StatusOr<Deformer*> Prepare(DeformationModel model, const Cancellation& cancellation);
 
   // Makes prepared answers unless the same were asked for before. Some are kept (kMostResponses);
   // the one that was not used for longest makes way, so use the pointer before the next call.
@@ -62,7 +59,7 @@ class SessionModels {
   // Errors: InvalidArgument (a model that has none, a tolerance or range that is not possible), and
   // those of Prepare.
   absl::StatusOr<VertexResponse*> PrepareResponse(const ResponseRequest& request,
-                                                  const CancelledFunction& cancelled);
+                                                  const Cancellation& cancellation);
 
   int64_t bytes_held() const { return reservation_.bytes(); }
 
@@ -72,7 +69,8 @@ class SessionModels {
     std::unique_ptr<VertexResponse> response;
   };
 
-  absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponse(const ResponseRequest& request);
+  absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponse(const ResponseRequest& request,
+                                                                 const Cancellation& cancellation);
   absl::Status Admit(int64_t more_bytes);
   // After something was made or given up: what is held, no longer what was expected.
   absl::Status Settle();
@@ -83,7 +81,6 @@ class SessionModels {
   MemoryBudget* const budget_;
 
   MemoryReservation reservation_;
-  const CancelledFunction* cancelled_ = nullptr;  // of the call that is under way
   std::shared_ptr<MeshPreparation> preparation_;
   std::map<DeformationModel, std::unique_ptr<Deformer>> deformers_;
   std::list<PreparedResponse> responses_;  // the last used first

@@ -28,8 +28,8 @@ absl::Status OtherRequest(const std::string& request_id) {
 }  // namespace
 
 SessionRegistry::SessionRegistry(const ServiceLimits& limits, MemoryBudget* budget,
-                                 WorkerPool* pool)
-    : limits_(limits), budget_(budget), pool_(pool) {}
+                                 WorkerPool* pool, const Clock* clock)
+    : limits_(limits), budget_(budget), pool_(pool), clock_(clock) {}
 
 void SessionRegistry::Create(SessionSpec spec, const RequestKey& key, CancelFlag cancelled,
                              const CreateCallback& done) {
@@ -46,11 +46,9 @@ void SessionRegistry::Create(SessionSpec spec, const RequestKey& key, CancelFlag
     return;
   }
   pool_->Post([this, creation = std::move(admission.started), spec = std::move(spec)]() mutable {
-    const CancelledFunction all_cancelled = [this, &creation] { return AllCancelled(*creation); };
-    FinishCreation(creation, all_cancelled()
-                                 ? absl::CancelledError("the client has cancelled the call")
-                                 : Session::Create(RandomId(), std::move(spec), budget_, pool_,
-                                                   all_cancelled));
+    const Cancellation cancellation([this, &creation] { return AllCancelled(*creation); });
+    FinishCreation(creation, Session::Create(RandomId(), std::move(spec), budget_, pool_, clock_,
+                                             cancellation));
   });
 }
 
@@ -179,7 +177,7 @@ int SessionRegistry::RemoveIdle() {
   std::vector<std::shared_ptr<Session>> removed;
   {
     MutexLock lock(mutex_);
-    const auto cutoff = std::chrono::steady_clock::now() - limits_.session_idle_ttl;
+    const auto cutoff = clock_->Now() - limits_.session_idle_ttl;
     std::vector<std::string> idle;
     for (const auto& [id, entry] : sessions_) {
       if (entry.session->last_used() <= cutoff) {

@@ -14,6 +14,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/mutex.h"
+#include "server/session/clock.h"
 #include "server/session/limits.h"
 #include "server/session/memory_budget.h"
 #include "server/session/session.h"
@@ -35,8 +36,9 @@ class SessionRegistry {
   using CancelFlag = std::shared_ptr<const std::atomic<bool>>;
   using CreateCallback = std::function<void(absl::StatusOr<std::shared_ptr<Session>>)>;
 
-  // `budget` and `pool` must outlive the registry and all its sessions.
-  SessionRegistry(const ServiceLimits& limits, MemoryBudget* budget, WorkerPool* pool);
+  // `budget`, `pool` and `clock` must outlive the registry and all its sessions.
+  SessionRegistry(const ServiceLimits& limits, MemoryBudget* budget, WorkerPool* pool,
+                  const Clock* clock = Clock::System());
 
   // Makes a session on a worker and calls `done` once. Calls with the same request id share one
   // session; its making stops early when `cancelled` is set for all who wait for it.
@@ -99,6 +101,7 @@ class SessionRegistry {
   const ServiceLimits limits_;
   MemoryBudget* const budget_;
   WorkerPool* const pool_;
+  const Clock* const clock_;
 
   mutable Mutex mutex_;
   std::map<std::string, Entry> sessions_ ABSL_GUARDED_BY(mutex_);

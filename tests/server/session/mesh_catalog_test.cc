@@ -3,11 +3,14 @@
 
 #include "server/session/mesh_catalog.h"
 
+#include <chrono>
 #include <limits>
+#include <string>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "tests/testing/fake_clock.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/session_samples.h"
 #include "tests/testing/status_matchers.h"
@@ -17,6 +20,7 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::tissueform::testing::Bar;
+using ::tissueform::testing::FakeClock;
 using ::tissueform::testing::IsOk;
 using ::tissueform::testing::SampleMesh;
 using ::tissueform::testing::StatusIs;
@@ -81,6 +85,21 @@ TEST_F(MeshCatalogTest, OnlyUnusedMeshesPastTheTtlAreIdle) {
 
   Store(sample_, &catalog_);  // TTL of half an hour
   EXPECT_EQ(catalog_.RemoveIdle(), 0);
+}
+
+TEST_F(MeshCatalogTest, AMeshIsIdleFromTheEndOfItsTtlAndNotBefore) {
+  FakeClock clock;
+  MeshCatalog catalog(limits_, &budget_, &clock);
+  const std::string sha256 = Store(sample_, &catalog)->sha256;
+  constexpr std::chrono::nanoseconds kTick{1};
+  clock.Advance(limits_.session_idle_ttl - kTick);
+  EXPECT_EQ(catalog.RemoveIdle(), 0) << "just before";
+  EXPECT_NE(catalog.Find(sha256), nullptr) << "and asking for it begins its time again";
+  clock.Advance(limits_.session_idle_ttl - kTick);
+  EXPECT_EQ(catalog.RemoveIdle(), 0);
+  clock.Advance(kTick);
+  EXPECT_EQ(catalog.RemoveIdle(), 1) << "just after";
+  EXPECT_EQ(catalog.Find(sha256), nullptr);
 }
 
 TEST_F(MeshCatalogTest, AnotherNameOfAnArrayMakesAnotherMesh) {

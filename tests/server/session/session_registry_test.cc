@@ -11,6 +11,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "tests/testing/fake_clock.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/session_samples.h"
 #include "tests/testing/status_matchers.h"
@@ -21,10 +22,14 @@ namespace {
 using ::testing::HasSubstr;
 using ::tissueform::testing::Bar;
 using ::tissueform::testing::BarSpec;
+using ::tissueform::testing::FakeClock;
 using ::tissueform::testing::IsOk;
 using ::tissueform::testing::SampleMesh;
 using ::tissueform::testing::StatusIs;
 using ::tissueform::testing::Store;
+
+constexpr std::chrono::nanoseconds kTick{1};
+const std::chrono::seconds kTtl = ServiceLimits().session_idle_ttl;
 
 using CreateResult = absl::StatusOr<std::shared_ptr<Session>>;
 
@@ -40,9 +45,9 @@ class SessionRegistryTest : public ::testing::Test {
     bar_.reset();
     catalog_.reset();
     budget_ = std::make_unique<MemoryBudget>(budget_bytes);
-    catalog_ = std::make_unique<MeshCatalog>(limits, budget_.get());
+    catalog_ = std::make_unique<MeshCatalog>(limits, budget_.get(), &clock_);
     pool_ = std::make_unique<WorkerPool>(1);
-    registry_ = std::make_unique<SessionRegistry>(limits, budget_.get(), pool_.get());
+    registry_ = std::make_unique<SessionRegistry>(limits, budget_.get(), pool_.get(), &clock_);
     budget_->set_reclaimer([this] { registry_->RemoveIdle(); });
     bar_ = Store(SampleMesh(Bar({2, 2, 3})), catalog_.get());
     mesh_bytes_ = budget_->reserved_bytes();
@@ -70,6 +75,7 @@ class SessionRegistryTest : public ::testing::Test {
     reached.get_future().wait();
   }
 
+  FakeClock clock_;
   std::unique_ptr<MemoryBudget> budget_;
   std::unique_ptr<MeshCatalog> catalog_;
   std::unique_ptr<WorkerPool> pool_;
@@ -236,6 +242,31 @@ TEST_F(SessionRegistryTest, SessionsWithinTheirTtlStay) {
   EXPECT_THAT(budget_->Reserve(free_bytes + 1, "mesh"),
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("mesh")));
   EXPECT_THAT(registry_->Find(session->id()), IsOk());
+}
+
+TEST_F(SessionRegistryTest, ASessionIsIdleFromTheEndOfItsTtlAndNotBefore) {
+  std::string id;
+  {
+    ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create().get());
+    id = session->id();
+  }
+  Drain();
+  clock_.Advance(kTtl - kTick);
+  EXPECT_EQ(registry_->RemoveIdle(), 0) << "just before";
+  clock_.Advance(kTick);
+  EXPECT_EQ(registry_->RemoveIdle(), 1) << "just after";
+  EXPECT_THAT(registry_->Find(id), StatusIs(absl::StatusCode::kNotFound, HasSubstr("idle")));
+  EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
+}
+
+TEST_F(SessionRegistryTest, WhoeverAsksForASessionKeepsIt) {
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create().get());
+  clock_.Advance(kTtl - kTick);
+  EXPECT_THAT(registry_->Find(session->id()), IsOk());
+  clock_.Advance(kTtl - kTick);
+  EXPECT_EQ(registry_->RemoveIdle(), 0);
+  clock_.Advance(kTick);
+  EXPECT_EQ(registry_->RemoveIdle(), 1);
 }
 
 }  // namespace

@@ -1,0 +1,19 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+
+namespace tissueform {
+
+// Who makes a call, and so whose its sessions are. Nobody logs in yet: everyone is anonymous.
+struct Principal {
+  std::string name;  // empty: anonymous; never logged
+
+  bool anonymous() const { return name.empty(); }
+
+  friend bool operator==(const Principal&, const Principal&) = default;
+};
+
+}  // namespace tissueform

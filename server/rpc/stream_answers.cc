@@ -1,0 +1,137 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/rpc/stream_answers.h"
+
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "proto/conversion/answer_conversion.h"
+#include "proto/conversion/model_conversion.h"
+#include "proto/conversion/session_conversion.h"
+
+namespace tissueform {
+namespace {
+
+absl::Status ReadPrepared(const v1::PreparedAnswers& settings, ResponseRequest* request) {
+  if (settings.has_tolerance_mm()) request->tolerance_mm = settings.tolerance_mm();
+  if (settings.has_max_rotation()) request->max_rotation_rad = settings.max_rotation();
+  for (const double number : {request->tolerance_mm, request->max_rotation_rad}) {
+    if (!std::isfinite(number) || number <= 0) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "prepared.tolerance_mm and max_rotation must be positive numbers, not ", number));
+    }
+  }
+  return absl::OkStatus();
+}
+
+// REQUIRES: the rest of the configuration is read.
+absl::StatusOr<ResponseRequest> ReadResponse(const v1::PreparedAnswers& settings,
+                                             const StreamConfiguration& configuration) {
+  ResponseRequest request{.model = configuration.model, .vertices = configuration.choice.vertices};
+  TF_RETURN_IF_ERROR(ReadPrepared(settings, &request));
+  if (configuration.choice.all) {
+    request.vertices.resize(configuration.session->mesh().mesh.num_vertices());
+    std::iota(request.vertices.begin(), request.vertices.end(), 0);
+  }
+  return request;
+}
+
+AnswerFrame FrameOf(const WaitingPose& pose, const Deformation& deformation,
+                    const VertexChoice& choice) {
+  return {.sequence = pose.sequence,
+          .coalesced_count = pose.coalesced_count,
+          .summary = deformation.summary,
+          .positions = EncodePositions(deformation.positions, choice)};
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ReadConfiguration(
+    const v1::DeformConfiguration& proto, const ServiceLimits& limits, SessionRegistry* registry) {
+  auto configuration = std::make_shared<StreamConfiguration>();
+  TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(proto.session()));
+  TF_RETURN_IF_ERROR(CheckEncoding(proto.encoding()));
+  if (proto.has_max_unacked()) {
+    if (proto.max_unacked() < 1 || proto.max_unacked() > limits.max_unacked) {
+      return absl::InvalidArgumentError(absl::StrCat("max_unacked is ", proto.max_unacked(),
+                                                     "; it must be 1 to ", limits.max_unacked));
+    }
+    configuration->max_unacked = proto.max_unacked();
+  }
+  TF_ASSIGN_OR_RETURN(configuration->session, registry->Find(id));
+  const StoredMesh& mesh = configuration->session->mesh();
+  TF_ASSIGN_OR_RETURN(configuration->choice,
+                      ToVertexChoice(proto.vertices(), mesh.mesh.num_vertices(), mesh.skin));
+  TF_ASSIGN_OR_RETURN(configuration->model,
+                      ToModel(proto.model(), configuration->session->model()));
+  if (proto.has_prepared()) {
+    TF_ASSIGN_OR_RETURN(configuration->response, ReadResponse(proto.prepared(), *configuration));
+  }
+  return configuration;
+}
+
+v1::DeformResponse StartedWithoutPreparation(const StreamConfiguration& configuration) {
+  const VertexChoice& choice = configuration.choice;
+  v1::DeformResponse response;
+  v1::DeformStarted* started = response.mutable_started();
+  started->set_max_unacked(configuration.max_unacked);
+  started->set_vertex_count(choice.all ? configuration.session->mesh().mesh.num_vertices()
+                                       : static_cast<int64_t>(choice.vertices.size()));
+  started->mutable_vertices()->Add(choice.vertices.begin(), choice.vertices.end());
+  return response;
+}
+
+absl::StatusOr<v1::DeformResponse> PrepareAnswers(const StreamConfiguration& configuration,
+                                                  const Cancellation& cancellation) {
+  Session& session = *configuration.session;
+  TF_RETURN_IF_ERROR(session.PrepareModel(configuration.model, cancellation));
+  v1::DeformResponse started = StartedWithoutPreparation(configuration);
+  if (configuration.response.has_value()) {
+    TF_ASSIGN_OR_RETURN(const VertexResponse* response,
+                        session.PrepareResponse(*configuration.response, cancellation));
+    started.mutable_started()->set_prepared_terms(response->num_terms());
+    started.mutable_started()->set_prepared_bytes(response->bytes_held());
+  }
+  return started;
+}
+
+absl::StatusOr<AnswerFrame> AnswerPose(const StreamConfiguration& configuration,
+                                       const WaitingPose& pose, const OnEarlyAnswer& on_early) {
+  if (configuration.response.has_value()) {
+    TF_ASSIGN_OR_RETURN(const std::optional<PreparedAnswer> answer,
+                        configuration.session->Respond(*configuration.response, pose.poses));
+    if (answer.has_value()) {
+      return AnswerFrame{.sequence = pose.sequence,
+                         .coalesced_count = pose.coalesced_count,
+                         .summary = answer->summary,
+                         .positions = EncodePositions(answer->positions)};
+    }
+  }
+  DeformControl control;
+  control.warm_start = true;
+  control.on_progress = [&](const Deformation& so_far) {
+    return on_early([&] { return FrameOf(pose, so_far, configuration.choice); });
+  };
+  TF_ASSIGN_OR_RETURN(const Deformation deformation,
+                      configuration.session->Deform(configuration.model, pose.poses, control));
+  return FrameOf(pose, deformation, configuration.choice);
+}
+
+v1::DeformResponse ToProto(AnswerFrame frame) {
+  v1::DeformResponse response;
+  v1::DeformFrame* proto = response.mutable_frame();
+  proto->set_sequence(frame.sequence);
+  proto->set_coalesced_count(frame.coalesced_count);
+  proto->set_refinement(frame.refinement);
+  proto->set_refining(frame.refining);
+  *proto->mutable_summary() = ToProto(frame.summary);
+  *proto->mutable_positions() = std::move(frame.positions);
+  return response;
+}
+
+}  // namespace tissueform

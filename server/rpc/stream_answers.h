@@ -1,0 +1,56 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/base/cancellation.h"
+#include "proto/conversion/geometry_conversion.h"
+#include "server/session/frame_flow.h"
+#include "server/session/limits.h"
+#include "server/session/session.h"
+#include "server/session/session_registry.h"
+#include "tissueform/v1/deform_service.pb.h"
+
+// How a Deform stream answers, without the stream.
+namespace tissueform {
+
+// What the first message of a stream has settled. Immutable: jobs hold it while they run.
+struct StreamConfiguration {
+  std::shared_ptr<Session> session;
+  VertexChoice choice;
+  DeformationModel model = DeformationModel::kGradientField;
+  std::optional<ResponseRequest> response;  // prepared answers
+  int max_unacked = 2;
+
+  // Something is to be made before the stream begins.
+  bool NeedsPreparation() const { return response.has_value() || model != session->model(); }
+};
+
+// Errors: InvalidArgument (a field that is unknown or out of range), NotFound (the session).
+absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ReadConfiguration(
+    const v1::DeformConfiguration& proto, const ServiceLimits& limits, SessionRegistry* registry);
+
+// The first message of the server. With preparation it must run on the session's strand; errors:
+// those of Session::PrepareModel and PrepareResponse.
+v1::DeformResponse StartedWithoutPreparation(const StreamConfiguration& configuration);
+absl::StatusOr<v1::DeformResponse> PrepareAnswers(const StreamConfiguration& configuration,
+                                                  const Cancellation& cancellation);
+
+// On the session's strand: the answer to a pose, from prepared answers where they cover it. A solve
+// that iterates shows what it has by `on_early`, which makes the frame when it wants it and returns
+// false when the solve is to stop.
+using MakeFrame = std::function<AnswerFrame()>;
+using OnEarlyAnswer = std::function<bool(const MakeFrame& make_frame)>;
+absl::StatusOr<AnswerFrame> AnswerPose(const StreamConfiguration& configuration,
+                                       const WaitingPose& pose, const OnEarlyAnswer& on_early);
+
+v1::DeformResponse ToProto(AnswerFrame frame);
+
+}  // namespace tissueform

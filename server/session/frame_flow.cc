@@ -1,0 +1,86 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/session/frame_flow.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+
+absl::Status FrameFlow::CheckSequence(uint64_t sequence) const {
+  if (!last_sequence_.has_value() || sequence > *last_sequence_) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("sequence ", sequence, " after ", *last_sequence_,
+                                                 "; sequences must rise from pose to pose"));
+}
+
+absl::Status FrameFlow::Put(uint64_t sequence, std::vector<HandlePose> poses) {
+  TF_RETURN_IF_ERROR(CheckSequence(sequence));
+  const int64_t coalesced_count = mailbox_.has_value() ? mailbox_->coalesced_count + 1 : 0;
+  mailbox_ = {sequence, coalesced_count, std::move(poses)};
+  last_sequence_ = sequence;
+  return absl::OkStatus();
+}
+
+absl::Status FrameFlow::Acknowledge(uint64_t sequence, std::optional<int32_t> refinement) {
+  const FrameNumber acknowledged(sequence,
+                                 refinement.value_or(std::max(0, CountFrames(sequence) - 1)));
+  if (!last_frame_.has_value() || acknowledged > *last_frame_) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("ack of frame ", sequence, ", refinement ", acknowledged.second,
+                     ", which was not sent; acknowledge frames that arrived"));
+  }
+  while (!unacked_.empty() && unacked_.front() <= acknowledged) {
+    unacked_.pop_front();
+  }
+  return absl::OkStatus();
+}
+
+bool FrameFlow::StartSolve() {
+  const bool has_credit = closed_ || unacked_.size() < max_unacked_;
+  if (busy_ || !mailbox_.has_value() || frame_.has_value() || !has_credit) return false;
+  busy_ = true;
+  return true;
+}
+
+void FrameFlow::FinishSolve(std::optional<AnswerFrame> frame) {
+  busy_ = false;
+  if (!frame.has_value()) return;
+  if (frame->summary.cancelled && CountFrames(frame->sequence) > 0) return;
+  Offer(*std::move(frame));
+}
+
+FrameFlow::EarlyAnswer FrameFlow::JudgeEarly() const {
+  if (mailbox_.has_value()) return EarlyAnswer::kStop;
+  const bool has_spare_credit = unacked_.size() + 1 < max_unacked_;
+  return frame_.has_value() || !has_spare_credit ? EarlyAnswer::kSkip : EarlyAnswer::kShow;
+}
+
+void FrameFlow::OfferEarly(AnswerFrame frame) {
+  frame.refining = true;
+  Offer(std::move(frame));
+}
+
+void FrameFlow::Offer(AnswerFrame frame) {
+  if (frame_.has_value()) {
+    // The same pose, and the same credit: nothing else is computed while a frame waits.
+    frame.refinement = frame_->refinement;
+  } else {
+    frame.refinement = CountFrames(frame.sequence);
+    last_frame_ = FrameNumber(frame.sequence, frame.refinement);
+    unacked_.push_back(*last_frame_);
+  }
+  if (frame.refinement > 0) {
+    frame.coalesced_count = 0;  // told by the first frame of the pose
+  }
+  frame_ = std::move(frame);
+}
+
+int32_t FrameFlow::CountFrames(uint64_t sequence) const {
+  return last_frame_.has_value() && last_frame_->first == sequence ? last_frame_->second + 1 : 0;
+}
+
+}  // namespace tissueform

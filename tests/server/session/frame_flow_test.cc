@@ -1,0 +1,242 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/session/frame_flow.h"
+
+#include <optional>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::HasSubstr;
+using ::tissueform::testing::IsOk;
+using ::tissueform::testing::StatusIs;
+using EarlyAnswer = FrameFlow::EarlyAnswer;
+
+constexpr absl::StatusCode kInvalid = absl::StatusCode::kInvalidArgument;
+
+AnswerFrame Answer(const WaitingPose& pose) {
+  return {.sequence = pose.sequence,
+          .coalesced_count = pose.coalesced_count,
+          .summary = {},
+          .positions = {}};
+}
+
+// Solves what waits, and takes the frame. REQUIRES: StartSolve is true.
+AnswerFrame SolveAndTake(FrameFlow* flow) {
+  EXPECT_TRUE(flow->StartSolve());
+  const std::optional<WaitingPose> pose = flow->TakePose();
+  flow->FinishSolve(Answer(*pose));
+  return *flow->TakeFrame();
+}
+
+TEST(FrameFlowTest, TheNewestPoseWinsAndCountsThoseItReplaced) {
+  FrameFlow flow(2);
+  EXPECT_FALSE(flow.StartSolve()) << "nothing waits";
+  for (uint64_t sequence = 1; sequence <= 5; ++sequence) {
+    ASSERT_THAT(flow.Put(sequence, {}), IsOk());
+  }
+  const AnswerFrame frame = SolveAndTake(&flow);
+  EXPECT_EQ(frame.sequence, 5);
+  EXPECT_EQ(frame.coalesced_count, 4);
+  EXPECT_EQ(frame.refinement, 0);
+  EXPECT_FALSE(frame.refining);
+  ASSERT_THAT(flow.Put(6, {}), IsOk());
+  EXPECT_EQ(SolveAndTake(&flow).coalesced_count, 0) << "each pose is counted once";
+}
+
+TEST(FrameFlowTest, APoseThatComesBeforeTheJobRunsIsTheOneThatIsSolved) {
+  FrameFlow flow(2);
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  ASSERT_TRUE(flow.StartSolve());
+  ASSERT_THAT(flow.Put(2, {}), IsOk());
+  const std::optional<WaitingPose> pose = flow.TakePose();
+  EXPECT_EQ(pose->sequence, 2);
+  EXPECT_EQ(pose->coalesced_count, 1);
+}
+
+TEST(FrameFlowTest, OneSolveAtATimeAndNoneWhileAFrameWaits) {
+  FrameFlow flow(8);
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  ASSERT_TRUE(flow.StartSolve());
+  const std::optional<WaitingPose> pose = flow.TakePose();
+  ASSERT_THAT(flow.Put(2, {}), IsOk());
+  EXPECT_FALSE(flow.StartSolve()) << "one is under way";
+  flow.FinishSolve(Answer(*pose));
+  EXPECT_FALSE(flow.StartSolve()) << "its frame waits";
+  EXPECT_TRUE(flow.TakeFrame().has_value());
+  EXPECT_TRUE(flow.StartSolve());
+}
+
+TEST(FrameFlowTest, NothingIsSolvedWhileSomethingIsPrepared) {
+  FrameFlow flow(2);
+  flow.StartPreparation();
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  EXPECT_TRUE(flow.busy());
+  EXPECT_FALSE(flow.StartSolve());
+  flow.FinishPreparation();
+  EXPECT_TRUE(flow.StartSolve());
+}
+
+TEST(FrameFlowTest, WithoutCreditNothingIsSolved) {
+  for (const size_t max_unacked : {1UL, 2UL, 5UL}) {
+    FrameFlow flow(max_unacked);
+    uint64_t sequence = 0;
+    for (size_t i = 0; i < max_unacked; ++i) {
+      ASSERT_THAT(flow.Put(++sequence, {}), IsOk());
+      SolveAndTake(&flow);
+    }
+    ASSERT_THAT(flow.Put(++sequence, {}), IsOk());
+    EXPECT_FALSE(flow.StartSolve());
+    ASSERT_THAT(flow.Acknowledge(1, 0), IsOk());
+    EXPECT_EQ(SolveAndTake(&flow).sequence, sequence);
+  }
+}
+
+TEST(FrameFlowTest, AnAcknowledgementCoversAllFramesBeforeIt) {
+  FrameFlow flow(3);
+  for (uint64_t sequence = 1; sequence <= 3; ++sequence) {
+    ASSERT_THAT(flow.Put(sequence, {}), IsOk());
+    SolveAndTake(&flow);
+  }
+  ASSERT_THAT(flow.Acknowledge(3, std::nullopt), IsOk());
+  for (uint64_t sequence = 4; sequence <= 6; ++sequence) {
+    ASSERT_THAT(flow.Put(sequence, {}), IsOk());
+    SolveAndTake(&flow);
+  }
+}
+
+TEST(FrameFlowTest, FramesThatWereNotMadeCannotBeAcknowledged) {
+  FrameFlow flow(2);
+  EXPECT_THAT(flow.Acknowledge(1, std::nullopt), StatusIs(kInvalid, HasSubstr("not sent")));
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  SolveAndTake(&flow);
+  EXPECT_THAT(flow.Acknowledge(1, 1), StatusIs(kInvalid, HasSubstr("refinement 1")));
+  EXPECT_THAT(flow.Acknowledge(2, std::nullopt), StatusIs(kInvalid, HasSubstr("frame 2")));
+  EXPECT_THAT(flow.Acknowledge(1, 0), IsOk());
+  EXPECT_THAT(flow.Acknowledge(1, 0), IsOk()) << "twice does no harm";
+}
+
+TEST(FrameFlowTest, SequencesMustRise) {
+  FrameFlow flow(2);
+  ASSERT_THAT(flow.Put(0, {}), IsOk());
+  EXPECT_THAT(flow.Put(0, {}), StatusIs(kInvalid, HasSubstr("sequence 0 after 0")));
+  ASSERT_THAT(flow.Put(7, {}), IsOk());
+  EXPECT_THAT(flow.Put(6, {}), StatusIs(kInvalid, HasSubstr("sequence 6 after 7")));
+  EXPECT_EQ(SolveAndTake(&flow).sequence, 7) << "what waited still does";
+}
+
+TEST(FrameFlowTest, EarlyAnswersKeepOneCreditForTheLast) {
+  FrameFlow flow(3);
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  ASSERT_THAT(flow.Put(2, {}), IsOk());
+  ASSERT_TRUE(flow.StartSolve());
+  const std::optional<WaitingPose> pose = flow.TakePose();
+  for (int refinement = 0; refinement < 2; ++refinement) {
+    ASSERT_EQ(flow.JudgeEarly(), EarlyAnswer::kShow);
+    flow.OfferEarly(Answer(*pose));
+    const std::optional<AnswerFrame> frame = flow.TakeFrame();
+    ASSERT_TRUE(frame.has_value());
+    EXPECT_TRUE(frame->refining);
+    EXPECT_EQ(frame->refinement, refinement);
+    EXPECT_EQ(frame->coalesced_count, refinement == 0 ? 1 : 0) << "told once a pose";
+  }
+  EXPECT_EQ(flow.JudgeEarly(), EarlyAnswer::kSkip);
+  flow.FinishSolve(Answer(*pose));
+  const std::optional<AnswerFrame> last = flow.TakeFrame();
+  EXPECT_FALSE(last->refining);
+  EXPECT_EQ(last->refinement, 2);
+  ASSERT_THAT(flow.Put(3, {}), IsOk());
+  EXPECT_FALSE(flow.StartSolve()) << "all three are on their way";
+  ASSERT_THAT(flow.Acknowledge(2, 0), IsOk());
+  EXPECT_TRUE(flow.StartSolve());
+}
+
+TEST(FrameFlowTest, WithOneCreditNothingIsShownEarly) {
+  FrameFlow flow(1);
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  ASSERT_TRUE(flow.StartSolve());
+  EXPECT_TRUE(flow.TakePose().has_value());
+  EXPECT_EQ(flow.JudgeEarly(), EarlyAnswer::kSkip);
+}
+
+TEST(FrameFlowTest, ABetterAnswerReplacesTheOneThatStillWaitsForItsWrite) {
+  FrameFlow flow(4);
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  ASSERT_THAT(flow.Put(2, {}), IsOk());
+  ASSERT_TRUE(flow.StartSolve());
+  const std::optional<WaitingPose> pose = flow.TakePose();
+  flow.OfferEarly(Answer(*pose));
+  EXPECT_EQ(flow.JudgeEarly(), EarlyAnswer::kSkip) << "a frame waits";
+  flow.FinishSolve(Answer(*pose));
+  const std::optional<AnswerFrame> frame = flow.TakeFrame();
+  EXPECT_FALSE(frame->refining);
+  EXPECT_EQ(frame->refinement, 0) << "the first that is sent";
+  EXPECT_EQ(frame->coalesced_count, 1);
+  EXPECT_FALSE(flow.TakeFrame().has_value());
+}
+
+TEST(FrameFlowTest, ANewerPoseStopsASolveWhoseFirstFrameIsKept) {
+  FrameFlow flow(3);
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  ASSERT_TRUE(flow.StartSolve());
+  WaitingPose pose = *flow.TakePose();
+  ASSERT_THAT(flow.Put(2, {}), IsOk());
+  EXPECT_EQ(flow.JudgeEarly(), EarlyAnswer::kStop);
+  AnswerFrame given_up = Answer(pose);
+  given_up.summary.cancelled = true;
+  flow.FinishSolve(given_up);
+  EXPECT_EQ(flow.TakeFrame()->sequence, 1) << "better than no frame of that pose";
+
+  ASSERT_TRUE(flow.StartSolve());
+  pose = *flow.TakePose();
+  flow.OfferEarly(Answer(pose));
+  EXPECT_TRUE(flow.TakeFrame().has_value());
+  given_up = Answer(pose);
+  given_up.summary.cancelled = true;
+  flow.FinishSolve(given_up);
+  EXPECT_FALSE(flow.TakeFrame().has_value()) << "its pose has a frame already";
+}
+
+TEST(FrameFlowTest, AfterCloseTheNewestPoseIsAnsweredWithoutCredit) {
+  FrameFlow flow(1);
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  SolveAndTake(&flow);
+  ASSERT_THAT(flow.Put(2, {}), IsOk());
+  EXPECT_FALSE(flow.StartSolve());
+  flow.CloseSending();
+  EXPECT_FALSE(flow.Done());
+  EXPECT_EQ(SolveAndTake(&flow).sequence, 2);
+  EXPECT_TRUE(flow.Done());
+}
+
+TEST(FrameFlowTest, ClosingWhileASolveRunsWaitsForItsFrame) {
+  FrameFlow flow(2);
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  ASSERT_TRUE(flow.StartSolve());
+  const std::optional<WaitingPose> pose = flow.TakePose();
+  flow.CloseSending();
+  EXPECT_FALSE(flow.Done()) << "it solves";
+  flow.FinishSolve(Answer(*pose));
+  EXPECT_FALSE(flow.Done()) << "its frame waits";
+  EXPECT_TRUE(flow.TakeFrame().has_value());
+  EXPECT_TRUE(flow.Done());
+}
+
+TEST(FrameFlowTest, ASolveWithoutAnswerFreesTheWay) {
+  FrameFlow flow(1);
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  ASSERT_TRUE(flow.StartSolve());
+  EXPECT_TRUE(flow.TakePose().has_value());
+  flow.FinishSolve(std::nullopt);
+  EXPECT_FALSE(flow.busy());
+  EXPECT_FALSE(flow.TakeFrame().has_value());
+}
+
+}  // namespace
+}  // namespace tissueform
