@@ -190,6 +190,15 @@ void ReportReorientation(Eigen::Index reoriented_tets, MeshReport* report) {
   report->defects.push_back(std::move(defect));
 }
 
+void ReportLeftOutCells(Eigen::Index left_out_cells, MeshReport* report) {
+  if (left_out_cells == 0) return;
+  MeshDefect defect{"left_out_cells", Severity::kWarning, left_out_cells, {}, ""};
+  defect.explanation = absl::StrCat(
+      left_out_cells,
+      " cells of the file are points, lines or faces: they were left out, with their values");
+  report->defects.push_back(std::move(defect));
+}
+
 // What is measured at places, which must be finite.
 void ValidatePlaces(const TetMesh& mesh, const TriangleIndices& boundary, MeshReport* report) {
   FindBadVolumes(mesh, report);
@@ -204,11 +213,13 @@ void ValidatePlaces(const TetMesh& mesh, const TriangleIndices& boundary, MeshRe
 
 }  // namespace
 
-MeshReport ValidateTetMesh(const TetMesh& mesh, Eigen::Index reoriented_tets) {
+MeshReport ValidateTetMesh(const TetMesh& mesh, Eigen::Index reoriented_tets,
+                           Eigen::Index left_out_cells) {
   MeshReport report;
   report.num_vertices = mesh.num_vertices();
   report.num_tets = mesh.num_tets();
   ReportReorientation(reoriented_tets, &report);
+  ReportLeftOutCells(left_out_cells, &report);
   const TriangleIndices boundary = BoundaryFacets(mesh);
   if (FindNonFiniteVertices(mesh, &report)) ValidatePlaces(mesh, boundary, &report);
   FindDuplicateTets(mesh, &report);

@@ -23,6 +23,7 @@ namespace tissueform {
 //   duplicate_tets         error    tets with the same four vertices as an earlier one
 //   overshared_facets      error    facets that three or more tets share
 //   reoriented_tets        warning  tets whose corners were swapped on reading
+//   left_out_cells         warning  points, lines and faces of the file beside its tets
 //   duplicate_vertices     warning  vertices at exactly the place of an earlier one
 //   non_matching_facets    warning  boundary facets that lie exactly on another one without sharing
 //                                   its vertices: parts that touch and are not joined
@@ -46,8 +47,10 @@ struct MeshReport {
   const MeshDefect* Find(std::string_view kind) const { return FindDefect(defects, kind); }
 };
 
-// `reoriented_tets` is what reading has told (TetMeshFile); it is only reported.
-MeshReport ValidateTetMesh(const TetMesh& mesh, Eigen::Index reoriented_tets = 0);
+// `reoriented_tets` and `left_out_cells` are what reading has told (TetMeshFile); they are only
+// reported.
+MeshReport ValidateTetMesh(const TetMesh& mesh, Eigen::Index reoriented_tets = 0,
+                           Eigen::Index left_out_cells = 0);
 
 // OK when the report is usable, otherwise InvalidArgument with the first error's explanation and
 // the number of further ones.

@@ -20,6 +20,7 @@ namespace {
 constexpr int64_t kSampleBytes = 4096;
 constexpr int64_t kBinaryStlHeaderBytes = 84;
 constexpr int64_t kBinaryStlTriangleBytes = 50;
+constexpr char kGmsh1Start[] = "$NOD";  // version 1 has no $MeshFormat, and its end is $ENDELM
 
 struct Sample {
   std::string start;
@@ -87,6 +88,7 @@ std::optional<MeshFormat> FormatOfStart(absl::string_view start) {
     if (look.first_word.empty() || look.first_word == "<") continue;
     if (absl::StartsWith(start, look.first_word)) return look.format;
   }
+  if (absl::StartsWith(start, kGmsh1Start)) return MeshFormat::kGmsh;
   const absl::string_view text = SkipComments(start);
   if (absl::StartsWith(text, "<")) {
     return absl::StrContains(text, "\"PolyData\"") ? MeshFormat::kVtp : MeshFormat::kVtu;
@@ -122,7 +124,7 @@ bool LooksLike(MeshFormat format, const Sample& sample, int64_t bytes) {
 absl::string_view MissingEnd(MeshFormat format, const Sample& sample, int64_t bytes) {
   switch (format) {
     case MeshFormat::kGmsh:
-      return absl::StartsWith(LastLine(sample.end), "$End") ? "" : "$End...";
+      return absl::StartsWithIgnoreCase(LastLine(sample.end), "$End") ? "" : "$End...";
     case MeshFormat::kMedit:
       return LastLine(sample.end) == "End" ? "" : "End";
     case MeshFormat::kStl:

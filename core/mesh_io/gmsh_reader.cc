@@ -32,21 +32,29 @@ absl::string_view TakeLine(absl::string_view* text) {
   return line;
 }
 
-// ASCII of version 2, whose elements are one a line, and without data that go by their numbers.
+bool IsVersion1(absl::string_view text) { return absl::StartsWith(text, "$NOD"); }
+
+// ASCII of version 1 or 2, whose elements are one a line, and without data that go by their
+// numbers.
 bool CanRenumber(absl::string_view text) {
+  if (IsVersion1(text)) return true;
   TakeLine(&text);
   return absl::StartsWith(text, "2") && absl::StrContains(TakeLine(&text), " 0 ") &&
          !absl::StrContains(text, "$ElementData");
+}
+
+bool BeginsElements(absl::string_view line) {
+  return absl::StartsWith(line, "$Elements") || absl::StartsWith(line, "$ELM");
 }
 
 // The text with the elements numbered from 1. Some programs (SOFA) give all the same number, and
 // Gmsh then keeps only one of them.
 std::string Renumber(absl::string_view text) {
   std::string result;
-  int64_t number = -1;  // of the line in $Elements, whose line 0 is the count
+  int64_t number = -1;  // of the line in the elements, whose line 0 is the count
   while (!text.empty()) {
     const absl::string_view line = TakeLine(&text);
-    if (absl::StartsWith(line, "$")) number = absl::StartsWith(line, "$Elements") ? 0 : -1;
+    if (absl::StartsWith(line, "$")) number = BeginsElements(line) ? 0 : -1;
     const size_t rest = line.find_first_of(" \t");
     if (number > 1 && rest != line.npos) {
       absl::StrAppend(&result, number - 1, line.substr(rest));

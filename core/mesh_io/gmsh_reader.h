@@ -10,7 +10,7 @@
 
 namespace tissueform {
 
-// Gmsh's .msh (2.2, 4.1, ASCII or binary) and MEDIT's .mesh, both through Gmsh's library in a
+// Gmsh's .msh (1, 2.2, 4.1, ASCII or binary) and MEDIT's .mesh, both through Gmsh's library in a
 // helper program.
 //
 // Tets come in the order of their numbers, which is that of the file in practice; vertices in the

@@ -22,12 +22,14 @@ struct TetMeshFile {
   std::vector<Attribute> cell_data;   // #T tuples each
   // Tets whose corners were swapped on reading: none or all. Not written.
   Eigen::Index reoriented_tets = 0;
+  // Points, lines and faces of the file, which are no part of the mesh. Not written.
+  int64_t left_out_cells = 0;
 };
 
 // The attribute of that name, or null.
 const Attribute* FindAttribute(const std::vector<Attribute>& attributes, const std::string& name);
 
-// Reads linear tetrahedra from .vtu (VTK XML), .vtk (legacy VTK), .msh (Gmsh 2.2, 4.1), .mesh
+// Reads linear tetrahedra from .vtu (VTK XML), .vtk (legacy VTK), .msh (Gmsh 1, 2.2, 4.1), .mesh
 // (MEDIT) or .node and .ele (TetGen; either of the pair); the ending, in any case, chooses the
 // format. docs/mesh-formats.md says what each keeps. When every tet is negative the file counts
 // corners the other way round: they are reoriented (see RepairOrientation) and reported. All

@@ -30,7 +30,8 @@ absl::StatusOr<TetMeshFile> ToTetMeshFile(RawMesh raw) {
   return TetMeshFile{.mesh = std::move(mesh),
                      .point_data = std::move(raw.point_data),
                      .cell_data = std::move(raw.cell_data),
-                     .reoriented_tets = reoriented};
+                     .reoriented_tets = reoriented,
+                     .left_out_cells = raw.left_out_cells};
 }
 
 }  // namespace

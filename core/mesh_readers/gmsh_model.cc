@@ -72,14 +72,15 @@ int64_t AnnouncedElements() {
   return announced;
 }
 
-absl::Status CheckNothingLost() {
+// How many elements there are, of all dimensions; an error when some were lost.
+absl::StatusOr<int64_t> CountElements() {
   std::vector<int> types;
   std::vector<std::vector<size_t>> elements;
   std::vector<std::vector<size_t>> nodes;
   gmsh_mesh::getElements(types, elements, nodes);
   int64_t count = 0;
   for (const auto& of_type : elements) count += static_cast<int64_t>(of_type.size());
-  if (count >= AnnouncedElements()) return absl::OkStatus();
+  if (count >= AnnouncedElements()) return count;
   return absl::FailedPreconditionError(
       absl::StrCat("it announces ", AnnouncedElements(), " elements, but only ", count,
                    " have a number of their own; renumber them (save the file again from Gmsh)"));
@@ -225,7 +226,7 @@ void CollectArrays(const std::vector<Tet>& tets, const RowOfNumber& nodes, bool 
 absl::StatusOr<RawMesh> ReadGmshModel(const std::string& path, bool is_medit) {
   TF_RETURN_IF_ERROR(Open(path));
   TF_RETURN_IF_ERROR(CheckOnlyLinearTets());
-  TF_RETURN_IF_ERROR(CheckNothingLost());
+  TF_ASSIGN_OR_RETURN(const int64_t num_elements, CountElements());
   const std::vector<Tet> tets = CollectTets();
   const RowOfNumber rows = RowsOfNodes(tets);
   RawMesh mesh;
@@ -238,6 +239,7 @@ absl::StatusOr<RawMesh> ReadGmshModel(const std::string& path, bool is_medit) {
     }
   }
   CollectArrays(tets, rows, is_medit, &mesh);
+  mesh.left_out_cells = num_elements - mesh.cells.rows();
   return mesh;
 }
 

@@ -43,15 +43,7 @@ absl::StatusOr<RawMesh> ReadLegacyVtk(const CheckedMeshFile& file) {
   if (!errors.first_error().empty() || reader->GetErrorCode() != 0) {
     return absl::InvalidArgumentError(absl::StrCat("it is damaged (", errors.first_error(), ")"));
   }
-  vtkUnstructuredGrid* grid = reader->GetOutput();
-  RawMesh mesh;
-  TF_ASSIGN_OR_RETURN(mesh.cells, CopyTets(grid));
-  mesh.positions = CopyPositions(grid);
-  TF_ASSIGN_OR_RETURN(mesh.point_data,
-                      CopyAttributes(grid->GetPointData(), grid->GetNumberOfPoints()));
-  TF_ASSIGN_OR_RETURN(mesh.cell_data,
-                      CopyAttributes(grid->GetCellData(), grid->GetNumberOfCells()));
-  return mesh;
+  return CopyTetGrid(reader->GetOutput());
 }
 
 }  // namespace tissueform

@@ -77,6 +77,7 @@ void SendRawMesh(const absl::StatusOr<RawMesh>& mesh, PipeSender* sender) {
   SendAttributes(mesh->point_data, sender);
   SendAttributes(mesh->cell_data, sender);
   sender->Number(mesh->split_polygons);
+  sender->Number(mesh->left_out_cells);
 }
 
 absl::StatusOr<RawMesh> ReceiveRawMesh(int descriptor, int64_t max_bytes) {
@@ -88,6 +89,7 @@ absl::StatusOr<RawMesh> ReceiveRawMesh(int descriptor, int64_t max_bytes) {
   TF_RETURN_IF_ERROR(ReceiveAttributes(&receiver, &mesh.point_data));
   TF_RETURN_IF_ERROR(ReceiveAttributes(&receiver, &mesh.cell_data));
   TF_ASSIGN_OR_RETURN(mesh.split_polygons, receiver.Number(INT64_MAX));
+  TF_ASSIGN_OR_RETURN(mesh.left_out_cells, receiver.Number(INT64_MAX));
   return mesh;
 }
 

@@ -32,6 +32,7 @@ struct RawMesh {
   std::vector<Attribute> point_data;  // #V tuples each
   std::vector<Attribute> cell_data;   // #C tuples each
   int64_t split_polygons = 0;         // faces with more than three corners that became triangles
+  int64_t left_out_cells = 0;         // points, lines and faces beside the tets
 };
 
 // OK for a name that every reader of the file format takes: 1 to 256 bytes, no control characters.

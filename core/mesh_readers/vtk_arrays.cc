@@ -5,9 +5,14 @@
 
 #include <type_traits>
 #include <utility>
+#include <vtkCell.h>
 #include <vtkCellArray.h>
+#include <vtkCellData.h>
 #include <vtkCellTypes.h>
 #include <vtkDataArray.h>
+#include <vtkGenericCell.h>
+#include <vtkPointData.h>
+#include <vtkSmartPointer.h>
 
 #include "absl/strings/str_cat.h"
 
@@ -63,39 +68,74 @@ Attribute::Values CopyValues(const T* values, vtkIdType count) {
   }
 }
 
+// Points, lines and faces; not what VTK knows no such cell for.
+bool IsOfLowerDimension(int cell_type) {
+  const auto cell = vtkSmartPointer<vtkCell>::Take(vtkGenericCell::InstantiateCell(cell_type));
+  return cell != nullptr && cell->GetCellDimension() < 3;
+}
+
+// The numbers of the cells that are tets.
+absl::StatusOr<std::vector<vtkIdType>> FindTets(vtkUnstructuredGrid* grid) {
+  std::vector<vtkIdType> tets;
+  for (vtkIdType c = 0; c < grid->GetNumberOfCells(); ++c) {
+    const int type = grid->GetCellType(c);
+    if (type == VTK_TETRA) {
+      tets.push_back(c);
+    } else if (!IsOfLowerDimension(type)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("cell ", c, " is a ", vtkCellTypes::GetClassNameFromTypeId(type), " (type ",
+                       type, "); only linear tetrahedra (type 10) are taken"));
+    }
+  }
+  if (tets.empty() && grid->GetNumberOfCells() > 0) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "it holds no tets: its ", grid->GetNumberOfCells(), " cells are points, lines or faces"));
+  }
+  return tets;
+}
+
+absl::StatusOr<CellIndices> CopyTets(vtkUnstructuredGrid* grid,
+                                     const std::vector<vtkIdType>& cells) {
+  const vtkIdType num_points = grid->GetNumberOfPoints();
+  CellIndices tets(static_cast<Eigen::Index>(cells.size()), 4);
+  for (Eigen::Index t = 0; t < tets.rows(); ++t) {
+    vtkIdType size = 0;
+    const vtkIdType* corners = nullptr;
+    grid->GetCells()->GetCellAtId(cells[static_cast<size_t>(t)], size, corners);
+    if (size != 4)
+      return absl::InvalidArgumentError(absl::StrCat("tet ", t, " has ", size, " corners, not 4"));
+    for (int corner = 0; corner < 4; ++corner) {
+      if (corners[corner] < 0 || corners[corner] >= num_points) {
+        return absl::InvalidArgumentError(absl::StrCat(
+            "tet ", t, " refers to vertex ", corners[corner], ", but there are ", num_points));
+      }
+      tets(t, corner) = static_cast<int32_t>(corners[corner]);
+    }
+  }
+  return tets;
+}
+
+// The tuples of these cells only.
+void KeepTuples(const std::vector<vtkIdType>& cells, Attribute* attribute) {
+  std::visit(
+      [&](auto& values) {
+        std::decay_t<decltype(values)> kept;
+        kept.reserve(cells.size() * static_cast<size_t>(attribute->components));
+        for (const vtkIdType c : cells) {
+          const auto first = values.begin() + c * attribute->components;
+          kept.insert(kept.end(), first, first + attribute->components);
+        }
+        values = std::move(kept);
+      },
+      attribute->values);
+}
+
 }  // namespace
 
 Positions CopyPositions(vtkPointSet* points) {
   Positions positions(points->GetNumberOfPoints(), 3);
   for (vtkIdType v = 0; v < positions.rows(); ++v) points->GetPoint(v, positions.row(v).data());
   return positions;
-}
-
-absl::StatusOr<CellIndices> CopyTets(vtkUnstructuredGrid* grid) {
-  const vtkIdType num_cells = grid->GetNumberOfCells();
-  const vtkIdType num_points = grid->GetNumberOfPoints();
-  CellIndices tets(num_cells, 4);
-  for (vtkIdType c = 0; c < num_cells; ++c) {
-    if (grid->GetCellType(c) != VTK_TETRA) {
-      const char* type = vtkCellTypes::GetClassNameFromTypeId(grid->GetCellType(c));
-      return absl::InvalidArgumentError(
-          absl::StrCat("cell ", c, " is a ", type, " (type ", grid->GetCellType(c),
-                       "); only linear tetrahedra (type 10) are taken"));
-    }
-    vtkIdType size = 0;
-    const vtkIdType* corners = nullptr;
-    grid->GetCells()->GetCellAtId(c, size, corners);
-    if (size != 4)
-      return absl::InvalidArgumentError(absl::StrCat("tet ", c, " has ", size, " corners, not 4"));
-    for (int corner = 0; corner < 4; ++corner) {
-      if (corners[corner] < 0 || corners[corner] >= num_points) {
-        return absl::InvalidArgumentError(absl::StrCat(
-            "tet ", c, " refers to vertex ", corners[corner], ", but there are ", num_points));
-      }
-      tets(c, corner) = static_cast<int32_t>(corners[corner]);
-    }
-  }
-  return tets;
 }
 
 absl::StatusOr<std::vector<Attribute>> CopyAttributes(vtkFieldData* fields, vtkIdType num_tuples) {
@@ -121,6 +161,21 @@ absl::StatusOr<std::vector<Attribute>> CopyAttributes(vtkFieldData* fields, vtkI
     attributes.push_back(std::move(attribute));
   }
   return attributes;
+}
+
+absl::StatusOr<RawMesh> CopyTetGrid(vtkUnstructuredGrid* grid) {
+  TF_ASSIGN_OR_RETURN(const std::vector<vtkIdType> tets, FindTets(grid));
+  RawMesh mesh;
+  TF_ASSIGN_OR_RETURN(mesh.cells, CopyTets(grid, tets));
+  mesh.positions = CopyPositions(grid);
+  TF_ASSIGN_OR_RETURN(mesh.point_data,
+                      CopyAttributes(grid->GetPointData(), grid->GetNumberOfPoints()));
+  TF_ASSIGN_OR_RETURN(mesh.cell_data,
+                      CopyAttributes(grid->GetCellData(), grid->GetNumberOfCells()));
+  mesh.left_out_cells = grid->GetNumberOfCells() - mesh.cells.rows();
+  if (mesh.left_out_cells == 0) return mesh;
+  for (Attribute& attribute : mesh.cell_data) KeepTuples(tets, &attribute);
+  return mesh;
 }
 
 }  // namespace tissueform

@@ -19,8 +19,11 @@ namespace tissueform {
 
 Positions CopyPositions(vtkPointSet* points);
 
-// #C by 4. An error where a cell is no linear tet or names a vertex that is not there.
-absl::StatusOr<CellIndices> CopyTets(vtkUnstructuredGrid* grid);
+// The linear tets, all points and all numeric arrays. Points, lines and faces, which meshers lay
+// beside the tets of a volume, are left out with their values and counted; vertices that only they
+// use stay, so that the numbers of the file still hold. An error where another cell has volume,
+// where there are only cells without, or where a tet names a vertex that is not there.
+absl::StatusOr<RawMesh> CopyTetGrid(vtkUnstructuredGrid* grid);
 
 // Every numeric array; an error where one has other than `num_tuples` tuples. Arrays that hold no
 // numbers (texts, bits) are left out.

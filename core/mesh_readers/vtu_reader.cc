@@ -59,15 +59,7 @@ absl::StatusOr<RawMesh> ReadVtu(const CheckedMeshFile& file, int64_t max_memory_
   reader->set_max_memory_bytes(max_memory_bytes);
   TF_RETURN_IF_ERROR(ReadGrid(file, reader));
   TF_RETURN_IF_ERROR(CheckCounts(reader));
-  vtkUnstructuredGrid* grid = reader->GetOutput();
-  RawMesh mesh;
-  TF_ASSIGN_OR_RETURN(mesh.cells, CopyTets(grid));
-  mesh.positions = CopyPositions(grid);
-  TF_ASSIGN_OR_RETURN(mesh.point_data,
-                      CopyAttributes(grid->GetPointData(), grid->GetNumberOfPoints()));
-  TF_ASSIGN_OR_RETURN(mesh.cell_data,
-                      CopyAttributes(grid->GetCellData(), grid->GetNumberOfCells()));
-  return mesh;
+  return CopyTetGrid(reader->GetOutput());
 }
 
 }  // namespace tissueform

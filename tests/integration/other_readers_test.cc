@@ -6,13 +6,12 @@
 #include <fstream>
 #include <memory>
 #include <string>
-#include <sys/wait.h>
 #include <variant>
 
+#include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-
-#include "absl/strings/str_cat.h"
+#include <sys/wait.h>
 
 #include "client/cli/online/server_process.h"
 #include "core/mesh_io/tet_mesh_io.h"
@@ -121,8 +120,9 @@ TEST_F(OtherReadersTest, EveryNumberTypeAndNumbersThatAreNone) {
 }
 
 TEST_F(OtherReadersTest, SurfacesInEveryFormat) {
-  ASSERT_OK_AND_ASSIGN(const TriangleMeshFile box,
-                       ReadTriangleMesh(TestDataPath("meshes/surf_manifold_tests/boxNotManifold.obj")));
+  ASSERT_OK_AND_ASSIGN(
+      const TriangleMeshFile box,
+      ReadTriangleMesh(TestDataPath("meshes/surf_manifold_tests/boxNotManifold.obj")));
   for (const char* name : {"box.vtp", "box.stl", "box.ply", "box.obj", "box.off"}) {
     ASSERT_THAT(WriteTriangleMesh(Path(name), box), IsOk());
     ExpectOthersReadTheSame(Path(name));
@@ -131,7 +131,8 @@ TEST_F(OtherReadersTest, SurfacesInEveryFormat) {
 
 TEST_F(OtherReadersTest, MeshGenerate) {
   Write("cube.off",
-        "OFF\n8 12 0\n0 0 0\n2 0 0\n0 2 0\n2 2 0\n0 0 2\n2 0 2\n0 2 2\n2 2 2\n3 0 2 1\n3 1 2 3\n3 4 5 "
+        "OFF\n8 12 0\n0 0 0\n2 0 0\n0 2 0\n2 2 0\n0 0 2\n2 0 2\n0 2 2\n2 2 2\n3 0 2 1\n3 1 2 3\n3 "
+        "4 5 "
         "6\n3 5 7 6\n3 0 1 4\n3 1 5 4\n3 2 6 3\n3 3 6 7\n3 0 4 2\n3 2 4 6\n3 1 3 5\n3 3 7 5\n");
   ASSERT_THAT(Run({"mesh", "generate", "cube.off", "--out", "cube.vtu", "--region", "1,1,1,7",
                    "--defects", "defects.vtp"}),
@@ -146,8 +147,9 @@ TEST_F(OtherReadersTest, DeformAndCompare) {
   ExpectOthersReadTheSame(Path("after.vtu"));
   ASSERT_THAT(Run({"compare", "bar.vtu", "after.vtu", "--out", "difference.vtu"}), Succeeds());
   ExpectOthersReadTheSame(Path("difference.vtu"));
-  ASSERT_THAT(Run({"compare", plan, "--models", "gradient_field,linear_elastic", "--out", "models"}),
-              Succeeds());
+  ASSERT_THAT(
+      Run({"compare", plan, "--models", "gradient_field,linear_elastic", "--out", "models"}),
+      Succeeds());
   ExpectOthersReadTheSame(Path("models/gradient_field.vtu"));
   ExpectOthersReadTheSame(Path("models/linear_elastic.vtu"));
 }

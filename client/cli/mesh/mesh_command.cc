@@ -34,7 +34,7 @@ absl::Status NameMesh(const std::string& path, const absl::Status& usable) {
 
 absl::Status CheckTets(const MeshCheckOptions& options) {
   TF_ASSIGN_OR_RETURN(const TetMeshFile file, ReadTetMesh(options.mesh));
-  const MeshReport report = ValidateTetMesh(file.mesh, file.reoriented_tets);
+  const MeshReport report = ValidateTetMesh(file.mesh, file.reoriented_tets, file.left_out_cells);
   PrintReport(options.json, MeshReportText(options.mesh, file, report),
               MeshReportJson(options.mesh, file, report));
   return NameMesh(options.mesh, CheckUsable(report));

@@ -175,6 +175,13 @@ TEST(ValidationTest, ReorientationOnReadingIsReportedAsAWarning) {
   EXPECT_TRUE(report.usable());
 }
 
+TEST(ValidationTest, CellsLeftOutOnReadingAreReportedAsAWarning) {
+  const MeshReport report = ValidateTetMesh(testing::Bar({1, 1, 1}), 0, 12);
+  ASSERT_NE(report.Find("left_out_cells"), nullptr);
+  EXPECT_EQ(report.Find("left_out_cells")->count, 12);
+  EXPECT_TRUE(report.usable());
+}
+
 TEST(ValidationTest, NegativeCotangentWeightsAreCountedAndNoDefect) {
   const MeshReport report =
       ValidateTetMesh(testing::LoadTestMesh("meshes/tet_sofa_tongue/volumetricTongue.vtu"));

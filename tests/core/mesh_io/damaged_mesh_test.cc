@@ -234,8 +234,15 @@ TEST_F(DamagedMeshTest, SeveralPiecesAreRefused) {
 }
 
 TEST_F(DamagedMeshTest, CellThatIsNoTetIsNamedWithItsType) {
-  EXPECT_THAT(ReadWith(">10<", ">9<"), IsRefused("cell 0 is a vtkQuad (type 9)"));
-  EXPECT_THAT(ReadWith(">10<", ">77<"), IsRefused("cell 0 is a"));
+  EXPECT_THAT(ReadWith(">10<", ">12<"), IsRefused("cell 0 is a vtkHexahedron (type 12)"));
+  EXPECT_THAT(ReadWith(">10<", ">14<"), IsRefused("cell 0 is a vtkPyramid (type 14)"));
+  EXPECT_THAT(ReadWith(">10<", ">78<"), IsRefused("cell 0 is a"));
+  EXPECT_THAT(ReadWith(">10<", ">200<"), IsRefused("cell 0 is a"));
+}
+
+TEST_F(DamagedMeshTest, FacesAloneAreNoMesh) {
+  EXPECT_THAT(ReadWith(">10<", ">9<"),
+              IsRefused("no tets: its 1 cells are points, lines or faces"));
 }
 
 TEST_F(DamagedMeshTest, TetWithAnotherNumberOfCornersIsRefused) {

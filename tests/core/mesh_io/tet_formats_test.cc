@@ -94,9 +94,10 @@ TEST_P(EveryTetFormatTest, ChangedBytesNeverEndTheProgram) {
 
 INSTANTIATE_TEST_SUITE_P(Files, EveryTetFormatTest,
                          ::testing::Values("legacy_ascii.vtk", "legacy_binary.vtk",
-                                           "gmsh22_ascii.msh", "gmsh22_binary.msh",
-                                           "gmsh41_ascii.msh", "gmsh41_binary.msh", "medit.mesh",
-                                           "tetgen.node", "tetgen.ele"),
+                                           "gmsh1_ascii.msh", "gmsh22_ascii.msh",
+                                           "gmsh22_binary.msh", "gmsh41_ascii.msh",
+                                           "gmsh41_binary.msh", "medit.mesh", "tetgen.node",
+                                           "tetgen.ele"),
                          [](const auto& test) {
                            std::string name = test.param;
                            name[name.find('.')] = '_';

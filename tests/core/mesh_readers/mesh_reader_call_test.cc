@@ -32,6 +32,7 @@ TEST(MeshReaderCallTest, MeshArrivesAsItWasSent) {
   EXPECT_EQ(arrived.positions, sent.positions);
   EXPECT_EQ(arrived.cells, sent.cells);
   EXPECT_EQ(arrived.split_polygons, 7);
+  EXPECT_EQ(arrived.left_out_cells, 9);
   ASSERT_EQ(arrived.point_data.size(), 3U);
   ASSERT_EQ(arrived.cell_data.size(), 2U);
   for (size_t i = 0; i < 3; ++i) {

@@ -23,6 +23,7 @@ RawMesh TriangleWithArrays() {
                      {"floats", 2, std::vector<float>{1, 2, 3, 4, 5, 6}}};
   mesh.cell_data = {{"doubles", 1, std::vector<double>{0.1}}, {"none", 1, std::vector<int16_t>{}}};
   mesh.split_polygons = 7;
+  mesh.left_out_cells = 9;
   return mesh;
 }
 

@@ -69,6 +69,18 @@ TEST_F(MeshCheckTest, TetsThatAreAllNegativeAreUsableAndReported) {
   EXPECT_EQ(json["defects"][0]["severity"], "warning");
 }
 
+TEST_F(MeshCheckTest, FacesBesideTheTetsAreLeftOutAndReported) {
+  const std::string mixed = TestDataPath("meshes/mixed_cells/meshio.vtk");
+  const ProcessResult result = Run({"mesh", "check", mixed, "--json"});
+  EXPECT_THAT(result, Succeeds());
+  const nlohmann::json json = nlohmann::json::parse(result.out);
+  EXPECT_EQ(json["tets"], 2);
+  EXPECT_EQ(json["defects"][0]["kind"], "left_out_cells");
+  EXPECT_EQ(json["defects"][0]["severity"], "warning");
+  EXPECT_EQ(json["defects"][0]["count"], 5);
+  EXPECT_EQ(json["defects"][1]["kind"], "unreferenced_vertices");
+}
+
 TEST_F(MeshCheckTest, JsonHoldsTheCountOfNegativeWeights) {
   const std::string tongue = TestDataPath("meshes/tet_sofa_tongue/volumetricTongue.vtu");
   const nlohmann::json json = nlohmann::json::parse(Run({"mesh", "check", tongue, "--json"}).out);
@@ -139,6 +151,8 @@ INSTANTIATE_TEST_SUITE_P(
         SharedMesh{"tet_sofa_armadillo_ok_and_broken/Armadillo_Tetra_4406.vtu", 0, "4406"},
         SharedMesh{"tet_sofa_armadillo_ok_and_broken/Armadillo_Tetra_4406_for_test_broken.vtu", 1,
                    "than the header says"},
+        SharedMesh{"tet_sofa_gmsh1/cylinder.msh", 0, "2430"},
+        SharedMesh{"tet_sofa_gmsh1/liver2.msh", 0, "left_out_cells"},
         SharedMesh{"tet_sofa_raptor/raptorTetra_19409.vtu", 0, "unreferenced_vertices"},
         SharedMesh{"tet_sofa_raptor/raptorTetra_8418.vtu", 0, "non_manifold_edges"},
         SharedMesh{"tet_sofa_small_inverted/6_tetra_bad.msh", 1, "inverted_tets"},
