@@ -8,7 +8,7 @@
 #include "absl/strings/str_format.h"
 
 #include "client/cli/online/handle_words.h"
-#include "client/cli/online/plan_session.h"
+#include "client/cpp/plan_session.h"
 #include "core/base/status_macros.h"
 #include "core/planning/model_names.h"
 

@@ -6,12 +6,12 @@
 #include <memory>
 #include <string>
 
-#include "client/cli/online/plan_session.h"
 #include "client/cli/shared/companion.h"
 #include "client/cli/shared/option_checks.h"
 #include "client/cli/shared/result_writer.h"
 #include "client/cli/shared/stage_progress.h"
 #include "client/cli/shared/stats_json.h"
+#include "client/cpp/plan_session.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -14,18 +15,22 @@
 
 namespace tissueform {
 
-// A session on a server that was made from a plan. It is deleted with this object, whatever happens
-// in between.
+// A session on a server that was made from a plan, whether that was read from files or has just
+// been built (core/problem). It is deleted with this object, whatever happens in between.
 class PlanSession {
  public:
-  // Uploads the mesh unless the server has it, and makes the session. `client` must outlive the
-  // result.
+  // Uploads the mesh with the stiffness of its tets unless the server has both, and makes the
+  // session. `client` must outlive the result.
+  //
+  // Errors: those of UploadMesh and CreateSession.
   static absl::StatusOr<std::unique_ptr<PlanSession>> Create(TissueformClient* client,
                                                              const PlanProblem& problem);
   ~PlanSession();
   PlanSession(const PlanSession&) = delete;
   PlanSession& operator=(const PlanSession&) = delete;
 
+  // "sessions/{id}": what DeformOnce and OpenStream of the client take.
+  const std::string& name() const { return description_.name(); }
   const v1::Session& description() const { return description_; }
 
  private:
@@ -37,5 +42,9 @@ class PlanSession {
 
 // The poses of the plan with the names of their handles.
 std::vector<NamedPose> NamedPoses(const PlanProblem& problem);
+
+// Whether the server can prepare answers of the plan's own model (PreparedAnswers in
+// deform_service.proto), so that frames of a stream need not be solved for one by one.
+bool HasPreparedAnswers(const DeformerOptions& options);
 
 }  // namespace tissueform

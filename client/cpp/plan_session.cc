@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "client/cli/online/plan_session.h"
+#include "client/cpp/plan_session.h"
 
 #include <utility>
 
@@ -10,6 +10,8 @@
 namespace tissueform {
 namespace {
 
+// The array with which the mesh is uploaded. A plan's stiffness goes as numbers of the tets, not as
+// the rule by which the plan says them: the server then needs to know no other arrays of the mesh.
 constexpr char kStiffnessArray[] = "youngs_modulus_pa";
 
 }  // namespace
@@ -44,6 +46,15 @@ std::vector<NamedPose> NamedPoses(const PlanProblem& problem) {
     poses.push_back({problem.constraints.handles()[h].name, problem.poses[h]});
   }
   return poses;
+}
+
+// The server refuses a stream that asks for what its model does not have
+// (SessionModels::CreateResponse has the same rule): who asks first, as here, can do without.
+bool HasPreparedAnswers(const DeformerOptions& options) {
+  if (options.model == DeformationModel::kLinearElastic) return true;
+  return options.model == DeformationModel::kGradientField &&
+         options.gradient_field.rotation == RotationMode::kPropagated &&
+         options.gradient_field.guidance == Guidance::kCotangent;
 }
 
 }  // namespace tissueform
