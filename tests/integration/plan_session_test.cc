@@ -61,7 +61,8 @@ TEST_F(PlanSessionTest, TheSessionEndsWithItsObject) {
     name = session->name();
     EXPECT_THAT(client->GetSession(name).status(), IsOk());
   }
-  EXPECT_THAT(client->GetSession(name).status(), StatusIs(absl::StatusCode::kNotFound, ::testing::_));
+  EXPECT_THAT(client->GetSession(name).status(),
+              StatusIs(absl::StatusCode::kNotFound, ::testing::_));
 }
 
 // The client's rule is the server's.

@@ -135,7 +135,14 @@ TEST_F(ServedCommandTest, DemoTellsHowTheFaceFollowsAndLeavesResultsAndPictures)
 
   const Json summary = Summary();
   EXPECT_EQ(summary["frames_sent"], 30);
-  EXPECT_EQ(summary["end_error_mm"], 0);
+  EXPECT_EQ(summary["frames_prepared"], summary["frames_answered"]);
+  EXPECT_EQ(summary["frame_vertices"], BoundaryVertices(result.mesh).size());
+  EXPECT_LT(summary["end_error_mm"], 0.01);  // the tolerance of prepared answers
+  const Json& solved = summary["every_frame_solved"];
+  EXPECT_EQ(solved["frames_sent"], 10);
+  EXPECT_EQ(solved["frames_prepared"], 0);
+  EXPECT_EQ(solved["frame_vertices"], result.mesh.num_vertices());
+  EXPECT_EQ(solved["end_error_mm"], 0);
   EXPECT_LT(summary["rest_error_mm"], 1e-4);
   EXPECT_EQ(summary["inverted_tets"], 0);
   // What the file of the result says of the chin.

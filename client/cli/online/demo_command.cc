@@ -104,35 +104,52 @@ absl::StatusOr<DemoCase> ReadCase(const DemoOptions& options) {
   return DemoCase{std::move(plan), std::move(problem), std::move(face)};
 }
 
-double LargestDistance(const Positions& a, const Positions& b) {
-  return (a - b).rowwise().norm().maxCoeff();
-}
-
-absl::StatusOr<DragResult> Drag(const DemoOptions& options, const PlanProblem& problem,
+absl::StatusOr<DragResult> Drag(const PlanProblem& problem, const DragOptions& options,
                                 TissueformClient* client, const std::string& session) {
-  absl::PrintF("dragging: %s, over %g s at %g poses a second ...\n", MovesInWords(problem),
-               options.drag.seconds, options.drag.poses_per_second);
   TF_ASSIGN_OR_RETURN(DragResult drag,
-                      RunDrag(client, session, NamedPoses(problem), options.drag, interrupted));
+                      RunDrag(client, session, NamedPoses(problem), options, interrupted));
   if (drag.frames.empty()) {
     return absl::InternalError("the server answered no pose");
   }
   return drag;
 }
 
+// The same way twice. First a third as long, as a client that knows nothing better would: all
+// vertices, every frame solved. Then as one that shows a face: its skin only, from prepared answers
+// where the model has them.
+struct TwoDrags {
+  DragResult solved;
+  DragResult skin;
+};
+
+absl::StatusOr<TwoDrags> DragTwice(const DemoOptions& options, const PlanProblem& problem,
+                                   TissueformClient* client, const std::string& session) {
+  DragOptions solved = options.drag;
+  solved.seconds /= 3;
+  DragOptions skin = options.drag;
+  skin.stream.vertices.kind = AnswerVertices::Kind::kSkin;
+  if (HasPreparedAnswers(problem.deformer)) skin.stream.prepared.emplace();
+  absl::PrintF("dragging: %s, over %g s at %g poses a second ...\n", MovesInWords(problem),
+               options.drag.seconds, options.drag.poses_per_second);
+  TwoDrags drags;
+  TF_ASSIGN_OR_RETURN(drags.solved, Drag(problem, solved, client, session));
+  TF_ASSIGN_OR_RETURN(drags.skin, Drag(problem, skin, client, session));
+  return drags;
+}
+
 // How exact the frames were, by other ways to the same answers.
-absl::Status CheckFrames(const PlanProblem& problem, const DragResult& drag,
-                         const Positions& deformed, TissueformClient* client,
-                         const std::string& session, DragSummary* summary) {
-  const int64_t count = problem.mesh->num_vertices();
-  TF_ASSIGN_OR_RETURN(const Positions last, DecodePositions(drag.last_positions, count));
+absl::StatusOr<DemoDrags> Summarize(const PlanProblem& problem, const TwoDrags& drags,
+                                    const Positions& deformed, TissueformClient* client,
+                                    const std::string& session) {
+  DemoDrags summary;
+  TF_ASSIGN_OR_RETURN(summary.solved, SummarizeDrag(drags.solved, deformed));
+  TF_ASSIGN_OR_RETURN(summary.skin, SummarizeDrag(drags.skin, deformed));
   TF_ASSIGN_OR_RETURN(const v1::DeformOnceResponse answer,
                       client->DeformOnce(session, PartOfPoses(NamedPoses(problem), 0)));
-  TF_ASSIGN_OR_RETURN(const Positions rest, DecodePositions(answer.positions(), count));
-  summary->vertices = count;
-  summary->end_error_mm = LargestDistance(last, deformed);
-  summary->rest_error_mm = LargestDistance(rest, problem.mesh->positions());
-  return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(const Positions rest,
+                      DecodePositions(answer.positions(), problem.mesh->num_vertices()));
+  summary.rest_error_mm = (rest - problem.mesh->positions()).rowwise().norm().maxCoeff();
+  return summary;
 }
 
 absl::Status WriteSkin(const std::string& path, const PlanProblem& problem,
@@ -145,7 +162,7 @@ absl::Status WriteSkin(const std::string& path, const PlanProblem& problem,
 }
 
 absl::Status WriteResults(const DemoOptions& options, const DemoCase& demo, const DragResult& drag,
-                          const DragSummary& summary, const DemoPrediction& prediction) {
+                          const DemoDrags& summary, const DemoPrediction& prediction) {
   TF_RETURN_IF_ERROR(WriteFramesCsv(options.FramesPath(), drag));
   TF_RETURN_IF_ERROR(WriteSummaryJson(options.SummaryPath(), summary, prediction));
   TF_RETURN_IF_ERROR(
@@ -184,17 +201,17 @@ absl::Status DragAndPredict(const DemoOptions& options, const DemoCase& demo,
                description.free_vertex_count(), description.seconds().factorise() * 1e3,
                static_cast<double>(description.bytes_held()) / (1 << 20));
   TF_RETURN_IF_ERROR(CheckNotInterrupted());
-  const std::string& name = description.name();
-  TF_ASSIGN_OR_RETURN(const DragResult drag, Drag(options, demo.problem, client, name));
+  const std::string& name = session->name();
+  TF_ASSIGN_OR_RETURN(const TwoDrags drags, DragTwice(options, demo.problem, client, name));
   TF_ASSIGN_OR_RETURN(const DemoPrediction prediction,
                       PredictAtEnd(demo.problem, demo.face, client, name));
-  DragSummary summary = SummarizeDrag(drag);
-  TF_RETURN_IF_ERROR(CheckFrames(demo.problem, drag, prediction.deformed, client, name, &summary));
+  TF_ASSIGN_OR_RETURN(const DemoDrags summary,
+                      Summarize(demo.problem, drags, prediction.deformed, client, name));
   TF_RETURN_IF_ERROR(CheckNotInterrupted());
-  PrintDragSummary(summary);
+  PrintDrags(summary);
   PrintPrediction(prediction);
   PrintInWords(summary, prediction);
-  TF_RETURN_IF_ERROR(WriteResults(options, demo, drag, summary, prediction));
+  TF_RETURN_IF_ERROR(WriteResults(options, demo, drags.skin, summary, prediction));
   DrawPictures(options, demo.problem, prediction, display);
   return CheckNotInterrupted();
 }
@@ -230,7 +247,10 @@ void AddDemoCommand(CLI::App& app, CommandWork* work) {
       ->capture_default_str();
   command->add_option("--plan", options->plan,
                       "another plan than the bundled head; it is dragged to its own pose");
-  command->add_option("--seconds", options->drag.seconds, "how long the drag takes")
+  command
+      ->add_option("--seconds", options->drag.seconds,
+                   "how long the drag takes; one of a third of it, every frame solved, comes "
+                   "first")
       ->check(CLI::Range(0.1, 60.0))
       ->capture_default_str();
   command->add_option("--port", options->port, "port of the server; 0 takes a free one")

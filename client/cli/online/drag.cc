@@ -3,6 +3,7 @@
 
 #include "client/cli/online/drag.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -11,6 +12,7 @@
 
 #include "core/base/mutex.h"
 #include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
 
 namespace tissueform {
 namespace {
@@ -49,7 +51,8 @@ void Receive(DeformStream* stream, Clock::time_point start, const SendTimes& sen
                               .sent_ms = Milliseconds(send_times.Get(frame->sequence()) - start),
                               .received_ms = Milliseconds(now - start),
                               .solve_ms = frame->summary().solve_seconds() * 1e3,
-                              .coalesced_count = frame->coalesced_count()});
+                              .coalesced_count = frame->coalesced_count(),
+                              .prepared = frame->summary().prepared()});
     result->coalesced += frame->coalesced_count();
     result->last_positions = std::move(*frame->mutable_positions());
   }
@@ -76,11 +79,18 @@ std::vector<NamedPose> PartOfPoses(absl::Span<const NamedPose> poses, double amo
 absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& session,
                                    absl::Span<const NamedPose> poses, const DragOptions& options,
                                    const std::atomic<bool>& interrupted) {
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<DeformStream> stream, client->OpenStream(session, {}));
-  const auto count = static_cast<int64_t>(options.seconds * options.poses_per_second);
+  const Stopwatch opening;
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<DeformStream> stream,
+                      client->OpenStream(session, options.stream));
+  DragResult result;
+  result.open_seconds = opening.Seconds();
+  result.vertex_count = stream->started().vertex_count();
+  result.vertices = {stream->started().vertices().begin(), stream->started().vertices().end()};
+  result.prepared_bytes = stream->started().prepared_bytes();
+  const auto count =
+      std::max<int64_t>(1, static_cast<int64_t>(options.seconds * options.poses_per_second));
   const std::chrono::duration<double> interval(1 / options.poses_per_second);
   SendTimes send_times(count);
-  DragResult result;
   const Clock::time_point start = Clock::now();
   std::thread receiver([&] { Receive(stream.get(), start, send_times, &result); });
   absl::Status sent;
@@ -88,6 +98,7 @@ absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& 
     // Deadlines of their own: a late pose does not delay the ones after it.
     std::this_thread::sleep_until(start +
                                   std::chrono::duration_cast<Clock::duration>(interval * i));
+    // From rest to the end and at rest at both: as a hand moves, not at one speed.
     const double amount =
         (1 - std::cos(M_PI * static_cast<double>(i + 1) / static_cast<double>(count))) / 2;
     send_times.Set(i, Clock::now());

@@ -19,6 +19,7 @@ namespace tissueform {
 struct DragOptions {
   double seconds = 3;
   double poses_per_second = 60;
+  DeformStream::Options stream;  // which vertices come back, and whether answers are prepared
 };
 
 // One frame that came back. Times are since the start of the drag.
@@ -28,6 +29,7 @@ struct DragFrame {
   double received_ms = 0;  // when its positions were there
   double solve_ms = 0;
   int64_t coalesced_count = 0;
+  bool prepared = false;  // by prepared answers, not by a solve of its own
 
   double latency_ms() const { return received_ms - sent_ms; }
   // All that is not solving: both ways through the network, queues and conversions.
@@ -35,13 +37,17 @@ struct DragFrame {
 };
 
 struct DragResult {
+  int64_t vertex_count = 0;       // that every frame holds
+  std::vector<int32_t> vertices;  // their numbers, as in the frames; empty: all
+  double open_seconds = 0;        // until the stream had begun: preparing answers is most of it
+  int64_t prepared_bytes = 0;
   int64_t poses_sent = 0;
   int64_t coalesced = 0;
   std::vector<DragFrame> frames;  // in the order of arrival
   std::string last_positions;     // of the last frame, as they came
 };
 
-// Streams the drag on `session`; all vertices come back. Stops early with Cancelled when
+// Streams the drag on `session`, at least one pose of it. Stops early with Cancelled when
 // `interrupted` is set.
 absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& session,
                                    absl::Span<const NamedPose> poses, const DragOptions& options,

@@ -41,6 +41,4 @@ absl::Status Drag(const std::string& address) {
 }  // namespace
 }  // namespace tissueform
 
-int main(int argc, char** argv) {
-  return argc == 2 && tissueform::Drag(argv[1]).ok() ? 0 : 1;
-}
+int main(int argc, char** argv) { return argc == 2 && tissueform::Drag(argv[1]).ok() ? 0 : 1; }
