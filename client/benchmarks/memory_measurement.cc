@@ -3,45 +3,32 @@
 
 #include "client/benchmarks/memory_measurement.h"
 
-#include <cerrno>
-#include <cstdio>
-#include <filesystem>
-#include <memory>
+#include <array>
 #include <string>
+#include <unistd.h>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "nlohmann/json.hpp"
 
-#include "client/cli/shared/demo_paths.h"
 #include "core/base/status_macros.h"
+#include "core/process/child_process.h"
 
 namespace tissueform::benchmarks {
 namespace {
 
-struct ClosePipe {
-  void operator()(FILE* pipe) const { pclose(pipe); }
-};
-
-absl::StatusOr<std::string> ProbeProgram() {
-  std::string program = SiblingProgram("tissueform-memory-probe");
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(program, error)) {
-    return absl::NotFoundError(
-        absl::StrCat("no program ", program, "; build it (target tissueform-memory-probe)"));
-  }
-  return program;
-}
-
-absl::StatusOr<std::string> OutputOf(const std::string& command) {
-  const std::unique_ptr<FILE, ClosePipe> pipe(popen(command.c_str(), "r"));
-  if (pipe == nullptr) {
-    return absl::ErrnoToStatus(errno, "cannot start the memory probe");
-  }
+absl::StatusOr<std::string> OutputOf(const std::string& program,
+                                     const std::vector<std::string>& arguments) {
+  ChildOptions options;
+  TF_ASSIGN_OR_RETURN(options.program, FindProgram(program));
+  options.arguments = arguments;
+  options.output = ChildStream::Pipe();
+  TF_ASSIGN_OR_RETURN(const auto child, ChildProcess::Start(options));
   std::string output;
-  char buffer[512];
-  while (std::fgets(buffer, sizeof(buffer), pipe.get()) != nullptr) {
-    output += buffer;
+  std::array<char, 512> block{};
+  for (ssize_t count = 0; (count = read(child->answer(), block.data(), block.size())) > 0;) {
+    output.append(block.data(), static_cast<size_t>(count));
   }
   return output;
 }
@@ -49,9 +36,9 @@ absl::StatusOr<std::string> OutputOf(const std::string& command) {
 }  // namespace
 
 absl::StatusOr<MemoryUse> MeasureMemory(const TestBar& bar, int threads) {
-  TF_ASSIGN_OR_RETURN(const std::string program, ProbeProgram());
-  TF_ASSIGN_OR_RETURN(const std::string output,
-                      OutputOf(absl::StrCat("'", program, "' ", bar.number, " ", threads)));
+  TF_ASSIGN_OR_RETURN(
+      const std::string output,
+      OutputOf("tissueform-memory-probe", {absl::StrCat(bar.number), absl::StrCat(threads)}));
   const auto json = nlohmann::json::parse(output, nullptr, false);
   if (!json.is_object()) {
     return absl::InternalError(absl::StrCat("the memory probe failed on bar ", bar.name));

@@ -18,6 +18,7 @@
 #include "core/base/stopwatch.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "core/planning/plan_io.h"
+#include "core/process/child_process.h"
 
 namespace tissueform::benchmarks {
 namespace {
@@ -58,12 +59,16 @@ absl::StatusOr<CalculixProblem> ProblemOf(const std::string& path) {
 }
 
 absl::StatusOr<double> RunOurs(const std::string& plan, const std::string& out, int threads) {
-  const std::string command = absl::StrCat("'", SiblingProgram("tissueform"), "' deform '", plan,
-                                           "' --model neo_hookean --threads ", threads, " --out '",
-                                           out, "' > '", out, ".log' 2>&1");
+  ChildOptions options;
+  TF_ASSIGN_OR_RETURN(options.program, FindProgram("tissueform"));
+  options.arguments = {"deform", plan, "--model", "neo_hookean", "--threads", absl::StrCat(threads),
+                       "--out",  out};
+  options.output = options.errors = ChildStream::File(out + ".log");
   const Stopwatch stopwatch;
-  if (std::system(command.c_str()) != 0) {
-    return absl::InternalError(absl::StrCat("this failed: ", command));
+  TF_ASSIGN_OR_RETURN(const auto child, ChildProcess::Start(options));
+  if (child->Wait().exit_code != 0) {
+    return absl::InternalError(
+        absl::StrCat("tissueform deform ", plan, " failed; see ", out, ".log"));
   }
   return stopwatch.Seconds();
 }

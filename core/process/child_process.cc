@@ -251,9 +251,13 @@ void ChildProcess::Signal(int signal) {
 
 void ChildProcess::SignalGroup(int signal) { kill(-pid_, signal); }
 
-absl::StatusOr<std::string> FindProgram(absl::string_view name) {
+std::string ProgramFolder() {
   std::error_code error;
-  const fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
+  return fs::read_symlink("/proc/self/exe", error).parent_path().string();
+}
+
+absl::StatusOr<std::string> FindProgram(absl::string_view name) {
+  const fs::path folder = ProgramFolder();
   const std::string beside = (folder / std::string(name)).string();
   const fs::path installed = folder.parent_path() / "libexec/tissueform" / std::string(name);
   for (const std::string& path : {beside, installed.string()}) {

@@ -108,6 +108,9 @@ class ChildProcess {
   std::optional<ChildEnd> end_ ABSL_GUARDED_BY(mutex_);  // when it has been reaped
 };
 
+// The folder in which the running program lies.
+std::string ProgramFolder();
+
 // Where a program of this product lies: in the folder of the running program, or in
 // ../libexec/tissueform seen from there, where programs are installed that nobody starts by hand.
 //

@@ -36,6 +36,7 @@
 #include "core/mesh_io/triangle_mesh_io.h"
 #include "core/planning/plan_io.h"
 #include "core/problem/plan_problem.h"
+#include "core/process/child_process.h"
 
 namespace tissueform {
 namespace {
@@ -222,9 +223,9 @@ absl::Status RunDemo(const DemoOptions& options) {
   TF_RETURN_IF_ERROR(MakeFolder(options));
   TF_ASSIGN_OR_RETURN(const DemoCase demo, ReadCase(options));
 
-  // Before the client: no thread of gRPC runs yet when the process forks.
+  TF_ASSIGN_OR_RETURN(const std::string server_program, FindProgram("tissueform-server"));
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<ServerProcess> server,
-                      ServerProcess::Start(SiblingProgram("tissueform-server"),
+                      ServerProcess::Start(server_program,
                                            {"--host", "127.0.0.1", "--port",
                                             std::to_string(options.port), "--log-level", "warn"},
                                            kServerStartDeadline));

@@ -9,7 +9,8 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "client/cli/shared/demo_paths.h"
+#include "core/base/status_macros.h"
+#include "core/process/child_process.h"
 
 namespace tissueform {
 
@@ -24,11 +25,7 @@ void AddCompanionCommand(CLI::App& app, const CompanionCommand& companion,
 }
 
 absl::Status BecomeProgram(const std::string& name, std::vector<std::string> arguments) {
-  std::string program = SiblingProgram(name);
-  if (access(program.c_str(), X_OK) != 0) {
-    return absl::NotFoundError(absl::StrCat("no program ", program, "; build it (target ", name,
-                                            ") or install it beside tissueform"));
-  }
+  TF_ASSIGN_OR_RETURN(std::string program, FindProgram(name));
   std::vector<char*> words = {program.data()};
   for (std::string& argument : arguments) {
     words.push_back(argument.data());

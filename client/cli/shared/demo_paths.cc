@@ -8,23 +8,15 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/process/child_process.h"
+
 namespace tissueform {
-namespace {
 
 namespace fs = std::filesystem;
 
-fs::path ProgramFolder() {
-  std::error_code error;
-  return fs::read_symlink("/proc/self/exe", error).parent_path();
-}
-
-}  // namespace
-
-std::string SiblingProgram(const std::string& name) { return (ProgramFolder() / name).string(); }
-
 absl::StatusOr<std::string> FindBundledPlan(const std::string& name) {
   const fs::path plan =
-      ProgramFolder().parent_path() / "share/tissueform/plans" / name / "plan.json";
+      fs::path(ProgramFolder()).parent_path() / "share/tissueform/plans" / name / "plan.json";
   std::error_code error;
   if (fs::is_regular_file(plan, error)) return plan.string();
   return absl::NotFoundError(absl::StrCat("the bundled plan \"", name,

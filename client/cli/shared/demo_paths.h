@@ -9,9 +9,6 @@
 
 namespace tissueform {
 
-// The program of that name in the folder of this one.
-std::string SiblingProgram(const std::string& name);
-
 // A plan that comes with the program, by the name of its folder under tests/data/plans:
 // ../share/tissueform/plans/NAME/plan.json seen from this program. Nothing of where it was built is
 // compiled in, so that an installed tree may be moved; in a build folder a link is in its place.
