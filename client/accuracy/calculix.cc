@@ -3,13 +3,11 @@
 
 #include "client/accuracy/calculix.h"
 
-#include <cerrno>
-#include <fcntl.h>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <spawn.h>
-#include <unistd.h>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/match.h"
@@ -17,60 +15,21 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
-#include <sys/wait.h>
 
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
+#include "core/process/guarded_program.h"
 
 namespace tissueform {
 namespace {
 
 constexpr char kJob[] = "problem";
+constexpr std::chrono::seconds kEndGrace{2};
 
 std::string ReadText(const std::string& path) {
   std::ifstream stream(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
-
-// Ours, but with one thread: times are compared with our own on one thread.
-std::vector<std::string> ChildEnvironment() {
-  std::vector<std::string> variables;
-  for (char** variable = environ; *variable != nullptr; ++variable) {
-    if (!absl::StartsWith(*variable, "OMP_NUM_THREADS=")) variables.emplace_back(*variable);
-  }
-  variables.emplace_back("OMP_NUM_THREADS=1");
-  return variables;
-}
-
-std::vector<char*> Pointers(std::vector<std::string>* words) {
-  std::vector<char*> pointers;
-  pointers.reserve(words->size() + 1);
-  for (std::string& word : *words) pointers.push_back(word.data());
-  pointers.push_back(nullptr);
-  return pointers;
-}
-
-absl::StatusOr<pid_t> StartProgram(const std::string& folder, const std::string& log) {
-  std::vector<std::string> arguments = {"ccx", kJob};
-  std::vector<std::string> environment = ChildEnvironment();
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, log.c_str(),
-                                   O_WRONLY | O_CREAT | O_TRUNC, 0644);
-  posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-  posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
-  pid_t child = 0;
-  const int error = posix_spawnp(&child, "ccx", &actions, nullptr, Pointers(&arguments).data(),
-                                 Pointers(&environment).data());
-  posix_spawn_file_actions_destroy(&actions);
-  if (error == ENOENT) {
-    return absl::NotFoundError(
-        "no program ccx (CalculiX, the independent finite elements); install the package "
-        "calculix-ccx");
-  }
-  if (error != 0) return absl::ErrnoToStatus(error, "cannot start ccx");
-  return child;
 }
 
 // The first line that says what went wrong, otherwise the last one that says anything.
@@ -86,12 +45,21 @@ std::string LastWord(const std::string& log) {
 
 absl::Status RunProgram(const std::string& folder) {
   const std::string log = absl::StrCat(folder, "/", kJob, ".log");
-  TF_ASSIGN_OR_RETURN(const pid_t child, StartProgram(folder, log));
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0) {
-    if (errno != EINTR) return absl::ErrnoToStatus(errno, "cannot wait for ccx");
+  ChildOptions options;
+  options.program = "ccx";
+  options.arguments = {kJob};
+  options.environment = {"OMP_NUM_THREADS=1"};  // times are compared with our own on one thread
+  options.folder = folder;
+  options.output = ChildStream::File(log);
+  options.errors = ChildStream::File(log);
+  const auto ccx = GuardedProgram::Start(std::move(options), kEndGrace);
+  if (absl::IsNotFound(ccx.status())) {
+    return absl::NotFoundError(
+        "no program ccx (CalculiX, the independent finite elements); install the package "
+        "calculix-ccx");
   }
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return absl::OkStatus();
+  TF_RETURN_IF_ERROR(ccx.status());
+  if ((*ccx)->Wait().exit_code == 0) return absl::OkStatus();
   return absl::InternalError(absl::StrCat("ccx failed: ", LastWord(ReadText(log)), " (", log, ")"));
 }
 

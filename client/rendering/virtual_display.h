@@ -4,17 +4,23 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "absl/status/statusor.h"
-#include <sys/types.h>
+
+#include "core/process/guarded_program.h"
 
 namespace tissueform {
 
+// Whether the X display that the environment variable DISPLAY names can be opened. VTK ends the
+// whole program when it cannot.
+bool DisplayOpens();
+
 // The X display that offscreen rendering needs: the one that DISPLAY names where that can be
 // opened, otherwise an Xvfb of our own on a free display, to which DISPLAY then points. Ended, and
-// DISPLAY put back, by the destructor. Changes the environment, so make it while there is one
-// thread.
+// DISPLAY put back, by the destructor; it also ends when this process does, whatever ends that.
+// Changes the environment, so make it while no other thread may read that.
 //
 // Errors: NotFound when there is no usable display and Xvfb is not installed, Unavailable when it
 // does not start.
@@ -29,9 +35,8 @@ class VirtualDisplay {
   VirtualDisplay() = default;
   absl::Status Start();
 
-  pid_t server_ = 0;  // 0: the user's own display
-  bool had_display_ = false;
-  std::string former_display_;
+  std::unique_ptr<GuardedProgram> server_;  // null: the user's own display
+  std::optional<std::string> former_display_;
 };
 
 }  // namespace tissueform

@@ -47,8 +47,8 @@ void ReplaceByNothing(int descriptor, int flags) {
 }
 
 // The exit code as a shell tells it; -1 while the program runs. What the program leaves behind is
-// killed before it is reaped, for until then nobody else can get its number, and not asked to end: a
-// shell's child that is asked before its exec may forget it with the shell's handlers.
+// killed before it is reaped, for until then nobody else can get its number, and not asked to end:
+// a shell's child that is asked before its exec may forget it with the shell's handlers.
 int ExitCodeOf(pid_t program) {
   siginfo_t info{};
   if (waitid(P_PID, program, &info, WEXITED | WNOWAIT | WNOHANG) != 0 || info.si_pid == 0) {
@@ -111,7 +111,7 @@ int main(int argc, char** argv) {
     return kCannotStart;
   }
   if (program == 0) Become(argv + 2, guard, former);
-  setpgid(program, program);  // whoever of the two is first
+  setpgid(program, program);                  // whoever of the two is first
   ReplaceByNothing(STDOUT_FILENO, O_WRONLY);  // whose end is the program's alone
   return Watch(program, arriving, static_cast<int>(grace_ms));
 }

@@ -5,6 +5,7 @@
 #include <future>
 #include <memory>
 #include <string>
+#include <unistd.h>
 #include <utility>
 #include <vector>
 
@@ -13,9 +14,13 @@
 #include "grpcpp/generic/generic_stub.h"
 #include "grpcpp/support/byte_buffer.h"
 #include "gtest/gtest.h"
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 
 #include "client/cli/online/server_process.h"
 #include "tests/integration/service_test.h"
+#include "tests/testing/killed_starter.h"
 #include "tests/testing/status_matchers.h"
 
 // The real program: starts, tells its port, serves, drains.
@@ -125,6 +130,33 @@ TEST_F(ServerProgramTest, AStreamThatDoesNotEndIsCutAtTheDrainDeadline) {
   EXPECT_FALSE((*stream)->Receive().has_value());
   EXPECT_FALSE((*stream)->Finish().ok());
   EXPECT_EQ(process_->WaitForExit(kPatience), 0);
+}
+
+// A connection to 127.0.0.1:PORT; -1 when nobody listens there.
+int ConnectTo(const std::string& host_and_port) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const std::string port = host_and_port.substr(host_and_port.rfind(':') + 1);
+  address.sin_port = htons(static_cast<uint16_t>(std::atoi(port.c_str())));
+  const int connection = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (connect(connection, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0) {
+    return connection;
+  }
+  close(connection);
+  return -1;
+}
+
+TEST(ServerProgramStartTest, TheServerEndsAlsoWhenItsStarterIsKilled) {
+  KilledStarter starter([] {
+    const std::unique_ptr<ServerProcess>& kept = *new auto(StartProgram({"--host", "127.0.0.1"}));
+    return kept == nullptr ? "" : kept->address();
+  });
+  const int connection = ConnectTo(starter.word());
+  ASSERT_GE(connection, 0) << starter.word();
+  starter.Kill();
+  EXPECT_TRUE(Closes(connection));
+  close(connection);
 }
 
 TEST(ServerProgramStartTest, AProgramThatIsNotThereIsNamed) {

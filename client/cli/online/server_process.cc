@@ -5,18 +5,13 @@
 
 #include <array>
 #include <cerrno>
-#include <cstring>
-#include <fcntl.h>
 #include <poll.h>
-#include <signal.h>
-#include <thread>
 #include <unistd.h>
+#include <utility>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
-#include <sys/prctl.h>
-#include <sys/wait.h>
 
 #include "core/base/status_macros.h"
 
@@ -26,23 +21,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr char kListening[] = "listening on ";
-constexpr std::chrono::seconds kEndDeadline{30};
-constexpr std::chrono::milliseconds kEndPollInterval{5};
-constexpr int kExecFailed = 127;
-
-// In the child, between fork and exec: calls only what is safe there.
-[[noreturn]] void BecomeServer(const char* binary, char* const* arguments, int output,
-                               pid_t parent) {
-  // A group of its own: Ctrl-C reaches the parent, which ends the server itself.
-  setpgid(0, 0);
-  prctl(PR_SET_PDEATHSIG, SIGTERM);
-  if (getppid() != parent) {
-    _exit(kExecFailed);  // the parent ended before prctl
-  }
-  dup2(output, STDOUT_FILENO);
-  execv(binary, arguments);
-  _exit(kExecFailed);
-}
+// More than a server may take that drains without being told how long.
+constexpr std::chrono::seconds kEndGrace{30};
 
 }  // namespace
 
@@ -54,61 +34,21 @@ absl::StatusOr<std::unique_ptr<ServerProcess>> ServerProcess::Start(
                                             "; build it (target tissueform-server) or install it "
                                             "beside tissueform"));
   }
-  std::vector<std::string> words = {binary};
-  words.insert(words.end(), arguments.begin(), arguments.end());
-  std::vector<char*> pointers;
-  pointers.reserve(words.size() + 1);
-  for (std::string& word : words) {
-    pointers.push_back(word.data());
-  }
-  pointers.push_back(nullptr);
-  std::array<int, 2> pipe_ends{};
-  if (pipe2(pipe_ends.data(), O_CLOEXEC) != 0) {
-    return absl::ErrnoToStatus(errno, "cannot start the server");
-  }
-  const pid_t parent = getpid();
-  const pid_t pid = fork();
-  if (pid == 0) {
-    BecomeServer(binary.c_str(), pointers.data(), pipe_ends[1], parent);
-  }
-  close(pipe_ends[1]);
-  if (pid < 0) {
-    close(pipe_ends[0]);
-    return absl::ErrnoToStatus(errno, "cannot start the server");
-  }
-  std::unique_ptr<ServerProcess> process(new ServerProcess(pid, pipe_ends[0]));
+  ChildOptions options;
+  options.program = binary;
+  options.arguments = arguments;
+  options.output = ChildStream::Pipe();
+  TF_ASSIGN_OR_RETURN(std::unique_ptr<GuardedProgram> program,
+                      GuardedProgram::Start(std::move(options), kEndGrace));
+  std::unique_ptr<ServerProcess> process(new ServerProcess(std::move(program)));
   TF_RETURN_IF_ERROR(process->WaitUntilListening(deadline));
   return process;
 }
 
-ServerProcess::~ServerProcess() {
-  close(output_);
-  Terminate();
-  if (!WaitForExit(kEndDeadline).has_value()) {
-    kill(pid_, SIGKILL);
-    waitpid(pid_, nullptr, 0);
-  }
-}
-
-void ServerProcess::Terminate() {
-  if (!exit_code_.has_value()) {
-    kill(pid_, SIGTERM);
-  }
-}
-
 std::optional<int> ServerProcess::WaitForExit(std::chrono::milliseconds deadline) {
-  const auto end = Clock::now() + deadline;
-  while (!exit_code_.has_value()) {
-    int status = 0;
-    if (waitpid(pid_, &status, WNOHANG) == pid_) {
-      exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    } else if (Clock::now() >= end) {
-      break;
-    } else {
-      std::this_thread::sleep_for(kEndPollInterval);
-    }
-  }
-  return exit_code_;
+  const std::optional<ChildEnd> end = program_->WaitFor(deadline);
+  if (!end.has_value()) return std::nullopt;
+  return end->exit_code;
 }
 
 absl::Status ServerProcess::WaitUntilListening(std::chrono::milliseconds deadline) {
@@ -116,12 +56,12 @@ absl::Status ServerProcess::WaitUntilListening(std::chrono::milliseconds deadlin
   std::string text;
   while (!absl::StrContains(text, "\n")) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
-    pollfd readable{.fd = output_, .events = POLLIN, .revents = 0};
+    pollfd readable{.fd = program_->answer(), .events = POLLIN, .revents = 0};
     if (left.count() <= 0 || poll(&readable, 1, static_cast<int>(left.count())) == 0) {
       return absl::UnavailableError("the server did not listen in time");
     }
     std::array<char, 256> buffer{};
-    const ssize_t count = read(output_, buffer.data(), buffer.size());
+    const ssize_t count = read(program_->answer(), buffer.data(), buffer.size());
     if (count > 0) {
       text.append(buffer.data(), count);
     } else if (count == 0) {

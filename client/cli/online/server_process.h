@@ -7,15 +7,17 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include <sys/types.h>
+
+#include "core/process/guarded_program.h"
 
 namespace tissueform {
 
-// A tissueform-server as a child of this process. Ends with this object, and with this process
-// whatever ends it.
+// A tissueform-server that this process has started. Ends with this object, and with this process
+// whatever ends it: SIGTERM, and SIGKILL when it has not ended in 30 s.
 class ServerProcess {
  public:
   // Starts `binary` with `arguments` and waits until it listens.
@@ -24,8 +26,6 @@ class ServerProcess {
   static absl::StatusOr<std::unique_ptr<ServerProcess>> Start(
       const std::string& binary, const std::vector<std::string>& arguments,
       std::chrono::milliseconds deadline);
-  // SIGTERM, and SIGKILL when it has not ended in 30 s.
-  ~ServerProcess();
   ServerProcess(const ServerProcess&) = delete;
   ServerProcess& operator=(const ServerProcess&) = delete;
 
@@ -33,19 +33,17 @@ class ServerProcess {
   const std::string& address() const { return address_; }
 
   // SIGTERM: the server drains and ends.
-  void Terminate();
+  void Terminate() { program_->Terminate(); }
   // Waits until it has ended. Its exit code (128 + signal when a signal ended it), or nothing when
   // it still runs at the deadline.
   std::optional<int> WaitForExit(std::chrono::milliseconds deadline);
 
  private:
-  ServerProcess(pid_t pid, int output) : pid_(pid), output_(output) {}
+  explicit ServerProcess(std::unique_ptr<GuardedProgram> program) : program_(std::move(program)) {}
 
   absl::Status WaitUntilListening(std::chrono::milliseconds deadline);
 
-  const pid_t pid_;
-  const int output_;              // read end of its stdout
-  std::optional<int> exit_code_;  // set: the process is gone, and its pid may be another's
+  const std::unique_ptr<GuardedProgram> program_;
   std::string address_;
 };
 

@@ -8,9 +8,13 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <unistd.h>
 
-#include "client/rendering/display_check.h"
+#include <sys/socket.h>
+#include <sys/un.h>
+
 #include "client/rendering/virtual_display.h"
+#include "tests/testing/killed_starter.h"
 #include "tests/testing/scoped_environment.h"
 #include "tests/testing/status_matchers.h"
 
@@ -174,6 +178,36 @@ TEST_F(FigureTest, OwnDisplayIsUsableAndGoneAfterwards) {
   }
   EXPECT_STREQ(std::getenv("DISPLAY"), ":71234");
   EXPECT_FALSE(DisplayOpens());
+}
+
+// A connection to the X display of that name; -1 when there is none.
+int ConnectTo(const std::string& display) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::string path = "/tmp/.X11-unix/X" + display.substr(display.find(':') + 1);
+  path.copy(address.sun_path, sizeof(address.sun_path) - 1);
+  const int connection = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (connect(connection, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0) {
+    return connection;
+  }
+  close(connection);
+  return -1;
+}
+
+TEST(VirtualDisplayTest, EndsAlsoWhenItsStarterIsKilled) {
+  const ScopedEnvironment no_display("DISPLAY", nullptr);
+  testing::KilledStarter starter([]() -> std::string {
+    auto display = VirtualDisplay::Open();
+    if (!display.ok()) return std::string(absl::StatusCodeToString(display.status().code()));
+    display->release();
+    return std::getenv("DISPLAY");
+  });
+  if (starter.word() == "NOT_FOUND") GTEST_SKIP() << "without Xvfb";
+  const int connection = ConnectTo(starter.word());
+  ASSERT_GE(connection, 0) << starter.word();
+  starter.Kill();
+  EXPECT_TRUE(testing::Closes(connection));
+  close(connection);
 }
 
 TEST(VirtualDisplayTest, MissingXvfbIsSaidWithItsPackage) {

@@ -19,8 +19,8 @@
 namespace tissueform {
 namespace {
 
-using ::testing::HasSubstr;
 using testing::Closes;
+using ::testing::HasSubstr;
 using testing::KilledStarter;
 using testing::ScopedEnvironment;
 using testing::StatusIs;
@@ -92,9 +92,8 @@ TEST(GuardedProgramTest, TerminatedProgramMayClearUp) {
 }
 
 TEST(GuardedProgramTest, OneThatDoesNotWantToEndIsKilledAfterTheGrace) {
-  ASSERT_OK_AND_ASSIGN(
-      const auto program,
-      GuardedProgram::Start(Shell(kIgnoresTerm), std::chrono::milliseconds(1)));
+  ASSERT_OK_AND_ASSIGN(const auto program,
+                       GuardedProgram::Start(Shell(kIgnoresTerm), std::chrono::milliseconds(1)));
   ASSERT_EQ(ReadLine(program->answer()), "begun");
   program->Terminate();
   EXPECT_EQ(program->Wait().exit_code, 128 + SIGKILL);
@@ -153,8 +152,7 @@ TEST(GuardProgramTest, WrongUseIsTold) {
   ASSERT_OK_AND_ASSIGN(const std::string guard, FindProgram("tissueform-guard"));
   ChildOptions silent = Program(guard);
   silent.errors = ChildStream::Null();
-  ASSERT_OK_AND_ASSIGN(const auto child,
-                       ChildProcess::Start(silent));
+  ASSERT_OK_AND_ASSIGN(const auto child, ChildProcess::Start(silent));
   EXPECT_EQ(child->Wait().exit_code, 2);
 }
 
