@@ -7,6 +7,7 @@
 #include "client/cli/bench/bench_command.h"
 #include "client/cli/compare/compare_command.h"
 #include "client/cli/mesh/mesh_command.h"
+#include "client/cli/plan_build/plan_build_command.h"
 #include "client/cli/predict/deform_command.h"
 #include "client/cli/predict/plan_command.h"
 #include "client/cli/shared/command_line.h"
@@ -16,7 +17,8 @@ int main(int argc, char** argv) {
   const std::vector<std::string> words(argv + 1, argv + argc);
   return tissueform::RunCommandLine(argc, argv, [&](CLI::App& app, tissueform::CommandWork* work) {
     tissueform::AddMeshCommand(app, work);
-    tissueform::AddPlanCommand(app, words, work);
+    CLI::App* plan = tissueform::AddPlanCommand(app, work);
+    tissueform::AddPlanBuildCommand(*plan, work);
     tissueform::AddDeformCommand(app, work);
     tissueform::AddCompanionCommand(app, tissueform::kRunCommand, words, work);
     tissueform::AddCompareCommand(app, work);

@@ -10,7 +10,6 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "core/process/child_process.h"
 
 namespace tissueform {
 namespace {
@@ -19,13 +18,14 @@ constexpr std::chrono::seconds kEndGrace{10};
 constexpr int kLoaderFailed = 127;  // what the dynamic loader ends a program with
 
 absl::Status ExplainEnd(const HelperCall& call, const ChildEnd& end) {
-  if (end.signal == SIGXCPU || end.signal == SIGKILL) {
-    return absl::ResourceExhaustedError(absl::StrCat(
-        call.what, " took more than ", call.limits.max_seconds, " seconds or all memory"));
-  }
   if (end.exit_code == kLoaderFailed) {
     return absl::FailedPreconditionError(absl::StrCat(
         "the program ", call.program, " does not start; a library that it needs is missing"));
+  }
+  if (call.explain) return call.explain(end);
+  if (end.signal == SIGXCPU || end.signal == SIGKILL) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        call.what, " took more than ", call.limits.max_seconds, " seconds or all memory"));
   }
   return absl::InvalidArgumentError(
       absl::StrCat("it is damaged: the library crashed while ", call.what));
@@ -52,6 +52,7 @@ absl::Status CallHelper(const HelperCall& call,
   request.Number(kHelperCallVersion);
   request.Number(call.limits.max_memory_bytes);
   request.Number(call.limits.max_seconds);
+  request.Number(call.limits.max_file_bytes);
   send(&request);  // where that fails, how the helper ended tells more
   const absl::Status received = receive(helper->answer());
   if (absl::IsDataLoss(received)) {

@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 
+#include "core/process/child_process.h"
 #include "core/process/helper_program.h"
 #include "core/process/pipe_stream.h"
 
@@ -19,6 +20,8 @@ struct HelperCall {
   absl::string_view program;  // its name; see FindProgram
   absl::string_view what;     // what it tries, for messages: "reading it"
   IsolationLimits limits;
+  // What it means that it ended in the middle; null: see below.
+  std::function<absl::Status(const ChildEnd& end)> explain = nullptr;
 };
 
 // Lets a helper program do a piece of work: starts it, sends it the limits and what `send` writes,
@@ -27,9 +30,9 @@ struct HelperCall {
 // call it, many at once.
 //
 // Errors: those of `receive`. Where `receive` says DataLoss, because the helper ended in the
-// middle: InvalidArgument when it crashed, ResourceExhausted when a limit stopped it,
-// FailedPrecondition when it could not begin. NotFound when there is no such program, or what the
-// system says when it cannot be started.
+// middle: InvalidArgument when it crashed, ResourceExhausted when a limit stopped it, or what
+// `explain` makes of these; FailedPrecondition when it could not begin. NotFound when there is no
+// such program, or what the system says when it cannot be started.
 absl::Status CallHelper(const HelperCall& call,
                         const std::function<void(PipeSender* request)>& send,
                         const std::function<absl::Status(int descriptor)>& receive);

@@ -72,6 +72,7 @@ absl::StatusOr<IsolationLimits> ReceiveLimits(PipeReceiver* request) {
   TF_ASSIGN_OR_RETURN(limits.max_memory_bytes, request->Number(INT64_MAX));
   TF_ASSIGN_OR_RETURN(const int64_t seconds, request->Number(kMostSeconds));
   limits.max_seconds = static_cast<int>(seconds);
+  TF_ASSIGN_OR_RETURN(limits.max_file_bytes, request->Number(INT64_MAX));
   return limits;
 }
 
@@ -106,7 +107,7 @@ void EndWhenClosed(int descriptor) {
 void BindToLimits(const IsolationLimits& limits) {
   std::signal(SIGXFSZ, SIG_IGN);  // so that writing fails, as on a full disk
   SetLimit(RLIMIT_CORE, 0);
-  SetLimit(RLIMIT_FSIZE, 0);
+  SetLimit(RLIMIT_FSIZE, limits.max_file_bytes);
   SetLimit(RLIMIT_CPU, limits.max_seconds);
   // Written so that a limit of "all there is" does not overflow.
   const int64_t present = AddressSpaceBytes();

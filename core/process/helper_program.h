@@ -13,10 +13,11 @@
 
 namespace tissueform {
 
-// What a helper program may use before it is stopped. It cannot write files.
+// What a helper program may use before it is stopped.
 struct IsolationLimits {
   int64_t max_memory_bytes = int64_t{16} << 30;  // beyond what it has when it begins
   int max_seconds = 600;                         // of processor time
+  int64_t max_file_bytes = 0;                    // of every file that it writes
 };
 
 // Both sides of a call must be of one build: the layout of what is sent is no public format.
@@ -49,7 +50,7 @@ absl::Status WithoutExceptions(absl::string_view what, const IsolationLimits& li
 // read.
 void EndWhenClosed(int descriptor);
 
-// From now on this process may use so much, cannot write files and leaves no core file. Memory
+// From now on this process may use so much and leaves no core file. Memory
 // is not limited under sanitizers, which reserve terabytes of addresses for themselves.
 void BindToLimits(const IsolationLimits& limits);
 

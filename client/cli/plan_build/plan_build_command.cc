@@ -4,10 +4,8 @@
 #include "client/cli/plan_build/plan_build_command.h"
 
 #include <algorithm>
-#include <cstdio>
+#include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <string>
 
@@ -16,27 +14,17 @@
 #include "nlohmann/json.hpp"
 #include <sys/resource.h>
 
-#include "client/cli/plan_build/folder_worker.h"
+#include "client/cli/plan_build/ending_signals.h"
 #include "client/cli/plan_build/stage_times.h"
-#include "client/cli/shared/companion.h"
 #include "client/cli/shared/version.h"
-#include "client/plan_report/cautions.h"
-#include "client/plan_report/plan_measures.h"
-#include "client/plan_report/plan_report.h"
-#include "client/rendering/virtual_display.h"
 #include "core/base/atomic_file.h"
 #include "core/base/atomic_folder.h"
 #include "core/base/parallel_for.h"
 #include "core/base/status_macros.h"
-#include "core/linear_solvers/blas_threads.h"
-#include "core/mesh_payload/sha256.h"
-#include "core/plan_building/plan_builder.h"
+#include "core/plan_building/plan_build_call.h"
 
 namespace tissueform {
 namespace {
-
-// Of the whole work's time: what building, without writing and the report, takes.
-constexpr double kBuildShare = 0.8;
 
 struct PlanBuildArguments {
   std::string ct;
@@ -46,12 +34,6 @@ struct PlanBuildArguments {
   int threads = 0;
   bool no_pictures = false;
 };
-
-std::string Sha256OfFile(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  return Sha256Hex({text});
-}
 
 // The folder appears all at once, and holds no times: they go elsewhere.
 absl::Status CheckStatsFile(const PlanBuildArguments& arguments) {
@@ -66,13 +48,6 @@ absl::Status CheckStatsFile(const PlanBuildArguments& arguments) {
         "--stats ", arguments.stats, " lies in the folder of --out; name a file elsewhere"));
   }
   return CheckWritable(arguments.stats);
-}
-
-StageFunction Within(StageTimes* times, double from, double to) {
-  return [times, from, to](absl::string_view stage, double fraction) {
-    if (stage == "done") return;
-    times->Begin(stage, from + (to - from) * fraction);
-  };
 }
 
 // Of this process, or of its largest child: what a machine must have, at least.
@@ -97,73 +72,38 @@ absl::Status WriteStatsFile(const std::string& path, const StageTimes& times, in
   return WriteFileAtomically(path, stats.dump(2) + "\n");
 }
 
-std::string QualityText(const PlanBuild& build) {
-  std::string failed;
-  for (const QualityCheck& check : CheckQuality(build, MeasurePlan(build))) {
-    if (check.passed) continue;
-    absl::StrAppend(&failed, failed.empty() ? "" : "; ", check.name, ": ", check.measured, ", not ",
-                    check.required);
-  }
-  return failed.empty() ? "all quality requirements are met"
-                        : absl::StrCat("NOT all quality requirements are met: ", failed);
-}
-
-// What is printed when all went well.
-std::string Outcome(const PlanBuildArguments& arguments, const PlanBuild& build) {
-  std::string text = absl::StrFormat("plan    %s/plan.json: %d vertices, %d tets\n", arguments.out,
-                                     build.mesh->mesh.num_vertices(), build.mesh->mesh.num_tets());
-  for (const BuiltSegment& segment : build.segments) {
-    absl::StrAppendFormat(&text, "  handle  %s (%s): %.1f cm3 of bone\n", segment.cut.name,
-                          OsteotomyKindName(segment.cut.kind), segment.volume_mm3 / 1000);
-  }
-  absl::StrAppendFormat(&text, "report  %s/report.html: %s\n", arguments.out, QualityText(build));
-  for (const std::string& caution : Cautions(build)) {
-    absl::StrAppend(&text, "mind    ", caution, "\n");
-  }
-  absl::StrAppendFormat(
-      &text, "the plan is ready: tissueform deform %s/plan.json --out after.vtu\n", arguments.out);
-  return text;
-}
-
-absl::StatusOr<std::string> BuildInto(const PlanBuildArguments& arguments, const Recipe& recipe,
-                                      const std::string& folder) {
-  // As deform does: the last digits would depend on their number, and with them what the trial of
-  // the planned move finds torn. Threads that wait for each other also cost more than they give.
-  SetBlasThreads(1);
+// All or nothing: when it has returned an error nothing is left.
+absl::StatusOr<std::string> BuildIntoFolder(const PlanBuildArguments& arguments,
+                                            const EndingSignals& signals) {
+  TF_ASSIGN_OR_RETURN(AtomicFolder folder, AtomicFolder::Create(arguments.out));
   StageTimes times;
-  std::unique_ptr<VirtualDisplay> display;
-  if (!arguments.no_pictures) {
-    // First: before any thread, and so that a missing program is told before the work.
-    TF_ASSIGN_OR_RETURN(display, VirtualDisplay::Open());
-  }
-  TF_ASSIGN_OR_RETURN(const PlanBuild build, BuildPlan(arguments.ct, recipe,
-                                                       {.threads = arguments.threads,
-                                                        .tell = Within(&times, 0, kBuildShare)}));
-  times.Begin("writing the plan", kBuildShare);
-  TF_RETURN_IF_ERROR(WritePlan(build, folder));
-  TF_RETURN_IF_ERROR(WritePlanReport(build,
-                                     {.program_version = kVersion,
-                                      .recipe_sha256 = Sha256OfFile(arguments.recipe),
-                                      .pictures = !arguments.no_pictures,
-                                      .tell = Within(&times, kBuildShare + 0.05, 1)},
-                                     folder));
+  TF_ASSIGN_OR_RETURN(std::string outcome,
+                      CallPlanBuild({.ct = arguments.ct,
+                                     .recipe = arguments.recipe,
+                                     .folder = folder.path(),
+                                     .folder_name = arguments.out,
+                                     .threads = arguments.threads,
+                                     .pictures = !arguments.no_pictures},
+                                    {.tell = [&times](absl::string_view stage,
+                                                      double done) { times.Begin(stage, done); },
+                                     .cancel = signals.descriptor()}));
   times.End();
   if (!arguments.stats.empty()) {
     TF_RETURN_IF_ERROR(WriteStatsFile(arguments.stats, times, arguments.threads));
   }
-  return Outcome(arguments, build);
+  TF_RETURN_IF_ERROR(folder.Publish());
+  return outcome;
 }
 
 absl::Status RunPlanBuild(PlanBuildArguments arguments) {
   TF_RETURN_IF_ERROR(CheckFillable(arguments.out));
   TF_RETURN_IF_ERROR(CheckStatsFile(arguments));
-  TF_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipe(arguments.recipe));
   if (arguments.threads == 0) arguments.threads = AvailableProcessors();
-  TF_ASSIGN_OR_RETURN(const std::string outcome,
-                      FillFolderAtomically(arguments.out, [&](const std::string& folder) {
-                        return BuildInto(arguments, recipe, folder);
-                      }));
-  absl::PrintF("%s", outcome);
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<EndingSignals> signals, EndingSignals::Catch());
+  const absl::StatusOr<std::string> outcome = BuildIntoFolder(arguments, *signals);
+  if (absl::IsCancelled(outcome.status())) signals->EndByArrived();
+  TF_RETURN_IF_ERROR(outcome.status());
+  absl::PrintF("%s", *outcome);
   return absl::OkStatus();
 }
 
@@ -186,7 +126,7 @@ constexpr char kFooter[] =
 
 void AddPlanBuildCommand(CLI::App& app, CommandWork* work) {
   auto arguments = std::make_shared<PlanBuildArguments>();
-  CLI::App* build = app.add_subcommand(kPlanBuildCommand.name, kPlanBuildCommand.description);
+  CLI::App* build = app.add_subcommand("build", "make a plan from a CT of a head");
   build
       ->add_option("--ct", arguments->ct,
                    "folder of a DICOM series or a file of it, or a volume (.nii .nii.gz .nrrd "

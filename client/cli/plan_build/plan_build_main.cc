@@ -1,14 +1,103 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
-// The companion of `tissueform` that makes plans from CTs.
+// The program that `tissueform plan build` starts, as does any other caller of CallPlanBuild: makes
+// a plan from a CT, and the report of it.
 
-#include "client/cli/plan_build/plan_build_command.h"
-#include "client/cli/shared/command_line.h"
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
 
-int main(int argc, char** argv) {
-  return tissueform::RunCommandLine(argc, argv, [](CLI::App& app, tissueform::CommandWork* work) {
-    CLI::App* plan = app.add_subcommand("plan", "work on plan files");
-    tissueform::AddPlanBuildCommand(*plan, work);
-  });
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+#include "client/cli/shared/version.h"
+#include "client/plan_report/cautions.h"
+#include "client/plan_report/plan_measures.h"
+#include "client/plan_report/plan_report.h"
+#include "client/rendering/virtual_display.h"
+#include "core/base/status_macros.h"
+#include "core/linear_solvers/blas_threads.h"
+#include "core/mesh_payload/sha256.h"
+#include "core/plan_building/plan_build_call.h"
+#include "core/plan_building/plan_builder.h"
+
+namespace tissueform {
+namespace {
+
+// Of the whole work's time: what building, without writing and the report, takes.
+constexpr double kBuildShare = 0.8;
+
+std::string Sha256OfFile(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  return Sha256Hex({text});
 }
+
+StageFunction Within(const StageFunction& tell, double from, double to) {
+  return [tell, from, to](absl::string_view stage, double fraction) {
+    if (stage != "done") tell(stage, from + (to - from) * fraction);
+  };
+}
+
+std::string QualityText(const PlanBuild& build) {
+  std::string failed;
+  for (const QualityCheck& check : CheckQuality(build, MeasurePlan(build))) {
+    if (check.passed) continue;
+    absl::StrAppend(&failed, failed.empty() ? "" : "; ", check.name, ": ", check.measured, ", not ",
+                    check.required);
+  }
+  return failed.empty() ? "all quality requirements are met"
+                        : absl::StrCat("NOT all quality requirements are met: ", failed);
+}
+
+// What is printed when all went well.
+std::string Outcome(const PlanBuildRequest& request, const PlanBuild& build) {
+  std::string text =
+      absl::StrFormat("plan    %s/plan.json: %d vertices, %d tets\n", request.folder_name,
+                      build.mesh->mesh.num_vertices(), build.mesh->mesh.num_tets());
+  for (const BuiltSegment& segment : build.segments) {
+    absl::StrAppendFormat(&text, "  handle  %s (%s): %.1f cm3 of bone\n", segment.cut.name,
+                          OsteotomyKindName(segment.cut.kind), segment.volume_mm3 / 1000);
+  }
+  absl::StrAppendFormat(&text, "report  %s/report.html: %s\n", request.folder_name,
+                        QualityText(build));
+  for (const std::string& caution : Cautions(build)) {
+    absl::StrAppend(&text, "mind    ", caution, "\n");
+  }
+  absl::StrAppendFormat(&text,
+                        "the plan is ready: tissueform deform %s/plan.json --out after.vtu\n",
+                        request.folder_name);
+  return text;
+}
+
+absl::StatusOr<std::string> BuildRequestedPlan(const PlanBuildRequest& request,
+                                               const StageFunction& tell) {
+  TF_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipe(request.recipe));
+  // As deform does: the last digits would depend on their number, and with them what the trial of
+  // the planned move finds torn. Threads that wait for each other also cost more than they give.
+  SetBlasThreads(1);
+  std::unique_ptr<VirtualDisplay> display;
+  if (request.pictures) {
+    // First, so that a missing program is told before the work.
+    TF_ASSIGN_OR_RETURN(display, VirtualDisplay::Open());
+  }
+  TF_ASSIGN_OR_RETURN(const PlanBuild build, BuildPlan(request.ct, recipe,
+                                                       {.threads = request.threads,
+                                                        .tell = Within(tell, 0, kBuildShare)}));
+  tell("writing the plan", kBuildShare);
+  TF_RETURN_IF_ERROR(WritePlan(build, request.folder));
+  TF_RETURN_IF_ERROR(WritePlanReport(build,
+                                     {.program_version = kVersion,
+                                      .recipe_sha256 = Sha256OfFile(request.recipe),
+                                      .pictures = request.pictures,
+                                      .tell = Within(tell, kBuildShare + 0.05, 1)},
+                                     request.folder));
+  return Outcome(request, build);
+}
+
+}  // namespace
+}  // namespace tissueform
+
+int main() { return tissueform::RunPlanBuildProgram(tissueform::BuildRequestedPlan); }

@@ -10,7 +10,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
-#include "client/cli/shared/companion.h"
 #include "client/cli/shared/option_checks.h"
 #include "core/base/status_macros.h"
 #include "core/planning/model_names.h"
@@ -57,13 +56,12 @@ absl::Status RunPlanCheck(const PlanCheckOptions& options) {
 
 }  // namespace
 
-void AddPlanCommand(CLI::App& app, const std::vector<std::string>& words, CommandWork* work) {
+CLI::App* AddPlanCommand(CLI::App& app, CommandWork* work) {
   CLI::App* plan = app.add_subcommand("plan", "work on plan files");
   plan->footer(
       "Examples:\n"
       "  tissueform plan build --ct series/ --recipe recipe.json --out head\n"
       "  tissueform plan check head/plan.json");
-  AddCompanionCommand(*plan, kPlanBuildCommand, words, work);
 
   auto options = std::make_shared<PlanCheckOptions>();
   CLI::App* check =
@@ -76,6 +74,7 @@ void AddPlanCommand(CLI::App& app, const std::vector<std::string>& words, Comman
       "Exit code 0: the plan can be run. 1: it cannot; the line on stderr names the key and what "
       "to do.");
   check->callback([options, work] { *work = [options] { return RunPlanCheck(*options); }; });
+  return plan;
 }
 
 }  // namespace tissueform

@@ -11,7 +11,7 @@
 namespace tissueform {
 
 // A command whose work another program does, which lies beside `tissueform`: loading the libraries
-// that only few commands need (gRPC, VTK's rendering, ITK) takes longer than most predictions.
+// that only few commands need (gRPC, VTK's rendering) takes longer than most predictions.
 struct CompanionCommand {
   const char* name;
   const char* description;
@@ -26,11 +26,9 @@ inline constexpr CompanionCommand kDemoCommand = {
 inline constexpr CompanionCommand kExperimentsCommand = {
     "experiments", "compute the paper's figures and table again, and the models' accuracy",
     "tissueform-experiments"};
-inline constexpr CompanionCommand kPlanBuildCommand = {  // of `plan`
-    "build", "make a plan from a CT of a head", "tissueform-plan-build"};
 
-// Adds the command to `app`, which may be a command itself (`plan`); all that follows its name,
-// --help too, is left to the companion, which is given the words of this process's command line.
+// Adds the command to `app`; all that follows its name, --help too, is left to the companion, which
+// is given the words of this process's command line.
 void AddCompanionCommand(CLI::App& app, const CompanionCommand& companion,
                          std::vector<std::string> words, CommandWork* work);
 
