@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <future>
 #include <string>
 
 #include "core/base/stopwatch.h"
@@ -11,9 +12,6 @@ namespace tissueform {
 
 // Tells on stderr that a stage is at work when it takes longer than a second, and how long it took
 // when it ends. Short stages say nothing. One at a time.
-//
-// Uses the process's interval timer (SIGALRM), not a thread: reading a mesh forks, and a thread
-// that holds a lock of the allocator at that moment would leave the child waiting for it for ever.
 class StageProgress {
  public:
   explicit StageProgress(std::string stage);
@@ -24,6 +22,8 @@ class StageProgress {
  private:
   const std::string stage_;
   const Stopwatch stopwatch_;
+  std::promise<void> ended_;
+  std::future<bool> announced_;  // by a thread that waits for the end, or a second
 };
 
 }  // namespace tissueform
