@@ -6,7 +6,8 @@
     tests/scripts/check_style.py
 
 Every source file begins with the two lines of copyright and licence (after a #! line); headers have `#pragma once`;
-no file holds a mark of unfinished work, a tab, a blank at the end of a line or more than 600 lines.
+no file holds a mark of unfinished work, a tab, a blank at the end of a line or more than 600 lines; processes are made
+in core/process only (tests may make their own).
 """
 
 import pathlib
@@ -18,6 +19,7 @@ SUFFIXES = {".h", ".cc", ".py", ".sh", ".cmake", ".proto", ".toml"}
 MAX_LINES = 600
 COPYRIGHT = re.compile(r"(//|#) Copyright 20\d\d The Tissueform Authors\.")
 LICENCE = re.compile(r"(//|#) SPDX-License-Identifier: AGPL-3\.0-or-later")
+MAKES_PROCESS = re.compile(r"(?<![\w.>])(v?fork|popen|posix_spawnp?|setitimer)\(|(?<![\w.>])system\([^)]")
 UNFINISHED = re.compile(r"\b(TO" r"DO|FIX" r"ME|X" r"XX)\b")
 
 
@@ -32,7 +34,10 @@ def errors_of(name, text):
         yield 1, "a header needs #pragma once"
     if len(lines) > MAX_LINES:
         yield len(lines), f"longer than {MAX_LINES} lines: cut it by topic"
+    makes_processes = name.startswith(("core/process/", "tests/")) or not name.endswith((".cc", ".h"))
     for number, line in enumerate(lines, start=1):
+        if not makes_processes and MAKES_PROCESS.search(line.split("//")[0]):
+            yield number, "processes are made in core/process only: ChildProcess, CallHelper, GuardedProgram"
         if UNFINISHED.search(line):
             yield number, "unfinished work belongs in an issue"
         if "\t" in line or line != line.rstrip():
