@@ -37,8 +37,7 @@ void SendRequest(const PlanBuildRequest& request, PipeSender* to) {
 
 absl::StatusOr<PlanBuildRequest> ReceiveRequest(PipeReceiver* from) {
   PlanBuildRequest request;
-  for (std::string* text :
-       {&request.ct, &request.recipe, &request.folder, &request.folder_name}) {
+  for (std::string* text : {&request.ct, &request.recipe, &request.folder, &request.folder_name}) {
     TF_ASSIGN_OR_RETURN(*text, from->Text());
   }
   TF_ASSIGN_OR_RETURN(const int64_t threads, from->Number(kMostThreads));
@@ -80,10 +79,9 @@ absl::Status Explain(const ChildEnd& end) {
     return absl::ResourceExhaustedError(
         "the work was killed, perhaps for want of memory; nothing was written");
   }
-  return absl::InternalError(
-      end.signal != 0
-          ? absl::StrCat("a library crashed (signal ", end.signal, "); nothing was written")
-          : "a library ended the work; nothing was written");
+  return absl::InternalError(end.signal != 0 ? absl::StrCat("a library crashed (signal ",
+                                                            end.signal, "); nothing was written")
+                                             : "a library ended the work; nothing was written");
 }
 
 }  // namespace
@@ -105,25 +103,25 @@ absl::StatusOr<std::string> CallPlanBuild(const PlanBuildRequest& request,
 }
 
 int RunPlanBuildProgram(const PlanBuildWork& work) {
-  return RunHelperProgram([&work](const IsolationLimits& limits, PipeReceiver* from,
-                                  PipeSender* answer) {
-    answer->Outcome(absl::OkStatus());
-    const auto tell = [answer](absl::string_view stage, double fraction) {
-      answer->Number(kStage);
-      answer->Text(stage);
-      answer->Number(std::llround(fraction * kFractionUnits));
-    };
-    std::string text;
-    const absl::Status outcome =
-        WithoutExceptions("building the plan", limits, [&]() -> absl::Status {
-          TF_ASSIGN_OR_RETURN(const PlanBuildRequest request, ReceiveRequest(from));
-          TF_ASSIGN_OR_RETURN(text, work(request, tell));
-          return absl::OkStatus();
-        });
-    answer->Number(kOutcome);
-    answer->Outcome(outcome);
-    answer->Text(text);
-  });
+  return RunHelperProgram(
+      [&work](const IsolationLimits& limits, PipeReceiver* from, PipeSender* answer) {
+        answer->Outcome(absl::OkStatus());
+        const auto tell = [answer](absl::string_view stage, double fraction) {
+          answer->Number(kStage);
+          answer->Text(stage);
+          answer->Number(std::llround(fraction * kFractionUnits));
+        };
+        std::string text;
+        const absl::Status outcome =
+            WithoutExceptions("building the plan", limits, [&]() -> absl::Status {
+              TF_ASSIGN_OR_RETURN(const PlanBuildRequest request, ReceiveRequest(from));
+              TF_ASSIGN_OR_RETURN(text, work(request, tell));
+              return absl::OkStatus();
+            });
+        answer->Number(kOutcome);
+        answer->Outcome(outcome);
+        answer->Text(text);
+      });
 }
 
 }  // namespace tissueform

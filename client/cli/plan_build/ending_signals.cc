@@ -12,8 +12,8 @@
 namespace tissueform {
 namespace {
 
-// Where the handler writes. Handlers and a pipe, instead of blocked signals and a signalfd: OpenBLAS
-// starts threads before main(), and they would not have the signals blocked.
+// Where the handler writes. Handlers and a pipe, instead of blocked signals and a signalfd:
+// OpenBLAS starts threads before main(), and they would not have the signals blocked.
 std::atomic<int> noted_by_handler = -1;
 static_assert(std::atomic<int>::is_always_lock_free, "read in a signal handler");
 

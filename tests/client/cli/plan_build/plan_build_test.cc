@@ -167,7 +167,7 @@ TEST_F(PlanBuildTest, SignalLeavesNothing) {
       "--stats",  "stats.json",  "--no-pictures"};
   for (const auto& [signal_number, stage] :
        {std::pair(SIGINT, "reading the CT"), std::pair(SIGINT, "remeshing"),
-        std::pair(SIGTERM, "filling the surface")}) {
+        std::pair(SIGHUP, "remeshing"), std::pair(SIGTERM, "filling the surface")}) {
     EXPECT_EQ(ExitCodeAfterSignal(words, folder_.string(), stage, signal_number),
               128 + signal_number);
     EXPECT_THAT(Files(), ElementsAre("recipe.json")) << stage;
