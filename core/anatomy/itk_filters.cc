@@ -8,15 +8,24 @@
 #include <itkDiscreteGaussianImageFilter.h>
 #include <itkImage.h>
 #include <itkMorphologicalWatershedFromMarkersImageFilter.h>
+#include <itkMultiThreaderBase.h>
+#include <itkObject.h>
 #include <itkRelabelComponentImageFilter.h>
 #include <itkSignedMaurerDistanceMapImageFilter.h>
 #include <limits>
 
 #include "core/anatomy/grid_operations.h"
-#include "core/ct/itk_setup.h"
 
 namespace tissueform {
 namespace {
+
+// Settings of ITK for this process; made again they change nothing. Threads that begin and end with
+// a filter: ITK's default is a pool, which keeps one a core for good and cuts images into four
+// times as many parts.
+void SetUpItk() {
+  itk::MultiThreaderBase::SetGlobalDefaultThreader(itk::MultiThreaderBase::ThreaderEnum::Platform);
+  itk::Object::GlobalWarningDisplayOff();
+}
 
 template <typename T>
 using Image = itk::Image<T, 3>;

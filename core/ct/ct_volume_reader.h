@@ -42,8 +42,8 @@ struct CtReadOptions {
 // file of NIfTI (.nii, .nii.gz), NRRD (.nrrd, .nhdr) or MetaImage (.mha, .mhd). Values are HU:
 // DICOM's rescale slope and intercept, or those of NIfTI, are applied, then `hu_offset`; values
 // under -1024 (outside the scanner's circle) become -1024. Places come from position and
-// orientation, never from the slice thickness. The libraries (ITK, GDCM) work in a child process
-// within the limits.
+// orientation, never from the slice thickness. The libraries (ITK, GDCM) work in a helper program
+// within the limits. Any thread may call it.
 //
 // Errors: NotFound when there is no such path; ResourceExhausted beyond a limit; InvalidArgument
 // for everything that cannot be used as a CT volume, in one line: what was found, where, what to

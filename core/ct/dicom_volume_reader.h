@@ -12,7 +12,7 @@
 namespace tissueform {
 
 // Reads a series from a folder, or the series of one of its files (`path` is then that file). In a
-// child process only: GDCM is not safe from damaged files. Internal to core/ct; errors as
+// helper program only: GDCM is not safe from damaged files. Internal to core/ct; errors as
 // ReadCtVolume's.
 absl::StatusOr<CtVolume> ReadDicomVolume(const std::string& path, const CtReadOptions& options);
 

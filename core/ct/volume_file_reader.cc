@@ -19,7 +19,6 @@
 
 #include "core/base/status_macros.h"
 #include "core/ct/hu_check.h"
-#include "core/ct/itk_setup.h"
 #include "core/ct/patient_axes.h"
 #include "core/ct/unpacked_size.h"
 #include "core/ct/whole_file.h"
@@ -265,7 +264,6 @@ absl::StatusOr<CtVolume> ReadWithItk(const std::string& path, VolumeFormat forma
 
 absl::StatusOr<CtVolume> ReadVolumeFile(const std::string& path, VolumeFormat format,
                                         const CtReadOptions& options) {
-  SetUpItk();
   TF_ASSIGN_OR_RETURN(const VolumeHeader header, ReadVolumeHeader(path, format));
   TF_ASSIGN_OR_RETURN(const FileContents contents,
                       ReadContents(path, header, options.limits.max_file_bytes));

@@ -14,8 +14,8 @@
 
 namespace tissueform {
 
-// Reads one file of NIfTI, NRRD or MetaImage. In a child process only: these libraries are not safe
-// from damaged files. Internal to core/ct; errors as ReadCtVolume's.
+// Reads one file of NIfTI, NRRD or MetaImage. In a helper program only: these libraries are not
+// safe from damaged files. Internal to core/ct; errors as ReadCtVolume's.
 absl::StatusOr<CtVolume> ReadVolumeFile(const std::string& path, VolumeFormat format,
                                         const CtReadOptions& options);
 
