@@ -7,22 +7,13 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/base/types.h"
-#include "core/mesh/triangle_mesh.h"
-#include "core/mesh_generation/tetrahedralization.h"
+#include "core/mesh_generation/tetgen_call.h"
 
 namespace tissueform {
 
-// What TetGen makes, before anything of it is checked.
-struct RawTets {
-  Positions positions;
-  TetIndices tets;
-  Eigen::VectorXd attributes;  // #T, or none where there are no regions
-};
-
 // TetGen with the surface, `holes_mm` instead of those of the options, and the switches that the
-// options stand for. It may crash, throw, loop or print: call it in a child process only. Internal
-// to core/mesh_generation/tetrahedralization.cc.
+// options stand for. It may crash, throw, loop or print: call it in a helper program only. Internal
+// to core/mesh_generation.
 //
 // Errors: InvalidArgument, ResourceExhausted.
 absl::StatusOr<RawTets> RunTetgen(const TriangleMesh& surface,

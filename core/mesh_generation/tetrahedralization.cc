@@ -14,13 +14,11 @@
 #include "core/mesh/tet_quality.h"
 #include "core/mesh_generation/cavities.h"
 #include "core/mesh_generation/surface_defects.h"
-#include "core/mesh_generation/tetgen_adaptor.h"
+#include "core/mesh_generation/tetgen_call.h"
 #include "core/process/pipe_stream.h"
 
 namespace tissueform {
 namespace {
-
-constexpr char kWhat[] = "filling the surface with tets";
 
 absl::Status CheckOptions(const TriangleMesh& surface, const TetrahedralizationOptions& options) {
   // Written so that NaN is refused too.
@@ -44,53 +42,6 @@ absl::Status CheckOptions(const TriangleMesh& surface, const TetrahedralizationO
                                                    " vertices of the surface; give one for each"));
   }
   return absl::OkStatus();
-}
-
-absl::StatusOr<RawTets> RunWithoutExceptions(const TriangleMesh& surface,
-                                             const std::vector<Eigen::Vector3d>& holes_mm,
-                                             const TetrahedralizationOptions& options) {
-  absl::StatusOr<RawTets> raw = absl::InternalError("not run");
-  const absl::Status status = WithoutExceptions(kWhat, options.limits, [&] {
-    raw = RunTetgen(surface, holes_mm, options);
-    return raw.status();
-  });
-  if (!status.ok()) return status;
-  return raw;
-}
-
-bool SendTets(int descriptor, const absl::StatusOr<RawTets>& raw) {
-  PipeSender sender(descriptor);
-  sender.Outcome(raw.status());
-  if (!raw.ok()) return sender.ok();
-  sender.Entries(raw->positions);
-  sender.Entries(raw->tets);
-  sender.Entries(raw->attributes);
-  return sender.ok();
-}
-
-absl::Status ReceiveTets(int descriptor, int64_t max_bytes, RawTets* raw) {
-  PipeReceiver receiver(descriptor, max_bytes);
-  TF_RETURN_IF_ERROR(receiver.Outcome());
-  TF_RETURN_IF_ERROR(receiver.Entries(3, &raw->positions));
-  TF_RETURN_IF_ERROR(receiver.Entries(4, &raw->tets));
-  return receiver.Entries(1, &raw->attributes);
-}
-
-absl::StatusOr<RawTets> RunTetgenIsolated(const TriangleMesh& surface,
-                                          const TetrahedralizationOptions& options) {
-  std::vector<Eigen::Vector3d> holes_mm = CavityPoints(surface);
-  holes_mm.insert(holes_mm.end(), options.holes_mm.begin(), options.holes_mm.end());
-  RawTets raw;
-  const absl::Status status = RunIsolated(
-      kWhat, options.limits,
-      [&](int descriptor) {
-        return SendTets(descriptor, RunWithoutExceptions(surface, holes_mm, options));
-      },
-      [&](int descriptor) {
-        return ReceiveTets(descriptor, options.limits.max_memory_bytes, &raw);
-      });
-  if (!status.ok()) return status;
-  return raw;
 }
 
 // Leaves out the vertices that no tet holds: those that lie exactly on another one.
@@ -121,7 +72,9 @@ absl::StatusOr<Tetrahedralization> Tetrahedralize(const TriangleMesh& surface,
                                                   const TetrahedralizationOptions& options) {
   TF_RETURN_IF_ERROR(CheckOptions(surface, options));
   TF_RETURN_IF_ERROR(CheckMeshable(FindSurfaceDefects(surface)));
-  TF_ASSIGN_OR_RETURN(RawTets raw, RunTetgenIsolated(surface, options));
+  std::vector<Eigen::Vector3d> holes_mm = CavityPoints(surface);
+  holes_mm.insert(holes_mm.end(), options.holes_mm.begin(), options.holes_mm.end());
+  TF_ASSIGN_OR_RETURN(RawTets raw, CallTetgen(surface, holes_mm, options));
   TF_RETURN_IF_ERROR(DropUnusedVertices(&raw));
   RepairOrientation(raw.positions, &raw.tets);
   const Eigen::VectorXd volumes = TetVolumes(raw.positions, raw.tets);

@@ -10,7 +10,7 @@
 
 #include "core/mesh/tet_mesh.h"
 #include "core/mesh/triangle_mesh.h"
-#include "core/process/isolated_process.h"
+#include "core/process/helper_program.h"
 
 namespace tissueform {
 
@@ -52,7 +52,7 @@ struct Tetrahedralization {
 // Edge length of the regular tet of this volume, and the reverse. For options that are in mm.
 double RegularTetVolume(double edge_mm);
 
-// Fills a closed surface with tets, by TetGen in a child process. Walls of cavities (CavityPoints)
+// Fills a closed surface with tets, by TetGen in a helper program. Walls of cavities (CavityPoints)
 // and `holes_mm` bound empty space. The vertices of the surface come first, in their order; those
 // that no tet needs are left out. Deterministic.
 //

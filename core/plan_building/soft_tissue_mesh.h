@@ -15,7 +15,7 @@
 #include "core/mesh/tet_quality.h"
 #include "core/mesh/triangle_mesh.h"
 #include "core/mesh_generation/surface_remeshing.h"
-#include "core/process/isolated_process.h"
+#include "core/process/helper_program.h"
 
 namespace tissueform {
 

@@ -5,9 +5,12 @@
 
 #include <cstdlib>
 #include <random>
+#include <thread>
+#include <vector>
 
 #include "core/ct/isotropic_resample.h"
 #include "tests/core/ct/ct_folder.h"
+#include "tests/testing/busy_threads.h"
 #include "tests/testing/meshes.h"
 
 namespace tissueform {
@@ -22,6 +25,23 @@ using tissueform::testing::StatusIs;
 using tissueform::testing::TestDataPath;
 
 using CtVolumeReaderTest = CtFolder;
+
+TEST_F(CtVolumeReaderTest, SeveralMayBeReadAtOnceWhileOtherThreadsAllocate) {
+  WriteSeries(PhantomSeries());
+  ASSERT_OK_AND_ASSIGN(const CtVolume alone, Read());
+  const testing::BusyThreads busy(3);
+  std::vector<std::thread> readers;
+  for (int t = 0; t < 4; ++t) {
+    readers.emplace_back([&] {
+      for (int i = 0; i < 3; ++i) {
+        const absl::StatusOr<CtVolume> volume = ReadCtVolume(Path());
+        ASSERT_THAT(volume, testing::IsOk());
+        EXPECT_EQ(volume->hu, alone.hu);
+      }
+    });
+  }
+  for (std::thread& reader : readers) reader.join();
+}
 
 TEST_F(CtVolumeReaderTest, DamagedBytesNeverEndThisProcess) {
   WriteSeries(PhantomSeries());

@@ -3,7 +3,6 @@
 
 #include "core/process/helper_call.h"
 
-#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -21,6 +20,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/process/child_process.h"
+#include "tests/testing/busy_threads.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {
@@ -109,16 +109,7 @@ TEST(HelperCallTest, MissingHelperIsToldWithWhatToDo) {
 }
 
 TEST(HelperCallTest, ThreadsThatAllocateMayCallAtOnce) {
-  std::atomic<bool> ends = false;
-  std::vector<std::thread> busy;
-  for (int t = 0; t < 3; ++t) {
-    busy.emplace_back([&ends] {
-      for (size_t size = 1; !ends; size = size * 5 % 99991 + 1) {
-        const std::vector<char> block(size, 'x');
-        ASSERT_EQ(block.back(), 'x');
-      }
-    });
-  }
+  const testing::BusyThreads busy(3);
   std::vector<std::thread> callers;
   for (int t = 0; t < 4; ++t) {
     callers.emplace_back([t] {
@@ -129,8 +120,6 @@ TEST(HelperCallTest, ThreadsThatAllocateMayCallAtOnce) {
     });
   }
   for (std::thread& caller : callers) caller.join();
-  ends = true;
-  for (std::thread& thread : busy) thread.join();
 }
 
 // The letter of the process's state in /proc, or nothing.
