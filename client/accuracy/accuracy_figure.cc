@@ -123,7 +123,7 @@ absl::Status DrawAccuracyCase(const AccuracyCase& problem, const AccuracyResult&
   const Positions& reference = result.Reference(kReference)->positions;
   const SkinPlace* face = FindPlace(problem.places, "face");
   const ColourBar bar{
-      "mm to CalculiX neo-Hookean (red: or more)", 0,
+      "mm to CalculiX neo-Hookean (darkest: or more)", 0,
       ColourRange(face != nullptr ? face->vertices : skin.vertices, result, reference)};
   Figure figure(absl::StrFormat("%s; Poisson's ratio %g", problem.title, result.poisson_ratio));
   for (const View& view : problem.views) {

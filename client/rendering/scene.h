@@ -6,19 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "client/rendering/palette.h"
 #include "core/base/types.h"
 
 namespace tissueform {
-
-// Red, green and blue in [0, 1].
-using Colour = Eigen::Vector3d;
-
-// Told apart in print and by most colour-blind readers.
-inline const Colour kTissueColour{0.93, 0.74, 0.62};
-inline const Colour kBlue{0.00, 0.35, 0.70};
-inline const Colour kOrange{0.84, 0.37, 0.00};
-inline const Colour kGreen{0.00, 0.55, 0.40};
-inline const Colour kGrey{0.55, 0.55, 0.55};
 
 // A triangle mesh as it is to be seen. Coloured by `vertex_values` where there are any, otherwise
 // by `triangle_colours`, otherwise by `colour`.
@@ -41,12 +32,12 @@ struct ArrowLayer {
   double thickness_mm = 0.1;  // of the shaft
 };
 
-// Blue for the low end, red for the high one, with a legend. No legend for an empty title.
+// MapColours() from the low end to the high one, with a legend; beyond an end its colour goes on.
+// No legend for an empty title.
 struct ColourBar {
   std::string title;  // with the unit
   double low = 0;
   double high = 1;
-  std::vector<Colour> colours = {};  // instead, evenly spaced from low to high; two or more
 };
 
 // Where the observer stands, seen from the scene, and what is up. Parallel projection.

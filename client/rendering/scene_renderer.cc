@@ -104,28 +104,14 @@ vtkSmartPointer<vtkUnsignedCharArray> MakeColours(const std::vector<Colour>& col
   return array;
 }
 
-vtkSmartPointer<vtkLookupTable> BlueToRed(const ColourBar& bar) {
-  auto table = vtkSmartPointer<vtkLookupTable>::New();
-  table->SetHueRange(0.667, 0.0);
-  table->SetSaturationRange(0.75, 0.75);
-  table->SetValueRange(0.95, 0.95);
-  table->SetNumberOfTableValues(20);  // bands show where the field is steep
-  table->SetTableRange(bar.low, bar.high);
-  table->Build();
-  return table;
-}
-
+// As many values as there are colours: bands show where the field is steep.
 vtkSmartPointer<vtkLookupTable> TableOf(const ColourBar& bar) {
-  auto table = BlueToRed(bar);
-  if (bar.colours.size() < 2) return table;
-  const auto spans = static_cast<double>(bar.colours.size() - 1);
-  const vtkIdType count = table->GetNumberOfTableValues();
-  for (vtkIdType i = 0; i < count; ++i) {
-    const double place = spans * static_cast<double>(i) / static_cast<double>(count - 1);
-    const size_t from = std::min(static_cast<size_t>(place), bar.colours.size() - 2);
-    const double part = place - static_cast<double>(from);
-    const Colour colour = (1 - part) * bar.colours[from] + part * bar.colours[from + 1];
-    table->SetTableValue(i, colour.x(), colour.y(), colour.z());
+  auto table = vtkSmartPointer<vtkLookupTable>::New();
+  table->SetNumberOfTableValues(kMapColours);
+  table->SetTableRange(bar.low, bar.high);
+  for (vtkIdType band = 0; band < kMapColours; ++band) {
+    const Colour& colour = MapColours()[static_cast<size_t>(band)];
+    table->SetTableValue(band, colour.x(), colour.y(), colour.z());
   }
   return table;
 }

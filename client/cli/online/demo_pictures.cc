@@ -32,15 +32,6 @@ constexpr std::array<NamedView, 3> kViews = {
      {"left.png", "from the patient's left", "along x", {1, 0, 0}},
      {"three_quarter.png", "three-quarter view", "oblique", {0.75, -1, 0.1}}}};
 
-// What has not moved keeps the colour of skin.
-std::vector<Colour> SkinToPurple() {
-  return {kTissueColour,
-          {0.97, 0.78, 0.42},
-          {0.94, 0.52, 0.24},
-          {0.82, 0.25, 0.25},
-          {0.55, 0.10, 0.38}};
-}
-
 SurfaceLayer Skin(const Positions& positions, const TriangleIndices& facets) {
   SurfaceLayer layer;
   layer.positions = positions;
@@ -85,8 +76,7 @@ absl::Status DrawBeforeAndAfter(const BeforeAndAfter& what, const std::string& f
   const Positions& rest = what.mesh.positions();
   SurfaceLayer after = Skin(what.deformed, facets);
   after.vertex_values = (what.deformed - rest).rowwise().norm();
-  const ColourBar bar{"movement of the skin [mm]", 0, BarEnd(after.vertex_values.maxCoeff()),
-                      SkinToPurple()};
+  const ColourBar bar{"movement of the skin [mm]", 0, BarEnd(after.vertex_values.maxCoeff())};
   for (const NamedView& view : kViews) {
     Figure figure(absl::StrCat(what.move, ", ", what.is_face ? view.of_face : view.of_anything),
                   kWidth);

@@ -131,18 +131,24 @@ TEST_F(FigureTest, PanelsWithRoomForEachOtherHaveOneCamera) {
   EXPECT_EQ(PictureOf(with_room), PictureOf(both));
 }
 
-TEST_F(FigureTest, ColoursOfABarReplaceBlueToRed) {
+TEST_F(FigureTest, EndsOfABarHaveTheEndsOfThePalette) {
   Scene scene;
   scene.surfaces = {OneTriangle()};
-  scene.surfaces[0].vertex_values = Eigen::Vector3d::Zero();
-  const size_t blue = PictureOf(scene);
-  const Colour lowest_colour(1, 0.8, 0.6);  // without rounding to 8 bits
-  scene.colour_bar.colours = {lowest_colour, kGreen, kOrange};
-  scene.surfaces[0].colour = lowest_colour;  // of the edges
-  const size_t lowest = PictureOf(scene);
-  EXPECT_NE(lowest, blue);
-  scene.surfaces[0].vertex_values = {};
-  EXPECT_EQ(PictureOf(scene), lowest) << "the low end has the first colour";
+  scene.surfaces[0].edges = false;
+  const auto picture_of_value = [&](double value) {
+    scene.surfaces[0].vertex_values = Eigen::Vector3d::Constant(value);
+    return PictureOf(scene);
+  };
+  const auto picture_of_colour = [&](const Colour& colour) {
+    scene.surfaces[0].vertex_values = {};
+    // As a table of colours rounds.
+    scene.surfaces[0].colour = ((255 * colour).array() + 0.5).floor() / 255;
+    return PictureOf(scene);
+  };
+  EXPECT_EQ(picture_of_value(0), picture_of_colour(MapColours().front()));
+  EXPECT_EQ(picture_of_value(1), picture_of_colour(MapColours().back()));
+  EXPECT_EQ(picture_of_value(7), picture_of_value(1)) << "beyond the end";
+  EXPECT_NE(picture_of_value(0.5), picture_of_value(1));
 }
 
 TEST_F(FigureTest, SmoothShadingChangesBentSurfacesOnly) {
