@@ -86,6 +86,7 @@ std::optional<v1::DeformFrame> DeformStream::Receive() {
 void DeformStream::Cancel() { context_.TryCancel(); }
 
 absl::Status DeformStream::Finish() {
+  // gRPC tells the status of a call only after everything before it was read.
   v1::DeformResponse dropped;
   while (call_->Read(&dropped)) {
   }

@@ -18,7 +18,10 @@ namespace {
 
 // All vertices of a mesh of a million are 12 MB; gRPC's own limit is 4 MiB.
 constexpr int kMaxReceiveBytes = 256 << 20;
+// Well below the server's limit of 4 MiB a message.
 constexpr size_t kChunkBytes = 512 << 10;
+// A drag may rest for minutes. Routers forget connections on which nothing goes, and a server that
+// lost its power says nothing: this finds out within a minute.
 constexpr int kKeepaliveMilliseconds = 30'000;
 
 std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address) {
@@ -91,6 +94,7 @@ absl::StatusOr<v1::Mesh> TissueformClient::UploadMesh(const TetMesh& mesh,
   }
   const MeshPayloadView payload = ViewMeshPayload(mesh.positions(), mesh.tets(), cell_arrays);
   const std::string sha256 = payload.Sha256();
+  // The name is the content: asking costs one round trip, and the same head again costs no more.
   grpc::ClientContext context;
   SetDeadline(&context);
   v1::GetMeshRequest request;
@@ -114,6 +118,7 @@ absl::StatusOr<v1::Mesh> TissueformClient::SendMesh(const MeshPayloadView& paylo
   const auto writer = meshes_->UploadMesh(&context, &response);
   v1::UploadMeshRequest request;
   *request.mutable_header() = ToProto(payload.shape, sha256);
+  // Where a write fails the server has ended the call, often with a reason: Finish has it.
   if (writer->Write(request)) {
     WriteChunks(payload, writer.get());
   }

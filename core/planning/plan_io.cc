@@ -55,11 +55,15 @@ std::filesystem::path RealPath(const std::filesystem::path& path) {
   return error ? absolute.lexically_normal() : real;
 }
 
+// Both ends are followed: a folder of plans may itself be a link, and then what lies in it still
+// lies below. By parts of the path, not by text: /data/a is not below /data/ab.
 bool LiesBelow(const std::filesystem::path& path, const std::filesystem::path& folder) {
   const std::filesystem::path relative = RealPath(path).lexically_relative(RealPath(folder));
   return !relative.empty() && *relative.begin() != "..";
 }
 
+// FilesOfTetMesh, because TetGen's formats are pairs: a plan that names mesh.node here could reach
+// mesh.ele elsewhere by a link.
 absl::Status CheckInside(const std::string& plan_path, const Plan& plan) {
   const std::filesystem::path folder = std::filesystem::path(plan_path).parent_path();
   for (const std::string& file : FilesOfTetMesh(plan.mesh_path)) {

@@ -22,6 +22,10 @@ absl::Status CheckUsable(const std::string& name, const TetMesh& mesh) {
   return absl::Status(usable.code(), absl::StrCat("mesh ", name, ": ", usable.message()));
 }
 
+// Boxes are in the plan's own axes, so that regions are looked up before the mesh is turned to LPS.
+//
+// What hangs together with no region has no unique answer. The factorisation would find out, too,
+// but know a pivot only; here the message still knows which vertices.
 absl::StatusOr<ConstraintSet> ResolveRegions(const Plan& plan, const TetMeshFile& file) {
   const SelectionSource source{file.mesh.positions(), file.point_data};
   TF_ASSIGN_OR_RETURN(std::vector<int32_t> fixed, ResolveSelector(plan.fixed, source, "fixed"));
@@ -42,6 +46,7 @@ absl::StatusOr<ConstraintSet> ResolveRegions(const Plan& plan, const TetMeshFile
 absl::StatusOr<std::vector<HandlePose>> ResolvePoses(const Plan& plan) {
   std::vector<HandlePose> poses;
   for (const PlannedHandle& handle : plan.handles) {
+    // The schema has seen to types and signs; how large a number may be is known here.
     if (const absl::Status legal = CheckPose(handle.pose); !legal.ok()) {
       return absl::Status(legal.code(),
                           absl::StrCat("handle \"", handle.name, "\": ", legal.message()));

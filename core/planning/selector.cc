@@ -32,6 +32,7 @@ absl::StatusOr<Selection> Select(const SelectByPointData& choice, const Selectio
   TF_ASSIGN_OR_RETURN(const std::vector<double> values,
                       FindScalars(source.point_data, choice.name, "point"));
   Selection selection;
+  // On purpose without a tolerance: the array holds labels. A NaN equals nothing.
   for (size_t v = 0; v < values.size(); ++v) {
     if (values[v] == choice.equals) selection.push_back(static_cast<int32_t>(v));
   }
@@ -44,6 +45,7 @@ absl::StatusOr<Selection> Select(const SelectBox& box, const SelectionSource& so
   }
   Selection selection;
   for (Eigen::Index v = 0; v < source.positions.rows(); ++v) {
+    // The faces belong to the box: layers of regular meshes lie exactly on round numbers.
     const Eigen::Array3d position = source.positions.row(v).transpose().array();
     if ((position >= box.min_mm.array()).all() && (position <= box.max_mm.array()).all()) {
       selection.push_back(static_cast<int32_t>(v));

@@ -27,9 +27,12 @@ absl::StatusOr<std::vector<double>> Resolve(const StiffnessFromCellData& choice,
 absl::StatusOr<std::vector<double>> Resolve(const StiffnessByCellData& choice, Eigen::Index,
                                             const std::vector<Attribute>& cell_data) {
   TF_ASSIGN_OR_RETURN(std::vector<double> values, FindScalars(cell_data, choice.name, "cell"));
+  // Labels come as any type of number, floats among them. As doubles whole numbers stay
+  // themselves up to 2^53.
   std::map<double, double> pa_of_value;
   for (const auto& [label, pa] : choice.pa_of_value) pa_of_value[static_cast<double>(label)] = pa;
   for (size_t t = 0; t < values.size(); ++t) {
+    // A NaN is not less than any key nor any key than it: the map would take it for its first one.
     const auto found = std::isnan(values[t]) ? pa_of_value.end() : pa_of_value.find(values[t]);
     if (found == pa_of_value.end()) {
       return absl::InvalidArgumentError(

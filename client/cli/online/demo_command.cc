@@ -41,9 +41,11 @@
 namespace tissueform {
 namespace {
 
+// For a machine that compiles beside it, and for sanitizers.
 constexpr std::chrono::seconds kServerStartDeadline{30};
 
-// How far beyond its plan the bundled head is dragged: 8 mm instead of 6.
+// How far beyond its plan the bundled head is dragged: 8 mm instead of 6. A picture
+// shows that at a glance, and no tet is inverted yet (tests/integration/served_command_test.cc).
 constexpr double kHeadReach = 4.0 / 3.0;
 
 struct DemoOptions {

@@ -14,7 +14,8 @@
 namespace tissueform {
 namespace {
 
-// Along an axis: the other two parts are below a hundredth.
+// Only along an axis, with less than 8 degrees beside it (cosine 0.99): "forward" for a move that
+// also goes up would tell half of it.
 std::string DirectionInWords(const Eigen::Vector3d& move) {
   struct AxisWords {
     const char* negative;
