@@ -2,10 +2,15 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
-# clang-tidy over every source file, and clang's thread-safety analysis with it. Every finding is an error.
+# clang-tidy, and clang's thread-safety analysis with it. Every finding is an error.
 #
-#   tests/scripts/check_tidy.sh [FILE.cc]...     all files of the repository without an argument
+#   tests/scripts/check_tidy.sh                what has changed since it last passed, and all that includes a changed
+#                                              header; everything when that is not known (tidy_selection.py)
+#   tests/scripts/check_tidy.sh --all          everything
+#   tests/scripts/check_tidy.sh FILE.cc...     these
 #
+# TISSUEFORM_TIDY_BASE  a commit that is known to pass, in place of the last run that did
+# TISSUEFORM_TIDY_STATE where the last run that passed is remembered (default: ~/.cache/tissueform/tidy_passed.json)
 # TISSUEFORM_BUILD_DIR  a finished build (it makes the generated headers; default: build/release)
 # JOBS                  files at once     (default: one a core)
 set -euo pipefail
@@ -19,11 +24,23 @@ if [[ ! -f $build_dir/compile_commands.json ]]; then
   exit 1
 fi
 
-if [[ $# -gt 0 ]]; then
-  sources=("$@")
-else
-  mapfile -t sources < <(git ls-files -- '*.cc')
-fi
+passed=${TISSUEFORM_TIDY_STATE:-${XDG_CACHE_HOME:-$HOME/.cache}/tissueform/tidy_passed.json}
+state=""  # of the tree when this run began, which is what will have passed; none when only some files are asked for
+case ${1:-} in
+  "" | --all)
+    state=$(tests/scripts/tidy_selection.py state)
+    if [[ ${1:-} == --all ]]; then
+      chosen=$(TISSUEFORM_TIDY_BASE="" tests/scripts/tidy_selection.py select)
+    else
+      chosen=$(tests/scripts/tidy_selection.py select "$passed")
+    fi
+    mapfile -t sources <<< "$chosen"
+    [[ -n $chosen ]] || sources=()
+    ;;
+  *)
+    sources=("$@")
+    ;;
+esac
 
 # Findings in our files, whether included or not. The commands are GCC's: clang does not know all of its warnings.
 tidy() {
@@ -49,8 +66,14 @@ check_batch() {
 export build_dir
 export -f tidy check_batch
 
-if ! tests/scripts/tidy_batches.py "$build_dir" "${sources[@]}" | tr '\t' ' ' |
+if [[ ${#sources[@]} -gt 0 ]] && ! tests/scripts/tidy_batches.py "$build_dir" "${sources[@]}" | tr '\t' ' ' |
   xargs -d '\n' -I '{}' -P "$jobs" bash -c 'check_batch {}'; then
   echo "check_tidy.sh: findings above; one file again: tests/scripts/check_tidy.sh FILE.cc" >&2
   exit 1
+fi
+
+if [[ -n $state ]]; then
+  mkdir -p "$(dirname "$passed")"
+  printf '%s\n' "$state" > "$passed.$$"
+  mv "$passed.$$" "$passed"
 fi
