@@ -12,7 +12,11 @@ function(_tissueform_precompiled name)
   add_library(${target} OBJECT "${PROJECT_SOURCE_DIR}/cmake/precompiled/none.cc")
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
   target_link_libraries(${target} PRIVATE Eigen3::Eigen absl::statusor absl::str_format Threads::Threads ${ARGN})
-  target_precompile_headers(${target} PRIVATE "${PROJECT_SOURCE_DIR}/cmake/precompiled/${name}.h")
+  set(header "${PROJECT_SOURCE_DIR}/cmake/precompiled/${name}.h")
+  if(TISSUEFORM_SHARES_OBJECTS)
+    set(header "<cmake/precompiled/${name}.h>")  # a name without the checkout's path: see CompilerCache.cmake
+  endif()
+  target_precompile_headers(${target} PRIVATE "${header}")
 endfunction()
 
 # Called once, when the packages are found.
@@ -104,16 +108,16 @@ function(tissueform_test name)
   _tissueform_resolve(deps ${ARG_DEPS})
   target_link_libraries(${target} PRIVATE ${deps} GTest::gmock GTest::gtest_main)
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
-  target_compile_definitions(${target} PRIVATE
-    TISSUEFORM_TEST_DATA_DIR="${PROJECT_SOURCE_DIR}/tests/data"
-    TISSUEFORM_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
   # Scratch files lie in the build folder, so that two builds may run their tests at the same time.
   set(scratch "${PROJECT_BINARY_DIR}/test_scratch")
   file(MAKE_DIRECTORY "${scratch}")
-  set(properties TIMEOUT ${ARG_TIMEOUT} ENVIRONMENT "TEST_TMPDIR=${scratch}/")
+  # Two properties, since gtest_discover_tests takes no list as a value. Paths come at run time and not as macros, so that
+  # two checkouts compile the same (tests/testing/test_paths.h).
+  set(properties TIMEOUT ${ARG_TIMEOUT} ENVIRONMENT "TEST_TMPDIR=${scratch}/"
+      ENVIRONMENT_MODIFICATION "TISSUEFORM_SOURCE_DIR=set:${PROJECT_SOURCE_DIR}")
   if(ARG_LABELS)
     list(APPEND properties LABELS "${ARG_LABELS}")
   endif()
@@ -123,7 +127,8 @@ function(tissueform_test name)
     endif()
     add_dependencies(tests-${label} ${target})
   endforeach()
-  gtest_discover_tests(${target} TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST
+  # A parameter is called by its generator's name: its "pretty value" is the bytes of a struct, with addresses.
+  gtest_discover_tests(${target} TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST NO_PRETTY_VALUES
                        DISCOVERY_TIMEOUT 60 PROPERTIES ${properties})
 endfunction()
 

@@ -175,7 +175,7 @@ TEST_F(DeformStreamTest, ACancelledStreamLeavesNothingAndDisturbsNobody) {
       ASSERT_THAT(stream->SendPoses(sequence, TopPose(SomePose(sequence))), IsOk());
     }
     stream->Cancel();
-    EXPECT_THAT(stream->Finish(), StatusIs(absl::StatusCode::kCancelled, HasSubstr("")));
+    EXPECT_EQ(stream->Finish().code(), absl::StatusCode::kCancelled);
   }
   EXPECT_TRUE(NoStreamIsLeft());
   EXPECT_THAT(client_->GetSession(session_), IsOk());

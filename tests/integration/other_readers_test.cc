@@ -19,6 +19,7 @@
 #include "tests/testing/meshes.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/status_matchers.h"
+#include "tests/testing/test_paths.h"
 
 // What each command leaves, opened by VTK's Python module and by meshio.
 namespace tissueform::testing {
@@ -26,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kCheck[] = TISSUEFORM_SOURCE_DIR "/tests/integration/open_with_others.py";
+const std::string kCheck = SourcePath("tests/integration/open_with_others.py");
 constexpr int kModulesMissing = 77;
 
 // What numpy calls the number types, in the order of Attribute::Values.
@@ -158,11 +159,11 @@ TEST_F(OtherReadersTest, RunAndDemo) {
   const std::string plan = TestDataPath("plans/tongue/plan.json");
   ASSERT_OK_AND_ASSIGN(
       const std::unique_ptr<ServerProcess> server,
-      ServerProcess::Start(TISSUEFORM_SERVER_BINARY, {"--port", "0", "--log-level", "warn"},
+      ServerProcess::Start(ProgramPath("tissueform-server"), {"--port", "0", "--log-level", "warn"},
                            std::chrono::seconds(60)));
   ASSERT_THAT(Run({"run", plan, "--server", server->address(), "--out", "run.vtu"}), Succeeds());
   ExpectOthersReadTheSame(Path("run.vtu"));
-  ASSERT_EQ(ExitCodeOf(absl::StrCat("env -u DISPLAY PATH=/nonexistent ", TISSUEFORM_BINARY,
+  ASSERT_EQ(ExitCodeOf(absl::StrCat("env -u DISPLAY PATH=/nonexistent ", ProgramPath("tissueform"),
                                     " demo --no-browser --seconds 0.1 --plan ", plan, " --out ",
                                     Path("demo"), " > ", Path("demo.txt"))),
             0);

@@ -26,6 +26,7 @@
 #include "core/mesh_io/triangle_mesh_io.h"
 #include "tests/testing/scoped_environment.h"
 #include "tests/testing/status_matchers.h"
+#include "tests/testing/test_paths.h"
 
 // `tissueform run` and `tissueform demo` as real programs with a real server.
 namespace tissueform::testing {
@@ -40,8 +41,8 @@ using ::testing::Not;
 using ::testing::StartsWith;
 
 constexpr std::chrono::seconds kPatience{60};
-const std::string kTonguePlan = TISSUEFORM_TEST_DATA_DIR "/plans/tongue/plan.json";
-const std::string kChinPlan = TISSUEFORM_TEST_DATA_DIR "/plans/head_chin/plan.json";
+const std::string kTonguePlan = SourcePath("tests/data/plans/tongue/plan.json");
+const std::string kChinPlan = SourcePath("tests/data/plans/head_chin/plan.json");
 
 int ExitCodeOf(const std::string& command) { return WEXITSTATUS(std::system(command.c_str())); }
 
@@ -75,8 +76,8 @@ class ServedCommandTest : public ::testing::Test {
   int RunDemo(const std::string& options, const std::string& before = "") const {
     // Under AddressSanitizer: Mesa's leaks, see tests/client/rendering/figure_test.cc.
     const ScopedEnvironment no_leak_check("LSAN_OPTIONS", "detect_leaks=0");
-    return ExitCodeOf(before + TISSUEFORM_BINARY + " demo --no-browser --out " + folder_.string() +
-                      " " + options + " > " + PathOf("out.txt"));
+    return ExitCodeOf(before + ProgramPath("tissueform") + " demo --no-browser --out " +
+                      folder_.string() + " " + options + " > " + PathOf("out.txt"));
   }
 
   Json Summary() const { return Json::parse(Read("summary.json")); }
@@ -97,9 +98,9 @@ class ServedCommandTest : public ::testing::Test {
 
 TEST_F(ServedCommandTest, RunEqualsDeformUpToFloat32) {
   ASSERT_OK_AND_ASSIGN(const std::unique_ptr<ServerProcess> server,
-                       ServerProcess::Start(TISSUEFORM_SERVER_BINARY,
+                       ServerProcess::Start(ProgramPath("tissueform-server"),
                                             {"--port", "0", "--log-level", "warn"}, kPatience));
-  const std::string program = TISSUEFORM_BINARY;
+  const std::string program = ProgramPath("tissueform");
   ASSERT_EQ(ExitCodeOf(program + " run " + kTonguePlan + " --server " + server->address() +
                        " --out " + PathOf("run.vtu") + " --stats " + PathOf("run.json")),
             0);
@@ -113,7 +114,7 @@ TEST_F(ServedCommandTest, RunEqualsDeformUpToFloat32) {
 }
 
 TEST_F(ServedCommandTest, RunWithoutServerFailsAndWritesNothing) {
-  EXPECT_EQ(ExitCodeOf(std::string(TISSUEFORM_BINARY) + " run " + kTonguePlan +
+  EXPECT_EQ(ExitCodeOf(ProgramPath("tissueform") + " run " + kTonguePlan +
                        " --server 127.0.0.1:1 --out " + PathOf("run.vtu") + " 2>" + PathOf("err")),
             1);
   EXPECT_FALSE(fs::exists(PathOf("run.vtu")));
@@ -155,7 +156,7 @@ TEST_F(ServedCommandTest, DemoTellsHowTheFaceFollowsAndLeavesResultsAndPictures)
 
 TEST_F(ServedCommandTest, DemoComparesWithTheElasticModelAsInProcess) {
   ASSERT_EQ(RunDemo("--plan " + kTonguePlan + " --seconds 0.1"), 0);
-  const std::string program = TISSUEFORM_BINARY;
+  const std::string program = ProgramPath("tissueform");
   const std::string elastic = PathOf("elastic.vtu");
   ASSERT_EQ(ExitCodeOf(program + " deform " + kTonguePlan + " --model linear_elastic --out " +
                        elastic + " 2>" + PathOf("err")),
@@ -190,7 +191,7 @@ TEST_F(ServedCommandTest, DemoMovesTheJawOfTheBundledHeadBy8MmAlsoWithoutADispla
 
 TEST_F(ServedCommandTest, AnInterruptedDemoEndsItsServer) {
   // The shell tells its process number and becomes the demo.
-  const std::string command = "echo $$; exec " + std::string(TISSUEFORM_BINARY) + " demo --out " +
+  const std::string command = "echo $$; exec " + ProgramPath("tissueform") + " demo --out " +
                               folder_.string() + " 2>" + PathOf("err");
   FILE* demo = popen(command.c_str(), "r");
   ASSERT_NE(demo, nullptr);

@@ -22,6 +22,7 @@
 #include "tests/integration/service_test.h"
 #include "tests/testing/killed_starter.h"
 #include "tests/testing/status_matchers.h"
+#include "tests/testing/test_paths.h"
 
 // The real program: starts, tells its port, serves, drains.
 namespace tissueform::testing {
@@ -33,7 +34,7 @@ constexpr std::chrono::seconds kPatience{60};
 
 std::unique_ptr<ServerProcess> StartProgram(std::vector<std::string> arguments = {}) {
   arguments.insert(arguments.end(), {"--port", "0", "--log-level", "warn"});
-  auto process = ServerProcess::Start(TISSUEFORM_SERVER_BINARY, arguments, kPatience);
+  auto process = ServerProcess::Start(ProgramPath("tissueform-server"), arguments, kPatience);
   EXPECT_THAT(process, IsOk());
   return process.ok() ? *std::move(process) : nullptr;
 }
@@ -165,7 +166,7 @@ TEST(ServerProgramStartTest, AProgramThatIsNotThereIsNamed) {
 }
 
 TEST(ServerProgramStartTest, WrongUseEndsWithTwo) {
-  const std::string command = std::string(TISSUEFORM_SERVER_BINARY) + " --port 99999 2>/dev/null";
+  const std::string command = ProgramPath("tissueform-server") + " --port 99999 2>/dev/null";
   const int status = std::system(command.c_str());
   EXPECT_EQ(WEXITSTATUS(status), 2);
 }

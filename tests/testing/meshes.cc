@@ -11,6 +11,7 @@
 
 #include "core/mesh/bar_mesh.h"
 #include "core/mesh_io/tet_mesh_io.h"
+#include "tests/testing/test_paths.h"
 
 namespace tissueform::testing {
 namespace {
@@ -74,14 +75,12 @@ TetMesh LoadTestMesh(const std::string& path_under_test_data) {
 }
 
 std::string TestDataPath(const std::string& path_under_test_data) {
-  return std::string(TISSUEFORM_TEST_DATA_DIR) + "/" + path_under_test_data;
+  return SourcePath("tests/data/" + path_under_test_data);
 }
 
 std::string SharedDataPath(const std::string& path) {
   const char* folder = std::getenv("TISSUEFORM_SHARED_DATA");
-  const std::string full =
-      (folder != nullptr ? folder : std::string(TISSUEFORM_SOURCE_DIR) + "/../shared/data") + "/" +
-      path;
+  const std::string full = (folder != nullptr ? folder : SourcePath("../shared/data")) + "/" + path;
   return std::filesystem::exists(full) ? full : "";
 }
 

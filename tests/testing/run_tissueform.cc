@@ -16,6 +16,7 @@
 #include <sys/wait.h>
 
 #include "tests/testing/meshes.h"
+#include "tests/testing/test_paths.h"
 
 namespace tissueform::testing {
 namespace {
@@ -54,7 +55,8 @@ void LimitFileSize(int64_t max_file_bytes) {
 
 ProcessResult RunTissueform(const std::vector<std::string>& arguments,
                             const std::filesystem::path& folder, int64_t max_file_bytes) {
-  std::vector<char*> argv = {const_cast<char*>(TISSUEFORM_BINARY)};
+  const std::string program = ProgramPath("tissueform");
+  std::vector<char*> argv = {const_cast<char*>(program.c_str())};
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
   const std::filesystem::path out = folder.string() + ".stdout";
@@ -64,7 +66,7 @@ ProcessResult RunTissueform(const std::vector<std::string>& arguments,
     Redirect(STDOUT_FILENO, out);
     Redirect(STDERR_FILENO, err);
     LimitFileSize(max_file_bytes);
-    if (chdir(folder.c_str()) == 0) execv(TISSUEFORM_BINARY, argv.data());
+    if (chdir(folder.c_str()) == 0) execv(program.c_str(), argv.data());
     _exit(127);
   }
   int status = 0;

@@ -17,6 +17,7 @@
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/scoped_environment.h"
 #include "tests/testing/status_matchers.h"
+#include "tests/testing/test_paths.h"
 
 namespace tissueform::testing {
 namespace {
@@ -134,7 +135,8 @@ TEST_F(PlanBuildTest, SameInputGivesTheSameBytesWithAnyNumberOfThreads) {
 // What the program wrote to stderr until it said `word`; then it is sent the signal.
 int ExitCodeAfterSignal(const std::vector<std::string>& arguments, const std::string& folder,
                         const std::string& word, int signal_number) {
-  std::vector<char*> argv = {const_cast<char*>(TISSUEFORM_BINARY)};
+  const std::string program = ProgramPath("tissueform");
+  std::vector<char*> argv = {const_cast<char*>(program.c_str())};
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
   std::array<int, 2> ends{};
@@ -145,7 +147,7 @@ int ExitCodeAfterSignal(const std::vector<std::string>& arguments, const std::st
     dup2(ends[1], STDERR_FILENO);
     close(ends[0]);
     close(ends[1]);
-    if (chdir(folder.c_str()) == 0) execv(TISSUEFORM_BINARY, argv.data());
+    if (chdir(folder.c_str()) == 0) execv(program.c_str(), argv.data());
     _exit(127);
   }
   close(ends[1]);
