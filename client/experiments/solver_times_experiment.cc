@@ -52,18 +52,28 @@ absl::StatusOr<SolverTimes> TimeBar(const std::array<int, 3>& cells, int repetit
   std::vector<double> analyse;
   std::vector<double> factorise;
   std::vector<double> solve;
+  int64_t factor_bytes = 0;
   for (int repetition = 0; repetition < repetitions; ++repetition) {
     TF_ASSIGN_OR_RETURN(const auto system, DirichletSystem::Create(L, ends.constrained(), {}));
     analyse.push_back(system->factorization().analyse_seconds);
     factorise.push_back(system->factorization().factorise_seconds);
+    factor_bytes = system->factorization().factor_bytes;
     for (int s = 0; s < kSolvesEach; ++s) {
       const Stopwatch stopwatch;
       TF_RETURN_IF_ERROR(system->Solve(rhs, values).status());
       solve.push_back(stopwatch.Seconds());
     }
   }
-  return SolverTimes{bar.num_vertices(), bar.num_tets(), Median(analyse), Median(factorise),
-                     Median(solve)};
+  return SolverTimes{
+      .vertices = bar.num_vertices(),
+      .tets = bar.num_tets(),
+      .analyse = Median(analyse),
+      .factorise = Median(factorise),
+      .three_solves = Median(solve),
+      .unknowns = bar.num_vertices() - static_cast<Eigen::Index>(ends.constrained().size()),
+      .factor_bytes = factor_bytes,
+      .num_factorizations = static_cast<int>(factorise.size()),
+      .num_solves = static_cast<int>(solve.size())};
 }
 
 absl::Status RunSolverTimesExperiment(const ExperimentOptions& options) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
@@ -16,9 +17,13 @@ namespace tissueform {
 struct SolverTimes {
   Eigen::Index vertices = 0;
   Eigen::Index tets = 0;
-  double analyse = 0;       // ordering and shape of the factor, once for a mesh and its regions
-  double factorise = 0;     // its numbers
-  double three_solves = 0;  // back-substitution of x, y and z in one pass
+  double analyse = 0;         // ordering and shape of the factor, once for a mesh and its regions
+  double factorise = 0;       // its numbers
+  double three_solves = 0;    // back-substitution of x, y and z in one pass
+  Eigen::Index unknowns = 0;  // free vertices
+  int64_t factor_bytes = 0;   // of one factorisation
+  int num_factorizations = 0;
+  int num_solves = 0;  // each for x, y and z
 };
 
 // A bar of cubes with both ends constrained. REQUIRES: repetitions >= 1.

@@ -216,7 +216,9 @@ TEST_F(SurfaceFormatsTest, FaceWithoutItsVertexIsRefused) {
   EXPECT_THAT(ReadSurface("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n"),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("refers to")));
   EXPECT_THAT(ReadSurface("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("")));
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       AllOf(HasSubstr("a.off"),
+                             HasSubstr("a face refers to a vertex that is not there"))));
 }
 
 TEST_F(SurfaceFormatsTest, TetMeshIsNoSurface) {

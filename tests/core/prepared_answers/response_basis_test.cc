@@ -5,6 +5,7 @@
 
 #include <numbers>
 
+#include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
@@ -128,9 +129,16 @@ TEST_P(ResponseBasisTest, MemoryIsKnownBeforeItIsBuilt) {
               0.1 * static_cast<double>(plan.bytes));
 }
 
+std::string NameOfCase(const ::testing::TestParamInfo<ResponseBasisTest::ParamType>& test) {
+  const auto [mesh, num_handles] = test.param;
+  return absl::StrCat(mesh == Tongue ? "Tongue" : "JitteredBar", "With", num_handles,
+                      num_handles == 1 ? "Handle" : "Handles");
+}
+
 INSTANTIATE_TEST_SUITE_P(MeshesAndHandles, ResponseBasisTest,
                          ::testing::Combine(::testing::Values(JitteredBar, Tongue),
-                                            ::testing::Values(1, 3)));
+                                            ::testing::Values(1, 3)),
+                         NameOfCase);
 
 TEST(ResponseBasisPlanTest, SmallerToleranceAndWiderRangeTakeMoreTerms) {
   const auto preparation = testing::PrepareMesh(JitteredBar(), 1);

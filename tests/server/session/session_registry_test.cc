@@ -190,7 +190,8 @@ TEST_F(SessionRegistryTest, OneCancelledCallerDoesNotSpoilItForTheOther) {
   registry_->Abandon(session);  // what the cancelled call does at its end
   EXPECT_THAT(registry_->Find(session->id()), IsOk());
   registry_->Abandon(session);
-  EXPECT_THAT(registry_->Find(session->id()), StatusIs(absl::StatusCode::kNotFound, HasSubstr("")));
+  EXPECT_THAT(registry_->Find(session->id()),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("it was deleted")));
   Drain();
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
 }

@@ -1,0 +1,52 @@
+#!/usr/bin/env python3
+# Copyright 2026 The Tissueform Authors.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+"""Every test can be called by its name, today and tomorrow: no name holds an address, the bytes of a parameter or a bare
+number where a parameter should be named.
+
+  tests/scripts/check_test_names.py [BUILD_DIR]     (default: TISSUEFORM_BUILD_DIR, or build/release)
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+
+NAMELESS = [
+    (re.compile(r"byte object"), "the bytes of a parameter"),
+    (re.compile(r"0x[0-9a-fA-F]"), "an address"),
+    (re.compile(r"/\d+$"), "a parameter by its number: give INSTANTIATE_TEST_SUITE_P a name generator"),
+    (re.compile(r"\s"), "a space"),
+]
+
+
+def faults(names):
+    """One line for each name that is none, and for each that two tests have."""
+    found = [f"{name}: {what}" for name in names for pattern, what in NAMELESS if pattern.search(name)]
+    seen = set()
+    for name in names:
+        if name in seen:
+            found.append(f"{name}: two tests have this name")
+        seen.add(name)
+    return found
+
+
+def names_of(build):
+    listing = subprocess.run(["ctest", "--test-dir", build, "--show-only=json-v1"], check=True, capture_output=True)
+    return [test["name"] for test in json.loads(listing.stdout)["tests"]]
+
+
+def main():
+    build = sys.argv[1] if len(sys.argv) > 1 else os.environ.get("TISSUEFORM_BUILD_DIR", "build/release")
+    names = names_of(build)
+    found = faults(names)
+    for fault in found:
+        print(f"check_test_names.py: {fault}", file=sys.stderr)
+    if not names:
+        print(f"check_test_names.py: no tests in {build}", file=sys.stderr)
+    sys.exit(1 if found or not names else 0)
+
+
+if __name__ == "__main__":
+    main()
