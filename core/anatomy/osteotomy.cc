@@ -136,18 +136,6 @@ class SegmentCutter {
 
 }  // namespace
 
-absl::string_view OsteotomyKindName(OsteotomyKind kind) {
-  switch (kind) {
-    case OsteotomyKind::kBssro:
-      return "bssro";
-    case OsteotomyKind::kLeFort1:
-      return "le_fort_1";
-    case OsteotomyKind::kGenioplasty:
-      return "genioplasty";
-  }
-  return "";
-}
-
 OsteotomySegment DefaultSegment(OsteotomyKind kind, absl::string_view name,
                                 const Landmarks& landmarks) {
   OsteotomySegment segment = {std::string(name), kind, {}};

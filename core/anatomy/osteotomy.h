@@ -23,7 +23,17 @@ enum class OsteotomyKind {
 };
 
 // "bssro", "le_fort_1", "genioplasty".
-absl::string_view OsteotomyKindName(OsteotomyKind kind);
+inline absl::string_view OsteotomyKindName(OsteotomyKind kind) {
+  switch (kind) {
+    case OsteotomyKind::kBssro:
+      return "bssro";
+    case OsteotomyKind::kLeFort1:
+      return "le_fort_1";
+    case OsteotomyKind::kGenioplasty:
+      return "genioplasty";
+  }
+  return "";
+}
 
 // A piece of bone that moves: of the lower jaw (bssro, genioplasty) or of the cranium (le_fort_1)
 // what lies on the positive side of every plane, and of that the largest connected piece.

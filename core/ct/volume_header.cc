@@ -86,6 +86,7 @@ absl::Status ReadMetaImage(std::istream& stream, const std::string& path, Volume
     if (key == "compresseddata") header->compressed = absl::StartsWith(value, "T");
     if (key == "compresseddatasize" && !absl::SimpleAtoi(value, &header->compressed_bytes)) break;
     if (key != "elementdatafile") continue;  // which is always the last
+    stream.clear();  // the file may end here, without a line's end: then there is no voxel
     header->data_offset = static_cast<size_t>(stream.tellg());
     return SetDataFile(path, value, header);
   }

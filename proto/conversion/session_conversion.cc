@@ -37,8 +37,8 @@ absl::Status ReadStiffness(const v1::Stiffness& stiffness, SessionRequest* reque
   return absl::InvalidArgumentError("stiffness is missing; set uniform_pa or cell_array");
 }
 
-absl::Status ReadHandles(const v1::CreateSessionRequest& proto,
-                         const SessionRequestLimits& limits, SessionRequest* request) {
+absl::Status ReadHandles(const v1::CreateSessionRequest& proto, const SessionRequestLimits& limits,
+                         SessionRequest* request) {
   if (proto.handles_size() > limits.max_handles) {
     return absl::InvalidArgumentError(absl::StrCat("the request has ", proto.handles_size(),
                                                    " handles; send ", limits.max_handles,

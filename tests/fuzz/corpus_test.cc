@@ -11,6 +11,7 @@
 #include "gtest/gtest.h"
 
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/testing/test_paths.h"
 
 // What the fuzzers start from, and what they have found, in the normal build too.
 namespace tissueform::fuzz {
@@ -26,7 +27,7 @@ class CorpusTest : public ::testing::TestWithParam<Target> {
   std::vector<std::string> Inputs() const {
     std::vector<std::string> inputs;
     const std::filesystem::path folder =
-        std::filesystem::path(TISSUEFORM_SOURCE_DIR) / "tests/fuzz/corpus" / GetParam().name;
+        testing::SourcePath(std::string("tests/fuzz/corpus/") + GetParam().name);
     for (const auto& entry : std::filesystem::directory_iterator(folder)) {
       std::ifstream stream(entry.path(), std::ios::binary);
       inputs.emplace_back(std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>());
@@ -55,7 +56,11 @@ TEST_P(CorpusTest, EveryBeginningOfEveryInputIsSurvived) {
 INSTANTIATE_TEST_SUITE_P(Targets, CorpusTest,
                          ::testing::Values(Target{"plan", FuzzPlan},
                                            Target{"mesh_validation", FuzzMeshValidation},
-                                           Target{"mesh_payload", FuzzMeshPayload}),
+                                           Target{"mesh_payload", FuzzMeshPayload},
+                                           Target{"dicom_series", FuzzDicomSeries},
+                                           Target{"volume_header", FuzzVolumeHeader},
+                                           Target{"recipe", FuzzRecipe},
+                                           Target{"medit", FuzzMeditLines}),
                          [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

@@ -22,4 +22,18 @@ void FuzzMeshValidation(const uint8_t* data, size_t size);
 // the mesh that comes of them.
 void FuzzMeshPayload(const uint8_t* data, size_t size);
 
+// The headers of a folder of DICOM files, as they come from the helper program in which GDCM reads
+// them (ChooseSeries, ArrangeStack).
+void FuzzDicomSeries(const uint8_t* data, size_t size);
+
+// The text at the head of a file of NRRD or MetaImage, and the size of what is compressed in one of
+// NIfTI (ReadVolumeHeader, UnpackedSize): no header chooses a file in another folder.
+void FuzzVolumeHeader(const uint8_t* data, size_t size);
+
+// The text of a recipe (ParseRecipe), as FuzzPlan.
+void FuzzRecipe(const uint8_t* data, size_t size);
+
+// A MEDIT text, before Gmsh sees it (CheckMeditLines).
+void FuzzMeditLines(const uint8_t* data, size_t size);
+
 }  // namespace tissueform::fuzz

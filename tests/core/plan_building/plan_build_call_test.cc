@@ -26,8 +26,8 @@ using ::testing::AllOf;
 using ::testing::Ge;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using ::testing::Le;
 using testing::IsOk;
+using ::testing::Le;
 using testing::StatusIs;
 
 // The lower face alone, so coarse that it takes seconds.
@@ -66,9 +66,11 @@ class PlanBuildCallTest : public ::testing::Test {
 
   // The outcome when the worker gets that signal as soon as it says what it does.
   absl::Status OutcomeAfter(int signal) const {
-    return CallPlanBuild(request_, {.tell = [signal](absl::string_view, double) {
-                           for (const pid_t child : Children()) kill(child, signal);
-                         }}).status();
+    return CallPlanBuild(request_, {.tell =
+                                        [signal](absl::string_view, double) {
+                                          for (const pid_t child : Children()) kill(child, signal);
+                                        }})
+        .status();
   }
 
   fs::path around_;

@@ -37,13 +37,13 @@ TEST(AnswerConversionTest, ASummarySurvivesTheJourney) {
 }
 
 TEST(AnswerConversionTest, QualitySurvivesTheJourney) {
-  const DeformationQuality back = ToDeformationQuality(ToProto(
-      DeformationQuality{.inverted_tets = 1,
-                         .min_volume_ratio = -0.5,
-                         .worst_tet = 7,
-                         .max_volume_ratio = 2,
-                         .total_volume_ratio = 1.1,
-                         .max_displacement_mm = 12}));
+  const DeformationQuality back =
+      ToDeformationQuality(ToProto(DeformationQuality{.inverted_tets = 1,
+                                                      .min_volume_ratio = -0.5,
+                                                      .worst_tet = 7,
+                                                      .max_volume_ratio = 2,
+                                                      .total_volume_ratio = 1.1,
+                                                      .max_displacement_mm = 12}));
   EXPECT_EQ(back.inverted_tets, 1);
   EXPECT_EQ(back.min_volume_ratio, -0.5);
   EXPECT_EQ(back.worst_tet, 7);

@@ -1,0 +1,108 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/ct/dicom_series.h"
+#include "core/ct/dicom_stack.h"
+#include "core/ct/unpacked_size.h"
+#include "core/ct/volume_header.h"
+#include "tests/fuzz/byte_source.h"
+#include "tests/fuzz/fuzz_target.h"
+#include "tests/fuzz/fuzzed_file.h"
+
+namespace tissueform::fuzz {
+namespace {
+
+void Require(bool promise) {
+  if (!promise) std::abort();
+}
+
+// A header from outside must not choose what is read.
+void CheckDataPath(const std::string& header_path, const VolumeHeader& header) {
+  if (header.data_path.empty()) return;
+  const std::filesystem::path data(header.data_path);
+  Require(data.parent_path() == std::filesystem::path(header_path).parent_path());
+  Require(data.filename() != ".." && data.filename() != ".");
+}
+
+std::optional<double> MaybeNumber(ByteSource* source) {
+  const auto choice = source->Take<uint8_t>();
+  if (choice % 4 == 0) return std::nullopt;
+  return choice % 4 == 1 ? source->Take<double>() : source->Take<int8_t>();
+}
+
+double FiniteNumber(ByteSource* source) {  // as ReadDicomHeader lets through
+  const auto number = source->Take<double>();
+  return std::isfinite(number) ? number : 0;
+}
+
+// Mostly a slice that belongs to the others; the bits of a byte say what does not.
+DicomHeader TakeHeader(int number, ByteSource* source) {
+  const auto odd = source->Take<uint8_t>();
+  DicomHeader header;
+  header.file_number = number;
+  header.kind = DicomKind::kCtSlice;
+  if ((odd & 1) != 0) header.kind = static_cast<DicomKind>(source->Take<uint8_t>() % 9);
+  header.modality = "CT";
+  header.series_uid = (odd & 2) != 0 ? "1.3" : "1.2";
+  header.series_number = 1;
+  header.instance_number = source->Take<int8_t>();
+  header.rows = (odd & 4) != 0 ? source->Take<uint16_t>() : 4;
+  header.columns = 4;
+  header.position_mm = Eigen::Vector3d(0, 0, source->Take<int8_t>());
+  header.row_direction = Eigen::Vector3d::UnitX();
+  header.column_direction = Eigen::Vector3d::UnitY();
+  header.pixel_spacing_mm = Eigen::Vector2d(0.5, 0.5);
+  if ((odd & 8) != 0) header.position_mm->x() = FiniteNumber(source);
+  if ((odd & 16) != 0) header.row_direction->y() = FiniteNumber(source);
+  if ((odd & 32) != 0) header.pixel_spacing_mm->x() = FiniteNumber(source);
+  if ((odd & 64) != 0) header.position_mm.reset();
+  if ((odd & 128) != 0) {
+    header.rescale_slope = MaybeNumber(source);
+    header.rescale_intercept = MaybeNumber(source);
+  }
+  return header;
+}
+
+}  // namespace
+
+// The file itself is GDCM's to read, in a helper program that may crash; what comes of it is ours.
+void FuzzDicomSeries(const uint8_t* data, size_t size) {
+  ByteSource source(data, size);
+  SeriesChoice choice;
+  if (source.Take<uint8_t>() % 4 == 1) choice.series_number = 1;
+  const bool has_offset = source.Take<uint8_t>() % 2 == 1;
+  std::vector<DicomHeader> files;
+  while (source.left() > 0 && files.size() < 64) {
+    files.push_back(TakeHeader(static_cast<int>(files.size()) + 1, &source));
+  }
+  absl::StatusOr<DicomStack> stack = ChooseSeries(files, choice);
+  Require(stack.ok() || !stack.status().message().empty());
+  if (!stack.ok() || !ArrangeStack(has_offset, &*stack).ok()) return;
+  Require(stack->spacing_mm.allFinite() && stack->spacing_mm.minCoeff() > 0);
+  Require(stack->direction.isUnitary(1e-3) && stack->slices.size() <= files.size());
+}
+
+void FuzzVolumeHeader(const uint8_t* data, size_t size) {
+  const FuzzedFile file(data, size);
+  for (const VolumeFormat format :
+       {VolumeFormat::kNifti, VolumeFormat::kNrrd, VolumeFormat::kMetaImage}) {
+    const absl::StatusOr<VolumeHeader> header = ReadVolumeHeader(file.path(), format);
+    if (header.ok()) {
+      CheckDataPath(file.path(), *header);
+      Require(header->data_offset <= size);
+    } else {
+      Require(!header.status().message().empty());
+    }
+  }
+  const absl::string_view bytes(reinterpret_cast<const char*>(data), size);
+  Require(UnpackedSize(bytes, 1 << 20) >= 0);
+}
+
+}  // namespace tissueform::fuzz
