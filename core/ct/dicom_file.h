@@ -57,12 +57,12 @@ std::string NameOf(const DicomHeader& header);
 // "a photograph or copy of a screen (secondary capture)", "of modality MR", ...
 std::string DescribeKind(const DicomHeader& header);
 
-// Reads a header up to its pixels. nullopt when the file is no DICOM file. In a child process only:
-// GDCM is not safe from damaged files. Internal to core/ct.
+// Reads a header up to its pixels. nullopt when the file is no DICOM file. In a helper program
+// only: GDCM is not safe from damaged files. Internal to core/ct.
 std::optional<DicomHeader> ReadDicomHeader(const std::string& path);
 
 // Stored values of a slice, row after row, from the contents of its file: rescale not applied. In a
-// child process only.
+// helper program only.
 //
 // Errors: InvalidArgument when the file is cut off or its pixels cannot be decoded.
 absl::StatusOr<std::vector<double>> DecodeDicomPixels(const DicomHeader& header,

@@ -33,7 +33,7 @@ const Attribute* FindAttribute(const std::vector<Attribute>& attributes, const s
 // (MEDIT) or .node and .ele (TetGen; either of the pair); the ending, in any case, chooses the
 // format. docs/mesh-formats.md says what each keeps. When every tet is negative the file counts
 // corners the other way round: they are reoriented (see RepairOrientation) and reported. All
-// formats but .vtu are read in a child process, because their libraries do not bear damaged files.
+// formats but .vtu are read by a helper program, because their libraries do not bear damaged files.
 //
 // Errors name the file: NotFound (no such file), PermissionDenied, InvalidArgument (truncated,
 // another format behind the ending, a header that disagrees with its arrays, cells that are not

@@ -15,7 +15,7 @@
 #include "core/mesh_io/mesh_format.h"
 #include "core/mesh_io/raw_mesh_check.h"
 #include "core/mesh_io/surface_writer.h"
-#include "core/mesh_io/vtp_writer.h"
+#include "core/mesh_io/vtk_export.h"
 
 namespace tissueform {
 namespace {

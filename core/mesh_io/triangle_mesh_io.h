@@ -29,7 +29,7 @@ bool NamesSurface(const std::string& path);
 
 // Reads .vtp (with all arrays), .ply (with normals, colours, texture coordinates), .stl (corners at
 // exactly one place become one vertex), .obj or .off (places and faces); the ending, in any case,
-// chooses the format. Each is read in a child process.
+// chooses the format. Each is read by a helper program.
 //
 // Errors: as ReadTetMesh (core/mesh_io/tet_mesh_io.h). Never throws.
 absl::StatusOr<TriangleMeshFile> ReadTriangleMesh(const std::string& path,

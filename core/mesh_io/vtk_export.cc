@@ -5,15 +5,18 @@
 
 #include <cstring>
 #include <set>
+#include <vtkCellArray.h>
 #include <vtkCellData.h>
 #include <vtkDataArray.h>
 #include <vtkDoubleArray.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
+#include <vtkPolyData.h>
 #include <vtkSmartPointer.h>
 #include <vtkTypeTraits.h>
 #include <vtkUnsignedCharArray.h>
+#include <vtkXMLPolyDataWriter.h>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
@@ -126,6 +129,21 @@ absl::StatusOr<std::string> SerializeWith(vtkXMLWriter* writer, vtkPointSet* dat
     return absl::InternalError(absl::StrCat("VTK's writer failed (", errors.first_error(), ")"));
   }
   return WithNoticeAsComment(writer->GetOutputString());
+}
+
+absl::StatusOr<std::string> VtpText(const TriangleMeshFile& file) {
+  TF_RETURN_IF_ERROR(CheckAttributes(file.point_data, file.mesh.num_vertices()));
+  TF_RETURN_IF_ERROR(CheckAttributes(file.cell_data, file.mesh.num_triangles()));
+  vtkNew<vtkPolyData> surface;
+  vtkNew<vtkCellArray> polygons;
+  polygons->AllocateExact(file.mesh.num_triangles(), 3 * file.mesh.num_triangles());
+  for (const auto& triangle : file.mesh.triangles().rowwise()) {
+    polygons->InsertNextCell({triangle[0], triangle[1], triangle[2]});
+  }
+  surface->SetPolys(polygons);
+  AddPointsAndArrays(file.mesh.positions(), file.point_data, file.cell_data, surface);
+  vtkNew<vtkXMLPolyDataWriter> writer;
+  return SerializeWith(writer, surface);
 }
 
 }  // namespace tissueform

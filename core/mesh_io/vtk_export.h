@@ -13,6 +13,7 @@
 
 #include "core/base/types.h"
 #include "core/mesh/attribute.h"
+#include "core/mesh_io/triangle_mesh_io.h"
 
 namespace tissueform {
 
@@ -28,5 +29,9 @@ void AddPointsAndArrays(const Positions& positions, const std::vector<Attribute>
 // The whole file as a text: XML with the arrays at its end, in base64 and compressed by zlib, and
 // the notice once more as a comment. The disk is touched in one place only, which is not VTK's.
 absl::StatusOr<std::string> SerializeWith(vtkXMLWriter* writer, vtkPointSet* data);
+
+// The surface with its arrays and the notice as the contents of a .vtp file. InvalidArgument for an
+// array of the wrong length or with an illegal name.
+absl::StatusOr<std::string> VtpText(const TriangleMeshFile& file);
 
 }  // namespace tissueform
