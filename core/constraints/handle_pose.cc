@@ -25,6 +25,11 @@ absl::Status CheckFinite(const Eigen::Vector3d& vector, absl::string_view field)
       absl::StrCat("pose has a NaN or infinite ", field, "; give three finite numbers"));
 }
 
+// pow is exact at 0 and 1, so both ends are met to the last bit; equal scales are not left to it.
+double ScaleBetween(double a, double b, double t) {
+  return a == b ? a : std::pow(a, 1 - t) * std::pow(b, t);
+}
+
 }  // namespace
 
 Eigen::Matrix3d RotationMatrix(const Eigen::Vector3d& rotation_vector) {
@@ -69,6 +74,26 @@ Eigen::Vector3d ApplyPose(const HandlePose& pose, const Eigen::Vector3d& positio
   return pose.pivot_mm +
          pose.scale * (RotationMatrix(pose.rotation_vector) * (position - pose.pivot_mm)) +
          pose.translation_mm;
+}
+
+HandlePose PoseBetween(const HandlePose& a, const HandlePose& b, double t) {
+  return {.rotation_vector = (1 - t) * a.rotation_vector + t * b.rotation_vector,
+          .pivot_mm = (1 - t) * a.pivot_mm + t * b.pivot_mm,
+          .translation_mm = (1 - t) * a.translation_mm + t * b.translation_mm,
+          .scale = ScaleBetween(a.scale, b.scale, t)};
+}
+
+HandlePose RestOf(const HandlePose& pose) {
+  return {.rotation_vector = Eigen::Vector3d::Zero(),
+          .pivot_mm = pose.pivot_mm,
+          .translation_mm = Eigen::Vector3d::Zero(),
+          .scale = 1};
+}
+
+HandlePose PartOfPose(const HandlePose& pose, double amount) {
+  HandlePose part = PoseBetween(RestOf(pose), pose, amount);
+  part.pivot_mm = pose.pivot_mm;  // mixed with itself it would be rounded
+  return part;
 }
 
 }  // namespace tissueform

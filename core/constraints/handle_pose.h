@@ -30,4 +30,23 @@ absl::Status CheckPose(const HandlePose& pose);
 
 Eigen::Vector3d ApplyPose(const HandlePose& pose, const Eigen::Vector3d& position);
 
+// The one way between two poses that the load paths of the models, drags and trials go:
+//
+//   w(t) = (1 - t) w_a + t w_b, the same for pivot and translation;  s(t) = s_a^(1-t) s_b^t.
+//
+// So rotation and scale go at an even pace, both through their logarithm: about one pivot the linear
+// part of the way from rest is exp(t (log(s) I + [w])). A full turn is walked through, not jumped
+// over, and the scale is positive at every t, also beyond 1 (mixed linearly, 0.2 would be negative
+// at t = 4/3). Exactly `a` at 0 and `b` at 1; a scale that both share stays to the last bit.
+//
+// REQUIRES: positive scales.
+HandlePose PoseBetween(const HandlePose& a, const HandlePose& b, double t);
+
+// Where a handle with this pose's pivot rests: nothing turned, scaled or moved.
+HandlePose RestOf(const HandlePose& pose);
+
+// The part `amount` of the way from rest to the pose; beyond 1 it goes farther. The pivot stays. A
+// part of a part is the part of their product.
+HandlePose PartOfPose(const HandlePose& pose, double amount);
+
 }  // namespace tissueform

@@ -11,9 +11,7 @@ namespace {
 // Of poses with the same pivots: nothing moves but what has to.
 std::vector<HandlePose> RestPoses(absl::Span<const HandlePose> to) {
   std::vector<HandlePose> rest(to.size());
-  for (size_t h = 0; h < to.size(); ++h) {
-    rest[h].pivot_mm = to[h].pivot_mm;
-  }
+  std::transform(to.begin(), to.end(), rest.begin(), RestOf);
   return rest;
 }
 
@@ -35,12 +33,7 @@ std::vector<HandlePose> LoadPath::PosesAt(double load) const {
   }
   std::vector<HandlePose> poses(to_.size());
   for (size_t h = 0; h < to_.size(); ++h) {
-    const HandlePose& a = from_[h];
-    const HandlePose& b = to_[h];
-    poses[h].rotation_vector = (1 - load) * a.rotation_vector + load * b.rotation_vector;
-    poses[h].pivot_mm = (1 - load) * a.pivot_mm + load * b.pivot_mm;
-    poses[h].translation_mm = (1 - load) * a.translation_mm + load * b.translation_mm;
-    poses[h].scale = (1 - load) * a.scale + load * b.scale;
+    poses[h] = PoseBetween(from_[h], to_[h], load);
   }
   return poses;
 }

@@ -12,9 +12,8 @@
 
 namespace tissueform {
 
-// The way of the handles from one set of poses to another. In between rotation vectors, pivots,
-// translations and scales are mixed linearly, so a full twist is walked through and not jumped
-// over.
+// The way of the handles from one set of poses to another, as PoseBetween goes it: a full twist is
+// walked through and not jumped over.
 class LoadPath {
  public:
   // From where the handles rest.

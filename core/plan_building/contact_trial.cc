@@ -23,11 +23,7 @@ constexpr double kOverreach = 4.0 / 3.0;
 constexpr int kMaxRounds = 20;
 
 std::vector<HandlePose> Overreaching(std::vector<HandlePose> poses) {
-  for (HandlePose& pose : poses) {
-    pose.rotation_vector *= kOverreach;
-    pose.translation_mm *= kOverreach;
-    pose.scale = 1 + kOverreach * (pose.scale - 1);
-  }
+  for (HandlePose& pose : poses) pose = PartOfPose(pose, kOverreach);
   return poses;
 }
 

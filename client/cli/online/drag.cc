@@ -60,14 +60,6 @@ void Receive(DeformStream* stream, Clock::time_point start, const SendTimes& sen
 
 }  // namespace
 
-HandlePose PartOfPose(const HandlePose& pose, double amount) {
-  HandlePose part = pose;
-  part.rotation_vector *= amount;
-  part.translation_mm *= amount;
-  part.scale = std::pow(pose.scale, amount);
-  return part;
-}
-
 std::vector<NamedPose> PartOfPoses(absl::Span<const NamedPose> poses, double amount) {
   std::vector<NamedPose> parts;
   for (const NamedPose& pose : poses) {

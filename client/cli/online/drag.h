@@ -53,8 +53,7 @@ absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& 
                                    absl::Span<const NamedPose> poses, const DragOptions& options,
                                    const std::atomic<bool>& interrupted);
 
-// The pose at the part `amount` (0 rest, 1 `pose`) of its way; beyond 1 it goes farther.
-HandlePose PartOfPose(const HandlePose& pose, double amount);
+// Each at the part `amount` (0 rest, 1 as given) of its way: PartOfPose.
 std::vector<NamedPose> PartOfPoses(absl::Span<const NamedPose> poses, double amount);
 
 }  // namespace tissueform

@@ -3,6 +3,7 @@
 
 #include "core/constraints/handle_pose.h"
 
+#include <cmath>
 #include <limits>
 #include <numbers>
 
@@ -85,6 +86,76 @@ TEST(CheckPoseTest, NumbersThatWouldOverflowAreRefused) {
   pose = {};
   pose.pivot_mm.x() = -1e300;
   EXPECT_THAT(CheckPose(pose), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("pivot")));
+}
+
+HandlePose Turned() {
+  return {.rotation_vector = {0.3, -0.7, 7.1},
+          .pivot_mm = {12.3, -4.5, 0.1},
+          .translation_mm = {1.7, -6.0, 0.3},
+          .scale = 0.2};
+}
+
+void ExpectSame(const HandlePose& a, const HandlePose& b) {
+  EXPECT_EQ(a.rotation_vector, b.rotation_vector);
+  EXPECT_EQ(a.pivot_mm, b.pivot_mm);
+  EXPECT_EQ(a.translation_mm, b.translation_mm);
+  EXPECT_EQ(a.scale, b.scale);
+}
+
+TEST(PoseBetweenTest, MeetsBothEndsToTheLastBit) {
+  HandlePose other = Turned();
+  other.scale = 1.7;
+  other.rotation_vector *= -0.37;
+  ExpectSame(PoseBetween(Turned(), other, 0), Turned());
+  ExpectSame(PoseBetween(Turned(), other, 1), other);
+}
+
+TEST(PoseBetweenTest, GoesTheSameWayInBothDirections) {
+  HandlePose other = Turned();
+  other.scale = 3;
+  other.translation_mm = {-4, 0, 2};
+  const HandlePose there = PoseBetween(Turned(), other, 0.25);
+  const HandlePose back = PoseBetween(other, Turned(), 0.75);
+  ExpectSame(there, back);
+}
+
+TEST(PoseBetweenTest, ScaleOfBothEndsStaysAllTheWay) {
+  HandlePose a = Turned();
+  HandlePose b = Turned();
+  for (const double scale : {1.0, 0.2, 1.1}) {
+    a.scale = b.scale = scale;
+    for (const double t : {0.1, 1.0 / 3, 0.7, 4.0 / 3}) {
+      EXPECT_EQ(PoseBetween(a, b, t).scale, scale);
+    }
+  }
+}
+
+TEST(PartOfPoseTest, LinearPartIsTheExponentialOfThatPartOfTheLogarithm) {
+  const HandlePose pose = Turned();
+  const Eigen::Matrix3d logarithm = std::log(pose.scale) * Eigen::Matrix3d::Identity() +
+                                    CrossProductMatrix(pose.rotation_vector);
+  for (const double t : {0.0, 0.3, 1.0, 4.0 / 3}) {
+    const HandlePose part = PartOfPose(pose, t);
+    const Eigen::Matrix3d oracle = (t * logarithm).exp();
+    EXPECT_LT((part.scale * RotationMatrix(part.rotation_vector) - oracle).norm(), 1e-12) << t;
+  }
+}
+
+TEST(PartOfPoseTest, PartOfAPartIsThePartOfTheirProduct) {
+  const HandlePose once = PartOfPose(Turned(), 0.25);
+  const HandlePose twice = PartOfPose(PartOfPose(Turned(), 0.5), 0.5);
+  ExpectSame(once, twice);
+}
+
+TEST(PartOfPoseTest, NoneIsRestAndThePivotStays) {
+  ExpectSame(PartOfPose(Turned(), 0), RestOf(Turned()));
+  for (const double t : {0.1, 0.3, 0.9, 1.5}) {
+    EXPECT_EQ(PartOfPose(Turned(), t).pivot_mm, Turned().pivot_mm);
+  }
+}
+
+TEST(PartOfPoseTest, BeyondThePoseTheScaleStaysPositive) {
+  EXPECT_THAT(CheckPose(PartOfPose(Turned(), 4.0 / 3)), IsOk());
 }
 
 }  // namespace
