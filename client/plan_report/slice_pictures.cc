@@ -82,7 +82,7 @@ std::vector<uint8_t> SampleLabels(const PlanBuild& build, const SlicePlane& plan
 
 Colour Grey(const HuGrid& hu, const Vector3d& place_mm) {
   const double brightness =
-      std::clamp((InterpolateHu(hu, place_mm) - kBlackHu) / (kWhiteHu - kBlackHu), 0.0, 1.0);
+      std::clamp((Interpolate(hu, place_mm) - kBlackHu) / (kWhiteHu - kBlackHu), 0.0, 1.0);
   return Colour::Constant(brightness);
 }
 

@@ -30,7 +30,7 @@ class FaceProfile {
     double before_hu = kAirHu;
     for (int step = 0; step < 2 * hu_.geometry.size[1]; ++step) {
       const double y_mm = hu_.geometry.origin_mm.y() + step * step_mm;
-      const double hu = InterpolateHu(hu_, Place(y_mm, z_mm, left_mm));
+      const double hu = Interpolate(hu_, Place(y_mm, z_mm, left_mm));
       if (hu > threshold_hu_) {
         const double part = (hu - threshold_hu_) / (hu - before_hu);
         return Place(y_mm - part * step_mm, z_mm, left_mm);

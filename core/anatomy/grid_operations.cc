@@ -46,29 +46,4 @@ double VoxelVolumeMm3(const GridGeometry& geometry) {
   return geometry.spacing_mm * geometry.spacing_mm * geometry.spacing_mm;
 }
 
-double InterpolateHu(const HuGrid& grid, const Eigen::Vector3d& place_mm) {
-  const Eigen::Vector3d voxels = grid.geometry.ToVoxels(place_mm);
-  std::array<int, 3> low = {};
-  std::array<double, 3> part = {};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const double inside = std::clamp(voxels[static_cast<Eigen::Index>(axis)], 0.0,
-                                     static_cast<double>(grid.geometry.size[axis] - 1));
-    low[axis] = std::min(static_cast<int>(inside), std::max(0, grid.geometry.size[axis] - 2));
-    part[axis] = inside - low[axis];
-  }
-  double value = 0;
-  for (unsigned corner = 0; corner < 8; ++corner) {
-    const std::array<int, 3> far = {static_cast<int>(corner & 1U),
-                                    static_cast<int>(corner >> 1U & 1U),
-                                    static_cast<int>(corner >> 2U)};
-    double weight = 1;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      weight *= far[axis] == 1 ? part[axis] : 1 - part[axis];
-    }
-    if (weight == 0) continue;
-    value += weight * grid.At(low[0] + far[0], low[1] + far[1], low[2] + far[2]);
-  }
-  return value;
-}
-
 }  // namespace tissueform

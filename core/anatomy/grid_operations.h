@@ -38,9 +38,6 @@ int64_t CountVoxels(const LabelGrid& mask);
 
 double VoxelVolumeMm3(const GridGeometry& geometry);
 
-// HU between the voxels' centres, linear along each axis; beyond the outermost centres those hold.
-double InterpolateHu(const HuGrid& grid, const Eigen::Vector3d& place_mm);
-
 // The part of a grid inside the box, with the same places.
 // REQUIRES: the box lies inside the grid and is not empty.
 template <typename T>

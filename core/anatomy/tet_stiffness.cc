@@ -43,18 +43,13 @@ class CtNumbers {
 
   // At a place in units of voxels, of its eight neighbours, mixed ones included or not.
   Mean Interpolate(const Eigen::Vector3d& place, bool with_mixed) const {
+    const VoxelCell cell(place, hu_.geometry.size);
     Mean mean;
-    const Eigen::Vector3d lower = place.array().floor();
-    const Eigen::Vector3d part = place - lower;
-    for (int corner = 0; corner < 8; ++corner) {
-      const Eigen::Vector3i side(corner & 1, (corner >> 1) & 1, corner >> 2);
-      const Eigen::Vector3i at = lower.cast<int>() + side;
-      double weight = 1;
-      for (int axis = 0; axis < 3; ++axis) {
-        weight *= side[axis] == 1 ? part[axis] : 1 - part[axis];
-      }
-      if (weight <= 0 || !hu_.geometry.Contains(at[0], at[1], at[2])) continue;
-      if (with_mixed || !IsMixed(at[0], at[1], at[2])) mean.Add(At(at[0], at[1], at[2]), weight);
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      const double weight = cell.Weight(corner);
+      if (weight <= 0) continue;
+      const auto [x, y, z] = cell.Corner(corner);
+      if (with_mixed || !IsMixed(x, y, z)) mean.Add(At(x, y, z), weight);
     }
     return mean;
   }

@@ -59,19 +59,13 @@ Samples SamplesPerVoxel(const Eigen::Matrix3d& to_index, double spacing_mm) {
   return samples;
 }
 
-// The two neighbours of a place along one axis, and how much the upper one weighs.
-struct Neighbours {
-  int lower = 0;
-  int upper = 0;
-  double weight = 0;
-};
-
-bool FindNeighbours(double place, int size, Neighbours* neighbours) {
-  if (!(place >= -0.5 - kRounding && place <= size - 0.5 + kRounding)) return false;
-  const double inside = std::clamp(place, 0.0, static_cast<double>(size - 1));
-  neighbours->lower = std::min(static_cast<int>(inside), std::max(0, size - 2));
-  neighbours->upper = std::min(neighbours->lower + 1, size - 1);
-  neighbours->weight = inside - neighbours->lower;
+// Whether a place, in voxels of the volume, lies in its box: half a voxel beyond the outermost
+// centres.
+bool LiesInVolume(const Eigen::Vector3d& place, const std::array<int, 3>& size) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double end = size[static_cast<size_t>(axis)] - 0.5;
+    if (!(place[axis] >= -0.5 - kRounding && place[axis] <= end + kRounding)) return false;
+  }
   return true;
 }
 
@@ -102,24 +96,11 @@ class Sampler {
  private:
   double Offset(int sample, size_t axis) const { return (sample + 0.5) / samples_[axis] - 0.5; }
 
-  double AlongRow(const Neighbours& i, int j, int k) const {
-    return (1 - i.weight) * volume_.At(i.lower, j, k) + i.weight * volume_.At(i.upper, j, k);
-  }
-
   bool AddSample(const Eigen::Vector3d& index, double* sum) const {
-    Neighbours i;
-    Neighbours j;
-    Neighbours k;
-    if (!FindNeighbours(index[0], volume_.size[0], &i) ||
-        !FindNeighbours(index[1], volume_.size[1], &j) ||
-        !FindNeighbours(index[2], volume_.size[2], &k)) {
-      return false;
-    }
-    const double below =
-        (1 - j.weight) * AlongRow(i, j.lower, k.lower) + j.weight * AlongRow(i, j.upper, k.lower);
-    const double above =
-        (1 - j.weight) * AlongRow(i, j.lower, k.upper) + j.weight * AlongRow(i, j.upper, k.upper);
-    *sum += (1 - k.weight) * below + k.weight * above;
+    if (!LiesInVolume(index, volume_.size)) return false;
+    *sum += VoxelCell(index, volume_.size).Mean([this](int i, int j, int k) {
+      return static_cast<double>(volume_.At(i, j, k));
+    });
     return true;
   }
 

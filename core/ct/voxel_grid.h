@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <utility>
@@ -48,6 +49,59 @@ struct VoxelGrid {
   T At(int x, int y, int z) const { return values[static_cast<size_t>(geometry.Index(x, y, z))]; }
   T& At(int x, int y, int z) { return values[static_cast<size_t>(geometry.Index(x, y, z))]; }
 };
+
+// The eight voxels about a place, and how far it lies from the lower to the upper ones along each
+// axis, in [0, 1]. A place beyond the outermost centres is taken onto them.
+struct VoxelCell {
+  std::array<int, 3> lower = {0, 0, 0};
+  std::array<int, 3> upper = {0, 0, 0};
+  std::array<double, 3> part = {0, 0, 0};
+
+  // `place` in units of voxels, see GridGeometry::ToVoxels.
+  VoxelCell(const Eigen::Vector3d& place, const std::array<int, 3>& size) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double inside = std::clamp(place[static_cast<Eigen::Index>(axis)], 0.0,
+                                       static_cast<double>(size[axis] - 1));
+      lower[axis] = std::min(static_cast<int>(inside), std::max(0, size[axis] - 2));
+      upper[axis] = std::min(lower[axis] + 1, size[axis] - 1);
+      part[axis] = inside - lower[axis];
+    }
+  }
+
+  // Corner 0 to 7: bit 0 is the upper one along x, bit 1 along y, bit 2 along z.
+  std::array<int, 3> Corner(unsigned corner) const {
+    std::array<int, 3> voxel{};
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      voxel[axis] = (corner >> axis & 1U) != 0 ? upper[axis] : lower[axis];
+    }
+    return voxel;
+  }
+  // Of a corner in the trilinear mean: not negative, one in sum.
+  double Weight(unsigned corner) const {
+    double weight = 1;
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      weight *= (corner >> axis & 1U) != 0 ? part[axis] : 1 - part[axis];
+    }
+    return weight;
+  }
+
+  // The trilinear mean of at(x, y, z): along x, then y, then z.
+  template <typename At>
+  double Mean(const At& at) const {
+    const auto mix = [](double part, double a, double b) { return (1 - part) * a + part * b; };
+    const auto row = [&](int y, int z) { return mix(part[0], at(lower[0], y, z), at(upper[0], y, z)); };
+    const auto slice = [&](int z) { return mix(part[1], row(lower[1], z), row(upper[1], z)); };
+    return mix(part[2], slice(lower[2]), slice(upper[2]));
+  }
+};
+
+// The value between the voxels' centres, linear along each axis; beyond the outermost centres those
+// hold.
+template <typename T>
+double Interpolate(const VoxelGrid<T>& grid, const Eigen::Vector3d& place_mm) {
+  return VoxelCell(grid.geometry.ToVoxels(place_mm), grid.geometry.size)
+      .Mean([&grid](int x, int y, int z) { return static_cast<double>(grid.At(x, y, z)); });
+}
 
 using HuGrid = VoxelGrid<int16_t>;
 using LabelGrid = VoxelGrid<uint8_t>;

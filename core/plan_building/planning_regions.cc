@@ -42,7 +42,7 @@ bool IsOnCut(const Eigen::Vector3d& place, const SoftTissue& soft_tissue) {
 }
 
 bool IsAir(const PlanningCt& ct, const Eigen::Vector3d& place) {
-  return InterpolateHu(ct.hu, place) < ct.tissue_above_hu;
+  return Interpolate(ct.hu, place) < ct.tissue_above_hu;
 }
 
 // The label of the nearest voxel that is no soft tissue; air where there is none near by.
@@ -78,25 +78,6 @@ std::vector<uint8_t> TouchedBy(const TetMesh& mesh, Eigen::Index boundary_vertic
   return touched;
 }
 
-double InterpolateMm(const FloatGrid& grid, const Eigen::Vector3d& place) {
-  const Eigen::Vector3d at = grid.geometry.ToVoxels(place);
-  std::array<int, 3> first{};
-  std::array<double, 3> part{};
-  for (int axis = 0; axis < 3; ++axis) {
-    const int last = std::max(0, grid.geometry.size[axis] - 2);
-    first[axis] = std::clamp(static_cast<int>(std::floor(at[axis])), 0, last);
-    part[axis] = std::clamp(at[axis] - first[axis], 0.0, 1.0);
-  }
-  double value = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const std::array<int, 3> bit = {corner & 1, (corner >> 1) & 1, (corner >> 2) & 1};
-    double weight = 1;
-    for (int axis = 0; axis < 3; ++axis) weight *= bit[axis] == 1 ? part[axis] : 1 - part[axis];
-    value += weight * grid.At(first[0] + bit[0], first[1] + bit[1], first[2] + bit[2]);
-  }
-  return value;
-}
-
 // Distances from every bone but the one of that label, which the vertices on it keep away from.
 FloatGrid DistanceFromOtherBone(const LabelGrid& labels, uint8_t own) {
   return DistanceMm(MaskWhere(labels, [own](uint8_t label) {
@@ -112,7 +93,7 @@ void FreeCutsNearSegments(const TetMesh& mesh, const LabelGrid& labels,
   const FloatGrid distance = DistanceFromOtherBone(labels, kFixedBone);
   for (size_t v = 0; v < touched.size(); ++v) {
     const Eigen::Vector3d place = mesh.positions().row(static_cast<Eigen::Index>(v));
-    if (touched[v] == kCut && InterpolateMm(distance, place) < nearer_than_mm) {
+    if (touched[v] == kCut && Interpolate(distance, place) < nearer_than_mm) {
       (*anatomy)[v] = kFree;
     }
   }
@@ -127,7 +108,7 @@ void FreeContacts(const TetMesh& mesh, const LabelGrid& labels, size_t num_segme
     for (size_t v = 0; v < touched.size(); ++v) {
       if (touched[v] != own) continue;
       const Eigen::Vector3d place = mesh.positions().row(static_cast<Eigen::Index>(v));
-      if (InterpolateMm(distance, place) < contact_band_mm) (*anatomy)[v] = kFree;
+      if (Interpolate(distance, place) < contact_band_mm) (*anatomy)[v] = kFree;
     }
   }
   FreeCutsNearSegments(mesh, labels, touched, kCutBands * contact_band_mm, anatomy);

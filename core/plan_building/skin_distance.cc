@@ -38,10 +38,10 @@ Positions VertexNormals(const TriangleMesh& surface) {
 std::optional<double> CrossingMm(const HuGrid& hu, double threshold_hu,
                                  const Eigen::Vector3d& place, const Eigen::Vector3d& direction) {
   const double step = kStepVoxels * hu.geometry.spacing_mm;
-  double before = InterpolateHu(hu, place) - threshold_hu;
+  double before = Interpolate(hu, place) - threshold_hu;
   if (before == 0) return 0.0;
   for (int i = 1; i * kStepVoxels <= kSearchVoxels; ++i) {
-    const double here = InterpolateHu(hu, place + i * step * direction) - threshold_hu;
+    const double here = Interpolate(hu, place + i * step * direction) - threshold_hu;
     if ((here > 0) != (before > 0)) return step * (i - 1 + before / (before - here));
     before = here;
   }

@@ -132,7 +132,7 @@ TEST(RealHeadsTest, TheBreathingTubeIsReplacedByAir) {
   ForEachVoxel(LabelGrid(ct.geometry, 1), [&](size_t index, const Eigen::Vector3d& place) {
     if ((place - tube).norm() > 6) return;
     if (ct.values[index] > head.options.tissue_above_hu) ++tissue_before;
-    if (InterpolateHu(head.hu, place) > head.options.tissue_above_hu) ++tissue_after;
+    if (Interpolate(head.hu, place) > head.options.tissue_above_hu) ++tissue_after;
   });
   EXPECT_GT(tissue_before, 8);
   EXPECT_LT(tissue_after, tissue_before / 3);
