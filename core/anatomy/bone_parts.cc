@@ -18,6 +18,8 @@
 namespace tissueform {
 namespace {
 
+// A piece with more than this above the plane holds upper teeth, so it is both jaws in one; a speck
+// of an upper tooth, or what the plane's tilt leaves of the lower crowns, is less.
 constexpr double kSmallestUpperTeethMm3 = 400;
 constexpr double kFaceDepthMm = 50;  // from the foremost bone of the head to the chin
 
@@ -29,7 +31,10 @@ struct Markers {
   const PieceShape& shape() const { return pieces.shapes[static_cast<size_t>(mandible) - 1]; }
 };
 
-// The mandible as a piece of its own, at the lowest threshold at which there is one.
+// The mandible as a piece of its own, at the lowest threshold at which there is one. Above the
+// threshold of bone alone the jaws, the joints and the spine are one piece: the CT's blur closes
+// the gaps. Raising it opens them, joint by joint, but also wears bone away; so the lowest one is
+// taken. It has the most of the jaw, and the watershed has the least to decide.
 std::optional<Markers> FindMarkers(const HeadSegmentation& head, const DentalCut* cut) {
   for (int hu = kLowestMarkerHu; hu <= kHighestMarkerHu; hu += kMarkerStepHu) {
     Markers markers;
@@ -59,7 +64,9 @@ absl::Status CheckInView(const PieceShape& mandible, const GridGeometry& geometr
       geometry.origin_mm.z()));
 }
 
-// `chin_z_mm` is the lowest, `front_mm` the foremost of the lower jaw.
+// `chin_z_mm` is the lowest, `front_mm` the foremost of the lower jaw. The box is a generous one
+// for an adult: it must hold the crowns of both jaws whether the mouth is open or not, and may hold
+// more, as only what is dense as a tooth counts in it.
 DentalBox BoxOfTeeth(double middle_mm, double front_mm, double chin_z_mm) {
   return {{middle_mm - 38, front_mm - 10, chin_z_mm + 20},
           {middle_mm + 38, front_mm + 55, chin_z_mm + 78}};
@@ -112,6 +119,8 @@ uint8_t PartOf(const PieceShape& piece, const PieceShape& mandible) {
 // there is none.
 Pieces PiecesWithoutNeck(const HeadSegmentation& head, const Markers& markers,
                          const DentalCut* cut) {
+  // A cranium that ends above the middle of the mandible has no neck on it: the skull's base and
+  // the upper teeth lie above, every vertebra but the first below.
   const double end_mm = markers.shape().low_mm.z() + 0.45 * markers.shape().extent_mm().z();
   for (int hu = markers.threshold_hu; hu <= kHighestMarkerHu; hu += kMarkerStepHu) {
     Pieces pieces = DensePieces(head, hu, cut);
@@ -156,6 +165,9 @@ void RelabelUnmarked(const LabelGrid& bone, const LabelGrid& markers, const Piec
   }
 }
 
+// What the threshold wore away is given back, the densest voxel first: of two parts that meet in
+// blurred bone each gets what hangs on it by the denser way, so the border falls into the gap of
+// the joint and not where two distances happen to be equal.
 LabelGrid GrowMarkers(const HeadSegmentation& head, const LabelGrid& markers) {
   VoxelGrid<int16_t> height(head.hu.geometry);
   for (size_t i = 0; i < height.values.size(); ++i) {
@@ -164,7 +176,9 @@ LabelGrid GrowMarkers(const HeadSegmentation& head, const LabelGrid& markers) {
   return WatershedFromMarkers(height, markers, head.bone);
 }
 
-// Of the faces of the mandible's voxels toward other labels, the share toward no bone.
+// Of the faces of the mandible's voxels toward other labels, the share toward no bone. A measure of
+// doubt that needs no truth to compare with: a face toward air or flesh is seen in the CT, one
+// toward other bone was decided by the watershed or a plane.
 double ShownBorder(const LabelGrid& labels) {
   int64_t shown = 0;
   int64_t decided = 0;
@@ -186,8 +200,10 @@ double ShownBorder(const LabelGrid& labels) {
   return static_cast<double>(shown) / static_cast<double>(std::max<int64_t>(1, shown + decided));
 }
 
-// The cut to use, or nothing when the jaws are pieces of their own without one. `uncut` is where
-// they are.
+// Teeth in occlusion hold the jaws together at every threshold, as enamel is the densest there is.
+// That shows in one of two ways: no piece looks like a mandible, or the one that does has upper
+// teeth. The cut to use, or nothing when the jaws are pieces of their own without one. `uncut` is
+// where they are.
 std::optional<DentalCut> ChooseCut(const HeadSegmentation& head,
                                    const std::optional<Markers>& uncut,
                                    const std::optional<Plane>& given_cut, BoneParts* result) {

@@ -11,6 +11,7 @@
 namespace tissueform {
 namespace {
 
+// Smaller pieces are specks: as markers they would claim bone about them for a part of their own.
 constexpr double kSmallestMarkerMm3 = 150;
 
 // Half the width of the cut through teeth that touch: what it takes away is grown back.
@@ -18,12 +19,17 @@ constexpr double kCutHalfWidthVoxels = 0.75;
 
 bool Between(double value, double low, double high) { return value >= low && value <= high; }
 
+// Wide bounds for adults, with or without what a high threshold has worn away. They keep specks and
+// the whole skull out; the shape decides between the rest.
 bool HasSizeOfMandible(const PieceShape& shape) {
   const Eigen::Vector3d extent = shape.extent_mm();
   return Between(shape.volume_mm3, 6e3, 150e3) && Between(extent.x(), 70, 150) &&
          Between(extent.y(), 40, 120) && Between(extent.z(), 40, 130);
 }
 
+// Two things that only a mandible is at once: hollow behind (less than a twentieth of it lies in
+// the rear half within 12 mm of its middle, where cranium, upper jaw and spine have bone), and
+// leaning back (its upper third lies 8 mm or more behind its lower third: rami over a chin).
 bool HasShapeOfMandible(const Components& components, int32_t piece, const PieceShape& shape) {
   const Eigen::Vector3d middle = (shape.low_mm + shape.high_mm) / 2;
   const double third = shape.extent_mm().z() / 3;
@@ -81,6 +87,7 @@ Pieces DensePieces(const HeadSegmentation& head, int threshold_hu, const DentalC
       }
     });
   }
+  // Over faces only: over edges and corners touching bones would hang together sooner.
   const double voxels = std::ceil(kSmallestMarkerMm3 / VoxelVolumeMm3(dense.geometry));
   Pieces pieces;
   pieces.components = LabelComponents(dense, Neighbours::kFaces, static_cast<int64_t>(voxels));

@@ -19,6 +19,8 @@ constexpr double kCornerFromMidlineMm = 25;
 constexpr double kBesideNoseMm = 10;
 constexpr double kAirHu = -1000;
 
+// Rays from the front, not the foremost voxels: so the skin's place is true to a part of a voxel,
+// and the subnasale, a hollow, is found as easily as the tips.
 class FaceProfile {
  public:
   FaceProfile(const HeadSegmentation& head, const Plane& midsagittal)
@@ -92,6 +94,8 @@ absl::Status FindSkinLandmarks(const HeadSegmentation& head, Landmarks* landmark
   const FaceProfile profile(head, l.midsagittal);
   const Eigen::Vector3d upper_front = l.ForwardOf(l.upper_teeth);
   const Eigen::Vector3d lower_front = l.ForwardOf(l.lower_teeth);
+  // Heights are looked for between landmarks of the teeth, which the CT shows without doubt, so
+  // that a lip or a double chin is not taken for the nose or the chin.
   const double upper_mm = l.upper_incisor.z();
   const double lower_mm = l.lower_incisor.z();
   const double chin_mm = l.menton.z();

@@ -18,6 +18,9 @@ namespace {
 constexpr int16_t kAirHu = -1000;
 constexpr double kSmallestHeadMm3 = 200e3;
 constexpr double kSmallestSkullMm3 = 20e3;
+
+// A living head has bone so near its outer surface on 0 to 0.1 of it, a bare skull all over: the
+// limit lies well apart from both.
 constexpr double kBareWithinMm = 2.5;
 constexpr double kLargestBareFraction = 0.35;
 constexpr int kMarginVoxels = 3;
@@ -33,6 +36,10 @@ LabelGrid Both(LabelGrid a, const LabelGrid& b) {
   return a;
 }
 
+// An opening by a ball, but not a plain one: eroded, only the largest piece is kept, so that a head
+// rest or a tube that touches the skin falls off with what is thinner than the ball. A plain
+// opening would also round off what is thin on the head itself.
+//
 // The largest body that survives the opening, and what of the tissue lies close to it: ears and
 // lips, which the ball has rounded off, but only the stump of a tube.
 LabelGrid LargestBody(const LabelGrid& tissue, double radius_mm) {
@@ -48,6 +55,7 @@ LabelGrid WithoutSpecks(const LabelGrid& mask, double smallest_mm3) {
   return MaskWhere(components.labels, [](int32_t label) { return label != 0; });
 }
 
+// Cavities count as head: a sinus has bone beside its air in every head.
 // The air outside: connected with the front of the grid, where a face has nothing before it.
 LabelGrid OutsideAir(const LabelGrid& head) {
   const LabelGrid air = MaskWhere(head, [](uint8_t label) { return label == 0; });

@@ -64,6 +64,8 @@ absl::Status Farthest(const Places& places, const Eigen::Vector3d& direction,
   return absl::OkStatus();
 }
 
+// Bounds in mm are of adult jaws with room to spare. The order matters: each landmark narrows where
+// the next is looked for, from the chin, which nothing else can be taken for, to the joints.
 class JawLandmarkFinder {
  public:
   JawLandmarkFinder(const LabelGrid& parts, Landmarks* landmarks)
@@ -155,7 +157,8 @@ class JawLandmarkFinder {
     l.occlusal.normal = (l.lower_teeth.normal + l.upper_teeth.normal).normalized();
   }
 
-  // At the height of the crowns, under the pterygoid plates.
+  // At the height of the crowns, under the pterygoid plates, which would pass for teeth: a Le Fort
+  // I cut behind them instead of behind the teeth would take a part of the skull's base along.
   absl::Status FindLastUpperTooth() {
     Landmarks& l = landmarks_;
     const Eigen::Vector3d back = -l.ForwardOf(l.upper_teeth);
@@ -203,7 +206,9 @@ class JawLandmarkFinder {
     return Farthest(rear, kUp, "a jaw joint", found);
   }
 
-  // Over each place of the palate the top of the first bone; the middle one of those heights.
+  // Over each place of the palate the top of the first bone; the middle one of those heights, as
+  // some columns run up into the septum or the turbinates and some through a gap of thin bone. Gaps
+  // of less than kThinGapMm are such thin bone, not the nose.
   absl::Status FindNasalFloor() {
     Landmarks& l = landmarks_;
     const Eigen::Vector3d front = l.upper_incisor;

@@ -14,10 +14,14 @@
 namespace tissueform {
 namespace {
 
+// Enamel and dentine, and hardly any bone.
 constexpr int16_t kToothHu = 1300;
 constexpr int16_t kSolidHu = 400;
+// About the height of a crown: so far on either side of the plane its row of teeth reaches.
 constexpr double kBesideMm = 8;
 constexpr double kSmallestToothRowMm3 = 300;
+// A head lies tilted and a bite slopes. Between two steps of 4 degrees a plane moves by less than 1
+// mm at the ends of a row of teeth, which is less than a voxel.
 constexpr std::array<int, 13> kPitchStepsDeg = {-24, -20, -16, -12, -8, -4, 0,
                                                 4,   8,   12,  16,  20, 24};
 constexpr std::array<int, 5> kRollStepsDeg = {-8, -4, 0, 4, 8};
@@ -50,7 +54,9 @@ std::vector<Sample> SolidSamples(const HuGrid& hu, const DentalBox& box) {
   return samples;
 }
 
-// What lies at each height over a plane through the box's middle, in steps of one voxel.
+// What lies at each height over a plane through the box's middle, in steps of one voxel. A
+// histogram of heights answers for all parallel planes at once, so that a whole search costs one
+// pass over the samples for each of the 65 directions.
 class HeightProfile {
  public:
   HeightProfile(const std::vector<Sample>& samples, const Plane& through_middle, double step_mm,
@@ -74,10 +80,12 @@ class HeightProfile {
     return std::clamp(static_cast<int>(std::lround(height_mm / step_mm_)) + half_, 0, 2 * half_);
   }
 
-  // Voxels of teeth within kBesideMm on the side that has fewer.
+  // Voxels of teeth within kBesideMm on the side that has fewer: teeth on one side only are a plane
+  // above or below both rows, however clear it is.
   double TeethBeside(int bin) const {
     return std::min(Sum(teeth_, bin - beside(), bin - 1), Sum(teeth_, bin + 1, bin + beside()));
   }
+  // Relative to what lies beside it, because crowns that overlap leave no plane quite empty.
   double Clearance(int bin) const {
     const double least =
         std::min(Sum(solid_, bin - beside(), bin - 1), Sum(solid_, bin + 1, bin + beside())) /
@@ -115,7 +123,8 @@ struct Candidate {
   double teeth = 0;
   double tilt_deg = 0;
 
-  // Both rows whole on their sides, not a plane that splits one row; the less tilted of equals.
+  // Both rows whole on their sides, not a plane that splits one row; the less tilted of equals: 0.2
+  // % a degree is less than any real difference of clearance.
   double Score() const { return cut.clearance * teeth * (1 - 0.002 * tilt_deg); }
 };
 

@@ -19,13 +19,17 @@ namespace tissueform {
 namespace {
 
 constexpr double kSmallestSegmentMm3 = 50;
-constexpr double kSplitAngleDeg = 40;
-constexpr double kBehindRamusFrontMm = 4;
-constexpr double kOverLowerTeethMm = 6;
-constexpr double kOverNasalFloorMm = 5;
-constexpr double kBehindUpperTeethMm = 3;
-constexpr double kBesideUpperMolarMm = 14;
-constexpr double kGenioplastyHeight = 0.3;
+
+// Where the default cuts lie: close to textbook cuts, from landmarks that are good to a few mm.
+// They keep clear of the teeth and their roots rather than follow a surgeon; a recipe gives planes
+// where it matters.
+constexpr double kSplitAngleDeg = 40;       // between a sagittal plane and one across
+constexpr double kBehindRamusFrontMm = 4;   // the whole tooth-bearing arch moves
+constexpr double kOverLowerTeethMm = 6;     // under the coronoid process
+constexpr double kOverNasalFloorMm = 5;     // the palate moves whole
+constexpr double kBehindUpperTeethMm = 3;   // before the pterygoid plates
+constexpr double kBesideUpperMolarMm = 14;  // the alveolar ridge, not the cheekbone
+constexpr double kGenioplastyHeight = 0.3;  // of the chin's height, under the incisors' roots
 
 uint8_t PartOf(OsteotomyKind kind) {
   return kind == OsteotomyKind::kLeFort1 ? kCranium : kMandible;
@@ -35,6 +39,9 @@ absl::string_view BoneName(OsteotomyKind kind) {
   return PartOf(kind) == kCranium ? "the cranium with the upper jaw" : "the lower jaw";
 }
 
+// The split of a sagittal osteotomy runs within the bone, between its two plates, which no CT of
+// 1.5 mm shows. One oblique plane a side stands for it: what moves and what stays is right, where
+// the two overlap is not, and the contact band leaves that free.
 std::vector<Plane> BssroPlanes(const Landmarks& l) {
   const double angle = kSplitAngleDeg * std::numbers::pi / 180;
   const Eigen::Vector3d front = l.ForwardOf(l.lower_teeth);
@@ -93,6 +100,7 @@ class SegmentCutter {
         if (segment_.planes[i].HeightMm(place) < 0) mask.values[index] = 0;
       });
     }
+    // A plane has no end: beyond the bone that is meant it may cut off a tip of the same bone.
     mask = LargestComponent(mask, Neighbours::kFaces);
     TF_RETURN_IF_ERROR(CheckSize(mask));
     return mask;
@@ -165,6 +173,7 @@ absl::StatusOr<LabelGrid> CutSegments(const LabelGrid& parts,
     const auto label = static_cast<uint8_t>(kFirstSegment + s);
     ForEachVoxel(mask, [&](size_t index, const Eigen::Vector3d&) { labels.values[index] = label; });
   }
+  // Again, as a later segment may have taken all of an earlier one.
   for (size_t s = 0; s < segments.size(); ++s) {
     const auto label = static_cast<uint8_t>(kFirstSegment + s);
     const LabelGrid left = MaskWhere(labels, [=](uint8_t value) { return value == label; });

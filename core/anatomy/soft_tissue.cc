@@ -14,6 +14,8 @@
 namespace tissueform {
 namespace {
 
+// The default region holds the face from the eyes to under the chin: each cm3 more costs tets, and
+// the cuts, which are fixed, must keep off what a jaw moves.
 constexpr double kBehindJawMm = 5;
 constexpr double kOverNasalFloorMm = 58;
 constexpr double kUnderChinMm = 15;
@@ -75,7 +77,9 @@ LabelGrid BrainMarkers(const FloatGrid& depth, double neck_mm, double joint_z_mm
 }
 
 // Brain and face hang together through the holes of the skull's base and where bone is thin: a
-// watershed of the depth parts them there.
+// watershed of the depth parts them there. Closing the bone instead would take a ball as large as
+// the largest hole, and would close lips and eyelids with it; depth has its narrowest place in each
+// hole, whatever its size. Depths are in tenths of a mm, as the watershed floods whole numbers.
 LabelGrid WithoutBrain(const LabelGrid& soft, double neck_mm, double joint_z_mm) {
   const FloatGrid depth = SignedDistanceMm(soft);
   VoxelGrid<int16_t> height(soft.geometry);
@@ -107,6 +111,9 @@ void FillSmallCavities(double smallest_mm3, LabelGrid* mask) {
 
 // The distance from the border of a mask, smooth, and larger by the tolerance.
 FloatGrid TolerantDistance(const LabelGrid& mask) {
+  // Without the tolerance the mask's steps of a voxel would stand out of the CT's own smooth
+  // surface; with it the mask cuts only where it differs from the CT by more than its own
+  // roughness.
   const double voxel_mm = mask.geometry.spacing_mm;
   FloatGrid distance = GaussianSmooth(SignedDistanceMm(mask), kCutSigmaVoxels * voxel_mm);
   for (float& value : distance.values) value += static_cast<float>(kToleranceVoxels * voxel_mm);
@@ -201,6 +208,7 @@ absl::StatusOr<SoftTissue> ExtractSoftTissue(
   const LabelGrid region_soft = Inside(face, planes);
   TF_RETURN_IF_ERROR(CheckVolume(VolumeMm3(region_soft)));
   const VoxelBox box = Grown(BoundingBox(region_soft), kMarginVoxels, head.hu.geometry);
+  // Sheets thinner than a tet (a nostril's wall, an eyelid) would make slivers or tear the surface.
   const LabelGrid kept = Open(Crop(region_soft, box), options.thinnest_mm / 2);
   LabelGrid mask = LargestComponent(kept, Neighbours::kFaces);
   FillSmallCavities(options.smallest_cavity_mm3, &mask);

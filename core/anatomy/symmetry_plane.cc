@@ -17,6 +17,8 @@
 namespace tissueform {
 namespace {
 
+// What has no counterpart within this counts the same however far off it is, so that a missing
+// tooth, a metal streak or the CT's border does not drag the plane along.
 constexpr double kFarthestMm = 6;
 constexpr size_t kSamples = 4000;
 constexpr double kFirstStep = 8;  // degrees, and mm
@@ -65,6 +67,9 @@ double MeanMirrorDistance(const std::vector<Eigen::Vector3d>& places, const Floa
 
 }  // namespace
 
+// A search along the three coordinates with steps that halve when none helps: the sum has no
+// derivative, as distances are looked up by whole voxels. The first steps of 8 degrees and 8 mm are
+// what a head may lie askew from the start.
 Plane FindSymmetryPlane(const LabelGrid& mask, double start_x_mm) {
   const std::vector<Eigen::Vector3d> places = SamplePlaces(mask);
   const FloatGrid distance = DistanceMm(mask);

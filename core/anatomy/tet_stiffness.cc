@@ -14,7 +14,9 @@
 namespace tissueform {
 namespace {
 
-constexpr int kMostRadius = 3;  // of the cube about a barycentre, in voxels
+// Of the cube about a barycentre, in voxels. Where it holds no pure voxel a tet lies deep in bone,
+// and muscle some mm away says nothing of it.
+constexpr int kMostRadius = 3;
 
 struct Mean {
   double sum = 0;
@@ -35,6 +37,9 @@ class CtNumbers {
 
   double At(int x, int y, int z) const { return hu_.At(x, y, z); }
 
+  // The partial-volume effect: a voxel at a border holds some of both sides, and fat beside air or
+  // muscle beside bone would come out as a tissue that is not there. One voxel is as far as the
+  // scanner's blur reaches after resampling.
   bool IsMixed(int x, int y, int z) const {
     return AnyWithin(1, {x, y, z}, [this](int a, int b, int c) {
       return bone_.At(a, b, c) != 0 || hu_.At(a, b, c) < air_below_hu_;

@@ -56,7 +56,7 @@ class TetShape {
                        [](const FacePlane& plane) { return plane.inner_sign != 0; });
   }
 
-  // Voxels along an axis whose centres may lie in the tet.
+  // Voxels along an axis whose centres may lie in the tet; an empty range where it is off the grid.
   IndexRange Range(int axis, int size) const {
     const double last = size - 1;
     return {static_cast<int>(std::clamp(std::ceil(box_.min()[axis]), 0.0, last + 1)),
@@ -78,6 +78,9 @@ Positions ToVoxels(const Positions& positions, const GridGeometry& grid) {
 
 }  // namespace
 
+// A centre on a shared face must count once. Both tets of a face see its plane with the same
+// numbers, so it is in at least one of them, never in none by rounding; `taken` gives it to the
+// first.
 void ForEachVoxelInTets(const TetMesh& mesh, const GridGeometry& grid,
                         const std::function<void(Eigen::Index tet, int x, int y, int z)>& visit) {
   const Positions voxel_positions = ToVoxels(mesh.positions(), grid);

@@ -34,10 +34,11 @@ Eigen::Vector3d ApplyPose(const HandlePose& pose, const Eigen::Vector3d& positio
 //
 //   w(t) = (1 - t) w_a + t w_b, the same for pivot and translation;  s(t) = s_a^(1-t) s_b^t.
 //
-// So rotation and scale go at an even pace, both through their logarithm: about one pivot the linear
-// part of the way from rest is exp(t (log(s) I + [w])). A full turn is walked through, not jumped
-// over, and the scale is positive at every t, also beyond 1 (mixed linearly, 0.2 would be negative
-// at t = 4/3). Exactly `a` at 0 and `b` at 1; a scale that both share stays to the last bit.
+// So rotation and scale go at an even pace, both through their logarithm: about one pivot the
+// linear part of the way from rest is exp(t (log(s) I + [w])). A full turn is walked through, not
+// jumped over, and the scale is positive at every t, also beyond 1 (mixed linearly, 0.2 would be
+// negative at t = 4/3). Exactly `a` at 0 and `b` at 1; a scale that both share stays to the last
+// bit.
 //
 // REQUIRES: positive scales.
 HandlePose PoseBetween(const HandlePose& a, const HandlePose& b, double t);

@@ -16,6 +16,9 @@ constexpr int kLowest = -1024;
 constexpr int kHighest = 32767;
 constexpr int kBinWidth = 16;
 constexpr size_t kNumBins = (kHighest - kLowest) / kBinWidth + 1;
+// HU cannot be told from other numbers one by one, but a body in air has a shape: some air below
+// half of water's, some matter above fat's. A thousandth of the voxels is less than any head's
+// share of either and more than a few damaged pixels.
 constexpr int kAirBelow = -500;
 constexpr int kMatterFrom = -200;
 constexpr double kLeastShare = 0.001;
@@ -48,6 +51,9 @@ int MostFrequent(const Histogram& histogram, int low, int high) {
   return kLowest + static_cast<int>(bin) * kBinWidth;
 }
 
+// Stored values of most scanners are HU + 1024: air near 0, soft tissue (HU 0 to 100, the most
+// frequent matter) near 1050. Then the message can give the offset; it is not applied by itself,
+// because a guess of a unit must be the user's.
 absl::Status WithoutAir(const Histogram& histogram, std::optional<double> hu_offset) {
   constexpr int kLeastTissueMode = 900;
   constexpr int kMostTissueMode = 1200;

@@ -18,6 +18,7 @@ namespace {
 constexpr int16_t kAir = -1024;
 constexpr double kLeastSpacingMm = 0.1;
 constexpr double kMostSpacingMm = 10;
+// Along an axis: 512 samples a voxel bound the time; beyond that more would hardly change a mean.
 constexpr int kMostSamples = 8;
 constexpr double kRounding = 1e-6;  // of a voxel
 
@@ -49,6 +50,9 @@ GridGeometry GridOver(const Eigen::AlignedBox3d& box, double spacing_mm) {
   return grid;
 }
 
+// As many as the volume's own voxels under one of the grid's, so that none is passed over: sampled
+// at its centre alone, a coarse grid would show the noise of one voxel in several, and thin bone or
+// not by chance (aliasing).
 Samples SamplesPerVoxel(const Eigen::Matrix3d& to_index, double spacing_mm) {
   Samples samples{};
   for (int axis = 0; axis < 3; ++axis) {

@@ -88,8 +88,10 @@ struct VoxelCell {
   // The trilinear mean of at(x, y, z): along x, then y, then z.
   template <typename At>
   double Mean(const At& at) const {
-    const auto mix = [](double part, double a, double b) { return (1 - part) * a + part * b; };
-    const auto row = [&](int y, int z) { return mix(part[0], at(lower[0], y, z), at(upper[0], y, z)); };
+    const auto mix = [](double t, double a, double b) { return (1 - t) * a + t * b; };
+    const auto row = [&](int y, int z) {
+      return mix(part[0], at(lower[0], y, z), at(upper[0], y, z));
+    };
     const auto slice = [&](int z) { return mix(part[1], row(lower[1], z), row(upper[1], z)); };
     return mix(part[2], slice(lower[2]), slice(upper[2]));
   }

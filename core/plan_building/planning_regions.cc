@@ -28,7 +28,9 @@ constexpr uint8_t kAir = 0;
 constexpr uint8_t kLeftOut = 253;  // tissue that is not modelled: brain, thin sheets
 constexpr uint8_t kCut = 254;
 
+// Half a voxel is what sampling leaves open where a surface lies, and a little for remeshing.
 constexpr double kCutVoxels = 0.6;
+// How far from a vertex of the mesh the voxel is looked for that it lies on.
 constexpr int kSearchVoxels = 3;
 
 // A cut is no anatomy: so much farther than contacts it keeps from bone that moves.
@@ -41,6 +43,8 @@ bool IsOnCut(const Eigen::Vector3d& place, const SoftTissue& soft_tissue) {
                      [&](const Plane& plane) { return plane.HeightMm(place) < reach; });
 }
 
+// Labels are 0 for air and for what was left out of the model (brain, thin sheets): the CT tells
+// which. A vertex beside the latter is neither skin nor held.
 bool IsAir(const PlanningCt& ct, const Eigen::Vector3d& place) {
   return Interpolate(ct.hu, place) < ct.tissue_above_hu;
 }

@@ -16,6 +16,9 @@
 namespace tissueform {
 namespace {
 
+// Farther than four voxels a crossing is that of another surface (the other side of a lip); an
+// eighth is fine enough that a linear step between two samples is exact to well under a hundredth
+// of a voxel.
 constexpr double kSearchVoxels = 4;
 constexpr double kStepVoxels = 0.125;
 

@@ -132,8 +132,8 @@ TEST(PoseBetweenTest, ScaleOfBothEndsStaysAllTheWay) {
 
 TEST(PartOfPoseTest, LinearPartIsTheExponentialOfThatPartOfTheLogarithm) {
   const HandlePose pose = Turned();
-  const Eigen::Matrix3d logarithm = std::log(pose.scale) * Eigen::Matrix3d::Identity() +
-                                    CrossProductMatrix(pose.rotation_vector);
+  const Eigen::Matrix3d logarithm =
+      std::log(pose.scale) * Eigen::Matrix3d::Identity() + CrossProductMatrix(pose.rotation_vector);
   for (const double t : {0.0, 0.3, 1.0, 4.0 / 3}) {
     const HandlePose part = PartOfPose(pose, t);
     const Eigen::Matrix3d oracle = (t * logarithm).exp();
