@@ -70,7 +70,7 @@ QualityCheck CheckSkin(const std::string& what, double voxels, double limit_voxe
 }  // namespace
 
 PlanMeasures MeasurePlan(const PlanBuild& build) {
-  const TetMesh& mesh = build.mesh->mesh;
+  const TetMesh& mesh = build.mesh.mesh;
   const double spacing_mm = build.head.hu.geometry.spacing_mm;
   PlanMeasures measures;
   const Eigen::VectorXd volumes = TetVolumes(mesh.positions(), mesh.tets());

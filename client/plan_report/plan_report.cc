@@ -45,7 +45,7 @@ absl::Status WritePlanReport(const PlanBuild& build, const PlanReportOptions& op
   }
   TellStage(options.tell, "writing the report", 0.9);
   const nlohmann::ordered_json report =
-      PlanReportJson(build, measures, {options.program_version, options.recipe_sha256}, pictures);
+      PlanReportJson(build, measures, options.program_version, pictures);
   TF_RETURN_IF_ERROR(WriteFileAtomically((root / "report.json").string(), report.dump(2) + "\n"));
   return WriteFileAtomically((root / "report.html").string(), PlanReportHtml(report, pictures));
 }

@@ -14,8 +14,7 @@ namespace tissueform {
 
 struct PlanReportOptions {
   std::string program_version;
-  std::string recipe_sha256;  // of the recipe's text
-  bool pictures = true;       // they need an X display (VirtualDisplay)
+  bool pictures = true;  // they need an X display (VirtualDisplay)
   StageFunction tell;
 };
 

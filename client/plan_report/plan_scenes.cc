@@ -72,7 +72,7 @@ Colour Majority(const Colour& first, const Colour& second, const Colour& third) 
 SurfaceLayer Boundary(const PlanBuild& build,
                       const std::function<bool(const std::array<size_t, 3>& corners)>& is_wanted,
                       const std::function<Colour(size_t vertex)>& colour_of) {
-  const TriangleMesh& surface = build.mesh->surface;
+  const TriangleMesh& surface = build.mesh.surface;
   SurfaceLayer layer{.positions = surface.positions(), .triangles = surface.triangles()};
   Eigen::Index kept = 0;
   for (const auto& row : surface.triangles().rowwise()) {
@@ -145,7 +145,7 @@ std::vector<Scene> ConstraintScenes(const PlanBuild& build) {
 
 std::vector<Scene> CutScenes(const PlanBuild& build) {
   const std::vector<Colour> colours = TissueColours(build);
-  const TetMesh& mesh = build.mesh->mesh;
+  const TetMesh& mesh = build.mesh.mesh;
   const Landmarks& landmarks = build.landmarks;
   const Plane coronal{(landmarks.lower_molar.left + landmarks.lower_molar.right) / 2,
                       Vector3d::UnitY()};

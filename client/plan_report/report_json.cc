@@ -28,19 +28,19 @@ Json PlanesJson(const std::vector<Plane>& planes) {
   return list;
 }
 
-Json ProgramJson(const ReportOrigin& origin) {
-  return {{"tissueform", origin.program_version},
+Json ProgramJson(const std::string& program_version) {
+  return {{"tissueform", program_version},
           {"itk", kItkVersion},
           {"cgal", kCgalVersion},
           {"vtk", kVtkVersion},
           {"tetgen", kTetgenVersion}};
 }
 
-Json InputJson(const PlanBuild& build, const ReportOrigin& origin) {
+Json InputJson(const PlanBuild& build) {
   return {{"format", build.ct.format},
           {"files", build.ct.num_files},
           {"ct_sha256", build.ct.sha256},
-          {"recipe_sha256", origin.recipe_sha256},
+          {"recipe_sha256", build.recipe.sha256},
           {"size_voxels", build.ct_size},
           {"spacing_mm", ToJson(build.ct_spacing_mm)},
           {"gantry_tilt_deg", build.ct.gantry_tilt_deg},
@@ -159,11 +159,11 @@ Json HistogramJson(const Histogram& histogram) {
 }
 
 Json MeshJson(const PlanBuild& build, const PlanMeasures& measures) {
-  const SoftTissueMeshReport& report = build.mesh->report;
-  return {{"vertices", build.mesh->mesh.num_vertices()},
-          {"tets", build.mesh->mesh.num_tets()},
-          {"boundary_vertices", build.mesh->surface.num_vertices()},
-          {"boundary_triangles", build.mesh->surface.num_triangles()},
+  const SoftTissueMeshReport& report = build.mesh.report;
+  return {{"vertices", build.mesh.mesh.num_vertices()},
+          {"tets", build.mesh.mesh.num_tets()},
+          {"boundary_vertices", build.mesh.surface.num_vertices()},
+          {"boundary_triangles", build.mesh.surface.num_triangles()},
           {"components", measures.components},
           {"cavities", report.cavities},
           {"edge_mm", report.edge_mm},
@@ -200,8 +200,8 @@ Json DistancesJson(const PlanBuild& build, const PlanMeasures& measures) {
             {"p99_voxels", measures.skin_p99_voxels},
             {"max_voxels", skin.max_mm / build.head.hu.geometry.spacing_mm},
             {"histogram_voxels", HistogramJson(SkinDistanceHistogram(measures))}}},
-          {"boundary_to_isosurface", DistanceJson(build.mesh->report.to_isosurface)},
-          {"isosurface_to_boundary", DistanceJson(build.mesh->report.from_isosurface)}};
+          {"boundary_to_isosurface", DistanceJson(build.mesh.report.to_isosurface)},
+          {"isosurface_to_boundary", DistanceJson(build.mesh.report.from_isosurface)}};
 }
 
 Json StiffnessJson(const PlanBuild& build, const PlanMeasures& measures) {
@@ -271,15 +271,16 @@ Json PicturesJson(const std::vector<ReportPicture>& pictures) {
 }  // namespace
 
 Json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
-                    const ReportOrigin& origin, const std::vector<ReportPicture>& pictures) {
+                    const std::string& program_version,
+                    const std::vector<ReportPicture>& pictures) {
   return {{"format", "tissueform-plan-report"},
           {"version", 1},
           {"notice", "research software, not a medical device"},
           {"coordinate_system", "LPS"},
           {"quality", QualityJson(build, measures)},
           {"cautions", Cautions(build)},
-          {"program", ProgramJson(origin)},
-          {"input", InputJson(build, origin)},
+          {"program", ProgramJson(program_version)},
+          {"input", InputJson(build)},
           {"head", HeadJson(build)},
           {"bone", BoneJson(build, measures)},
           {"landmarks", LandmarksJson(build.landmarks)},

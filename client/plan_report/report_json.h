@@ -14,15 +14,9 @@
 
 namespace tissueform {
 
-// What a report tells that the build does not know.
-struct ReportOrigin {
-  std::string program_version;
-  std::string recipe_sha256;
-};
-
 // report.json (docs/recipe-format.md tells its keys).
 nlohmann::ordered_json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
-                                      const ReportOrigin& origin,
+                                      const std::string& program_version,
                                       const std::vector<ReportPicture>& pictures);
 
 }  // namespace tissueform

@@ -18,8 +18,11 @@
 namespace tissueform {
 namespace {
 
-// The trial goes so much farther than the plan.
+// The trial goes so much farther than the plan, so that the plan can still be dragged on from its
+// pose: the demo moves the bundled jaw, planned by 6 mm, to 8.
 constexpr double kOverreach = 4.0 / 3.0;
+// Freeing corners may move the tear on to the next tets; every round but the last frees some
+// vertex.
 constexpr int kMaxRounds = 20;
 
 std::vector<HandlePose> Overreaching(std::vector<HandlePose> poses) {
@@ -51,7 +54,10 @@ absl::StatusOr<ConstraintSet> Constraints(const ContactTrial& trial,
   return ConstraintSet::Create(trial.mesh, std::move(vertices[kFixedBone]), std::move(handles));
 }
 
-// The tets that a model turns inside out.
+// The tets that a model turns inside out. The two models that answer without iterating stand for
+// all: the gradient field tears where rotations and gaps disagree, linear elasticity where strain
+// is large. arap and neo-Hookean cost tens of solves a pose, and the energy of the latter forbids
+// inversion.
 absl::Status FindTorn(const ContactTrial& trial,
                       const std::shared_ptr<MeshPreparation>& preparation, DeformationModel model,
                       std::vector<bool>* torn) {
@@ -87,6 +93,7 @@ absl::StatusOr<std::vector<bool>> TornTets(const ContactTrial& trial,
   return torn;
 }
 
+// Only the corners of torn tets are freed, not their neighbours: what holds must go on holding.
 std::set<int32_t> CornersOf(const TetMesh& mesh, const std::vector<bool>& torn) {
   std::set<int32_t> corners;
   for (size_t t = 0; t < torn.size(); ++t) {
@@ -99,22 +106,23 @@ std::set<int32_t> CornersOf(const TetMesh& mesh, const std::vector<bool>& torn) 
 
 }  // namespace
 
-absl::StatusOr<int64_t> ReleaseTornContacts(const ContactTrial& trial, PlanningRegions* regions) {
-  int64_t freed = 0;
-  if (std::none_of(trial.poses.begin(), trial.poses.end(), Moves)) return freed;
+absl::StatusOr<ReleasedContacts> ReleaseTornContacts(const ContactTrial& trial,
+                                                     PlanningRegions regions) {
+  ReleasedContacts released{.regions = std::move(regions), .freed = 0};
+  if (std::none_of(trial.poses.begin(), trial.poses.end(), Moves)) return released;
   for (int round = 0; round < kMaxRounds; ++round) {
-    TF_ASSIGN_OR_RETURN(const std::vector<bool> torn, TornTets(trial, regions->anatomy));
+    TF_ASSIGN_OR_RETURN(const std::vector<bool> torn, TornTets(trial, released.regions.anatomy));
     int64_t now = 0;
     for (const int32_t v : CornersOf(trial.mesh, torn)) {
-      uint8_t& held_by = regions->anatomy[static_cast<size_t>(v)];
+      uint8_t& held_by = released.regions.anatomy[static_cast<size_t>(v)];
       now += held_by != 0 ? 1 : 0;
       held_by = 0;
     }
     if (now == 0) break;
-    freed += now;
+    released.freed += now;
   }
-  regions->freed_by_contact += freed;
-  return freed;
+  released.regions.freed_by_contact += released.freed;
+  return released;
 }
 
 }  // namespace tissueform

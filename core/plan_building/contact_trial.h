@@ -23,14 +23,20 @@ struct ContactTrial {
   int threads = 1;                // the outcome does not depend on it
 };
 
+struct ReleasedContacts {
+  PlanningRegions regions;
+  int64_t freed = 0;  // of regions.freed_by_contact, by the trial
+};
+
 // Widens the contact band where it is too narrow for the planned moves: deforms the mesh by a third
 // more than planned, with gradient_field and linear_elastic, frees the constrained vertices of
 // inverted tets, and again, until no tet is inverted or after some rounds.
 // What is narrow (the gap between teeth, the walls of a cut) is so given way where it must be, and
 // held elsewhere. Nothing is tried where nothing moves.
 //
-// Returns how many vertices were freed and adds them to `regions`. Errors: InvalidArgument when
-// nothing of a segment or of the fixed bone would be left.
-absl::StatusOr<int64_t> ReleaseTornContacts(const ContactTrial& trial, PlanningRegions* regions);
+// Returns the regions with those vertices freed. Errors: InvalidArgument when nothing of a segment
+// or of the fixed bone would be left.
+absl::StatusOr<ReleasedContacts> ReleaseTornContacts(const ContactTrial& trial,
+                                                     PlanningRegions regions);
 
 }  // namespace tissueform

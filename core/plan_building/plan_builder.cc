@@ -17,11 +17,15 @@
 namespace tissueform {
 namespace {
 
-// How large the parts are that have smaller triangles, round the lips and the chin, in mm.
+// How large the parts are that have smaller triangles, round the lips and the chin, in mm: it
+// holds a lip, or the soft chin, whole. There tissue is thin over teeth, and its answer is looked
+// at.
 constexpr double kFineRadiusMm = 24;
 
 // Without a number in the recipe: this part of the largest planned move, and no less than so many
-// voxels. Both sides keep this distance, so the gap between them is twice as wide.
+// voxels. Both sides keep this distance, so the gap between them is twice as wide: as wide as the
+// move. Tissue in it is then at worst squeezed or stretched by its own width; what tears all the
+// same is found by the contact trial.
 constexpr double kBandOfMove = 0.5;
 constexpr double kBandVoxels = 2;
 
@@ -48,26 +52,56 @@ class Progress {
   double to_ = 0;
 };
 
-absl::StatusOr<HuGrid> ReadAndResample(const std::string& ct_path, const PlanBuildOptions& options,
-                                       Progress* progress, PlanBuild* build) {
+// What the stages hand on, each made whole by one of them.
+
+struct ResampledCt {
+  CtProvenance provenance;
+  std::array<int, 3> size = {0, 0, 0};  // of the CT as it was read
+  Eigen::Vector3d spacing_mm = Eigen::Vector3d::Zero();
+  HuGrid hu;
+};
+
+struct Anatomy {
+  HeadSegmentation head;
+  BoneParts parts;
+  Landmarks landmarks;
+};
+
+struct DividedBone {
+  LabelGrid labels;  // 0 none, 1 stays, 2.. the segments
+  std::vector<BuiltSegment> segments;
+};
+
+struct Description {
+  TetStiffness stiffness;
+  double contact_band_mm = 0;
+  ReleasedContacts released;
+  SkinDistance skin_distance;
+};
+
+absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Recipe& recipe,
+                                            int threads, Progress* progress) {
   progress->Begin("reading the CT", 0, 0.08);
-  TF_ASSIGN_OR_RETURN(const CtVolume volume, ReadCtVolume(ct_path, build->recipe.ct));
-  build->ct = volume.provenance;
-  build->ct_size = volume.size;
-  build->ct_spacing_mm = volume.spacing_mm;
+  TF_ASSIGN_OR_RETURN(CtVolume volume, ReadCtVolume(ct_path, recipe.ct));
   progress->Begin("resampling", 0.08, 0.12);
-  return ResampleIsotropic(volume, build->recipe.spacing_mm, {.threads = options.threads});
+  TF_ASSIGN_OR_RETURN(HuGrid hu,
+                      ResampleIsotropic(volume, recipe.spacing_mm, {.threads = threads}));
+  return ResampledCt{.provenance = std::move(volume.provenance),
+                     .size = volume.size,
+                     .spacing_mm = volume.spacing_mm,
+                     .hu = std::move(hu)};
 }
 
-absl::Status FindAnatomy(const HuGrid& ct, Progress* progress, PlanBuild* build) {
+absl::StatusOr<Anatomy> FindAnatomy(const HuGrid& ct, const Recipe& recipe, Progress* progress) {
   progress->Begin("finding the head and its bone", 0.12, 0.3);
-  TF_ASSIGN_OR_RETURN(build->head, SegmentHead(ct, build->recipe.segmentation, progress->Parts()));
+  TF_ASSIGN_OR_RETURN(HeadSegmentation head,
+                      SegmentHead(ct, recipe.segmentation, progress->Parts()));
   progress->Begin("telling the bones apart", 0.3, 0.42);
-  TF_ASSIGN_OR_RETURN(build->parts, SeparateBoneParts(build->head, build->recipe.occlusal_plane,
-                                                      progress->Parts()));
+  TF_ASSIGN_OR_RETURN(BoneParts parts,
+                      SeparateBoneParts(head, recipe.occlusal_plane, progress->Parts()));
   progress->Begin("finding landmarks", 0.42, 0.46);
-  TF_ASSIGN_OR_RETURN(build->landmarks, FindLandmarks(build->head, build->parts));
-  return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(Landmarks landmarks, FindLandmarks(head, parts));
+  return Anatomy{.head = std::move(head), .parts = std::move(parts), .landmarks = landmarks};
 }
 
 absl::StatusOr<TriangleMesh> SegmentSurface(const LabelGrid& bone, uint8_t label) {
@@ -84,43 +118,48 @@ absl::Status CheckMove(const std::string& segment, double largest_move_mm) {
                       segment, largest_move_mm, kMostMoveMm));
 }
 
-absl::Status CutBone(Progress* progress, PlanBuild* build) {
-  progress->Begin("cutting the bone", 0.46, 0.5);
-  std::vector<OsteotomySegment> cuts;
-  for (const RecipeSegment& segment : build->recipe.segments) {
-    cuts.push_back(segment.planes.empty()
-                       ? DefaultSegment(segment.kind, segment.name, build->landmarks)
-                       : OsteotomySegment{segment.name, segment.kind, segment.planes});
-  }
-  TF_ASSIGN_OR_RETURN(build->bone, CutSegments(build->parts.labels, cuts));
-  for (size_t s = 0; s < cuts.size(); ++s) {
-    const auto label = static_cast<uint8_t>(kFirstSegment + s);
-    const HandlePose& pose = build->recipe.segments[s].pose;
-    const double largest_move_mm = LargestMoveMm(build->bone, label, pose);
-    TF_RETURN_IF_ERROR(CheckMove(cuts[s].name, largest_move_mm));
-    TF_ASSIGN_OR_RETURN(TriangleMesh surface, SegmentSurface(build->bone, label));
-    const auto voxels = std::count(build->bone.values.begin(), build->bone.values.end(), label);
-    build->segments.push_back(
-        {.cut = std::move(cuts[s]),
-         .pose = pose,
-         .largest_move_mm = largest_move_mm,
-         .volume_mm3 = static_cast<double>(voxels) * VoxelVolumeMm3(build->bone.geometry),
-         .surface = std::move(surface)});
-  }
-  return absl::OkStatus();
+absl::StatusOr<BuiltSegment> BuildSegment(const LabelGrid& bone, uint8_t label,
+                                          OsteotomySegment cut, const HandlePose& pose) {
+  const double largest_move_mm = LargestMoveMm(bone, label, pose);
+  TF_RETURN_IF_ERROR(CheckMove(cut.name, largest_move_mm));
+  TF_ASSIGN_OR_RETURN(TriangleMesh surface, SegmentSurface(bone, label));
+  const auto voxels = std::count(bone.values.begin(), bone.values.end(), label);
+  return BuiltSegment{.cut = std::move(cut),
+                      .pose = pose,
+                      .largest_move_mm = largest_move_mm,
+                      .volume_mm3 = static_cast<double>(voxels) * VoxelVolumeMm3(bone.geometry),
+                      .surface = std::move(surface)};
 }
 
-absl::Status FindSoftTissue(Progress* progress, PlanBuild* build) {
+absl::StatusOr<DividedBone> CutBone(const Anatomy& anatomy,
+                                    const std::vector<RecipeSegment>& planned, Progress* progress) {
+  progress->Begin("cutting the bone", 0.46, 0.5);
+  std::vector<OsteotomySegment> cuts;
+  for (const RecipeSegment& segment : planned) {
+    cuts.push_back(segment.planes.empty()
+                       ? DefaultSegment(segment.kind, segment.name, anatomy.landmarks)
+                       : OsteotomySegment{segment.name, segment.kind, segment.planes});
+  }
+  DividedBone divided;
+  TF_ASSIGN_OR_RETURN(divided.labels, CutSegments(anatomy.parts.labels, cuts));
+  for (size_t s = 0; s < cuts.size(); ++s) {
+    TF_ASSIGN_OR_RETURN(BuiltSegment segment,
+                        BuildSegment(divided.labels, static_cast<uint8_t>(kFirstSegment + s),
+                                     std::move(cuts[s]), planned[s].pose));
+    divided.segments.push_back(std::move(segment));
+  }
+  return divided;
+}
+
+absl::StatusOr<SoftTissue> FindSoftTissue(const Anatomy& anatomy, const LabelGrid& bone,
+                                          const Recipe& recipe, Progress* progress) {
   progress->Begin("finding the soft tissue", 0.5, 0.62);
-  const Recipe& recipe = build->recipe;
-  RegionOfInterest region = DefaultRegion(build->landmarks, build->head.hu.geometry);
+  RegionOfInterest region = DefaultRegion(anatomy.landmarks, anatomy.head.hu.geometry);
   region.back = recipe.back.value_or(region.back);
   region.above = recipe.above.value_or(region.above);
   region.below = recipe.below.value_or(region.below);
-  TF_ASSIGN_OR_RETURN(build->soft_tissue,
-                      ExtractSoftTissue(build->head, build->bone, build->landmarks, region,
-                                        recipe.soft_tissue, progress->Parts()));
-  return absl::OkStatus();
+  return ExtractSoftTissue(anatomy.head, bone, anatomy.landmarks, region, recipe.soft_tissue,
+                           progress->Parts());
 }
 
 std::vector<FineRegion> LipsAndChin(const Landmarks& landmarks, double edge_mm) {
@@ -132,79 +171,99 @@ std::vector<FineRegion> LipsAndChin(const Landmarks& landmarks, double edge_mm) 
   return regions;
 }
 
-absl::Status Mesh(Progress* progress, PlanBuild* build) {
+absl::StatusOr<SoftTissueMesh> Mesh(const SoftTissue& soft_tissue, const Landmarks& landmarks,
+                                    const Recipe& recipe, Progress* progress) {
   progress->Begin("meshing", 0.62, 0.9);
-  const RecipeMesh& recipe = build->recipe.mesh;
   SoftTissueMeshOptions options;
-  options.edge_mm = recipe.edge_mm;
-  options.fine_regions = LipsAndChin(build->landmarks, recipe.fine_edge_mm);
-  options.interior_edge_factor = recipe.interior_edge_factor;
-  options.min_dihedral_deg = recipe.min_dihedral_deg;
-  options.min_cavity_volume_mm3 = build->recipe.soft_tissue.smallest_cavity_mm3;
+  options.edge_mm = recipe.mesh.edge_mm;
+  options.fine_regions = LipsAndChin(landmarks, recipe.mesh.fine_edge_mm);
+  options.interior_edge_factor = recipe.mesh.interior_edge_factor;
+  options.min_dihedral_deg = recipe.mesh.min_dihedral_deg;
+  options.min_cavity_volume_mm3 = recipe.soft_tissue.smallest_cavity_mm3;
   int stages = 0;
   options.on_stage = [&](absl::string_view stage) {
     progress->Parts()(stage, std::min(0.9, 0.15 * stages++));
     return absl::OkStatus();
   };
-  TF_ASSIGN_OR_RETURN(build->mesh, MeshSoftTissue(build->soft_tissue.field, options));
-  return absl::OkStatus();
+  return MeshSoftTissue(soft_tissue.field, options);
 }
 
-double BandMm(const PlanBuild& build) {
-  if (build.recipe.contact_band_mm) return *build.recipe.contact_band_mm;
+double BandMm(const Recipe& recipe, const std::vector<BuiltSegment>& segments) {
+  if (recipe.contact_band_mm) return *recipe.contact_band_mm;
   double largest_move_mm = 0;
-  for (const BuiltSegment& segment : build.segments) {
+  for (const BuiltSegment& segment : segments) {
     largest_move_mm = std::max(largest_move_mm, segment.largest_move_mm);
   }
-  return std::max(kBandVoxels * build.recipe.spacing_mm, kBandOfMove * largest_move_mm);
+  return std::max(kBandVoxels * recipe.spacing_mm, kBandOfMove * largest_move_mm);
 }
 
-absl::Status Describe(int threads, Progress* progress, PlanBuild* build) {
+// What the tets are made of and what holds the vertices.
+absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTissue& soft_tissue,
+                                     const Anatomy& anatomy,
+                                     const std::vector<BuiltSegment>& segments,
+                                     const Recipe& recipe, int threads, Progress* progress) {
   progress->Begin("stiffness and regions", 0.9, 1);
-  const TetMesh& mesh = build->mesh->mesh;
-  TF_ASSIGN_OR_RETURN(build->stiffness, ComputeTetStiffness(mesh, build->head.hu, build->head.bone,
-                                                            {.table = build->recipe.tissues}));
+  const HeadSegmentation& head = anatomy.head;
+  TF_ASSIGN_OR_RETURN(TetStiffness stiffness, ComputeTetStiffness(built.mesh, head.hu, head.bone,
+                                                                  {.table = recipe.tissues}));
   std::vector<std::string> names;
-  for (const BuiltSegment& segment : build->segments) names.push_back(segment.cut.name);
-  build->contact_band_mm = BandMm(*build);
-  TF_ASSIGN_OR_RETURN(
-      build->regions,
-      AssignRegions(
-          mesh, build->mesh->surface.num_vertices(), build->soft_tissue, names,
-          build->contact_band_mm, build->landmarks,
-          {build->head.hu, static_cast<double>(build->recipe.segmentation.tissue_above_hu)}));
   std::vector<HandlePose> poses;
-  for (const BuiltSegment& segment : build->segments) poses.push_back(segment.pose);
-  TF_ASSIGN_OR_RETURN(build->freed_by_trial,
-                      ReleaseTornContacts({.mesh = mesh,
-                                           .youngs_modulus_pa = build->stiffness.youngs_modulus_pa,
-                                           .poisson_ratio = build->recipe.poisson_ratio,
+  for (const BuiltSegment& segment : segments) {
+    names.push_back(segment.cut.name);
+    poses.push_back(segment.pose);
+  }
+  const double contact_band_mm = BandMm(recipe, segments);
+  const double tissue_above_hu = recipe.segmentation.tissue_above_hu;
+  TF_ASSIGN_OR_RETURN(
+      PlanningRegions regions,
+      AssignRegions(built.mesh, built.surface.num_vertices(), soft_tissue, names, contact_band_mm,
+                    anatomy.landmarks, {head.hu, tissue_above_hu}));
+  TF_ASSIGN_OR_RETURN(ReleasedContacts released,
+                      ReleaseTornContacts({.mesh = built.mesh,
+                                           .youngs_modulus_pa = stiffness.youngs_modulus_pa,
+                                           .poisson_ratio = recipe.poisson_ratio,
                                            .poses = std::move(poses),
                                            .threads = threads},
-                                          &build->regions));
-  build->skin_distance =
-      MeasureSkinDistance(build->mesh->surface, build->regions.on_skin, build->head.hu,
-                          build->recipe.segmentation.tissue_above_hu);
-  return absl::OkStatus();
+                                          std::move(regions)));
+  SkinDistance skin_distance =
+      MeasureSkinDistance(built.surface, released.regions.on_skin, head.hu, tissue_above_hu);
+  return Description{.stiffness = std::move(stiffness),
+                     .contact_band_mm = contact_band_mm,
+                     .released = std::move(released),
+                     .skin_distance = std::move(skin_distance)};
 }
 
 }  // namespace
 
 absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& recipe,
                                     const PlanBuildOptions& options) {
-  PlanBuild build;
-  build.recipe = recipe;
   Progress progress(options.tell);
-  {
-    TF_ASSIGN_OR_RETURN(const HuGrid ct, ReadAndResample(ct_path, options, &progress, &build));
-    TF_RETURN_IF_ERROR(FindAnatomy(ct, &progress, &build));
-  }
-  TF_RETURN_IF_ERROR(CutBone(&progress, &build));
-  TF_RETURN_IF_ERROR(FindSoftTissue(&progress, &build));
-  TF_RETURN_IF_ERROR(Mesh(&progress, &build));
-  TF_RETURN_IF_ERROR(Describe(options.threads, &progress, &build));
+  TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(ct_path, recipe, options.threads, &progress));
+  TF_ASSIGN_OR_RETURN(Anatomy anatomy, FindAnatomy(ct.hu, recipe, &progress));
+  ct.hu = {};  // the head has its own: as large as the CT, and the next stages need the room
+  TF_ASSIGN_OR_RETURN(DividedBone bone, CutBone(anatomy, recipe.segments, &progress));
+  TF_ASSIGN_OR_RETURN(SoftTissue soft_tissue,
+                      FindSoftTissue(anatomy, bone.labels, recipe, &progress));
+  TF_ASSIGN_OR_RETURN(SoftTissueMesh mesh, Mesh(soft_tissue, anatomy.landmarks, recipe, &progress));
+  TF_ASSIGN_OR_RETURN(Description description, Describe(mesh, soft_tissue, anatomy, bone.segments,
+                                                        recipe, options.threads, &progress));
   TellStage(options.tell, "done", 1);
-  return build;
+  return PlanBuild{.recipe = recipe,
+                   .ct = std::move(ct.provenance),
+                   .ct_size = ct.size,
+                   .ct_spacing_mm = ct.spacing_mm,
+                   .head = std::move(anatomy.head),
+                   .parts = std::move(anatomy.parts),
+                   .bone = std::move(bone.labels),
+                   .landmarks = anatomy.landmarks,
+                   .segments = std::move(bone.segments),
+                   .soft_tissue = std::move(soft_tissue),
+                   .contact_band_mm = description.contact_band_mm,
+                   .mesh = std::move(mesh),
+                   .stiffness = std::move(description.stiffness),
+                   .regions = std::move(description.released.regions),
+                   .freed_by_trial = description.released.freed,
+                   .skin_distance = std::move(description.skin_distance)};
 }
 
 }  // namespace tissueform

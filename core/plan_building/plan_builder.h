@@ -4,7 +4,6 @@
 #pragma once
 
 #include <array>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,7 +38,8 @@ struct BuiltSegment {
   TriangleMesh surface;  // closed, LPS
 };
 
-// A planning model with all that led to it: what is written, reported and drawn.
+// A planning model with all that led to it: what is written, reported and drawn. BuildPlan makes it
+// whole, at the end, from what its stages return; there is none without its mesh.
 struct PlanBuild {
   Recipe recipe;
   CtProvenance ct;
@@ -52,7 +52,7 @@ struct PlanBuild {
   std::vector<BuiltSegment> segments;
   SoftTissue soft_tissue;
   double contact_band_mm = 0;
-  std::optional<SoftTissueMesh> mesh;  // there in every build that BuildPlan returns
+  SoftTissueMesh mesh;
   TetStiffness stiffness;
   PlanningRegions regions;
   int64_t freed_by_trial = 0;  // of regions.freed_by_contact, by ReleaseTornContacts

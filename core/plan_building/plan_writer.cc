@@ -70,7 +70,7 @@ Plan PlanOf(const PlanBuild& build) {
 
 TetMeshFile MeshFile(const PlanBuild& build) {
   const TetStiffness& stiffness = build.stiffness;
-  return {.mesh = build.mesh->mesh,
+  return {.mesh = build.mesh.mesh,
           .point_data = {{kAnatomyArray, 1, build.regions.anatomy},
                          {"skin_region", 1, build.regions.skin_region}},
           .cell_data = {{"mean_hu", 1, stiffness.mean_hu},

@@ -16,6 +16,7 @@
 #include "core/base/status_macros.h"
 #include "core/json/json_schema.h"
 #include "core/json/json_text.h"
+#include "core/mesh_payload/sha256.h"
 #include "core/plan_building/recipe_schema_text.h"
 #include "core/planning/json_values.h"
 #include "core/planning/model_names.h"
@@ -226,7 +227,10 @@ absl::StatusOr<Recipe> ReadRecipe(const std::string& path) {
 
 absl::StatusOr<Recipe> ParseRecipe(std::string_view json, const std::string& name) {
   absl::StatusOr<Recipe> recipe = ParseUnnamed(std::string(json));
-  if (recipe.ok()) return recipe;
+  if (recipe.ok()) {
+    recipe->sha256 = Sha256Hex({{json.data(), json.size()}});
+    return recipe;
+  }
   return absl::Status(recipe.status().code(),
                       absl::StrCat("recipe ", name, ": ", recipe.status().message()));
 }

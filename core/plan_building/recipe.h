@@ -39,6 +39,7 @@ struct RecipeMesh {
 // How a planning model is made from a CT of a head (docs/recipe-format.md). Coordinates are LPS,
 // mm.
 struct Recipe {
+  std::string sha256;  // of the text that was parsed; empty for a recipe that was not read
   CtReadOptions ct;
   double spacing_mm = 1.5;
   HeadSegmentationOptions segmentation;
@@ -66,7 +67,7 @@ inline constexpr size_t kMaxRecipeBytes = size_t{1} << 20;
 // the key as a JSON pointer).
 absl::StatusOr<Recipe> ReadRecipe(const std::string& path);
 
-// The same for a text; `name` stands for the file in messages.
+// The same for a text, whose SHA-256 it keeps; `name` stands for the file in messages.
 absl::StatusOr<Recipe> ParseRecipe(std::string_view json, const std::string& name);
 
 // The recipe with everything that was left out filled in: what report.json tells.

@@ -4,8 +4,6 @@
 // The program that `tissueform plan build` starts, as does any other caller of CallPlanBuild: makes
 // a plan from a CT, and the report of it.
 
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <string>
 
@@ -19,7 +17,6 @@
 #include "client/rendering/virtual_display.h"
 #include "core/base/status_macros.h"
 #include "core/linear_solvers/blas_threads.h"
-#include "core/mesh_payload/sha256.h"
 #include "core/plan_building/plan_build_call.h"
 #include "core/plan_building/plan_builder.h"
 
@@ -28,12 +25,6 @@ namespace {
 
 // Of the whole work's time: what building, without writing and the report, takes.
 constexpr double kBuildShare = 0.8;
-
-std::string Sha256OfFile(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  return Sha256Hex({text});
-}
 
 StageFunction Within(const StageFunction& tell, double from, double to) {
   return [tell, from, to](absl::string_view stage, double fraction) {
@@ -56,7 +47,7 @@ std::string QualityText(const PlanBuild& build) {
 std::string Outcome(const PlanBuildRequest& request, const PlanBuild& build) {
   std::string text =
       absl::StrFormat("plan    %s/plan.json: %d vertices, %d tets\n", request.folder_name,
-                      build.mesh->mesh.num_vertices(), build.mesh->mesh.num_tets());
+                      build.mesh.mesh.num_vertices(), build.mesh.mesh.num_tets());
   for (const BuiltSegment& segment : build.segments) {
     absl::StrAppendFormat(&text, "  handle  %s (%s): %.1f cm3 of bone\n", segment.cut.name,
                           OsteotomyKindName(segment.cut.kind), segment.volume_mm3 / 1000);
@@ -90,7 +81,6 @@ absl::StatusOr<std::string> BuildRequestedPlan(const PlanBuildRequest& request,
   TF_RETURN_IF_ERROR(WritePlan(build, request.folder));
   TF_RETURN_IF_ERROR(WritePlanReport(build,
                                      {.program_version = kVersion,
-                                      .recipe_sha256 = Sha256OfFile(request.recipe),
                                       .pictures = request.pictures,
                                       .tell = Within(tell, kBuildShare + 0.05, 1)},
                                      request.folder));

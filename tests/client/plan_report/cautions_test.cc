@@ -6,6 +6,8 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "tests/client/plan_report/plan_build_of_mesh.h"
+
 namespace tissueform {
 namespace {
 
@@ -15,7 +17,7 @@ using ::testing::IsEmpty;
 
 // A CT that begins at z = -101 mm, with the chin at -60 mm.
 PlanBuild WholeHead() {
-  PlanBuild build;
+  PlanBuild build = testing::PlanBuildOfMesh();
   build.head.hu.geometry = {.size = {10, 10, 10}, .origin_mm = {0, 0, -100}, .spacing_mm = 2};
   build.landmarks.menton = {0, 0, -60};
   build.landmarks.nose_prominence_mm = 9;

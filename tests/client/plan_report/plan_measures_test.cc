@@ -9,6 +9,7 @@
 #include "gtest/gtest.h"
 
 #include "core/mesh/tet_quality.h"
+#include "tests/client/plan_report/plan_build_of_mesh.h"
 #include "tests/testing/meshes.h"
 
 namespace tissueform {
@@ -18,14 +19,10 @@ using ::testing::ElementsAre;
 
 // A bar of 3 x 3 x 4 cubes of 1 mm as if it were the soft tissue of a head.
 PlanBuild BuildOfBar(const TetMesh& mesh) {
-  PlanBuild build;
+  PlanBuild build = testing::PlanBuildOfMesh(mesh);
   build.head.hu.geometry.spacing_mm = 2;
   build.parts.labels = LabelGrid({.size = {2, 2, 1}, .spacing_mm = 2});
   build.parts.labels.values = {kCranium, kMandible, kMandible, 0};
-  build.mesh =
-      SoftTissueMesh{.mesh = mesh,
-                     .surface = *TriangleMesh::Create(mesh.positions(), TriangleIndices{{0, 1, 2}}),
-                     .report = {}};
   build.soft_tissue.volume_mm3 = 36;
   build.stiffness.tissue.assign(static_cast<size_t>(mesh.num_tets()), 1);
   build.stiffness.tissue[0] = 0;

@@ -8,6 +8,7 @@
 #include "gtest/gtest.h"
 
 #include "client/plan_report/label_colours.h"
+#include "tests/client/plan_report/plan_build_of_mesh.h"
 
 namespace tissueform {
 namespace {
@@ -17,7 +18,7 @@ using Eigen::Vector3d;
 // A head of air, 40 mm wide, with one bright place that stands off the middle: at the patient's
 // left, behind and above.
 PlanBuild WithBrightPlace() {
-  PlanBuild build;
+  PlanBuild build = testing::PlanBuildOfMesh();
   const GridGeometry geometry{.size = {21, 21, 21}, .origin_mm = Vector3d::Zero(), .spacing_mm = 2};
   build.head.hu = HuGrid(geometry, -1000);
   build.bone = LabelGrid(geometry);

@@ -3,12 +3,14 @@
 
 #include "core/plan_building/contact_trial.h"
 
+#include <utility>
 #include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
 #include "core/anatomy/osteotomy.h"
+#include "core/base/status_macros.h"
 #include "core/deformation/create_deformer.h"
 #include "core/deformation/deformation_quality.h"
 #include "tests/testing/meshes.h"
@@ -36,12 +38,15 @@ class ContactTrialTest : public ::testing::Test {
   absl::StatusOr<int64_t> Release(double down_mm) {
     HandlePose pose;
     pose.translation_mm.z() = -down_mm;
-    return ReleaseTornContacts({.mesh = mesh_,
-                                .youngs_modulus_pa = stiffness_,
-                                .poisson_ratio = 0.3,
-                                .poses = {pose},
-                                .threads = 2},
-                               &regions_);
+    TF_ASSIGN_OR_RETURN(ReleasedContacts released,
+                        ReleaseTornContacts({.mesh = mesh_,
+                                             .youngs_modulus_pa = stiffness_,
+                                             .poisson_ratio = 0.3,
+                                             .poses = {pose},
+                                             .threads = 2},
+                                            regions_));
+    regions_ = std::move(released.regions);
+    return released.freed;
   }
 
   std::vector<int32_t> VerticesWith(uint8_t label) const {

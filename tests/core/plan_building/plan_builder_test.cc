@@ -55,11 +55,11 @@ TEST(PlanBuilderTest, BundledHeadBecomesAUsablePlan) {
   };
   ASSERT_OK_AND_ASSIGN(const PlanBuild build, BuildPlan(BundledCt(), CoarseRecipe(), options));
   EXPECT_EQ(last, 1);
-  const TetMesh& mesh = build.mesh->mesh;
+  const TetMesh& mesh = build.mesh.mesh;
   EXPECT_THAT(CheckTetMesh(mesh), IsOk());
   EXPECT_EQ(ValidateTetMesh(mesh).num_components, 1);
-  EXPECT_LE(build.mesh->report.tets_below_3_deg, mesh.num_tets() / 1000);
-  EXPECT_NEAR(build.mesh->report.volume_ratio, 1, 0.03);
+  EXPECT_LE(build.mesh.report.tets_below_3_deg, mesh.num_tets() / 1000);
+  EXPECT_NEAR(build.mesh.report.volume_ratio, 1, 0.03);
   EXPECT_LE(build.skin_distance.mean_mm, 0.6 * 2.5);
   EXPECT_LE(build.skin_distance.p99_mm, 2 * 2.5);
   EXPECT_GT(build.skin_distance.mm.size(), 500U);

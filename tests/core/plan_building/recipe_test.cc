@@ -6,6 +6,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/mesh_payload/sha256.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {
@@ -32,6 +33,14 @@ TEST(RecipeTest, SegmentsAreEnough) {
   EXPECT_TRUE(recipe.segments[0].planes.empty());
   EXPECT_EQ(recipe.spacing_mm, 1.5);
   EXPECT_FALSE(recipe.ct.hu_offset.has_value());
+}
+
+TEST(RecipeTest, KeepsTheDigestOfTheTextThatWasParsed) {
+  const std::string text = WithKeys("");
+  ASSERT_OK_AND_ASSIGN(const Recipe recipe, ParseRecipe(text, "r"));
+  EXPECT_EQ(recipe.sha256, Sha256Hex({text}));
+  ASSERT_OK_AND_ASSIGN(const Recipe spaced, ParseRecipe(text + "\n", "r"));
+  EXPECT_EQ(spaced.sha256, Sha256Hex({text + "\n"}));
 }
 
 TEST(RecipeTest, EveryKeyArrives) {
