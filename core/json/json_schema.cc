@@ -4,6 +4,9 @@
 #include "core/json/json_schema.h"
 
 #include <exception>
+#include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -14,7 +17,9 @@
 #include <valijson/validation_results.hpp>
 #include <valijson/validator.hpp>
 
+#include "core/base/status_macros.h"
 #include "core/json/schema_errors.h"
+#include "core/json/schema_versions.h"
 
 namespace tissueform {
 namespace {
@@ -36,35 +41,87 @@ std::vector<SchemaViolation> ToViolations(const valijson::ValidationResults& res
   return violations;
 }
 
+// The schema of one version.
+class OneVersion {
+ public:
+  explicit OneVersion(Json json) : json_(std::move(json)) {
+    valijson::SchemaParser().populateSchema(Adapter(json_), schema_);
+  }
+
+  // Nothing when the document follows it.
+  std::vector<SchemaViolation> Violations(const Json& document) const {
+    valijson::ValidationResults results;
+    valijson::Validator validator;
+    if (validator.validate(schema_, Adapter(document), &results)) return {};
+    return ToViolations(results);
+  }
+  const Json& json() const { return json_; }
+
+ private:
+  const Json json_;
+  valijson::Schema schema_;
+};
+
+Json WithVersion(Json document, int version) {
+  document["version"] = version;
+  return document;
+}
+
 }  // namespace
 
 struct JsonSchema::Compiled {
-  explicit Compiled(const char* text) : json(Json::parse(text)) {
-    valijson::SchemaParser().populateSchema(Adapter(json), schema);
+  explicit Compiled(const char* text) : published(Json::parse(text)) {
+    for (int version = 1; version <= NewestVersion(published); ++version) {
+      versions.push_back(std::make_unique<const OneVersion>(SchemaOfVersion(published, version)));
+    }
   }
 
-  const Json json;
-  valijson::Schema schema;
+  int newest() const { return static_cast<int>(versions.size()); }
+  const OneVersion& Of(int version) const { return *versions[static_cast<size_t>(version) - 1]; }
+
+  // The lowest version from `first` on whose schema the document follows but for what it says as
+  // its version; 0 when there is none.
+  int LowestThatFits(const Json& document, int first) const {
+    for (int version = first; document.is_object() && version <= newest(); ++version) {
+      if (Of(version).Violations(WithVersion(document, version)).empty()) return version;
+    }
+    return 0;
+  }
+
+  absl::Status Check(const Json& document) const {
+    TF_ASSIGN_OR_RETURN(const int version, VersionToCheck(document, published));
+    const OneVersion& schema = Of(version);
+    const std::vector<SchemaViolation> violations = schema.Violations(document);
+    if (violations.empty()) return absl::OkStatus();
+    std::string message = ExplainViolations(violations, schema.json(), published, document);
+    if (const int fits = LowestThatFits(document, version + 1); fits != 0) {
+      absl::StrAppend(&message, " (as \"version\": ", fits, " it would be read)");
+    }
+    return absl::InvalidArgumentError(message);
+  }
+
+  const Json published;
+  std::vector<std::unique_ptr<const OneVersion>> versions;
 };
 
 JsonSchema::JsonSchema(const char* text) : compiled_(std::make_unique<const Compiled>(text)) {}
 
 JsonSchema::~JsonSchema() = default;
 
-const Json& JsonSchema::json() const { return compiled_->json; }
+const Json& JsonSchema::json() const { return compiled_->published; }
 
 absl::Status JsonSchema::Check(const Json& document) const {
   try {
-    valijson::ValidationResults results;
-    valijson::Validator validator;
-    if (validator.validate(compiled_->schema, Adapter(document), &results)) {
-      return absl::OkStatus();
-    }
-    return absl::InvalidArgumentError(ExplainViolations(ToViolations(results), json(), document));
+    return compiled_->Check(document);
   } catch (const std::exception& exception) {
     return absl::InternalError(
         absl::StrCat("checking against the schema failed: ", exception.what()));
   }
+}
+
+int JsonSchema::LowestVersion(const Json& document) const {
+  const int fits = compiled_->LowestThatFits(document, 1);
+  return fits == 0 ? compiled_->newest() : fits;
 }
 
 }  // namespace tissueform

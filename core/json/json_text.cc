@@ -8,9 +8,8 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "nlohmann/json.hpp"
-
-#include "core/json/json_pointer.h"
 
 namespace tissueform {
 namespace {
@@ -106,6 +105,15 @@ class StrictnessCheck : public nlohmann::json_sax<Json> {
 };
 
 }  // namespace
+
+std::string JsonPointer(const std::vector<std::string>& path) {
+  std::string pointer;
+  for (const std::string& step : path) {
+    pointer += '/';
+    pointer += absl::StrReplaceAll(step, {{"~", "~0"}, {"/", "~1"}});
+  }
+  return pointer.empty() ? "/" : pointer;
+}
 
 absl::StatusOr<Json> ParseJsonStrictly(const std::string& text) {
   // The library takes a zero byte for the end and would not look at what follows.

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "nlohmann/json_fwd.hpp"
@@ -25,5 +26,9 @@ inline constexpr size_t kMaxJsonKeyBytes = 256;
 //
 // Errors: InvalidArgument with line and column, or with the JSON pointer of the object concerned.
 absl::StatusOr<nlohmann::json> ParseJsonStrictly(const std::string& text);
+
+// RFC 6901 pointer of a path of keys and array positions; "/" for the whole text, because an empty
+// pointer is hard to see in a message.
+std::string JsonPointer(const std::vector<std::string>& path);
 
 }  // namespace tissueform

@@ -12,7 +12,8 @@
 #include "absl/strings/str_join.h"
 #include "nlohmann/json.hpp"
 
-#include "core/json/json_pointer.h"
+#include "core/json/json_text.h"
+#include "core/json/schema_versions.h"
 
 namespace tissueform {
 namespace {
@@ -108,6 +109,16 @@ std::string AllowedKeys(const Json& subschema) {
   return absl::StrCat("allowed there: ", absl::StrJoin(keys, ", "));
 }
 
+std::string UnknownKey(const std::string& key, const std::string& pointer, const Json& subschema,
+                       const Json& newest) {
+  if (newest.contains("properties") && newest.at("properties").contains(key)) {
+    return absl::StrCat("key \"", key, "\" at ", pointer, " came with version ",
+                        SinceVersion(newest.at("properties").at(key)),
+                        " of the format; write that as \"version\", or leave the key out");
+  }
+  return absl::StrCat("unknown key \"", key, "\" at ", pointer, "; ", AllowedKeys(subschema));
+}
+
 std::string AllowedValues(const Json& subschema) {
   if (subschema.contains("const")) return subschema.at("const").dump();
   std::vector<std::string> values;
@@ -129,15 +140,15 @@ std::string Meaning(const Json& subschema) {
 }  // namespace
 
 std::string ExplainViolations(const std::vector<SchemaViolation>& violations, const Json& schema,
-                              const Json& document) {
+                              const Json& newest, const Json& document) {
   const SchemaViolation& violation = NearestToMistake(violations);
   const std::string pointer = JsonPointer(violation.path);
   const Json& subschema = SubschemaAt(violation.path, schema);
   const std::string value = ShortValueAt(violation.path, document);
   switch (KindOf(violation)) {
     case Kind::kUnknownKey:
-      return absl::StrCat("unknown key \"", Quoted(violation.description), "\" at ", pointer, "; ",
-                          AllowedKeys(subschema));
+      return UnknownKey(Quoted(violation.description), pointer, subschema,
+                        SubschemaAt(violation.path, newest));
     case Kind::kMissingKey:
       return absl::StrCat("missing key \"", Quoted(violation.description), "\" at ", pointer,
                           "; add it");

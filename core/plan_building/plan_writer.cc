@@ -16,6 +16,7 @@
 #include "core/planning/json_values.h"
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
+#include "core/planning/plan_schema.h"
 
 namespace tissueform {
 namespace {
@@ -30,7 +31,6 @@ Json Equals(size_t label) { return {{"point_data", kAnatomyArray}, {"equals", la
 
 std::string PlanJson(const PlanBuild& build) {
   Json plan = {{"format", "tissueform-plan"},
-               {"version", 1},
                {"unit", "mm"},
                {"coordinate_system", "LPS"},
                {"mesh", kMeshFile},
@@ -43,6 +43,7 @@ std::string PlanJson(const PlanBuild& build) {
                                {"region", Equals(kFirstSegment + s)},
                                {"pose", ToJson(build.segments[s].pose)}});
   }
+  plan["version"] = LowestPlanVersion(plan);
   return plan.dump(2) + "\n";
 }
 

@@ -237,7 +237,6 @@ absl::StatusOr<Recipe> ParseRecipe(std::string_view json, const std::string& nam
 
 std::string RecipeToJson(const Recipe& recipe) {
   Json json = {{"format", "tissueform-recipe"},
-               {"version", 1},
                {"ct", CtToJson(recipe.ct)},
                {"spacing_mm", recipe.spacing_mm},
                {"segmentation",
@@ -269,6 +268,7 @@ std::string RecipeToJson(const Recipe& recipe) {
   add_plane(json["region_of_interest"], "above", recipe.above);
   add_plane(json["region_of_interest"], "below", recipe.below);
   if (recipe.contact_band_mm) json["contact_band_mm"] = *recipe.contact_band_mm;
+  json["version"] = RecipeSchema().LowestVersion(json);
   return json.dump(2);
 }
 

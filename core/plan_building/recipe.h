@@ -59,8 +59,8 @@ struct Recipe {
 // Largest recipe file that is read.
 inline constexpr size_t kMaxRecipeBytes = size_t{1} << 20;
 
-// Reads and checks a recipe (version 1) against the published schema, docs/recipe.schema.json,
-// which is built into the program.
+// Reads and checks a recipe against the published schema, docs/recipe.schema.json, which is built
+// into the program, in the version that the file says.
 //
 // Errors: NotFound (no such file), InvalidArgument (not JSON, unknown key, wrong type, value out of
 // range, two segments of one name, a normal of length 0, tissues out of order; the message names

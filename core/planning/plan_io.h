@@ -23,8 +23,8 @@ struct PlanReadOptions {
   bool allow_outside = false;
 };
 
-// Reads and checks a plan file (version 1) against the published schema, docs/plan.schema.json,
-// which is built into the program.
+// Reads and checks a plan file against the published schema, docs/plan.schema.json, which is built
+// into the program, in the version that the file says.
 //
 // Errors: NotFound (no such file), InvalidArgument (not JSON, unknown key, wrong type, value out of
 // range; the message names the key as a JSON pointer), PermissionDenied (the mesh, or the file that

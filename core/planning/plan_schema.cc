@@ -20,4 +20,6 @@ const nlohmann::json& PlanSchema() { return Schema().json(); }
 
 absl::Status CheckAgainstPlanSchema(const nlohmann::json& plan) { return Schema().Check(plan); }
 
+int LowestPlanVersion(const nlohmann::json& plan) { return Schema().LowestVersion(plan); }
+
 }  // namespace tissueform

@@ -8,11 +8,15 @@
 
 namespace tissueform {
 
-// The published schema of plans, docs/plan.schema.json, as it was when the program was built.
+// The published schema of plans, docs/plan.schema.json, as it was when the program was built: that
+// of the newest version (core/json/schema_versions.h).
 const nlohmann::json& PlanSchema();
 
-// InvalidArgument in one line when `plan` does not follow the schema: what is wrong, at which JSON
-// pointer, and what is allowed there.
+// InvalidArgument in one line when `plan` does not follow the schema of the version that it says:
+// what is wrong, at which JSON pointer, and what is allowed there.
 absl::Status CheckAgainstPlanSchema(const nlohmann::json& plan);
+
+// What a plan with these keys is to say as its "version".
+int LowestPlanVersion(const nlohmann::json& plan);
 
 }  // namespace tissueform
