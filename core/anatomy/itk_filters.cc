@@ -102,6 +102,8 @@ FloatGrid DistanceMm(const LabelGrid& mask) {
   return grid;
 }
 
+// From the border between voxels, half a voxel from the centres on either side of it: the distances
+// to the nearest centre beyond, which the filter gives, are by that too long.
 FloatGrid SignedDistanceMm(const LabelGrid& mask) {
   FloatGrid inside = DistanceMm(Complement(mask));
   const FloatGrid outside = DistanceMm(mask);
@@ -112,6 +114,7 @@ FloatGrid SignedDistanceMm(const LabelGrid& mask) {
   return inside;
 }
 
+// By distance, not by a ball of voxels: exact for any radius in mm, and as quick for a large one.
 LabelGrid Erode(const LabelGrid& mask, double radius_mm) {
   return MaskWhere(DistanceMm(Complement(mask)), [=](float mm) { return mm > radius_mm; });
 }

@@ -7,7 +7,7 @@
 
 #include "core/anatomy/face_profile.h"
 #include "core/anatomy/jaw_landmarks.h"
-#include "core/anatomy/symmetry_plane.h"
+#include "core/anatomy/plane.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -15,7 +15,8 @@ namespace {
 
 constexpr double kFaceHeightMm = 110;
 
-// The bone of the face: cranium and mandible, up from the chin and in front of the jaw's back.
+// The bone of the face: cranium and mandible, up from the chin and in front of the jaw's back. The
+// vault would outweigh it, is seldom in view whole, and may be askew to the face.
 LabelGrid FacialBone(const LabelGrid& parts, const VoxelBox& mandible) {
   const double top_mm = parts.geometry.Centre(0, 0, mandible.first[2]).z() + kFaceHeightMm;
   const double back_mm = parts.geometry.Centre(0, mandible.last[1], 0).y();

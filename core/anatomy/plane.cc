@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/anatomy/symmetry_plane.h"
+#include "core/anatomy/plane.h"
 
 #include <algorithm>
 #include <array>
@@ -68,8 +68,8 @@ double MeanMirrorDistance(const std::vector<Eigen::Vector3d>& places, const Floa
 }  // namespace
 
 // A search along the three coordinates with steps that halve when none helps: the sum has no
-// derivative, as distances are looked up by whole voxels. The first steps of 8 degrees and 8 mm are
-// what a head may lie askew from the start.
+// derivative, as distances are looked up by whole voxels. Two of the first steps, 16 degrees and
+// 16 mm, are as much as a head lies askew in a scanner.
 Plane FindSymmetryPlane(const LabelGrid& mask, double start_x_mm) {
   const std::vector<Eigen::Vector3d> places = SamplePlaces(mask);
   const FloatGrid distance = DistanceMm(mask);

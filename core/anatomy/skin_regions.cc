@@ -8,6 +8,8 @@
 namespace tissueform {
 namespace {
 
+// Sizes of an adult face with a little to spare; heights come from its own landmarks. The names are
+// for figures by place, not for cutting, so a border a few mm off does no harm.
 constexpr double kNoseHalfWidthMm = 20;
 constexpr double kMouthHalfWidthMm = 28;
 constexpr double kOverNoseTipMm = 20;
@@ -17,7 +19,8 @@ constexpr double kLipsDepthMm = 14;
 constexpr double kChinDepthMm = 20;
 constexpr double kCheekDepthMm = 55;
 
-// Patient coordinates turned into left, back and up of the face.
+// Patient coordinates turned into left, back and up of the face: along the upper teeth, as a head
+// lies tilted in a scanner but its lips lie over its teeth.
 class FaceFrame {
  public:
   explicit FaceFrame(const Landmarks& l)

@@ -17,7 +17,6 @@
 #include "core/json/json_schema.h"
 #include "core/json/json_text.h"
 #include "core/mesh_payload/sha256.h"
-#include "core/plan_building/recipe_schema_text.h"
 #include "core/planning/json_values.h"
 #include "core/planning/model_names.h"
 

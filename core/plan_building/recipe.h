@@ -56,6 +56,9 @@ struct Recipe {
   DeformationModel model = DeformationModel::kGradientField;
 };
 
+// The text of docs/recipe.schema.json.
+const char* RecipeSchemaText();
+
 // Largest recipe file that is read.
 inline constexpr size_t kMaxRecipeBytes = size_t{1} << 20;
 

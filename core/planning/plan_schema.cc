@@ -4,7 +4,6 @@
 #include "core/planning/plan_schema.h"
 
 #include "core/json/json_schema.h"
-#include "core/planning/plan_schema_text.h"
 
 namespace tissueform {
 namespace {

@@ -8,6 +8,9 @@
 
 namespace tissueform {
 
+// The text of docs/plan.schema.json.
+const char* PlanSchemaText();
+
 // The published schema of plans, docs/plan.schema.json, as it was when the program was built: that
 // of the newest version (core/json/schema_versions.h).
 const nlohmann::json& PlanSchema();

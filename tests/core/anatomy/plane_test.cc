@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/anatomy/symmetry_plane.h"
+#include "core/anatomy/plane.h"
 
 #include <cmath>
 #include <numbers>
