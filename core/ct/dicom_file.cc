@@ -48,6 +48,7 @@ const gdcm::Tag kRescaleSlope(0x0028, 0x1053);
 const gdcm::Tag kLossyImageCompression(0x0028, 0x2110);
 const gdcm::Tag kPixelData(0x7fe0, 0x0010);
 
+// Values are taken as text and read strictly: a header may hold anything.
 std::string TextOf(const gdcm::DataSet& data, const gdcm::Tag& tag) {
   if (!data.FindDataElement(tag)) return "";
   const gdcm::ByteValue* const value = data.GetDataElement(tag).GetByteValue();
@@ -99,6 +100,8 @@ bool IsLocaliser(const gdcm::DataSet& data) {
   return absl::StrContains(image_type, "LOCALIZER") || absl::StrContains(image_type, "SCOUT");
 }
 
+// In an order in which each test may trust the ones before: a directory has no modality, a
+// photograph may say CT, and a report of doses has no rows.
 DicomKind KindOf(const gdcm::File& file, const std::string& modality) {
   const gdcm::DataSet& data = file.GetDataSet();
   const std::string sop_class = TextOf(data, kSopClass);

@@ -16,6 +16,7 @@ namespace tissueform {
 namespace {
 
 constexpr size_t kLeastSlices = 8;
+// Of unit vectors, and relative for spacings: what rounding in decimal headers leaves.
 constexpr double kSameDirection = 1e-3;
 constexpr double kSamePositionMm = 0.01;
 constexpr double kPositionToleranceMm = 0.1;  // positions are rounded when they are written
@@ -109,6 +110,8 @@ std::string Place(const DicomHeader& slice) {
                          position[2]);
 }
 
+// By positions, not by instance numbers or names of files, which scanners count in either
+// direction.
 void SortAlong(const Eigen::Vector3d& normal, std::vector<DicomHeader>* slices) {
   std::sort(slices->begin(), slices->end(), [&](const DicomHeader& a, const DicomHeader& b) {
     const double height_a = a.position_mm->dot(normal);
@@ -125,6 +128,7 @@ std::vector<double> Gaps(const std::vector<DicomHeader>& slices) {
   return gaps;
 }
 
+// The usual gap: one or two missing slices do not move a median, as they would a mean.
 double Median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -155,6 +159,8 @@ absl::Status CheckGaps(const std::vector<DicomHeader>& slices) {
   return absl::OkStatus();
 }
 
+// Each gap may be even within the tolerance and all of them drift: so every slice is held against
+// the line from the first to the last, too.
 absl::Status CheckOnLine(const std::vector<DicomHeader>& slices, const Eigen::Vector3d& step) {
   for (size_t i = 0; i < slices.size(); ++i) {
     const Eigen::Vector3d expected = *slices.front().position_mm + static_cast<double>(i) * step;
@@ -168,6 +174,7 @@ absl::Status CheckOnLine(const std::vector<DicomHeader>& slices, const Eigen::Ve
   return absl::OkStatus();
 }
 
+// A tilted gantry stacks slices along a step that is not their normal: the turn about the row.
 double TiltDeg(const Eigen::Vector3d& row, const Eigen::Vector3d& normal,
                const Eigen::Vector3d& step) {
   const double angle = std::atan2(row.dot(step.cross(normal)), step.dot(normal)) * 180 / M_PI;

@@ -48,6 +48,8 @@ class Inflater {
 
 }  // namespace
 
+// Counted and thrown away, a chunk at a time, and no further than is enough: a few kilobytes may
+// unpack to as many gigabytes as whoever packed them liked.
 int64_t UnpackedSize(absl::string_view packed, int64_t enough) {
   enough += static_cast<int64_t>(kChunk);
   Inflater inflater;

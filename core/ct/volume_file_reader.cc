@@ -128,7 +128,8 @@ bool HoldsAllOfMetaImage(const VolumeHeader& header, const FileContents& content
   return UnpackedSize(data, bytes) >= bytes;
 }
 
-// ITK fills up with anything what is missing from NIfTI and MetaImage.
+// ITK fills up with anything what is missing from NIfTI and MetaImage: so the bytes are counted
+// against the header before ITK reads them.
 bool HoldsAllVoxels(VolumeFormat format, const VolumeHeader& header, const FileContents& contents,
                     const itk::ImageIOBase& io) {
   switch (format) {

@@ -38,6 +38,8 @@ absl::Status NotOfItsFormat(absl::string_view format) {
       absl::StrCat("the file ends like one of ", format, " but does not begin like one"));
 }
 
+// Read by ourselves before ITK opens anything: a header may name any file of the machine as its
+// data, and the voxels of what it names would end up in a result that is passed on.
 absl::Status SetDataFile(const std::string& path, const std::string& value, VolumeHeader* header) {
   if (value == "LOCAL" || value == "Local" || value == "local") return absl::OkStatus();
   const bool several = absl::StartsWith(value, "LIST") || absl::StrContains(value, '%');

@@ -32,6 +32,7 @@
 #include "client/rendering/virtual_display.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
+#include "core/constraints/handle_pose.h"
 #include "core/mesh/tet_topology.h"
 #include "core/mesh_io/triangle_mesh_io.h"
 #include "core/planning/plan_io.h"

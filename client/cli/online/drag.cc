@@ -13,6 +13,7 @@
 #include "core/base/mutex.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
+#include "core/constraints/handle_pose.h"
 
 namespace tissueform {
 namespace {
