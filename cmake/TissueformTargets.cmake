@@ -68,7 +68,8 @@ endfunction()
 
 # tissueform_binary(tissueform INSTALL bin SOURCES main.cc DEPS client_cli_shared)
 #
-# INSTALL bin: users start it; libexec: other programs of ours do. Without it the program is not installed.
+# INSTALL bin: users start it; otherwise other programs of ours do (libexec), and find it by FindProgram of core/process.
+# Programs of tests/ are not installed.
 function(tissueform_binary name)
   cmake_parse_arguments(ARG "" "PRECOMPILED;INSTALL" "SOURCES;DEPS" ${ARGN})
   if(NOT ARG_PRECOMPILED)
@@ -78,8 +79,11 @@ function(tissueform_binary name)
   _tissueform_use_precompiled(${name} ${ARG_PRECOMPILED})
   _tissueform_resolve(deps ${ARG_DEPS})
   target_link_libraries(${name} PRIVATE ${deps})
+  file(RELATIVE_PATH folder "${PROJECT_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")
   if(ARG_INSTALL)
     tissueform_install_program(${name} ${ARG_INSTALL})
+  elseif(NOT folder MATCHES "^tests/")
+    tissueform_install_program(${name} libexec)
   endif()
 endfunction()
 

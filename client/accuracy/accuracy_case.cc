@@ -7,7 +7,7 @@
 #include <numbers>
 #include <utility>
 
-#include "client/accuracy/bar_ends.h"
+#include "client/accuracy/boundary_surface.h"
 #include "client/accuracy/layered_block.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/bar_mesh.h"

@@ -32,4 +32,13 @@ std::vector<int32_t> VerticesWhere(const Positions& positions,
   return selected;
 }
 
+absl::StatusOr<ConstraintSet> ConstrainEnds(const Positions& positions) {
+  const double low = positions.col(2).minCoeff();
+  const double high = positions.col(2).maxCoeff();
+  return ConstraintSet::Create(
+      positions.rows(),
+      VerticesWhere(positions, [=](const Eigen::Vector3d& v) { return v.z() == low; }),
+      {{"end", VerticesWhere(positions, [=](const Eigen::Vector3d& v) { return v.z() == high; })}});
+}
+
 }  // namespace tissueform

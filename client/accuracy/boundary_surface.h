@@ -7,7 +7,10 @@
 #include <functional>
 #include <vector>
 
+#include "absl/status/statusor.h"
+
 #include "core/base/types.h"
+#include "core/constraints/constraint_set.h"
 #include "core/mesh/tet_mesh.h"
 #include "core/mesh/triangle_mesh.h"
 
@@ -26,5 +29,9 @@ BoundarySurface BoundaryOf(const TetMesh& mesh);
 // Rows of `positions` for which `inside` holds, rising.
 std::vector<int32_t> VerticesWhere(const Positions& positions,
                                    const std::function<bool(const Eigen::Vector3d&)>& inside);
+
+// The lowest vertices of a bar along z fixed, the highest ones the one handle, "end"; for a volume
+// mesh and for its boundary surface.
+absl::StatusOr<ConstraintSet> ConstrainEnds(const Positions& positions);
 
 }  // namespace tissueform

@@ -48,6 +48,7 @@ void AppendMaterial(const CalculixProblem& problem, double youngs_modulus, const
   if (problem.law == CalculixLaw::kLinear) {
     absl::StrAppend(text, "*ELASTIC\n", Number(youngs_modulus), ", ", Number(nu), "\n");
   } else {
+    // W = C10 (J^(-2/3) I1 - 3) + (J - 1)^2 / D1 with C10 = mu / 2 and D1 = 2 / K: our law.
     absl::StrAppend(text, "*HYPERELASTIC, NEO HOOKE\n", Number(youngs_modulus / (4 * (1 + nu))),
                     ", ", Number(6 * (1 - 2 * nu) / youngs_modulus), "\n");
   }

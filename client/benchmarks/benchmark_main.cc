@@ -19,7 +19,7 @@
 #include "client/benchmarks/linear_solver_benchmark.h"
 #include "client/benchmarks/memory_measurement.h"
 #include "client/benchmarks/process_benchmark.h"
-#include "client/cli/bench/bench_options.h"
+#include "client/cli/bench/bench_command.h"
 #include "client/cli/shared/exit_code.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"

@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "client/accuracy/bar_ends.h"
+#include "client/accuracy/boundary_surface.h"
 #include "core/base/status_macros.h"
 #include "core/deformation/harmonic_fields.h"
 #include "core/deformation/rotation_estimation.h"

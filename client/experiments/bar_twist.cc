@@ -9,7 +9,7 @@
 #include <numbers>
 #include <utility>
 
-#include "client/accuracy/bar_ends.h"
+#include "client/accuracy/boundary_surface.h"
 #include "client/experiments/surface_measures.h"
 #include "core/base/status_macros.h"
 #include "core/deformation/deformation_quality.h"

@@ -5,7 +5,7 @@
 
 #include <utility>
 
-#include "client/experiments/twist_figure.h"
+#include "client/experiments/twist_experiment.h"
 #include "client/rendering/figure.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/bar_mesh.h"

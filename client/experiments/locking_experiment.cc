@@ -9,7 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
-#include "client/accuracy/bar_ends.h"
+#include "client/accuracy/boundary_surface.h"
 #include "client/accuracy/layered_block.h"
 #include "client/rendering/figure.h"
 #include "core/base/csv_table.h"
@@ -37,6 +37,9 @@ struct LockingRow {
   LockingError error;
 };
 
+// A bar bent by moments about y: the strain along z is curvature * x, those across are
+// -poisson_ratio times that, all shears vanish, and so do all stresses but the one along z. Exact
+// in three dimensions for any Poisson's ratio, so what is left is the error of the tets alone.
 Eigen::RowVector3d ExactBending(const Eigen::Vector3d& v, double poisson_ratio) {
   const double anticlastic = poisson_ratio * (v.x() * v.x() - v.y() * v.y());
   return kCurvature * Eigen::RowVector3d(-(v.z() * v.z() + anticlastic) / 2,

@@ -7,7 +7,7 @@
 
 #include "absl/strings/str_format.h"
 
-#include "client/experiments/twist_figure.h"
+#include "client/experiments/twist_experiment.h"
 #include "client/rendering/figure.h"
 #include "core/base/status_macros.h"
 #include "core/deformation/harmonic_fields.h"

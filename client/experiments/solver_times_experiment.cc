@@ -10,7 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
-#include "client/accuracy/bar_ends.h"
+#include "client/accuracy/boundary_surface.h"
 #include "core/base/atomic_file.h"
 #include "core/base/csv_table.h"
 #include "core/base/percentiles.h"

@@ -27,6 +27,8 @@ AndersonAcceleration::AndersonAcceleration(int depth)
 Eigen::MatrixXd AndersonAcceleration::Next(const Eigen::MatrixXd& x, const Eigen::MatrixXd& image) {
   Eigen::MatrixXd residual = image - x;
   const double norm = residual.norm();
+  // Against the smallest so far and not against the last one: a residual that creeps upwards in
+  // small steps is dropped as well.
   if (norm > kLargestGrowth * smallest_residual_) {
     image_differences_.clear();
     residual_differences_.clear();
@@ -41,7 +43,11 @@ Eigen::MatrixXd AndersonAcceleration::Next(const Eigen::MatrixXd& x, const Eigen
   }
   smallest_residual_ = std::min(smallest_residual_, norm);
 
-  // Least squares for the weights of the differences, by its small normal equations.
+  // Least squares for the weights of the differences, by its small normal equations: a QR
+  // factorisation of the differences would be safer and needs a copy of them, each a whole field;
+  // kRegularisation bounds what the squared condition number can do. In a prototype
+  // plain iteration contracted by about 0.73 a step and took over 20 steps to a change of 1e-4;
+  // depth 5 took about 12.
   const auto count = static_cast<Eigen::Index>(residual_differences_.size());
   last_image_ = image;
   if (count == 0) {

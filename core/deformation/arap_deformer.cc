@@ -70,6 +70,9 @@ class ArapDeformer : public Deformer {
       summary.changes_mm.push_back((image - state.displacements).rowwise().norm().maxCoeff());
       summary.converged = summary.changes_mm.back() <= options_.tolerance_mm;
       const Eigen::MatrixXd accelerated = acceleration.Next(state.displacements, image);
+      // Two trials: the extrapolated iterate may raise the energy, the plain image cannot but for
+      // rounding (both halves of the step minimise the same energy). When even that rises, the
+      // arithmetic has nothing more to give. A converged iterate is not extrapolated from.
       stuck = !(!summary.converged && Accept(accelerated, &state)) && !Accept(image, &state);
       summary.energies_nj.push_back(state.energy);
     }
@@ -114,6 +117,9 @@ class ArapDeformer : public Deformer {
 
   absl::StatusOr<State> Start(absl::Span<const HandlePose> poses, const HandleTargets& targets,
                               bool warm) {
+    // The better of two begins: the last answer's rotations under the new poses, which are near
+    // while a handle is dragged, or the propagated ones, which are near after a jump. The energy
+    // decides, for one more solve. Fit at the end: loads_ must belong to the state that is kept.
     State last;
     const bool has_last = warm && loads_.rows() > 0 && options_.max_iterations > 1;
     if (has_last) {

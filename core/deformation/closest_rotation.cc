@@ -19,6 +19,8 @@ Eigen::Matrix3d ClosestRotation(const Eigen::Matrix3d& F) {
 }
 
 Eigen::Matrix3d RotationPower(const Eigen::Matrix3d& R, double exponent) {
+  // Eigen goes through a quaternion, so the axis is found at half a turn, too, where the skew part
+  // vanishes: the case for which the batch function hands over.
   const Eigen::AngleAxisd rotation(R);
   return Eigen::AngleAxisd(exponent * rotation.angle(), rotation.axis()).toRotationMatrix();
 }

@@ -20,7 +20,9 @@
 namespace tissueform {
 namespace {
 
-// Enough to tell the condition number to a factor of a few; each step costs a back-substitution.
+// Power iteration on the matrix and on its inverse. Three steps are enough to tell the condition
+// number to a factor of a few, and a limit for double precision needs no more; each step on the
+// inverse costs a back-substitution.
 constexpr int kConditionIterations = 3;
 
 // The three unknowns of every constrained vertex, rising.
@@ -84,6 +86,8 @@ absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
     const ElasticSystemOptions& options, const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(CheckPoissonRatio(options.poisson_ratio));
   auto elastic = absl::WrapUnique(new ElasticSystem());
+  // Affine motions are taken about the middle of the mesh. About zero, which may lie far outside it
+  // in a scanner's coordinates, a small turn would be the difference of two large columns.
   elastic->origin_ =
       0.5 * (mesh.positions().colwise().minCoeff() + mesh.positions().colwise().maxCoeff());
   Stopwatch stopwatch;
@@ -120,6 +124,8 @@ absl::Status ElasticSystem::PrepareResponses(const TetMesh& mesh, const Constrai
         admission(rows * kColumnsPerHandle * handles * static_cast<int64_t>(sizeof(double))));
   }
   response_columns_.resize(rows, Eigen::Index{kColumnsPerHandle} * handles);
+  // Handle by handle: 12 right-hand sides make one pass over the factor worth its reading, and all
+  // handles at once would need their right-hand sides beside the columns.
   for (int h = 0; h < handles; ++h) {
     TF_RETURN_IF_ERROR(cancellation.Check());
     TF_ASSIGN_OR_RETURN(

@@ -52,6 +52,8 @@ void EquilibriumSearch::Accept(Trial* trial) {
   free_gradient_ = FreePart(gradient_);
   const double free2 = free_gradient_.squaredNorm();
   const double reaction = std::sqrt(std::max(0.0, gradient_.squaredNorm() - free2));
+  // Against the reactions, so that the tolerance means the same for soft and stiff, large and
+  // small. The force unit keeps it a number at rest, where there are none.
   residual_ = std::sqrt(free2) / (reaction + force_unit_);
 }
 
@@ -63,6 +65,9 @@ absl::StatusOr<double> EquilibriumSearch::Step() {
   TF_ASSIGN_OR_RETURN(Eigen::VectorXd direction, history_.Apply(free_gradient_, precondition));
   direction = -direction;
   const double length = SearchLine(direction, free_gradient_.dot(direction));
+  // No length lowers the energy along the L-BFGS direction: the remembered pairs may be of another
+  // valley. Without them the direction is that of the linear stiffness alone, a sure one of
+  // descent; if that fails too, this is the end of what the arithmetic can do.
   if (length == 0) {
     if (history_.empty()) {
       return 0.0;
@@ -87,6 +92,7 @@ double EquilibriumSearch::SearchLine(const Eigen::VectorXd& direction, double sl
     Eigen::Map<Eigen::VectorXd>(trial_.displacements.data(),
                                 trial_.displacements.size())(system_.free()) += length * direction;
     trial_.value = energy_.Evaluate(trial_.displacements, &trial_.gradient);
+    // Behind an inverted tet the energy is infinite, so there is no parabola to lay through it.
     if (trial_.value.inverted_tets > 0) {
       length *= kLargestShortening;
       continue;
@@ -95,6 +101,8 @@ double EquilibriumSearch::SearchLine(const Eigen::VectorXd& direction, double sl
     if (rise <= kSufficientDecrease * length * slope) {
       return length;
     }
+    // Near the end the decrease that Armijo asks for is smaller than the rounding of the energies,
+    // and a good step would be refused; the slope has kept its digits.
     if (rise <= rounding &&
         std::abs(FreePart(trial_.gradient).dot(direction)) <= kSlopeDecrease * -slope) {
       return length;

@@ -163,8 +163,12 @@ class GradientFieldDeformer : public Deformer {
       TransformsToCornerLoads(elements_, parts_.stiffness, options_.threads, &last_loads_);
       TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd image, Reconstruct(last_loads_, target));
       ++summary.iterations;
+      // By what the plain step does, not the accelerated one: only that is zero at the fixed point
+      // and nowhere else.
       summary.changes_mm.push_back((image - iterate).rowwise().norm().maxCoeff());
       summary.converged = summary.changes_mm.back() <= options_.tolerance_mm;
+      // The image, not the extrapolated iterate, is what is shown and answered: it is the Poisson
+      // reconstruction of rotations, which an extrapolation is not.
       report(image);
       iterate = acceleration.Next(iterate, image);
     }

@@ -11,6 +11,12 @@
 
 namespace tissueform {
 
+// Where the poses put the constrained vertices, #constrained by 3: fixed ones stay, those of a
+// handle go with its pose. `rest` is #V by 3.
+Positions ConstrainedPositions(const Eigen::Ref<const Positions>& rest,
+                               const ConstraintSet& constraints,
+                               absl::Span<const HandlePose> poses);
+
 // Where the constrained vertices go, #constrained by 3, in the order of constraints.constrained().
 struct HandleTargets {
   Positions positions;

@@ -16,6 +16,9 @@ absl::StatusOr<Eigen::MatrixXd> ComputeHarmonicFields(const ConstraintSet& const
       values(static_cast<Eigen::Index>(c), regions[c]) = 1;
     }
   }
+  // All handles in one pass over the factor. What leaves [0, 1], because obtuse tets have negative
+  // weights, is left so and reported (harmonic_min, harmonic_max): clamping would break the sum of
+  // one and with it the answer to equal poses.
   return laplacian->Solve(Eigen::MatrixXd(), values);
 }
 

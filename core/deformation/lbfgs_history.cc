@@ -11,6 +11,9 @@
 namespace tissueform {
 
 void LbfgsHistory::Add(Eigen::VectorXd step, Eigen::VectorXd gradient_change) {
+  // The neo-Hookean energy is not convex, and a line search by Armijo alone does not promise
+  // positive curvature. Measured by the cosine, so that neither the unit nor the length of a step
+  // decides.
   constexpr double kSmallestCosine = 1e-10;
   const double curvature = step.dot(gradient_change);
   if (length_ == 0 || !(curvature > kSmallestCosine * step.norm() * gradient_change.norm())) {
@@ -24,6 +27,9 @@ void LbfgsHistory::Add(Eigen::VectorXd step, Eigen::VectorXd gradient_change) {
 
 absl::StatusOr<Eigen::VectorXd> LbfgsHistory::Apply(const Eigen::VectorXd& gradient,
                                                     const InitialInverse& initial_inverse) const {
+  // The two loops of Nocedal and Wright's algorithm 7.4, with a solve where theirs has a multiple
+  // of the identity: the linear stiffness knows the mesh and the materials, which a handful of
+  // pairs could not learn.
   Eigen::VectorXd direction = gradient;
   std::vector<double> weights(pairs_.size());
   for (size_t p = pairs_.size(); p-- > 0;) {

@@ -7,8 +7,8 @@
 
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
-#include "core/deformation/constrained_positions.h"
 #include "core/deformation/deformation_checks.h"
+#include "core/deformation/handle_targets.h"
 
 namespace tissueform {
 namespace {

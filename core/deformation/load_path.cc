@@ -28,6 +28,7 @@ LoadPath::LoadPath(absl::Span<const HandlePose> from, absl::Span<const HandlePos
     : from_(from.begin(), from.end()), to_(to.begin(), to.end()) {}
 
 std::vector<HandlePose> LoadPath::PosesAt(double load) const {
+  // To the bit: (1 - load) * a + load * b would leave rounding in the constrained vertices.
   if (load == 1.0) {
     return to_;
   }

@@ -13,20 +13,23 @@
 
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
-#include "core/deformation/constrained_positions.h"
 #include "core/deformation/deformation_checks.h"
 #include "core/deformation/equilibrium_search.h"
+#include "core/deformation/handle_targets.h"
 #include "core/deformation/load_path.h"
 #include "core/elasticity/neo_hookean_energy.h"
 
 namespace tissueform {
 namespace {
 
-// The furthest that a handle turns in one load step.
+// The furthest that a handle turns in one load step. Linear elasticity, whose answer a search
+// begins with, takes a turn for a strain of cos(angle) - 1: 13 % at 30 degrees.
 constexpr double kLargestTurn = std::numbers::pi / 6;
-// Load steps shorter than this are not tried.
+// Load steps shorter than this are not tried: nine halvings of the whole way. What does not go
+// through then is reported with the load that was reached, and is no error.
 constexpr double kSmallestLoadStep = 1.0 / 512;
-// Residual at which a load step is left for the next one.
+// Residual at which a load step is left for the next one: only the last equilibrium is an answer,
+// the ones before need to be near enough to begin the next step from.
 constexpr double kStepTolerance = 0.02;
 // Strain whose forces are added to those that the residual is measured by.
 constexpr double kSmallStrain = 1e-6;
@@ -122,6 +125,7 @@ class NeoHookeanDeformer : public Deformer {
     if (control.warm_start && !last_poses_.empty()) {
       TF_ASSIGN_OR_RETURN(Deformation deformation,
                           Walk(LoadPath(last_poses_, poses), Begin::kWhereItIs, control));
+      // From the last answer a far pose may not be reached, where from rest it is: begin again.
       if (deformation.summary.load == 1.0 || deformation.summary.cancelled) {
         return deformation;
       }
@@ -154,6 +158,8 @@ class NeoHookeanDeformer : public Deformer {
     run.summary().load = 0;
     run.summary().converged = false;
     last_poses_.clear();
+    // Only turns are cut into steps. A translation, however long, is tried at once from the linear
+    // answer; where that inverts tets the way is walked from rest, in steps that are halved.
     double step = std::min(1.0, kLargestTurn / std::max(path.LargestTurn(), kLargestTurn));
     if (begin == Begin::kAtRest && !(step == 1.0 && StartFromLinear(&run))) {
       search_.Start(Positions::Zero(rest().rows(), 3));
@@ -221,6 +227,7 @@ class NeoHookeanDeformer : public Deformer {
       ++summary.iterations;
       summary.changes_mm.push_back(change);
       summary.energies_nj.push_back(search_.value().energy_nj);
+      // The search can do no more; the residual says below whether that is enough.
       if (change == 0) {
         break;
       }

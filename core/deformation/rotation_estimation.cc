@@ -21,6 +21,8 @@ constexpr Eigen::Index kBatch = RotationBatch::kSize;
 double MapToWeight(double u, BlendMap map) {
   switch (map) {
     case BlendMap::kCosine:
+      // Clamped: with obtuse tets harmonic values may leave [0, 1] (negative weights), and a
+      // power outside would turn the wrong way or too far.
       return std::clamp(std::cos(std::numbers::pi * (u - 0.5)), 0.0, 1.0);
     case BlendMap::kLinear:
       return std::clamp(2.0 * (1.0 - u), 0.0, 1.0);
@@ -105,6 +107,8 @@ class BatchEstimator {
       exponents_[lane] = used ? weights_[begin + lane] : 0.0;
     }
     ClosestRotations(&batch_);
+    // One by one by the slower function: few tets of a usable answer are inverted or turned half
+    // round, so the batch stays the price.
     RepairUnreliable([](const Eigen::Matrix3d& F, double) { return ClosestRotation(F); });
     if (propagated_.rows() > 0) {
       for (Eigen::Index lane = 0; begin + lane < end; ++lane) {

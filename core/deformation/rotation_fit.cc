@@ -63,6 +63,8 @@ double FitBatch(const PiecewiseLinearElements& elements, const Eigen::VectorXd& 
 double FitRotations(const PiecewiseLinearElements& elements, const Eigen::VectorXd& stiffness,
                     const Positions& displacements, int threads, CellTransforms* rotations) {
   rotations->resize(elements.num_cells(), 9);
+  // Added up in the order of the batches afterwards: an energy that depended on the threads would
+  // let them decide whether a step is accepted.
   std::vector<double> energies((elements.num_cells() + kBatch - 1) / kBatch);
   ParallelFor(threads, elements.num_cells(), kBatch, [&](Eigen::Index begin, Eigen::Index end) {
     for (Eigen::Index first = begin; first < end; first += kBatch) {

@@ -17,9 +17,13 @@ void PropagateRotations(const PiecewiseLinearElements& elements, const Eigen::Ma
   const bool identity = std::all_of(poses.begin(), poses.end(), [](const HandlePose& pose) {
     return pose.rotation_vector.isZero(0) && pose.scale == 1.0;
   });
+  // No rows stand for identities everywhere: while a handle is only pushed, which is what a plan
+  // mostly does, there is nothing to blend and no right-hand side.
   transforms->resize(identity ? 0 : elements.num_cells(), 9);
   ParallelFor(threads, transforms->rows(), kCellGrain, [&](Eigen::Index begin, Eigen::Index end) {
     for (Eigen::Index c = begin; c < end; ++c) {
+      // Rotation vectors are mixed, not matrices or quaternions: those know no full turn, and mixed
+      // matrices are no rotations. For one handle this is the source's blend.
       Eigen::Vector3d rotation_vector = Eigen::Vector3d::Zero();
       double scale = 1.0;
       for (size_t h = 0; h < poses.size(); ++h) {

@@ -39,6 +39,8 @@ SparseMatrix LayOutColumns(const PiecewiseLinearElements& elements, const Vertex
       counts[v] = static_cast<int32_t>(neighbours.size());
     }
   });
+  // The columns are laid out before they are filled, so that threads write to places of their own.
+  // A list of triplets would hold 144 of them a tet, several times the matrix, and sort them.
   SparseMatrix K(3 * num_vertices, 3 * num_vertices);
   int32_t* outer = K.outerIndexPtr();
   outer[0] = 0;

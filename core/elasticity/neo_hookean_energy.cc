@@ -58,6 +58,8 @@ NeoHookeanEnergy::Value NeoHookeanEnergy::Evaluate(const Positions& displacement
           EvaluateTets(displacements, first, std::min(first + kTetGrain, num_tets));
     }
   });
+  // Block after block, whatever thread has done which: the line search compares energies to 1e-13,
+  // so their last digits must not depend on the threads.
   Value whole;
   whole.smallest_volume_ratio = std::numeric_limits<double>::infinity();
   for (const Value& block : blocks_) {
@@ -66,6 +68,7 @@ NeoHookeanEnergy::Value NeoHookeanEnergy::Evaluate(const Positions& displacement
     whole.smallest_volume_ratio =
         std::min(whole.smallest_volume_ratio, block.smallest_volume_ratio);
   }
+  // The gradient is not wanted then: the line search only shortens the step.
   if (whole.inverted_tets > 0) {
     whole.energy_nj = std::numeric_limits<double>::infinity();
     return whole;
@@ -81,6 +84,7 @@ NeoHookeanEnergy::Value NeoHookeanEnergy::EvaluateTets(const Positions& displace
   value.smallest_volume_ratio = std::numeric_limits<double>::infinity();
   for (Eigen::Index first = begin; first < end; first += kLanes) {
     for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
+      // The last tet fills the lanes behind it: they are computed and left out below.
       LoadTet(elements_, displacements, stiffness_, std::min(first + lane, end - 1), lane, &batch);
     }
     EvaluateNeoHookean(unit_.shear, unit_.bulk, &batch);

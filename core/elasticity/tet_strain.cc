@@ -41,6 +41,8 @@ PrincipalValues PrincipalGreenStrains(const PiecewiseLinearElements& elements,
   ParallelFor(threads, elements.num_cells(), kTetGrain, [&](Eigen::Index begin, Eigen::Index end) {
     for (Eigen::Index t = begin; t < end; ++t) {
       const Eigen::Matrix3d H = DisplacementGradient(elements, positions, t);
+      // (F^T F - I) / 2 written with H = F - I: the ones do not cancel, so small strains keep their
+      // digits.
       const Eigen::Matrix3d strain = 0.5 * (H + H.transpose() + H.transpose() * H);
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(strain, Eigen::EigenvaluesOnly);
       strains.row(t) = solver.eigenvalues().reverse();

@@ -90,6 +90,8 @@ absl::StatusOr<std::unique_ptr<DirichletSystem>> DirichletSystem::Create(
   }
   std::vector<int32_t> free_number(K.rows(), kNotInSystem);
   for (int32_t i = 0; i < K.rows(); ++i) {
+    // A vertex of no cell has an empty row; in the system it would be a zero pivot. It keeps the
+    // zero of `solution`.
     const bool empty = K.outerIndexPtr()[i] == K.outerIndexPtr()[i + 1];
     if (!is_prescribed[i] && !empty) {
       free_number[i] = static_cast<int32_t>(system->free_.size());
@@ -124,6 +126,7 @@ absl::StatusOr<Eigen::MatrixXd> DirichletSystem::Solve(const Eigen::MatrixXd& rh
                                                        const Eigen::MatrixXd& values) {
   Eigen::MatrixXd solution = Eigen::MatrixXd::Zero(size_, values.cols());
   if (!free_.empty()) {
+    // Two steps: Eigen would make a temporary of the size of the product for its negative.
     reduced_rhs_.noalias() = free_prescribed_ * values;
     reduced_rhs_ = -reduced_rhs_;
     if (rhs.rows() > 0) {
@@ -140,6 +143,8 @@ absl::StatusOr<double> DirichletSystem::EstimateCondition(int iterations) {
   if (free_.empty()) {
     return 1.0;
   }
+  // Power iteration on A for its largest eigenvalue, and by the factor on its inverse for one over
+  // the smallest: no library's condition estimate, so both backends say the same.
   double largest = 0;
   double largest_of_inverse = 0;
   Eigen::MatrixXd x = RandomUnitVector(num_free());

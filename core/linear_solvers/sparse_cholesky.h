@@ -10,13 +10,24 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/types.h"
-#include "core/linear_solvers/single_precision_solver.h"
 
 namespace tissueform {
 
 enum class CholeskyBackend {
   kCholmod,  // supernodal with METIS ordering; the default
   kEigen,    // Eigen::SimplicialLLT with AMD ordering; the independent second opinion
+};
+
+// Solves A x = b nearly, with a Cholesky factor rounded to single precision: a back-substitution is
+// bound by reading the factor, and this one reads half as much. The rounded factor is that of a
+// matrix that is positive definite, too, and differs from A by some 1e-7 of A's size: what a
+// preconditioner needs. One thread at a time.
+class SinglePrecisionSolver {
+ public:
+  virtual ~SinglePrecisionSolver() = default;
+
+  // `rhs` has one entry a row of A; `solution` is resized.
+  virtual void Solve(const Eigen::VectorXf& rhs, Eigen::VectorXf* solution) = 0;
 };
 
 // Direct solver for A x = b with A sparse, symmetric and positive definite.

@@ -58,6 +58,8 @@ void SupernodalSolver::Solve(const Eigen::VectorXf& rhs, Eigen::VectorXf* soluti
 }
 
 void SupernodalSolver::SolveDown() {
+  // CHOLMOD 3 solves in double precision only. Its supernodes are dense blocks, so the level 2 BLAS
+  // reads each once, at the speed of memory: half the bytes are half the time.
   for (size_t s = 0; s + 1 < factor_.first_columns.size(); ++s) {
     const Block block = BlockOf(s);
     const int leading = block.columns + block.rows_below;
@@ -75,6 +77,7 @@ void SupernodalSolver::SolveUp() {
   for (size_t s = factor_.first_columns.size() - 1; s-- > 0;) {
     const Block block = BlockOf(s);
     const int leading = block.columns + block.rows_below;
+    // Gathered first, so that the product runs over neighbouring numbers.
     for (int i = 0; i < block.rows_below; ++i) {
       below_[i] = x_[block.below[i]];
     }

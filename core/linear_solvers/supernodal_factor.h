@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/linear_solvers/single_precision_solver.h"
+#include "core/linear_solvers/sparse_cholesky.h"
 
 namespace tissueform {
 

@@ -37,6 +37,7 @@ class LinearElasticResponse : public VertexResponse {
   }
 
   double ErrorBoundMm(absl::Span<const HandlePose> poses) override {
+    // Nothing is truncated: 12 columns make every affine motion of a handle.
     return panel_.RoundingBoundMm(elastic_.Coefficients(poses));
   }
 

@@ -44,6 +44,8 @@ double PanelResponse::RoundingBoundMm(const Eigen::MatrixXd& factors) const {
   double partial_sums = 0;
   for (Eigen::Index c = 0; c < factors.rows(); ++c) {
     sum += factors.row(c).norm() * largest_[c];
+    // Columns are added in their order and small ones come first, so the early partial sums, which
+    // every later rounding is measured by, stay small.
     partial_sums += sum;
   }
   // Entry, factor and product of every column, every partial sum, the result.

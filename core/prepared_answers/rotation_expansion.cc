@@ -50,6 +50,9 @@ RotationExpansion::RotationExpansion(const SimplexDomain& domain, int degree)
     values.row(node) = at_node;
     nodes_.row(node) = domain_.FromUnit(unit_nodes.row(node));
   }
+  // An inverse and not a factorisation: it is multiplied by nine columns for every pose, its size
+  // is that of the polynomials (tens to hundreds), and the points are chosen so that it is well
+  // conditioned.
   interpolation_ = values.inverse();
 }
 
@@ -69,6 +72,8 @@ double RotationExpansion::RemainderBound(absl::Span<const HandlePose> poses, int
   for (Eigen::Index h = 0; h < k; ++h) {
     corners.push_back(BlendAt(poses, domain_.FromUnit(Eigen::VectorXd::Unit(k, h))));
   }
+  // Mixed rotation vectors fill the polytope of the corners, and the furthest two points of that
+  // are two corners.
   double diameter = 0;
   double smallest_scale = corners.front().scale;
   double largest_scale = corners.front().scale;

@@ -33,6 +33,8 @@ void ForEachComposition(int dimension, int sum, const std::function<void(std::ve
 
 SimplexDomain EnclosingSimplex(const Eigen::Ref<const Eigen::MatrixXd>& values) {
   SimplexDomain domain;
+  // Wider than the unit simplex where obtuse tets let harmonic values leave [0, 1]: polynomials
+  // grow fast outside their domain.
   domain.low = values.colwise().minCoeff().transpose().cwiseMin(0.0);
   const double largest_sum = std::max(1.0, values.rowwise().sum().maxCoeff());
   domain.width = largest_sum - domain.low.sum();
@@ -103,6 +105,7 @@ void SimplexPolynomials::Evaluate(const Eigen::VectorXd& y, Eigen::Index first,
   double* table = workspace->data();
   double s = 1;
   for (int i = 0; i < dimension_; ++i) {
+    // The homogeneous form s^n P_n(2 y / s - 1) has no division, so the corner s = 0 needs no case.
     const double z = 2 * y[i] - s;
     const int largest_rest = i + 1 < dimension_ ? degree_ : 0;
     for (int rest = 0; rest <= largest_rest; ++rest) {
@@ -130,6 +133,10 @@ void SimplexPolynomials::Evaluate(const Eigen::VectorXd& y, Eigen::Index first,
 
 Eigen::MatrixXd InterpolationNodes(const SimplexPolynomials& polynomials) {
   const int k = polynomials.dimension();
+  // In one dimension exactly as many candidates as points: the Chebyshev extrema, all taken. In
+  // more there is no such rule; a lattice twice as fine leaves a choice, and pivoting takes
+  // greedily the point that adds most volume. The squared sine is that of Chebyshev's extrema in
+  // every direction.
   const int lattice = k == 1 ? polynomials.degree() : 2 * polynomials.degree();
   std::vector<Eigen::VectorXd> candidates;
   const auto add = [&](const std::vector<int>& barycentric) {

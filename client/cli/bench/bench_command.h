@@ -3,9 +3,30 @@
 
 #pragma once
 
+#include <string>
+#include <vector>
+
+#include "CLI/CLI.hpp"
+
 #include "client/cli/shared/command.h"
 
 namespace tissueform {
+
+// The options that `tissueform bench` and the benchmark program behind it share.
+struct BenchOptions {
+  std::vector<int> meshes;  // 1 to 8, at least one
+  int repetitions = 5;
+  int threads = 1;
+  std::string json;  // empty: no file
+
+  BenchOptions();  // all meshes, all processors
+};
+
+// Declares them with their help. `options` outlives `app`'s parsing.
+void AddBenchOptions(CLI::App& app, BenchOptions* options);
+
+// The arguments that say what `options` says.
+std::vector<std::string> BenchArguments(const BenchOptions& options);
 
 // `bench [--mesh N] [--repetitions N] [--threads N] [--json OUT.json]`: becomes the program
 // tissueform-benchmarks, which lies beside this one, so that its output, its exit code and Ctrl-C

@@ -1,14 +1,16 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include "core/linear_solvers/sparse_cholesky.h"
+
 #include "core/linear_solvers/cholmod_cholesky.h"
 #include "core/linear_solvers/eigen_cholesky.h"
-#include "core/linear_solvers/sparse_cholesky.h"
 
 namespace tissueform {
 
 std::unique_ptr<SparseCholesky> CreateSparseCholesky(CholeskyBackend backend,
                                                      int unknowns_per_node) {
+  // The one place that knows which backends there are; a new one is a new file and a new case.
   switch (backend) {
     case CholeskyBackend::kCholmod:
       return CreateCholmodCholesky(unknowns_per_node);
