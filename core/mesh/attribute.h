@@ -8,6 +8,8 @@
 #include <variant>
 #include <vector>
 
+#include "absl/status/statusor.h"
+
 namespace tissueform {
 
 // A named array with one tuple per vertex or per tet, in the number type that the file had, so that
@@ -24,10 +26,16 @@ struct Attribute {
 };
 
 // All values as double (64-bit integers beyond 2^53 are rounded).
-inline std::vector<double> ToDoubles(const Attribute& attribute) {
-  return std::visit(
-      [](const auto& values) { return std::vector<double>(values.begin(), values.end()); },
-      attribute.values);
-}
+std::vector<double> ToDoubles(const Attribute& attribute);
+
+// The attribute of that name, or null.
+const Attribute* FindAttribute(const std::vector<Attribute>& attributes, const std::string& name);
+
+// The values of the one-component array `name`. `kind` is "point" or "cell".
+//
+// Errors: InvalidArgument when there is no such array (the message lists those that there are) or
+// when it has more than one component.
+absl::StatusOr<std::vector<double>> FindScalars(const std::vector<Attribute>& attributes,
+                                                const std::string& name, const std::string& kind);
 
 }  // namespace tissueform

@@ -26,9 +26,6 @@ struct TetMeshFile {
   int64_t left_out_cells = 0;
 };
 
-// The attribute of that name, or null.
-const Attribute* FindAttribute(const std::vector<Attribute>& attributes, const std::string& name);
-
 // Reads linear tetrahedra from .vtu (VTK XML), .vtk (legacy VTK), .msh (Gmsh 1, 2.2, 4.1), .mesh
 // (MEDIT) or .node and .ele (TetGen; either of the pair); the ending, in any case, chooses the
 // format. docs/mesh-formats.md says what each keeps. When every tet is negative the file counts

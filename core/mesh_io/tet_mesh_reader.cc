@@ -36,13 +36,6 @@ absl::StatusOr<TetMeshFile> ToTetMeshFile(RawMesh raw) {
 
 }  // namespace
 
-const Attribute* FindAttribute(const std::vector<Attribute>& attributes, const std::string& name) {
-  for (const Attribute& attribute : attributes) {
-    if (attribute.name == name) return &attribute;
-  }
-  return nullptr;
-}
-
 absl::StatusOr<TetMeshFile> ReadTetMesh(const std::string& path, const MeshReadLimits& limits) {
   TF_ASSIGN_OR_RETURN(const CheckedMeshFile file, CheckMeshFile(path, MeshKind::kTets, limits));
   try {

@@ -8,7 +8,6 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "core/planning/array_lookup.h"
 
 namespace tissueform {
 namespace {

@@ -8,8 +8,6 @@
 
 #include "core/base/status_macros.h"
 #include "core/mesh/skin_region.h"
-#include "core/mesh_io/tet_mesh_io.h"
-#include "core/planning/array_lookup.h"
 
 namespace tissueform {
 namespace {

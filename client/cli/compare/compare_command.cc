@@ -9,7 +9,6 @@
 
 #include "client/cli/compare/compare_files.h"
 #include "client/cli/compare/compare_models.h"
-#include "client/cli/compare/compare_options.h"
 #include "client/cli/shared/option_checks.h"
 #include "core/base/parallel_for.h"
 #include "core/planning/model_names.h"

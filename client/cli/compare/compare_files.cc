@@ -12,12 +12,11 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
-#include "client/cli/compare/comparison_report.h"
 #include "client/cli/shared/report_parts.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
+#include "core/mesh/attribute.h"
 #include "core/mesh_io/tet_mesh_io.h"
-#include "core/planning/array_lookup.h"
 
 namespace tissueform {
 namespace {

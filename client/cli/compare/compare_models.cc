@@ -14,7 +14,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
-#include "client/cli/compare/comparison_report.h"
 #include "client/cli/shared/report_parts.h"
 #include "client/cli/shared/result_writer.h"
 #include "client/cli/shared/stage_progress.h"

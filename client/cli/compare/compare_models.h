@@ -5,7 +5,7 @@
 
 #include "absl/status/status.h"
 
-#include "client/cli/compare/compare_options.h"
+#include "client/cli/compare/comparison_report.h"
 
 namespace tissueform {
 

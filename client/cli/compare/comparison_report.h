@@ -14,10 +14,27 @@
 #include "core/deformation/comparison.h"
 #include "core/mesh/attribute.h"
 #include "core/mesh/tet_mesh.h"
+#include "core/planning/plan_io.h"
 
 namespace tissueform {
 
-// How far two results lie apart, by regions, as the command compare tells it.
+// What the command compare was asked for.
+struct CompareOptions {
+  std::string a;  // a result, or the plan whose models are compared
+  std::string b;  // another result
+  std::string by;
+  std::string out;  // a file for results, a folder for models
+  std::string csv;
+  bool json = false;
+
+  // Of models.
+  std::vector<std::string> models;
+  std::string reference = "neo_hookean";
+  PlanReadOptions reading;
+  int threads = 1;
+};
+
+// How far two results lie apart, by regions, as that command tells it.
 
 // Vertices that are told of together.
 struct ComparedRegion {

@@ -1,14 +1,25 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/planning/array_lookup.h"
+#include "core/mesh/attribute.h"
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 
-#include "core/mesh_io/tet_mesh_io.h"
-
 namespace tissueform {
+
+std::vector<double> ToDoubles(const Attribute& attribute) {
+  return std::visit(
+      [](const auto& values) { return std::vector<double>(values.begin(), values.end()); },
+      attribute.values);
+}
+
+const Attribute* FindAttribute(const std::vector<Attribute>& attributes, const std::string& name) {
+  for (const Attribute& attribute : attributes) {
+    if (attribute.name == name) return &attribute;
+  }
+  return nullptr;
+}
 
 absl::StatusOr<std::vector<double>> FindScalars(const std::vector<Attribute>& attributes,
                                                 const std::string& name, const std::string& kind) {
