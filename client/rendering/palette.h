@@ -21,8 +21,8 @@ inline const Colour kGrey{0.55, 0.55, 0.55};
 
 inline constexpr int kMapColours = 20;
 
-// The colours of every map of numbers, from the low end to the high one: from that of pale skin over
-// red to a dark purple. Each is darker than the one before by about as much, so that equal
+// The colours of every map of numbers, from the low end to the high one: from that of pale skin
+// over red to a dark purple. Each is darker than the one before by about as much, so that equal
 // steps of a number look equal, also to colour-blind readers and in print without colours.
 //
 // Source: the colour map "magma" of matplotlib, by Nathaniel Smith and Stefan van der Walt, 2015,

@@ -21,12 +21,10 @@ Eigen::Vector3d ToLab(const Colour& colour) {
       0.2126729, 0.7151522, 0.0721750,        //
       0.0193339, 0.1191920, 0.9503041;
   const Eigen::Vector3d white(0.95047, 1, 1.08883);
-  const Eigen::Vector3d f =
-      (to_xyz * linear).cwiseQuotient(white).unaryExpr([](double t) {
-        constexpr double kSmall = 6.0 / 29;
-        return t > kSmall * kSmall * kSmall ? std::cbrt(t)
-                                            : t / (3 * kSmall * kSmall) + 4.0 / 29;
-      });
+  const Eigen::Vector3d f = (to_xyz * linear).cwiseQuotient(white).unaryExpr([](double t) {
+    constexpr double kSmall = 6.0 / 29;
+    return t > kSmall * kSmall * kSmall ? std::cbrt(t) : t / (3 * kSmall * kSmall) + 4.0 / 29;
+  });
   return {116 * f.y() - 16, 500 * (f.x() - f.y()), 200 * (f.y() - f.z())};
 }
 
