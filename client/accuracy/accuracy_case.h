@@ -9,7 +9,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "client/rendering/scene.h"
+#include "client/rendering/panels.h"
 #include "core/constraints/constraint_set.h"
 #include "core/constraints/handle_pose.h"
 #include "core/mesh/tet_mesh.h"

@@ -8,8 +8,7 @@
 
 #include "client/experiments/bar_twist.h"
 #include "client/experiments/experiment.h"
-#include "client/rendering/chart.h"
-#include "client/rendering/scene.h"
+#include "client/rendering/panels.h"
 #include "core/base/csv_table.h"
 
 namespace tissueform {

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "client/rendering/scene.h"
+#include "client/rendering/panels.h"
 #include "core/anatomy/plane.h"
 #include "core/mesh/tet_mesh.h"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "client/rendering/chart.h"
+#include "client/rendering/panels.h"
 
 namespace tissueform {
 

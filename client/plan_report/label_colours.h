@@ -5,7 +5,7 @@
 
 #include <cstddef>
 
-#include "client/rendering/scene.h"
+#include "client/rendering/panels.h"
 #include "core/mesh/skin_region.h"
 
 namespace tissueform {

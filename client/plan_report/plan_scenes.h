@@ -7,7 +7,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "client/rendering/scene.h"
+#include "client/rendering/panels.h"
 #include "core/plan_building/plan_builder.h"
 
 namespace tissueform {

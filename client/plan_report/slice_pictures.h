@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "client/rendering/picture.h"
+#include "client/rendering/panels.h"
 #include "core/plan_building/plan_builder.h"
 
 namespace tissueform {

@@ -9,9 +9,7 @@
 
 #include "absl/status/status.h"
 
-#include "client/rendering/chart.h"
-#include "client/rendering/picture.h"
-#include "client/rendering/scene.h"
+#include "client/rendering/panels.h"
 
 namespace tissueform {
 

@@ -6,7 +6,7 @@
 #include <vtkRenderer.h>
 #include <vtkSmartPointer.h>
 
-#include "client/rendering/picture.h"
+#include "client/rendering/panels.h"
 
 namespace tissueform {
 

@@ -8,7 +8,7 @@
 
 #include "CLI/CLI.hpp"
 
-#include "client/cli/shared/command.h"
+#include "client/cli/shared/command_line.h"
 
 namespace tissueform {
 

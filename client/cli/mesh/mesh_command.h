@@ -3,7 +3,7 @@
 
 #pragma once
 
-#include "client/cli/shared/command.h"
+#include "client/cli/shared/command_line.h"
 
 namespace tissueform {
 

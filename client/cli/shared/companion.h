@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/shared/command.h"
+#include "client/cli/shared/command_line.h"
 
 namespace tissueform {
 

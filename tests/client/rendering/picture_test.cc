@@ -1,13 +1,12 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "client/rendering/picture.h"
-
 #include <array>
 #include <filesystem>
 #include <png.h>
 
 #include "client/rendering/figure.h"
+#include "client/rendering/panels.h"
 #include "client/rendering/virtual_display.h"
 #include "tests/testing/status_matchers.h"
 

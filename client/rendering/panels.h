@@ -3,12 +3,14 @@
 
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "client/rendering/palette.h"
 #include "core/base/types.h"
 
+// What the panels of a figure hold: a scene in space, curves over axes, or pixels.
 namespace tissueform {
 
 // A triangle mesh as it is to be seen. Coloured by `vertex_values` where there are any, otherwise
@@ -46,7 +48,7 @@ struct View {
   Eigen::Vector3d up{0, 0, 1};
 };
 
-// One panel of a figure.
+// Layers seen from somewhere: one panel of a figure.
 struct Scene {
   std::string title;
   std::vector<SurfaceLayer> surfaces;
@@ -57,6 +59,41 @@ struct Scene {
   // agree in both are seen by one camera.
   Positions room_for = {};
   bool room_for_legend = false;
+};
+
+enum class CurveStyle { kSolid, kDashed, kDotted };
+
+struct Curve {
+  std::string name;  // in the legend
+  std::vector<double> x;
+  std::vector<double> y;  // as many; positive in a chart with a logarithmic axis
+  Colour colour = kBlue;
+  CurveStyle style = CurveStyle::kSolid;
+};
+
+// Curves over axes with a legend: one panel of a figure.
+struct Chart {
+  std::string title;
+  std::string x_title;  // with the unit
+  std::string y_title;
+  bool logarithmic_y = false;
+  // The y axis reaches at least over these values; no demand when equal.
+  double y_low = 0;
+  double y_high = 0;
+  std::vector<Curve> curves;
+};
+
+// Coloured pixels as one panel of a figure, with words at the middles of its edges that say where
+// they lie ("R", "L", ...).
+struct Picture {
+  std::string title;
+  int width = 0;
+  int height = 0;
+  std::vector<uint8_t> rgb;  // 3 a pixel, row by row from the top
+  std::string at_left = {};
+  std::string at_right = {};
+  std::string at_top = {};
+  std::string at_bottom = {};
 };
 
 }  // namespace tissueform
