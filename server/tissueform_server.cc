@@ -73,7 +73,7 @@ TissueformServer::TissueformServer(const ServerOptions& options)
       budget_(options.memory_budget_bytes),
       catalog_(options.limits, &budget_),
       pool_(std::make_unique<WorkerPool>(options.workers)),
-      registry_(options.limits, &budget_, pool_.get()),
+      registry_(options.limits, &budget_, pool_.get(), &store_),
       streams_(options.limits.max_streams),
       mesh_service_(&gate_, &catalog_, pool_.get()),
       session_service_(&gate_, options.limits, &catalog_, &registry_),

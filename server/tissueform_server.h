@@ -19,6 +19,7 @@
 #include "server/session/mesh_catalog.h"
 #include "server/session/session_registry.h"
 #include "server/session/worker_pool.h"
+#include "server/store/in_memory_session_store.h"
 
 namespace tissueform {
 
@@ -42,6 +43,7 @@ class TissueformServer {
   void Drain();
 
   const MemoryBudget& memory_budget() const { return budget_; }
+  SessionStore& store() { return store_; }
   const SessionRegistry& sessions() const { return registry_; }
   const DeformStreams& streams() const { return streams_; }
 
@@ -61,6 +63,7 @@ class TissueformServer {
   MemoryBudget budget_;
   MeshCatalog catalog_;
   std::unique_ptr<WorkerPool> pool_;
+  InMemorySessionStore store_;
   SessionRegistry registry_;
   DeformStreams streams_;
   MeshService mesh_service_;

@@ -5,7 +5,7 @@
 
 #include <utility>
 
-#include "client/cpp/client_status.h"
+#include "client/cpp/client_call.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -19,6 +19,7 @@ DeformStream::~DeformStream() {
 
 absl::Status DeformStream::Start(v1::DeformService::Stub* stub, const std::string& session,
                                  const Options& options) {
+  AddSessionHeader(session, &context_);
   call_ = stub->Deform(&context_);
   v1::DeformRequest request;
   v1::DeformConfiguration* configuration = request.mutable_configuration();

@@ -9,7 +9,7 @@
 #include "grpcpp/create_channel.h"
 #include "grpcpp/security/credentials.h"
 
-#include "client/cpp/client_status.h"
+#include "client/cpp/client_call.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/mesh_conversion.h"
 
@@ -138,6 +138,7 @@ absl::Status TissueformClient::DeleteMesh(const std::string& name) {
 absl::StatusOr<v1::Session> TissueformClient::CreateSession(const SessionRequest& request) {
   grpc::ClientContext context;
   SetDeadline(&context);
+  AddSessionHeader(SessionName(request.session_id), &context);
   v1::Session session;
   TF_RETURN_IF_ERROR(
       FromGrpcStatus(sessions_->CreateSession(&context, ToProto(request), &session)));
@@ -147,6 +148,7 @@ absl::StatusOr<v1::Session> TissueformClient::CreateSession(const SessionRequest
 absl::StatusOr<v1::Session> TissueformClient::GetSession(const std::string& name) {
   grpc::ClientContext context;
   SetDeadline(&context);
+  AddSessionHeader(name, &context);
   v1::GetSessionRequest request;
   request.set_name(name);
   v1::Session session;
@@ -157,6 +159,7 @@ absl::StatusOr<v1::Session> TissueformClient::GetSession(const std::string& name
 absl::Status TissueformClient::DeleteSession(const std::string& name) {
   grpc::ClientContext context;
   SetDeadline(&context);
+  AddSessionHeader(name, &context);
   v1::DeleteSessionRequest request;
   request.set_name(name);
   google::protobuf::Empty response;
@@ -168,6 +171,7 @@ absl::StatusOr<v1::DeformOnceResponse> TissueformClient::DeformOnce(
     v1::DeformationModel model) {
   grpc::ClientContext context;
   SetDeadline(&context);
+  AddSessionHeader(session, &context);
   v1::DeformOnceRequest request;
   request.set_model(model);
   request.set_session(session);

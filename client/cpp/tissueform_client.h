@@ -27,6 +27,7 @@ namespace tissueform {
 
 // A connection to a tissueform-server. Calls block; each has a deadline. Errors carry the server's
 // code and message (proto/tissueform/v1 says which), besides Unavailable and DeadlineExceeded.
+// Calls that concern a session carry its id in a header, by which a proxy can route them.
 //
 // Thread-safe.
 class TissueformClient {

@@ -22,6 +22,22 @@ namespace {
 
 constexpr absl::string_view kSessionPrefix = "sessions/";
 constexpr size_t kMaxSessionIdBytes = 64;
+// An id that a client chooses is all that protects its session from strangers: not too short.
+constexpr size_t kMinChosenIdBytes = 16;
+
+// Letters, digits and "-", not too many: fit for a header, a log and a path.
+bool IsSessionId(absl::string_view id) {
+  return !id.empty() && id.size() <= kMaxSessionIdBytes &&
+         std::all_of(id.begin(), id.end(),
+                     [](unsigned char c) { return absl::ascii_isalnum(c) || c == '-'; });
+}
+
+absl::Status CheckChosenId(absl::string_view id) {
+  if (id.empty() || (IsSessionId(id) && id.size() >= kMinChosenIdBytes)) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "session_id must be ", kMinChosenIdBytes, " to ", kMaxSessionIdBytes,
+      " letters, digits and \"-\", hard to guess; leave it out and the server chooses one"));
+}
 
 absl::Status ReadStiffness(const v1::Stiffness& stiffness, SessionRequest* request) {
   switch (stiffness.source_case()) {
@@ -63,10 +79,7 @@ absl::Status ReadHandles(const v1::CreateSessionRequest& proto, const SessionReq
 std::string SessionName(absl::string_view id) { return absl::StrCat(kSessionPrefix, id); }
 
 absl::StatusOr<std::string> ParseSessionName(absl::string_view name) {
-  if (!absl::ConsumePrefix(&name, kSessionPrefix) || name.empty() ||
-      name.size() > kMaxSessionIdBytes ||
-      !std::all_of(name.begin(), name.end(),
-                   [](unsigned char c) { return absl::ascii_isalnum(c); })) {
+  if (!absl::ConsumePrefix(&name, kSessionPrefix) || !IsSessionId(name)) {
     return absl::InvalidArgumentError(
         "not the name of a session; use the name that CreateSession returned, \"sessions/{id}\"");
   }
@@ -91,6 +104,7 @@ v1::CreateSessionRequest ToProto(const SessionRequest& request) {
   proto.set_poisson_ratio(request.poisson_ratio);
   *proto.mutable_gradient_field() = ToProto(request.gradient_field);
   proto.set_request_id(request.request_id);
+  proto.set_session_id(request.session_id);
   return proto;
 }
 
@@ -101,8 +115,10 @@ absl::StatusOr<SessionRequest> ToSessionRequest(const v1::CreateSessionRequest& 
                                                    " bytes; it may have ",
                                                    limits.max_request_id_bytes));
   }
+  TF_RETURN_IF_ERROR(CheckChosenId(proto.session_id()));
   SessionRequest request;
   request.mesh = proto.mesh();
+  request.session_id = proto.session_id();
   request.request_id = proto.request_id();
   TF_RETURN_IF_ERROR(ReadStiffness(proto.stiffness(), &request));
   TF_ASSIGN_OR_RETURN(request.model, ToModel(proto.model(), DeformationModel::kGradientField));

@@ -17,6 +17,9 @@
 
 namespace tissueform {
 
+// The header by which a proxy sends the calls of one session to one server: the session's id.
+inline constexpr char kSessionHeader[] = "x-tissueform-session";
+
 // "sessions/{id}" from the id and back. Errors: InvalidArgument.
 std::string SessionName(absl::string_view id);
 absl::StatusOr<std::string> ParseSessionName(absl::string_view name);
@@ -31,6 +34,7 @@ struct SessionRequest {
   double poisson_ratio = 0.45;          // of the elastic models
   GradientFieldOptions gradient_field;  // what belongs to the server is not sent
   std::string request_id;               // empty: repeating the call makes another session
+  std::string session_id;               // empty: the server chooses
 };
 
 // What a request may hold.

@@ -9,8 +9,8 @@
 #include "absl/strings/ascii.h"
 #include "spdlog/spdlog.h"
 
+#include "server/auth/identity.h"
 #include "server/rpc/status_conversion.h"
-#include "server/session/random_id.h"
 
 namespace tissueform {
 namespace {

@@ -13,7 +13,7 @@
 #include "grpcpp/support/status.h"
 
 #include "core/base/mutex.h"
-#include "server/auth/principal.h"
+#include "server/auth/identity.h"
 
 namespace tissueform {
 

@@ -30,23 +30,29 @@ v1::Mesh ToProto(const StoredMesh& mesh) {
   return proto;
 }
 
-absl::StatusOr<SessionSpec> ToSessionSpec(const v1::CreateSessionRequest& request,
-                                          std::shared_ptr<const StoredMesh> mesh,
-                                          const ServiceLimits& limits) {
+absl::StatusOr<SessionRecord> ToSessionRecord(const v1::CreateSessionRequest& request,
+                                              const StoredMesh& mesh, const Principal& owner,
+                                              const ServiceLimits& limits) {
   TF_ASSIGN_OR_RETURN(
       SessionRequest checked,
-      ToSessionRequest(request, {.num_vertices = mesh->mesh.num_vertices(),
+      ToSessionRequest(request, {.num_vertices = mesh.mesh.num_vertices(),
                                  .max_handles = limits.max_handles,
                                  .max_name_bytes = limits.max_name_bytes,
                                  .max_request_id_bytes = limits.max_request_id_bytes,
                                  .max_iterations = limits.max_iterations}));
-  return SessionSpec{.mesh = std::move(mesh),
-                     .stiffness = std::move(checked.stiffness),
-                     .fixed = std::move(checked.fixed),
-                     .handles = std::move(checked.handles),
-                     .model = checked.model,
-                     .poisson_ratio = checked.poisson_ratio,
-                     .gradient_field = checked.gradient_field};
+  SessionRecord record;
+  record.id = std::move(checked.session_id);
+  record.owner = owner.name;
+  record.mesh_sha256 = mesh.sha256;
+  record.stiffness = std::move(checked.stiffness);
+  record.fixed = std::move(checked.fixed);
+  record.handles = std::move(checked.handles);
+  record.model = checked.model;
+  record.poisson_ratio = checked.poisson_ratio;
+  record.gradient_field = checked.gradient_field;
+  record.request_id = std::move(checked.request_id);
+  record.request_fingerprint = RequestFingerprint(request);
+  return record;
 }
 
 v1::Session ToProto(const Session& session) {

@@ -3,13 +3,13 @@
 
 #pragma once
 
-#include <memory>
-
 #include "absl/status/statusor.h"
 
+#include "server/auth/identity.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session.h"
+#include "server/store/session_record.h"
 #include "tissueform/v1/mesh.pb.h"
 #include "tissueform/v1/mesh_service.pb.h"
 #include "tissueform/v1/session.pb.h"
@@ -21,10 +21,10 @@ namespace tissueform {
 MeshAnnouncement ToAnnouncement(const v1::MeshHeader& header);
 v1::Mesh ToProto(const StoredMesh& mesh);
 
-// Errors: those of ToSessionRequest.
-absl::StatusOr<SessionSpec> ToSessionSpec(const v1::CreateSessionRequest& request,
-                                          std::shared_ptr<const StoredMesh> mesh,
-                                          const ServiceLimits& limits);
+// The record of a session that `owner` asks for on `mesh`. Errors: those of ToSessionRequest.
+absl::StatusOr<SessionRecord> ToSessionRecord(const v1::CreateSessionRequest& request,
+                                              const StoredMesh& mesh, const Principal& owner,
+                                              const ServiceLimits& limits);
 v1::Session ToProto(const Session& session);
 
 }  // namespace tissueform

@@ -21,8 +21,8 @@ class CreateSessionCall : public grpc::ServerUnaryReactor {
   CreateSessionCall(CallScope scope, SessionRegistry* registry, v1::Session* response)
       : scope_(std::move(scope)), registry_(registry), response_(response) {}
 
-  void Start(SessionSpec spec, const RequestKey& key) {
-    registry_->Create(std::move(spec), key, cancelled_,
+  void Start(SessionRecord record, std::shared_ptr<const StoredMesh> mesh) {
+    registry_->Create(std::move(record), std::move(mesh), cancelled_,
                       [this](absl::StatusOr<std::shared_ptr<Session>> result) {
                         const absl::Status outcome = result.status();
                         if (result.ok()) {
@@ -59,14 +59,14 @@ grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerCont
                                                         const v1::CreateSessionRequest* request,
                                                         v1::Session* response) {
   CallScope scope(context, "SessionService.CreateSession", CallKind::kNewWork, gate_);
-  absl::StatusOr<SessionSpec> spec = scope.admission().ok()
-                                         ? ReadRequest(*request)
-                                         : absl::StatusOr<SessionSpec>(scope.admission());
+  absl::StatusOr<Creation> creation = scope.admission().ok()
+                                          ? ReadRequest(scope, *request)
+                                          : absl::StatusOr<Creation>(scope.admission());
   auto* call = new CreateSessionCall(std::move(scope), registry_, response);
-  if (spec.ok()) {
-    call->Start(*std::move(spec), {request->request_id(), RequestFingerprint(*request)});
+  if (creation.ok()) {
+    call->Start(std::move(creation->record), std::move(creation->mesh));
   } else {
-    call->End(spec.status());
+    call->End(creation.status());
   }
   return call;
 }
@@ -99,13 +99,17 @@ grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerCont
   return reactor;
 }
 
-absl::StatusOr<SessionSpec> SessionService::ReadRequest(const v1::CreateSessionRequest& request) {
+absl::StatusOr<SessionService::Creation> SessionService::ReadRequest(
+    const CallScope& scope, const v1::CreateSessionRequest& request) {
   TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request.mesh()));
-  std::shared_ptr<const StoredMesh> mesh = catalog_->Find(sha256);
-  if (mesh == nullptr) {
+  Creation creation;
+  creation.mesh = catalog_->Find(sha256);
+  if (creation.mesh == nullptr) {
     return absl::NotFoundError("the server does not have the mesh of this request; upload it");
   }
-  return ToSessionSpec(request, std::move(mesh), limits_);
+  TF_ASSIGN_OR_RETURN(creation.record,
+                      ToSessionRecord(request, *creation.mesh, scope.principal(), limits_));
+  return creation;
 }
 
 absl::Status SessionService::FindSession(const v1::GetSessionRequest& request,

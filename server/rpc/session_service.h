@@ -3,6 +3,10 @@
 
 #pragma once
 
+#include <memory>
+
+#include "absl/status/statusor.h"
+
 #include "server/rpc/call_scope.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
@@ -29,7 +33,14 @@ class SessionService final : public v1::SessionService::CallbackService {
                                           google::protobuf::Empty* response) override;
 
  private:
-  absl::StatusOr<SessionSpec> ReadRequest(const v1::CreateSessionRequest& request);
+  // What a session is made from.
+  struct Creation {
+    SessionRecord record;
+    std::shared_ptr<const StoredMesh> mesh;
+  };
+
+  absl::StatusOr<Creation> ReadRequest(const CallScope& scope,
+                                       const v1::CreateSessionRequest& request);
   absl::Status FindSession(const v1::GetSessionRequest& request, v1::Session* response);
 
   ServiceGate* const gate_;

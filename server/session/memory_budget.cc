@@ -3,6 +3,7 @@
 
 #include "server/session/memory_budget.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -55,6 +56,11 @@ int64_t MemoryBudget::reserved_bytes() const {
   return reserved_bytes_;
 }
 
+int64_t MemoryBudget::most_reserved_bytes() const {
+  MutexLock lock(mutex_);
+  return most_reserved_bytes_;
+}
+
 absl::Status MemoryBudget::Take(int64_t bytes, absl::string_view what) {
   if (TryTake(bytes)) {
     return absl::OkStatus();
@@ -77,6 +83,7 @@ bool MemoryBudget::TryTake(int64_t bytes) {
     return false;
   }
   reserved_bytes_ += bytes;
+  most_reserved_bytes_ = std::max(most_reserved_bytes_, reserved_bytes_);
   return true;
 }
 

@@ -64,6 +64,8 @@ class MemoryBudget {
 
   int64_t limit_bytes() const { return limit_bytes_; }
   int64_t reserved_bytes() const;
+  // The most that was reserved at one time.
+  int64_t most_reserved_bytes() const;
 
  private:
   friend class MemoryReservation;
@@ -78,6 +80,7 @@ class MemoryBudget {
 
   mutable Mutex mutex_;
   int64_t reserved_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
+  int64_t most_reserved_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace tissueform

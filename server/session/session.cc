@@ -13,12 +13,13 @@
 namespace tissueform {
 namespace {
 
-absl::StatusOr<Eigen::VectorXd> ResolveStiffness(const SessionSpec& spec) {
-  if (const double* uniform = std::get_if<double>(&spec.stiffness)) {
-    return Eigen::VectorXd::Constant(spec.mesh->mesh.num_tets(), *uniform);
+absl::StatusOr<Eigen::VectorXd> ResolveStiffness(const SessionRecord& record,
+                                                 const StoredMesh& mesh) {
+  if (const double* uniform = std::get_if<double>(&record.stiffness)) {
+    return Eigen::VectorXd::Constant(mesh.mesh.num_tets(), *uniform);
   }
-  const std::string& name = std::get<std::string>(spec.stiffness);
-  const CellArray* array = spec.mesh->FindCellArray(name);
+  const std::string& name = std::get<std::string>(record.stiffness);
+  const CellArray* array = mesh.FindCellArray(name);
   if (array == nullptr) {
     return absl::InvalidArgumentError(absl::StrCat(
         "the mesh has no cell array \"", name, "\" for the stiffness; upload the mesh with it"));
@@ -28,29 +29,30 @@ absl::StatusOr<Eigen::VectorXd> ResolveStiffness(const SessionSpec& spec) {
 
 }  // namespace
 
-Session::Session(std::string id, SessionSpec spec, ConstraintSet constraints, WorkerPool* pool,
-                 const Clock* clock)
+Session::Session(const SessionRecord& record, std::shared_ptr<const StoredMesh> mesh,
+                 ConstraintSet constraints, WorkerPool* pool, const Clock* clock)
     : clock_(clock),
-      id_(std::move(id)),
-      mesh_(std::move(spec.mesh)),
+      id_(record.id),
+      mesh_(std::move(mesh)),
       constraints_(std::move(constraints)),
-      model_(spec.model),
-      poisson_ratio_(spec.poisson_ratio),
-      gradient_field_(spec.gradient_field),
+      model_(record.model),
+      poisson_ratio_(record.poisson_ratio),
+      gradient_field_(record.gradient_field),
       strand_(pool),
       last_used_(clock->Now()) {}
 
-absl::StatusOr<std::shared_ptr<Session>> Session::Create(std::string id, SessionSpec spec,
+absl::StatusOr<std::shared_ptr<Session>> Session::Create(SessionRecord record,
+                                                         std::shared_ptr<const StoredMesh> mesh,
                                                          MemoryBudget* budget, WorkerPool* pool,
                                                          const Clock* clock,
                                                          const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(cancellation.Check());
   TF_ASSIGN_OR_RETURN(
       ConstraintSet constraints,
-      ConstraintSet::Create(spec.mesh->mesh, std::move(spec.fixed), std::move(spec.handles)));
-  TF_ASSIGN_OR_RETURN(const Eigen::VectorXd stiffness, ResolveStiffness(spec));
+      ConstraintSet::Create(mesh->mesh, std::move(record.fixed), std::move(record.handles)));
+  TF_ASSIGN_OR_RETURN(const Eigen::VectorXd stiffness, ResolveStiffness(record, *mesh));
   std::shared_ptr<Session> session(
-      new Session(std::move(id), std::move(spec), std::move(constraints), pool, clock));
+      new Session(record, std::move(mesh), std::move(constraints), pool, clock));
   TF_RETURN_IF_ERROR(session->Prepare(stiffness, budget, cancellation));
   return session;
 }

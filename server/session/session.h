@@ -5,11 +5,9 @@
 
 #include <atomic>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -26,19 +24,9 @@
 #include "server/session/mesh_catalog.h"
 #include "server/session/session_models.h"
 #include "server/session/worker_pool.h"
+#include "server/store/session_record.h"
 
 namespace tissueform {
-
-// What a session is made from.
-struct SessionSpec {
-  std::shared_ptr<const StoredMesh> mesh;
-  std::variant<double, std::string> stiffness;  // Pa for every tet, or the name of a cell array
-  std::vector<int32_t> fixed;
-  std::vector<HandleRegion> handles;
-  DeformationModel model = DeformationModel::kGradientField;
-  double poisson_ratio = 0.45;          // of the elastic models
-  GradientFieldOptions gradient_field;  // as the client asks; the server fills in the rest
-};
 
 // An answer at chosen vertices from prepared columns.
 struct PreparedAnswer {
@@ -50,11 +38,13 @@ struct PreparedAnswer {
 // everything else is constant and may be read from any thread.
 class Session {
  public:
-  // Factorises: call it on a worker. `budget`, `pool` and `clock` must outlive the session.
+  // Factorises: call it on a worker. `mesh` is the one that the record names. `budget`, `pool` and
+  // `clock` must outlive the session.
   //
   // Errors: InvalidArgument (regions, stiffness), FailedPrecondition (not positive definite),
   // ResourceExhausted (no room), Cancelled.
-  static absl::StatusOr<std::shared_ptr<Session>> Create(std::string id, SessionSpec spec,
+  static absl::StatusOr<std::shared_ptr<Session>> Create(SessionRecord record,
+                                                         std::shared_ptr<const StoredMesh> mesh,
                                                          MemoryBudget* budget, WorkerPool* pool,
                                                          const Clock* clock,
                                                          const Cancellation& cancellation);
@@ -99,8 +89,8 @@ class Session {
   Clock::TimePoint last_used() const { return last_used_; }
 
  private:
-  Session(std::string id, SessionSpec spec, ConstraintSet constraints, WorkerPool* pool,
-          const Clock* clock);
+  Session(const SessionRecord& record, std::shared_ptr<const StoredMesh> mesh,
+          ConstraintSet constraints, WorkerPool* pool, const Clock* clock);
 
   absl::Status Prepare(const Eigen::VectorXd& stiffness, MemoryBudget* budget,
                        const Cancellation& cancellation);

@@ -9,7 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "spdlog/spdlog.h"
 
-#include "server/session/random_id.h"
+#include "server/auth/identity.h"
 
 namespace tissueform {
 namespace {
@@ -25,15 +25,27 @@ absl::Status OtherRequest(const std::string& request_id) {
       "request_id \"", request_id, "\" was used for another request; choose a new one"));
 }
 
+absl::Status TakenId(const std::string& id) {
+  return absl::AlreadyExistsError(
+      absl::StrCat("a session \"sessions/", id, "\" exists already; choose another session_id"));
+}
+
+// This process is the only one that writes to its store; a store that outlives its server gives
+// each start an epoch of its own.
+constexpr int64_t kEpoch = 1;
+
 }  // namespace
 
 SessionRegistry::SessionRegistry(const ServiceLimits& limits, MemoryBudget* budget,
-                                 WorkerPool* pool, const Clock* clock)
-    : limits_(limits), budget_(budget), pool_(pool), clock_(clock) {}
+                                 WorkerPool* pool, SessionStore* store, const Clock* clock)
+    : limits_(limits), budget_(budget), pool_(pool), store_(store), clock_(clock) {}
 
-void SessionRegistry::Create(SessionSpec spec, const RequestKey& key, CancelFlag cancelled,
-                             const CreateCallback& done) {
-  Admission admission = Admit(key, Waiter{std::move(cancelled), done});
+void SessionRegistry::Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
+                             CancelFlag cancelled, const CreateCallback& done) {
+  if (record.id.empty()) {
+    record.id = RandomId();
+  }
+  Admission admission = Admit(record, Waiter{std::move(cancelled), done});
   if (!admission.refusal.ok()) {
     done(std::move(admission.refusal));
     return;
@@ -45,14 +57,35 @@ void SessionRegistry::Create(SessionSpec spec, const RequestKey& key, CancelFlag
   if (admission.started == nullptr) {
     return;
   }
-  pool_->Post([this, creation = std::move(admission.started), spec = std::move(spec)]() mutable {
-    const Cancellation cancellation([this, &creation] { return AllCancelled(*creation); });
-    FinishCreation(creation, Session::Create(RandomId(), std::move(spec), budget_, pool_, clock_,
-                                             cancellation));
-  });
+  pool_->Post(
+      [this, creation = std::move(admission.started), record = std::move(record),
+       mesh = std::move(mesh)]() mutable { Make(creation, std::move(record), std::move(mesh)); });
 }
 
-SessionRegistry::Admission SessionRegistry::Admit(const RequestKey& key, const Waiter& waiter) {
+void SessionRegistry::Make(const std::shared_ptr<Creation>& creation, SessionRecord record,
+                           std::shared_ptr<const StoredMesh> mesh) {
+  const Cancellation cancellation([this, &creation] { return AllCancelled(*creation); });
+  absl::StatusOr<std::shared_ptr<Session>> session =
+      Session::Create(record, std::move(mesh), budget_, pool_, clock_, cancellation);
+  if (!session.ok()) {
+    FinishCreation(creation, session.status());
+    return;
+  }
+  store_->Create(std::move(record), kEpoch,
+                 [this, creation, session = *std::move(session)](
+                     const absl::StatusOr<SessionRecord>& stored) mutable {
+                   if (stored.ok()) {
+                     FinishCreation(creation, std::move(session));
+                   } else {
+                     session.reset();
+                     FinishCreation(creation, stored.status());
+                   }
+                 });
+}
+
+SessionRegistry::Admission SessionRegistry::Admit(const SessionRecord& record,
+                                                  const Waiter& waiter) {
+  const RequestKey key{record.request_id, record.request_fingerprint};
   bool full = false;
   {
     MutexLock lock(mutex_);
@@ -66,15 +99,25 @@ SessionRegistry::Admission SessionRegistry::Admit(const RequestKey& key, const W
   if (!key.request_id.empty() && JoinEarlierRequest(key, waiter, &admission)) {
     return admission;
   }
+  if (IsTaken(record.id)) {
+    admission.refusal = TakenId(record.id);
+    return admission;
+  }
   if (Full()) {
     admission.refusal = absl::ResourceExhaustedError(
         absl::StrCat("the server holds ", limits_.max_sessions,
                      " sessions, as many as it may; delete one or raise --max-sessions"));
     return admission;
   }
-  admission.started = std::make_shared<Creation>(Creation{key, {waiter}});
+  admission.started = std::make_shared<Creation>(Creation{record.id, key, {waiter}});
   creations_.push_back(admission.started);
   return admission;
+}
+
+bool SessionRegistry::IsTaken(const std::string& id) const {
+  return sessions_.find(id) != sessions_.end() ||
+         std::any_of(creations_.begin(), creations_.end(),
+                     [&id](const auto& creation) { return creation->id == id; });
 }
 
 bool SessionRegistry::JoinEarlierRequest(const RequestKey& key, const Waiter& waiter,
@@ -144,7 +187,16 @@ void SessionRegistry::Abandon(const std::shared_ptr<Session>& session) {
     }
     Take(session->id());
   }
-  session->strand().Post([session] { session->Close(); });
+  session->strand().Post([this, session] {
+    session->Close();
+    Forget(session->id());
+  });
+}
+
+void SessionRegistry::Forget(const std::string& id) {
+  store_->Delete(id, "", kEpoch, [](const absl::Status& status) {
+    if (!status.ok()) spdlog::warn("a session's record stays behind: {}", status.ToString());
+  });
 }
 
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string& id) {
@@ -167,9 +219,9 @@ void SessionRegistry::Delete(const std::string& id, std::function<void(absl::Sta
     done(NoSuchSession(id));
     return;
   }
-  session->strand().Post([session, done = std::move(done)] {
+  session->strand().Post([this, session, done = std::move(done)] {
     session->Close();
-    done(absl::OkStatus());
+    store_->Delete(session->id(), "", kEpoch, done);
   });
 }
 
@@ -194,6 +246,7 @@ int SessionRegistry::RemoveIdle() {
                  limits_.session_idle_ttl.count());
   }
   for (std::shared_ptr<Session>& session : removed) {
+    Forget(session->id());
     // Usually the last reference, which frees the memory here and now. A silent stream may hold
     // another one: then the strand does it.
     if (session.use_count() > 1) {

@@ -19,16 +19,11 @@
 #include "server/session/memory_budget.h"
 #include "server/session/session.h"
 #include "server/session/worker_pool.h"
+#include "server/store/session_store.h"
 
 namespace tissueform {
 
-// What makes a creation idempotent.
-struct RequestKey {
-  std::string request_id;   // empty: every call makes a session of its own
-  std::string fingerprint;  // equal for equal requests
-};
-
-// The sessions of the server by their id.
+// The sessions of the server by their id: in memory, each with its record in a store.
 //
 // Thread-safe. Callbacks are called without a lock held, from the calling thread or from a worker.
 class SessionRegistry {
@@ -36,18 +31,21 @@ class SessionRegistry {
   using CancelFlag = std::shared_ptr<const std::atomic<bool>>;
   using CreateCallback = std::function<void(absl::StatusOr<std::shared_ptr<Session>>)>;
 
-  // `budget`, `pool` and `clock` must outlive the registry and all its sessions.
+  // All pointers must outlive the registry and all its sessions.
   SessionRegistry(const ServiceLimits& limits, MemoryBudget* budget, WorkerPool* pool,
-                  const Clock* clock = Clock::System());
+                  SessionStore* store, const Clock* clock = Clock::System());
 
-  // Makes a session on a worker and calls `done` once. Calls with the same request id share one
-  // session; its making stops early when `cancelled` is set for all who wait for it.
+  // Makes a session of `record` on a worker, keeps the record and calls `done` once. A record
+  // without id gets a random one. Calls with the same request id share one session; its making
+  // stops early when `cancelled` is set for all who wait for it. `mesh` is the one that the record
+  // names.
   //
   // Every successful answer is a claim on the session, see Abandon.
   //
-  // Errors: those of Session::Create; ResourceExhausted (too many sessions); InvalidArgument (the
-  // request id belongs to another request); Cancelled.
-  void Create(SessionSpec spec, const RequestKey& key, CancelFlag cancelled,
+  // Errors: those of Session::Create and SessionStore::Create; AlreadyExists (the id is taken);
+  // ResourceExhausted (too many sessions); InvalidArgument (the request id belongs to another
+  // request); Cancelled.
+  void Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh, CancelFlag cancelled,
               const CreateCallback& done);
 
   // Takes back one claim of a caller who never saw the answer. The session ends with its last
@@ -57,7 +55,8 @@ class SessionRegistry {
   // Errors: NotFound.
   absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& id);
 
-  // Calls `done` when the memory of the session is free. Errors: NotFound.
+  // Calls `done` when the memory of the session is free and its record is gone. Errors: NotFound,
+  // those of SessionStore::Delete.
   void Delete(const std::string& id, std::function<void(absl::Status)> done);
 
   // Ends the sessions that were idle for longer than the TTL. Returns how many.
@@ -70,8 +69,14 @@ class SessionRegistry {
     CancelFlag cancelled;
     CreateCallback done;
   };
+  // What makes a creation idempotent.
+  struct RequestKey {
+    std::string request_id;
+    std::string fingerprint;
+  };
   // A session that is being made.
   struct Creation {
+    std::string id;
     RequestKey key;
     std::vector<Waiter> waiters;  // guarded by the mutex of the registry
   };
@@ -87,20 +92,27 @@ class SessionRegistry {
     std::shared_ptr<Creation> started;  // all three empty: joined a creation that is under way
   };
 
-  Admission Admit(const RequestKey& key, const Waiter& waiter) ABSL_LOCKS_EXCLUDED(mutex_);
+  Admission Admit(const SessionRecord& record, const Waiter& waiter) ABSL_LOCKS_EXCLUDED(mutex_);
+  bool IsTaken(const std::string& id) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // False when no session and no creation has the request id.
   bool JoinEarlierRequest(const RequestKey& key, const Waiter& waiter, Admission* admission)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool Full() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // On a worker.
+  void Make(const std::shared_ptr<Creation>& creation, SessionRecord record,
+            std::shared_ptr<const StoredMesh> mesh) ABSL_LOCKS_EXCLUDED(mutex_);
   bool AllCancelled(const Creation& creation) const ABSL_LOCKS_EXCLUDED(mutex_);
   void FinishCreation(const std::shared_ptr<Creation>& creation,
                       absl::StatusOr<std::shared_ptr<Session>> result) ABSL_LOCKS_EXCLUDED(mutex_);
+  // Takes the record of a session that has ended out of the store.
+  void Forget(const std::string& id);
   std::shared_ptr<Session> Take(const std::string& id) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   // Constant.
   const ServiceLimits limits_;
   MemoryBudget* const budget_;
   WorkerPool* const pool_;
+  SessionStore* const store_;
   const Clock* const clock_;
 
   mutable Mutex mutex_;

@@ -130,6 +130,24 @@ TEST_F(SessionsTest, ARepeatedRequestIdGivesTheSameSession) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("request_id")));
 }
 
+TEST_F(SessionsTest, AClientChoosesTheIdOfItsSession) {
+  const BarProblem problem(1);
+  const auto client = Connect();
+  ASSERT_OK_AND_ASSIGN(const v1::Mesh mesh, client->UploadMesh(problem.mesh, problem.CellArrays()));
+  SessionRequest request = problem.Request(mesh.name());
+  request.session_id = "8d2c1f00-3a4b-4c5d-9e6f";
+  ASSERT_OK_AND_ASSIGN(const v1::Session session, client->CreateSession(request));
+  EXPECT_EQ(session.name(), "sessions/" + request.session_id);
+  EXPECT_THAT(client->DeformOnce(session.name(), TopPose(SomePose(1))), IsOk());
+  EXPECT_THAT(client->CreateSession(request),
+              StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("session_id")));
+  EXPECT_THAT(client->DeleteSession(session.name()), IsOk());
+  EXPECT_THAT(client->CreateSession(request), IsOk());
+  request.session_id = "short";
+  EXPECT_THAT(client->CreateSession(request),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("session_id")));
+}
+
 TEST_F(SessionsTest, CancelledCreationsLeaveNothingBehind) {
   const BarProblem problem(1, {6, 6, 20});
   const auto client = Connect();

@@ -51,14 +51,14 @@ std::shared_ptr<const StoredMesh> Store(const SampleMesh& sample, MeshCatalog* c
   std::abort();
 }
 
-SessionSpec BarSpec(std::shared_ptr<const StoredMesh> bar) {
-  const ConstraintSet ends = BarEnds(bar->mesh);
-  SessionSpec spec;
-  spec.mesh = std::move(bar);
-  spec.stiffness = "youngs_modulus_pa";
-  spec.fixed = ends.fixed();
-  spec.handles = ends.handles();
-  return spec;
+SessionRecord BarRecord(const StoredMesh& bar) {
+  const ConstraintSet ends = BarEnds(bar.mesh);
+  SessionRecord record;
+  record.mesh_sha256 = bar.sha256;
+  record.stiffness = "youngs_modulus_pa";
+  record.fixed = ends.fixed();
+  record.handles = ends.handles();
+  return record;
 }
 
 }  // namespace tissueform::testing

@@ -9,7 +9,7 @@
 
 #include "core/mesh/tet_mesh.h"
 #include "server/session/mesh_catalog.h"
-#include "server/session/session.h"
+#include "server/store/session_record.h"
 
 namespace tissueform::testing {
 
@@ -29,7 +29,7 @@ struct SampleMesh {
 std::shared_ptr<const StoredMesh> Store(const SampleMesh& sample, MeshCatalog* catalog,
                                         size_t chunk_bytes = 1000);
 
-// A session on a stored bar: lowest layer fixed, highest layer the handle "top".
-SessionSpec BarSpec(std::shared_ptr<const StoredMesh> bar);
+// The record of a session on a stored bar: lowest layer fixed, highest layer the handle "top".
+SessionRecord BarRecord(const StoredMesh& bar);
 
 }  // namespace tissueform::testing

@@ -97,6 +97,7 @@ TEST(SessionConversionTest, ARequestSurvivesTheJourney) {
   request.gradient_field.max_iterations = 7;
   request.gradient_field.tolerance_mm = 0.25;
   request.request_id = "once";
+  request.session_id = "0123-4567-89ab-cdef";
   ASSERT_OK_AND_ASSIGN(const SessionRequest back,
                        ToSessionRequest(ToProto(request), {.num_vertices = 36}));
   EXPECT_EQ(back.mesh, request.mesh);
@@ -113,6 +114,25 @@ TEST(SessionConversionTest, ARequestSurvivesTheJourney) {
   EXPECT_EQ(back.gradient_field.max_iterations, request.gradient_field.max_iterations);
   EXPECT_EQ(back.gradient_field.tolerance_mm, request.gradient_field.tolerance_mm);
   EXPECT_EQ(back.request_id, request.request_id);
+  EXPECT_EQ(back.session_id, request.session_id);
+}
+
+TEST(SessionConversionTest, AChosenIdIsLongEnoughAndPlain) {
+  v1::CreateSessionRequest request;
+  request.mutable_stiffness()->set_uniform_pa(1000);
+  for (const std::string& id : {std::string(), std::string(16, 'a'),
+                                std::string("0aZ-0aZ-0aZ-0aZ-"), std::string(64, '-')}) {
+    request.set_session_id(id);
+    EXPECT_THAT(ToSessionRequest(request, {.num_vertices = 36}), IsOk()) << id;
+  }
+  for (const std::string& id :
+       {std::string(15, 'a'), std::string(65, 'a'), std::string("0123456789abcde/"),
+        std::string("0123456789abcde "), std::string("0123456789abcde\n"),
+        std::string("0123456789abcd\xc3\xa4"), std::string("0123456789abcde_")}) {
+    request.set_session_id(id);
+    EXPECT_THAT(ToSessionRequest(request, {.num_vertices = 36}),
+                StatusIs(kInvalid, HasSubstr("session_id")));
+  }
 }
 
 TEST(SessionConversionTest, TheFingerprintIgnoresTheRequestIdAndNothingElse) {

@@ -16,6 +16,7 @@
 #include "server/rpc/deform_service.h"
 #include "server/rpc/mesh_service.h"
 #include "server/rpc/session_service.h"
+#include "server/store/in_memory_session_store.h"
 #include "tests/server/rpc/fake_calls.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/session_samples.h"
@@ -110,7 +111,8 @@ class ReactorsTest : public ::testing::Test {
   MemoryBudget budget_{64 << 20};
   MeshCatalog catalog_{limits_, &budget_};
   std::unique_ptr<WorkerPool> workers_ = std::make_unique<WorkerPool>(kWorkers);
-  SessionRegistry registry_{limits_, &budget_, workers_.get()};
+  InMemorySessionStore store_;
+  SessionRegistry registry_{limits_, &budget_, workers_.get(), &store_};
   DeformStreams streams_{limits_.max_streams};
   MeshService mesh_service_{&gate_, &catalog_, workers_.get()};
   SessionService session_service_{&gate_, limits_, &catalog_, &registry_};

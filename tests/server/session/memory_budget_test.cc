@@ -105,5 +105,17 @@ TEST(MemoryBudgetTest, ThreadsNeverTakeMoreThanThereIs) {
   EXPECT_EQ(budget.reserved_bytes(), 0);
 }
 
+TEST(MemoryBudgetTest, TheMostThatWasReservedIsRemembered) {
+  MemoryBudget budget(100);
+  {
+    const MemoryReservation first = *budget.Reserve(40, "first");
+    const MemoryReservation second = *budget.Reserve(30, "second");
+    EXPECT_FALSE(budget.Reserve(31, "third").ok());
+  }
+  const MemoryReservation later = *budget.Reserve(20, "later");
+  EXPECT_EQ(budget.reserved_bytes(), 20);
+  EXPECT_EQ(budget.most_reserved_bytes(), 70);
+}
+
 }  // namespace
 }  // namespace tissueform

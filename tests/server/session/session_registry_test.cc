@@ -6,11 +6,14 @@
 #include <atomic>
 #include <future>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "absl/strings/match.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "server/store/in_memory_session_store.h"
 #include "tests/testing/fake_clock.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/session_samples.h"
@@ -21,7 +24,7 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::tissueform::testing::Bar;
-using ::tissueform::testing::BarSpec;
+using ::tissueform::testing::BarRecord;
 using ::tissueform::testing::FakeClock;
 using ::tissueform::testing::IsOk;
 using ::tissueform::testing::SampleMesh;
@@ -30,6 +33,13 @@ using ::tissueform::testing::Store;
 
 constexpr std::chrono::nanoseconds kTick{1};
 const std::chrono::seconds kTtl = ServiceLimits().session_idle_ttl;
+
+// What a client says of a creation.
+struct Key {
+  std::string request_id;
+  std::string fingerprint;
+  std::string session_id;
+};
 
 using CreateResult = absl::StatusOr<std::shared_ptr<Session>>;
 
@@ -47,17 +57,21 @@ class SessionRegistryTest : public ::testing::Test {
     budget_ = std::make_unique<MemoryBudget>(budget_bytes);
     catalog_ = std::make_unique<MeshCatalog>(limits, budget_.get(), &clock_);
     pool_ = std::make_unique<WorkerPool>(1);
-    registry_ = std::make_unique<SessionRegistry>(limits, budget_.get(), pool_.get(), &clock_);
+    registry_ =
+        std::make_unique<SessionRegistry>(limits, budget_.get(), pool_.get(), &store_, &clock_);
     budget_->set_reclaimer([this] { registry_->RemoveIdle(); });
     bar_ = Store(SampleMesh(Bar({2, 2, 3})), catalog_.get());
     mesh_bytes_ = budget_->reserved_bytes();
   }
 
-  std::future<CreateResult> Create(
-      const RequestKey& key = {},
-      SessionRegistry::CancelFlag cancelled = std::make_shared<std::atomic<bool>>()) {
+  std::future<CreateResult> Create(const Key& key = {}, SessionRegistry::CancelFlag cancelled =
+                                                            std::make_shared<std::atomic<bool>>()) {
     auto promise = std::make_shared<std::promise<CreateResult>>();
-    registry_->Create(BarSpec(bar_), key, std::move(cancelled),
+    SessionRecord record = BarRecord(*bar_);
+    record.id = key.session_id;
+    record.request_id = key.request_id;
+    record.request_fingerprint = key.fingerprint;
+    registry_->Create(std::move(record), bar_, std::move(cancelled),
                       [promise](CreateResult result) { promise->set_value(std::move(result)); });
     return promise->get_future();
   }
@@ -75,7 +89,18 @@ class SessionRegistryTest : public ::testing::Test {
     reached.get_future().wait();
   }
 
+  // The ids in the store, in order.
+  std::vector<std::string> Stored() {
+    std::vector<std::string> ids;
+    store_.List({.owner = "", .after = "", .limit = 1000},
+                [&ids](const absl::StatusOr<SessionStore::Page>& page) {
+                  for (const SessionRecord& record : page->records) ids.push_back(record.id);
+                });
+    return ids;
+  }
+
   FakeClock clock_;
+  InMemorySessionStore store_;
   std::unique_ptr<MemoryBudget> budget_;
   std::unique_ptr<MeshCatalog> catalog_;
   std::unique_ptr<WorkerPool> pool_;
@@ -135,13 +160,13 @@ TEST_F(SessionRegistryTest, TheFactorIsRefusedBeforeItIsComputed) {
 }
 
 TEST_F(SessionRegistryTest, TheSameRequestIdGivesTheSameSession) {
-  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first, Create({"id", "print"}).get());
-  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> again, Create({"id", "print"}).get());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first, Create({"id", "print", ""}).get());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> again, Create({"id", "print", ""}).get());
   EXPECT_EQ(first, again);
-  EXPECT_THAT(Create({"id", "other"}).get(),
+  EXPECT_THAT(Create({"id", "other", ""}).get(),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("request_id")));
   ASSERT_THAT(Delete(first->id()), IsOk());
-  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> fresh, Create({"id", "other"}).get());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> fresh, Create({"id", "other", ""}).get());
   EXPECT_NE(fresh, first);
 }
 
@@ -154,9 +179,9 @@ TEST_F(SessionRegistryTest, RequestsWithoutIdGetSessionsOfTheirOwn) {
 TEST_F(SessionRegistryTest, ConcurrentCallsWithOneRequestIdShareTheWork) {
   std::promise<void> go;
   pool_->Post([&go] { go.get_future().wait(); });
-  std::future<CreateResult> first = Create({"id", "print"});
-  std::future<CreateResult> second = Create({"id", "print"});
-  std::future<CreateResult> other = Create({"id", "other"});
+  std::future<CreateResult> first = Create({"id", "print", ""});
+  std::future<CreateResult> second = Create({"id", "print", ""});
+  std::future<CreateResult> other = Create({"id", "other", ""});
   EXPECT_THAT(other.get(), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("request_id")));
   go.set_value();
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> one, first.get());
@@ -182,8 +207,8 @@ TEST_F(SessionRegistryTest, OneCancelledCallerDoesNotSpoilItForTheOther) {
   std::promise<void> go;
   pool_->Post([&go] { go.get_future().wait(); });
   const auto cancelled = std::make_shared<std::atomic<bool>>(true);
-  std::future<CreateResult> gone = Create({"id", "print"}, cancelled);
-  std::future<CreateResult> stays = Create({"id", "print"});
+  std::future<CreateResult> gone = Create({"id", "print", ""}, cancelled);
+  std::future<CreateResult> stays = Create({"id", "print", ""});
   go.set_value();
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, gone.get());
   ASSERT_THAT(stays.get(), IsOk());
@@ -268,6 +293,77 @@ TEST_F(SessionRegistryTest, WhoeverAsksForASessionKeepsIt) {
   EXPECT_EQ(registry_->RemoveIdle(), 0);
   clock_.Advance(kTick);
   EXPECT_EQ(registry_->RemoveIdle(), 1);
+}
+
+TEST_F(SessionRegistryTest, AClientMayChooseTheId) {
+  const std::string id = "my-session-of-2026-11-22";
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create({"", "", id}).get());
+  EXPECT_EQ(session->id(), id);
+  EXPECT_THAT(registry_->Find(id), IsOk());
+  EXPECT_THAT(Create({"", "", id}).get(),
+              StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("session_id")));
+  ASSERT_THAT(Delete(id), IsOk());
+  EXPECT_THAT(Create({"", "", id}).get(), IsOk()) << "free again";
+}
+
+TEST_F(SessionRegistryTest, AChosenIdIsTakenFromTheFirstCallOn) {
+  std::promise<void> go;
+  pool_->Post([&go] { go.get_future().wait(); });
+  std::future<CreateResult> first = Create({"", "", "chosen"});
+  std::future<CreateResult> second = Create({"", "", "chosen"});
+  EXPECT_THAT(second.get(), StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("chosen")));
+  go.set_value();
+  EXPECT_THAT(first.get(), IsOk());
+}
+
+TEST_F(SessionRegistryTest, TheSameRequestWithTheSameChosenIdIsRepeatedSafely) {
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first,
+                       Create({"id", "print", "chosen"}).get());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> again,
+                       Create({"id", "print", "chosen"}).get());
+  EXPECT_EQ(first, again);
+}
+
+TEST_F(SessionRegistryTest, TheStoreHoldsTheRecordsOfTheSessionsThatLive) {
+  EXPECT_THAT(Stored(), ::testing::IsEmpty());
+  ASSERT_THAT(Create({"", "", "a"}).get(), IsOk());
+  ASSERT_THAT(Create({"", "", "b"}).get(), IsOk());
+  EXPECT_THAT(Stored(), ::testing::ElementsAre("a", "b"));
+  store_.Get("a", [this](const absl::StatusOr<SessionRecord>& stored) {
+    ASSERT_THAT(stored, IsOk());
+    SessionRecord expected = BarRecord(*bar_);
+    expected.id = "a";
+    EXPECT_EQ(SerializeRecord(*stored), SerializeRecord(expected));
+  });
+  ASSERT_THAT(Delete("a"), IsOk());
+  EXPECT_THAT(Stored(), ::testing::ElementsAre("b"));
+  Drain();
+  clock_.Advance(kTtl);
+  EXPECT_EQ(registry_->RemoveIdle(), 1);
+  EXPECT_THAT(Stored(), ::testing::IsEmpty());
+}
+
+TEST_F(SessionRegistryTest, WhatCannotBeMadeOrIsAbandonedLeavesNoRecord) {
+  const auto cancelled = std::make_shared<std::atomic<bool>>(true);
+  EXPECT_FALSE(Create({}, cancelled).get().ok());
+  EXPECT_THAT(Stored(), ::testing::IsEmpty());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create().get());
+  registry_->Abandon(session);
+  Drain();
+  EXPECT_THAT(Stored(), ::testing::IsEmpty());
+}
+
+TEST_F(SessionRegistryTest, AnIdThatTheStoreHasAlreadyIsRefusedAndLeavesNothing) {
+  SessionRecord record = BarRecord(*bar_);
+  record.id = "chosen";
+  store_.Create(record, 1,
+                [](const absl::StatusOr<SessionRecord>& stored) { EXPECT_THAT(stored, IsOk()); });
+  EXPECT_THAT(Create({"", "", "chosen"}).get(),
+              StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("chosen")));
+  Drain();
+  EXPECT_EQ(registry_->size(), 0);
+  EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
+  EXPECT_THAT(Stored(), ::testing::ElementsAre("chosen"));
 }
 
 }  // namespace

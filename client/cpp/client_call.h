@@ -3,12 +3,18 @@
 
 #pragma once
 
+#include <string>
+
 #include "absl/status/status.h"
+#include "grpcpp/client_context.h"
 #include "grpcpp/support/status.h"
 
 namespace tissueform {
 
 // The same code and message.
 absl::Status FromGrpcStatus(const grpc::Status& status);
+
+// Lets a proxy send the call to the server of `session` ("sessions/{id}"); see kSessionHeader.
+void AddSessionHeader(const std::string& session, grpc::ClientContext* context);
 
 }  // namespace tissueform

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/session/random_id.h"
+#include "server/auth/identity.h"
 
 #include <array>
 #include <cstdlib>

@@ -1,0 +1,125 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/store/session_record.h"
+
+#include <limits>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "google/protobuf/io/coded_stream.h"
+#include "google/protobuf/io/zero_copy_stream_impl_lite.h"
+
+#include "core/base/status_macros.h"
+#include "core/mesh_payload/sha256.h"
+#include "proto/conversion/geometry_conversion.h"
+#include "proto/conversion/model_conversion.h"
+#include "tissueform/store/v1/session_record.pb.h"
+
+namespace tissueform {
+namespace {
+
+absl::Status Damaged(absl::string_view what) {
+  return absl::DataLossError(absl::StrCat("a session record is damaged: ", what));
+}
+
+absl::Status ReadStiffness(const v1::Stiffness& stiffness, SessionRecord* record) {
+  switch (stiffness.source_case()) {
+    case v1::Stiffness::kUniformPa:
+      record->stiffness = stiffness.uniform_pa();
+      return absl::OkStatus();
+    case v1::Stiffness::kCellArray:
+      record->stiffness = stiffness.cell_array();
+      return absl::OkStatus();
+    case v1::Stiffness::SOURCE_NOT_SET:
+      break;
+  }
+  return Damaged("it has no stiffness");
+}
+
+absl::Status ReadPoses(const store::v1::SessionRecord& proto, SessionRecord* record) {
+  if (!proto.last_poses().empty() && proto.last_poses_size() != proto.handles_size()) {
+    return Damaged(absl::StrCat("it has ", proto.last_poses_size(), " poses for ",
+                                proto.handles_size(), " handles"));
+  }
+  for (int h = 0; h < proto.last_poses_size(); ++h) {
+    NamedPose pose = ToNamedPose(proto.last_poses(h));
+    if (pose.handle != proto.handles(h).name() || !CheckPose(pose.pose).ok()) {
+      return Damaged(absl::StrCat("pose ", h, " is not one of its handle"));
+    }
+    record->last_poses.push_back(pose.pose);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+std::string SerializeRecord(const SessionRecord& record) {
+  store::v1::SessionRecord proto;
+  proto.set_id(record.id);
+  proto.set_owner(record.owner);
+  proto.set_project(record.project);
+  proto.set_mesh_sha256(record.mesh_sha256);
+  if (const double* uniform_pa = std::get_if<double>(&record.stiffness)) {
+    proto.mutable_stiffness()->set_uniform_pa(*uniform_pa);
+  } else {
+    proto.mutable_stiffness()->set_cell_array(std::get<std::string>(record.stiffness));
+  }
+  proto.mutable_fixed_vertices()->Add(record.fixed.begin(), record.fixed.end());
+  for (const HandleRegion& region : record.handles) {
+    v1::Handle* handle = proto.add_handles();
+    handle->set_name(region.name);
+    handle->mutable_vertices()->Add(region.vertices.begin(), region.vertices.end());
+  }
+  proto.set_model(ToProto(record.model));
+  proto.set_poisson_ratio(record.poisson_ratio);
+  *proto.mutable_gradient_field() = ToProto(record.gradient_field);
+  for (size_t h = 0; h < record.last_poses.size(); ++h) {
+    *proto.add_last_poses() = ToProto(NamedPose{record.handles[h].name, record.last_poses[h]});
+  }
+  proto.set_request_id(record.request_id);
+  proto.set_request_fingerprint(record.request_fingerprint);
+  std::string bytes;
+  {
+    google::protobuf::io::StringOutputStream stream(&bytes);
+    google::protobuf::io::CodedOutputStream output(&stream);
+    output.SetSerializationDeterministic(true);
+    proto.SerializeToCodedStream(&output);
+  }
+  return bytes;
+}
+
+absl::StatusOr<SessionRecord> ParseRecord(absl::string_view bytes) {
+  store::v1::SessionRecord proto;
+  if (bytes.size() > std::numeric_limits<int>::max() ||
+      !proto.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+    return Damaged("its bytes are not a record");
+  }
+  if (proto.id().empty()) return Damaged("it has no id");
+  if (!IsSha256Hex(proto.mesh_sha256())) return Damaged("its mesh has no name");
+  SessionRecord record;
+  record.id = proto.id();
+  record.owner = proto.owner();
+  record.project = proto.project();
+  record.mesh_sha256 = proto.mesh_sha256();
+  TF_RETURN_IF_ERROR(ReadStiffness(proto.stiffness(), &record));
+  record.fixed = {proto.fixed_vertices().begin(), proto.fixed_vertices().end()};
+  for (const v1::Handle& handle : proto.handles()) {
+    record.handles.push_back({handle.name(), {handle.vertices().begin(), handle.vertices().end()}});
+  }
+  const absl::StatusOr<DeformationModel> model =
+      ToModel(proto.model(), DeformationModel::kGradientField);
+  if (!model.ok()) return Damaged(model.status().message());
+  record.model = *model;
+  record.poisson_ratio = proto.poisson_ratio();
+  absl::StatusOr<GradientFieldOptions> gradient_field =
+      ToGradientFieldOptions(proto.gradient_field(), std::numeric_limits<int>::max());
+  if (!gradient_field.ok()) return Damaged(gradient_field.status().message());
+  record.gradient_field = *std::move(gradient_field);
+  TF_RETURN_IF_ERROR(ReadPoses(proto, &record));
+  record.request_id = proto.request_id();
+  record.request_fingerprint = proto.request_fingerprint();
+  return record;
+}
+
+}  // namespace tissueform

@@ -1,0 +1,284 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <functional>
+#include <future>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "server/store/in_memory_session_store.h"
+#include "server/store/session_store.h"
+#include "tests/testing/status_matchers.h"
+
+// What every session store must do. A new store adds itself at the end.
+namespace tissueform {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::tissueform::testing::IsOk;
+using ::tissueform::testing::StatusIs;
+
+struct StoreCase {
+  std::string name;
+  std::function<std::unique_ptr<SessionStore>()> make;  // an empty one
+};
+
+void PrintTo(const StoreCase& store_case, std::ostream* out) { *out << store_case.name; }
+
+using Result = absl::StatusOr<SessionRecord>;
+
+// Calls that wait for their answer.
+class SessionStoreContractTest : public ::testing::TestWithParam<StoreCase> {
+ protected:
+  static SessionRecord Record(const std::string& id, const std::string& owner = "") {
+    SessionRecord record;
+    record.id = id;
+    record.owner = owner;
+    record.mesh_sha256 = std::string(64, 'a');
+    record.stiffness = 1000.0;
+    record.fixed = {0, 1};
+    record.handles = {{"chin", {2, 3}}};
+    return record;
+  }
+
+  Result Create(const SessionRecord& record, int64_t epoch = 1) {
+    return Wait<Result>([&](auto done) { store_->Create(record, epoch, done); });
+  }
+  Result Get(const std::string& id) {
+    return Wait<Result>([&](auto done) { store_->Get(id, done); });
+  }
+  Result Update(const SessionRecord& record, int64_t epoch = 1) {
+    return Wait<Result>([&](auto done) { store_->Update(record, epoch, done); });
+  }
+  absl::Status Delete(const std::string& id, const std::string& etag = "", int64_t epoch = 1) {
+    return Wait<absl::Status>([&](auto done) { store_->Delete(id, etag, epoch, done); });
+  }
+  absl::StatusOr<SessionStore::Page> List(const SessionStore::ListRequest& request) {
+    return Wait<absl::StatusOr<SessionStore::Page>>(
+        [&](auto done) { store_->List(request, done); });
+  }
+  static std::vector<std::string> Ids(const SessionStore::Page& page) {
+    std::vector<std::string> ids;
+    for (const SessionRecord& record : page.records) ids.push_back(record.id);
+    return ids;
+  }
+
+  template <typename Answer, typename Call>
+  static Answer Wait(Call call) {
+    auto promise = std::make_shared<std::promise<Answer>>();
+    auto future = promise->get_future();
+    call([promise](Answer answer) { promise->set_value(std::move(answer)); });
+    return future.get();
+  }
+
+  const std::unique_ptr<SessionStore> store_ = GetParam().make();
+};
+
+TEST_P(SessionStoreContractTest, WhatWasCreatedIsFoundAsItWas) {
+  SessionRecord record = Record("a", "planner");
+  record.project = "study";
+  record.stiffness = "youngs_modulus_pa";
+  record.model = DeformationModel::kLinearElastic;
+  record.gradient_field.max_iterations = 7;
+  record.last_poses.resize(1);
+  record.last_poses[0].translation_mm = {1, 2, 3};
+  record.request_id = "once";
+  record.request_fingerprint = "print";
+  ASSERT_OK_AND_ASSIGN(const SessionRecord created, Create(record, 4));
+  EXPECT_EQ(SerializeRecord(created), SerializeRecord(record));
+  EXPECT_FALSE(created.etag.empty());
+  EXPECT_EQ(created.epoch, 4);
+  ASSERT_OK_AND_ASSIGN(const SessionRecord found, Get("a"));
+  EXPECT_EQ(SerializeRecord(found), SerializeRecord(record));
+  EXPECT_EQ(found.etag, created.etag);
+  EXPECT_EQ(found.epoch, 4);
+}
+
+TEST_P(SessionStoreContractTest, WhatWasNeverThereIsNotFound) {
+  EXPECT_THAT(Get("a"), StatusIs(absl::StatusCode::kNotFound, HasSubstr("a")));
+  EXPECT_THAT(Update(Record("a")), StatusIs(absl::StatusCode::kNotFound, HasSubstr("a")));
+  EXPECT_THAT(Delete("a"), StatusIs(absl::StatusCode::kNotFound, HasSubstr("a")));
+}
+
+TEST_P(SessionStoreContractTest, ARecordNeedsAnIdAndAnIdIsTakenOnce) {
+  EXPECT_THAT(Create(Record("")), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("id")));
+  ASSERT_THAT(Create(Record("a", "first")), IsOk());
+  EXPECT_THAT(Create(Record("a", "second")),
+              StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("a")));
+  EXPECT_THAT(Create(Record("a", "second"), 9),
+              StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("a")))
+      << "a higher epoch does not take it";
+  ASSERT_OK_AND_ASSIGN(const SessionRecord found, Get("a"));
+  EXPECT_EQ(found.owner, "first");
+}
+
+TEST_P(SessionStoreContractTest, AnUpdateOfTheNewestVersionIsKept) {
+  ASSERT_OK_AND_ASSIGN(SessionRecord record, Create(Record("a")));
+  std::string etag = record.etag;
+  for (int i = 1; i <= 3; ++i) {
+    record.poisson_ratio = 0.1 * i;
+    ASSERT_OK_AND_ASSIGN(record, Update(record));
+    EXPECT_NE(record.etag, etag) << "a version of its own";
+    etag = record.etag;
+    ASSERT_OK_AND_ASSIGN(const SessionRecord found, Get("a"));
+    EXPECT_EQ(found.poisson_ratio, 0.1 * i);
+    EXPECT_EQ(found.etag, etag);
+  }
+}
+
+TEST_P(SessionStoreContractTest, AnUpdateOfAnOldVersionIsAborted) {
+  ASSERT_OK_AND_ASSIGN(const SessionRecord first, Create(Record("a")));
+  SessionRecord mine = first;
+  mine.project = "mine";
+  ASSERT_THAT(Update(mine), IsOk());
+  SessionRecord theirs = first;
+  theirs.project = "theirs";
+  EXPECT_THAT(Update(theirs), StatusIs(absl::StatusCode::kAborted, HasSubstr("changed")));
+  theirs.etag.clear();
+  EXPECT_THAT(Update(theirs), StatusIs(absl::StatusCode::kAborted, HasSubstr("changed")))
+      << "an update without etag is no way around it";
+  EXPECT_THAT(Delete("a", first.etag), StatusIs(absl::StatusCode::kAborted, HasSubstr("changed")));
+  ASSERT_OK_AND_ASSIGN(const SessionRecord found, Get("a"));
+  EXPECT_EQ(found.project, "mine");
+}
+
+TEST_P(SessionStoreContractTest, TheSameContentAgainIsAnotherVersion) {
+  ASSERT_OK_AND_ASSIGN(const SessionRecord first, Create(Record("a")));
+  ASSERT_OK_AND_ASSIGN(const SessionRecord second, Update(first));
+  EXPECT_NE(first.etag, second.etag);
+  EXPECT_THAT(Update(first), StatusIs(absl::StatusCode::kAborted, HasSubstr("changed")));
+}
+
+TEST_P(SessionStoreContractTest, ARecordThatIsMadeAnewDoesNotTakeItsOldEtags) {
+  ASSERT_OK_AND_ASSIGN(const SessionRecord before, Create(Record("a")));
+  ASSERT_THAT(Delete("a"), IsOk());
+  ASSERT_THAT(Create(Record("a")), IsOk());
+  EXPECT_THAT(Update(before), StatusIs(absl::StatusCode::kAborted, HasSubstr("changed")));
+}
+
+TEST_P(SessionStoreContractTest, AnOlderEpochIsRefusedWhateverItsEtag) {
+  ASSERT_OK_AND_ASSIGN(SessionRecord record, Create(Record("a"), 5));
+  EXPECT_THAT(Update(record, 4), StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("5")));
+  EXPECT_THAT(Delete("a", "", 4), StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("5")));
+  ASSERT_OK_AND_ASSIGN(record, Update(record, 6));  // another node takes it over
+  EXPECT_EQ(record.epoch, 6);
+  EXPECT_THAT(Update(record, 5), StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("6")))
+      << "the newest etag does not help";
+  EXPECT_THAT(Update(record, 6), IsOk()) << "the owner goes on";
+}
+
+TEST_P(SessionStoreContractTest, WhatWasDeletedIsGone) {
+  ASSERT_OK_AND_ASSIGN(const SessionRecord record, Create(Record("a")));
+  ASSERT_THAT(Create(Record("b")), IsOk());
+  EXPECT_THAT(Delete("a", record.etag), IsOk());
+  EXPECT_FALSE(Get("a").ok());
+  EXPECT_THAT(Delete("a"), StatusIs(absl::StatusCode::kNotFound, HasSubstr("a")));
+  EXPECT_THAT(Get("b"), IsOk());
+}
+
+TEST_P(SessionStoreContractTest, ListsByOwnerInOrderPageAfterPage) {
+  for (const char* id : {"d", "b", "a", "e", "c"}) {
+    ASSERT_THAT(Create(Record(id, "planner")), IsOk());
+    ASSERT_THAT(Create(Record(absl::StrCat(id, "2"), "other")), IsOk());
+  }
+  ASSERT_THAT(Create(Record("anonymous")), IsOk());
+  SessionStore::ListRequest request{.owner = "planner", .after = "", .limit = 2};
+  ASSERT_OK_AND_ASSIGN(SessionStore::Page page, List(request));
+  EXPECT_THAT(Ids(page), ElementsAre("a", "b"));
+  EXPECT_EQ(page.records[0].mesh_sha256, std::string(64, 'a')) << "whole records";
+  request.after = page.next;
+  ASSERT_THAT(Delete("c"), IsOk());
+  ASSERT_OK_AND_ASSIGN(page, List(request));
+  EXPECT_THAT(Ids(page), ElementsAre("d", "e"));
+  EXPECT_EQ(page.next, "") << "that was all";
+  ASSERT_OK_AND_ASSIGN(page, List({}));
+  EXPECT_THAT(Ids(page), ElementsAre("anonymous"));
+  ASSERT_OK_AND_ASSIGN(page, List({.owner = "nobody", .after = ""}));
+  EXPECT_THAT(Ids(page), IsEmpty());
+  EXPECT_THAT(List({.owner = "", .after = "", .limit = 0}),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("limit")));
+}
+
+TEST_P(SessionStoreContractTest, CopiesAreIsolated) {
+  SessionRecord record = Record("a");
+  ASSERT_THAT(Create(record), IsOk());
+  record.handles[0].vertices.clear();
+  ASSERT_OK_AND_ASSIGN(SessionRecord found, Get("a"));
+  EXPECT_THAT(found.handles[0].vertices, ElementsAre(2, 3));
+  found.handles[0].name = "other";
+  ASSERT_OK_AND_ASSIGN(found, Get("a"));
+  EXPECT_EQ(found.handles[0].name, "chin");
+}
+
+TEST_P(SessionStoreContractTest, OfConcurrentWritersOfOneVersionExactlyOneWins) {
+  constexpr int kWriters = 8;
+  constexpr int kRounds = 20;
+  ASSERT_OK_AND_ASSIGN(SessionRecord record, Create(Record("a")));
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<Result> results(kWriters, absl::UnknownError(""));
+    std::vector<std::thread> writers;
+    for (int i = 0; i < kWriters; ++i) {
+      writers.emplace_back([this, &results, i, record] {
+        SessionRecord mine = record;
+        mine.project = absl::StrCat(i);
+        results[i] = Update(mine);
+      });
+    }
+    for (std::thread& writer : writers) writer.join();
+    ASSERT_OK_AND_ASSIGN(record, Get("a"));
+    int winners = 0;
+    for (int i = 0; i < kWriters; ++i) {
+      if (!results[i].ok()) {
+        EXPECT_EQ(results[i].status().code(), absl::StatusCode::kAborted);
+        continue;
+      }
+      ++winners;
+      EXPECT_EQ(record.project, absl::StrCat(i));
+      EXPECT_EQ(record.etag, results[i]->etag);
+    }
+    EXPECT_EQ(winners, 1);
+  }
+}
+
+TEST_P(SessionStoreContractTest, OfConcurrentCreatorsOfOneIdExactlyOneWins) {
+  constexpr int kWriters = 8;
+  std::vector<Result> results(kWriters, absl::UnknownError(""));
+  std::vector<std::thread> writers;
+  for (int i = 0; i < kWriters; ++i) {
+    writers.emplace_back([this, &results, i] { results[i] = Create(Record("a")); });
+  }
+  for (std::thread& writer : writers) writer.join();
+  int winners = 0;
+  for (const Result& result : results) {
+    winners += result.ok() ? 1 : 0;
+    if (!result.ok()) {
+      EXPECT_EQ(result.status().code(), absl::StatusCode::kAlreadyExists);
+    }
+  }
+  EXPECT_EQ(winners, 1);
+}
+
+TEST_P(SessionStoreContractTest, AnAnswerMayAskTheStoreAgain) {
+  ASSERT_THAT(Create(Record("a")), IsOk());
+  std::promise<Result> answer;
+  store_->Get("a", [this, &answer](const Result& record) {
+    store_->Update(*record, 1, [&answer](Result updated) { answer.set_value(std::move(updated)); });
+  });
+  EXPECT_THAT(answer.get_future().get(), IsOk()) << "no lock is held over it";
+}
+
+INSTANTIATE_TEST_SUITE_P(Stores, SessionStoreContractTest,
+                         ::testing::Values(StoreCase{
+                             "InMemory", [] { return std::make_unique<InMemorySessionStore>(); }}),
+                         [](const auto& of) { return of.param.name; });
+
+}  // namespace
+}  // namespace tissueform
