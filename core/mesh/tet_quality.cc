@@ -43,6 +43,12 @@ Eigen::VectorXd TetVolumes(const Positions& positions, const TetIndices& tets) {
   return volumes;
 }
 
+Eigen::Index RepairOrientation(const Positions& positions, TetIndices* tets) {
+  if (tets->rows() == 0 || !(TetVolumes(positions, *tets).array() < 0).all()) return 0;
+  tets->col(2).swap(tets->col(3));
+  return tets->rows();
+}
+
 Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor> DihedralAnglesDeg(
     const Positions& positions, const TetIndices& tets) {
   Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor> angles(tets.rows(), 6);

@@ -12,6 +12,14 @@ namespace tissueform {
 // deformed.
 Eigen::VectorXd TetVolumes(const Positions& positions, const TetIndices& tets);
 
+// When every tet is negative, swaps its last two vertices, so that every tet is positive, and
+// returns their number; otherwise changes nothing and returns 0. A whole mesh of negative tets was
+// written with the other vertex convention and is sound. A negative tet among positive ones may as
+// well be folded space, which no swap repairs: it is left for ValidateTetMesh to report.
+//
+// REQUIRES: `tets` names rows of `positions`.
+Eigen::Index RepairOrientation(const Positions& positions, TetIndices* tets);
+
 // Dihedral angles in degrees, #T by 6, column e at edge e of kTetEdges. NaN where a facet has no
 // area.
 Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor> DihedralAnglesDeg(

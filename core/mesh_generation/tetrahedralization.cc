@@ -10,7 +10,6 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "core/mesh/orientation.h"
 #include "core/mesh/tet_quality.h"
 #include "core/mesh_generation/cavities.h"
 #include "core/mesh_generation/surface_defects.h"

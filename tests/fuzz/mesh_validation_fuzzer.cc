@@ -3,7 +3,6 @@
 
 #include <cstdlib>
 
-#include "core/mesh/orientation.h"
 #include "core/mesh/surface_validation.h"
 #include "core/mesh/tet_mesh.h"
 #include "core/mesh/tet_quality.h"
