@@ -5,7 +5,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/mesh_io/mesh_read_limits.h"
+#include "core/mesh_io/tet_mesh_io.h"
 #include "core/mesh_readers/raw_mesh.h"
 
 namespace tissueform {

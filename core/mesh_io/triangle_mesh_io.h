@@ -11,7 +11,7 @@
 
 #include "core/mesh/attribute.h"
 #include "core/mesh/triangle_mesh.h"
-#include "core/mesh_io/mesh_read_limits.h"
+#include "core/mesh_io/tet_mesh_io.h"
 
 namespace tissueform {
 
