@@ -75,6 +75,20 @@ absl::StatusOr<PreparedLaplacian*> MeshPreparation::Laplacian(const Cancellation
   return laplacian_.get();
 }
 
+absl::StatusOr<ElasticSystem*> MeshPreparation::Elastic(const Cancellation& cancellation) {
+  if (elastic_ == nullptr) {
+    TF_ASSIGN_OR_RETURN(elastic_, ElasticSystem::Create(mesh_, stiffness_, constraints_,
+                                                        {options_.poisson_ratio, options_.backend,
+                                                         options_.admission, options_.threads},
+                                                        cancellation));
+  }
+  return elastic_.get();
+}
+
+int64_t MeshPreparation::bytes_held() const {
+  return laplacian_bytes() + (elastic_ != nullptr ? elastic_->bytes_held() : 0);
+}
+
 int64_t MeshPreparation::laplacian_bytes() const {
   return vertex_cells_.bytes_held() + BytesOf(stiffness_) + BytesOf(elements_.measures) +
          (laplacian_ != nullptr ? laplacian_->bytes_held() : 0);
