@@ -7,6 +7,8 @@
 
 #include <Eigen/LU>
 
+#include "core/mesh/tet_quality.h"
+
 namespace tissueform {
 
 HatGradientMatrix HatGradients(const TetMesh& mesh) {
@@ -42,6 +44,21 @@ SparseMatrix Gradient(const TetMesh& mesh) {
   SparseMatrix G(3 * mesh.num_tets(), mesh.num_vertices());
   G.setFromTriplets(entries.begin(), entries.end());
   return G;
+}
+
+SparseMatrix MassMatrix(const TetMesh& mesh, const Eigen::VectorXd& stiffness) {
+  const Eigen::VectorXd weights = stiffness.cwiseProduct(TetVolumes(mesh.positions(), mesh.tets()));
+  SparseMatrix M(3 * mesh.num_tets(), 3 * mesh.num_tets());
+  M.reserve(Eigen::VectorXi::Ones(M.cols()));
+  for (Eigen::Index row = 0; row < M.rows(); ++row) {
+    M.insert(row, row) = weights[row / 3];
+  }
+  M.makeCompressed();
+  return M;
+}
+
+SparseMatrix Divergence(const TetMesh& mesh, const Eigen::VectorXd& stiffness) {
+  return Gradient(mesh).transpose() * MassMatrix(mesh, stiffness);
 }
 
 }  // namespace tissueform

@@ -26,4 +26,24 @@ HatGradientMatrix HatGradients(const TetMesh& mesh);
 // REQUIRES: every tet has positive volume.
 SparseMatrix Gradient(const TetMesh& mesh);
 
+// "Mass" matrix of piecewise-constant vector fields (Liao et al. 2009, section 3.1 for M,
+// section 3.3 for M').
+//
+// Returns M', 3*#T by 3*#T, diagonal, positive: rows 3t..3t+2 hold stiffness(t) * |T_t| [Pa mm^3].
+// With a stiffness of one everywhere it is M.
+//
+// REQUIRES: stiffness has #T positive entries; every tet has positive volume.
+SparseMatrix MassMatrix(const TetMesh& mesh, const Eigen::VectorXd& stiffness);
+
+// Integrated divergence of piecewise-constant vector fields, G^T M' (Liao et al. 2009,
+// section 3.1).
+//
+// Returns D, #V by 3*#T: for w with rows 3t..3t+2 the vector in tet t,
+// (D w)_i = sum over tets t holding i of stiffness(t) |T_t| grad phi_i . w_t. This is the source's
+// sign: minus the usual divergence of the interior, so that D * Gradient = +Laplacian (positive
+// semi-definite). Its columns sum to zero.
+//
+// REQUIRES: stiffness has #T positive entries; every tet has positive volume.
+SparseMatrix Divergence(const TetMesh& mesh, const Eigen::VectorXd& stiffness);
+
 }  // namespace tissueform

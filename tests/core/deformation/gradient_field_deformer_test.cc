@@ -15,7 +15,6 @@
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "core/deformation/deformation_quality.h"
-#include "core/operators/divergence.h"
 #include "core/operators/gradient.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"

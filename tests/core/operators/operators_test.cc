@@ -8,11 +8,9 @@
 #include <Eigen/Eigenvalues>
 
 #include "core/mesh/tet_quality.h"
-#include "core/operators/divergence.h"
 #include "core/operators/edge_laplacian.h"
 #include "core/operators/gradient.h"
 #include "core/operators/laplacian.h"
-#include "core/operators/mass_matrix.h"
 #include "core/operators/piecewise_linear_elements.h"
 #include "tests/testing/meshes.h"
 
