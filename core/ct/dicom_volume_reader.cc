@@ -11,9 +11,9 @@
 #include "core/base/status_macros.h"
 #include "core/ct/dicom_file.h"
 #include "core/ct/dicom_series.h"
+#include "core/ct/file_bytes.h"
 #include "core/ct/hu_check.h"
 #include "core/ct/patient_axes.h"
-#include "core/ct/whole_file.h"
 #include "core/mesh_payload/sha256.h"
 
 namespace tissueform {

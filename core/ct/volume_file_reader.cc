@@ -18,10 +18,9 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "core/ct/file_bytes.h"
 #include "core/ct/hu_check.h"
 #include "core/ct/patient_axes.h"
-#include "core/ct/unpacked_size.h"
-#include "core/ct/whole_file.h"
 #include "core/mesh_payload/sha256.h"
 
 namespace tissueform {

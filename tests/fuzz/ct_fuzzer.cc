@@ -10,7 +10,7 @@
 
 #include "core/ct/dicom_series.h"
 #include "core/ct/dicom_stack.h"
-#include "core/ct/unpacked_size.h"
+#include "core/ct/file_bytes.h"
 #include "core/ct/volume_header.h"
 #include "tests/fuzz/byte_source.h"
 #include "tests/fuzz/fuzz_target.h"

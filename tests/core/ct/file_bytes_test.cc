@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/ct/unpacked_size.h"
+#include "core/ct/file_bytes.h"
 
 #include <string>
 

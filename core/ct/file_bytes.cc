@@ -1,9 +1,11 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/ct/unpacked_size.h"
+#include "core/ct/file_bytes.h"
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <vector>
 #include <zlib.h>
 
@@ -47,6 +49,26 @@ class Inflater {
 };
 
 }  // namespace
+
+absl::StatusOr<std::string> ReadWholeFile(const std::string& path, int64_t* bytes_left) {
+  std::error_code error;
+  const auto bytes = std::filesystem::is_regular_file(path, error)
+                         ? static_cast<int64_t>(std::filesystem::file_size(path, error))
+                         : int64_t{-1};
+  if (error || bytes < 0) {
+    return absl::InvalidArgumentError("the file, or the data file beside it, cannot be opened");
+  }
+  if (bytes > *bytes_left) {
+    return absl::ResourceExhaustedError("its files are larger than the limit on their bytes");
+  }
+  *bytes_left -= bytes;
+  std::string contents(static_cast<size_t>(bytes), '\0');
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream.read(contents.data(), bytes)) {
+    return absl::InvalidArgumentError("a file cannot be read, or became shorter meanwhile");
+  }
+  return contents;
+}
 
 // Counted and thrown away, a chunk at a time, and no further than is enough: a few kilobytes may
 // unpack to as many gigabytes as whoever packed them liked.

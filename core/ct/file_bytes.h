@@ -4,10 +4,16 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
+#include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
 namespace tissueform {
+
+// Contents of a file of at most `*bytes_left` bytes, which it lowers by what was read. The message
+// of an error (InvalidArgument, ResourceExhausted) does not hold the path.
+absl::StatusOr<std::string> ReadWholeFile(const std::string& path, int64_t* bytes_left);
 
 // How many bytes the streams of gzip or zlib in `packed` hold, one after the other; 0 where they
 // are cut off or damaged. Stops counting soon after `enough`. ITK's readers of NIfTI and MetaImage
