@@ -61,6 +61,8 @@ absl::StatusOr<AccuracyCase> BlockCase(std::string name, std::string title,
 }  // namespace
 
 absl::StatusOr<AccuracyCase> BendCase(int cells) {
+  // Of the arc into which the bar would bend at its own length: the end goes where that arc ends,
+  // so that the case is bending and not stretching.
   constexpr double kRadius = kLengthMm / kBendRadians;
   HandlePose pose = AtUpperEnd();
   pose.rotation_vector.y() = kBendRadians;

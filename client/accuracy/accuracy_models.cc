@@ -16,6 +16,8 @@ namespace {
 
 // Plenty: the fixed point is compared, not a number of steps.
 constexpr int kMaxEstimations = 200;
+// A hundredth of the default, so that what is left against CalculiX (4e-5 mm at most,
+// docs/accuracy.md) is not where the search stopped.
 constexpr double kNeoHookeanTolerance = 1e-6;
 
 DeformerOptions OptionsOf(const ModelVariant& variant) {

@@ -112,6 +112,8 @@ absl::StatusOr<Positions> ParseCalculixDisplacements(absl::string_view dat,
   Eigen::Index rows = 0;
   double time = 0;
   for (const absl::string_view line : absl::StrSplit(dat, '\n')) {
+    // A later block overwrites those of earlier increments; the time in its headline says whether
+    // it is that of the whole load.
     if (absl::StrContains(line, "displacements")) {
       time = TimeOf(line);
       rows = 0;

@@ -56,6 +56,8 @@ double TurnAtMiddleDeg(const Positions& rest, const Positions& deformed) {
   const Eigen::RowVector3d middle = (rest.colwise().minCoeff() + rest.colwise().maxCoeff()) / 2;
   const Eigen::ArrayXd distances = (rest.col(2).array() - middle.z()).abs();
   const double nearest = distances.minCoeff() * (1 + 1e-9) + 1e-9;
+  // Least squares over turns in a plane has this closed form. No angle is taken of a single vertex,
+  // which may lie on the axis.
   double dot = 0;
   double cross = 0;
   for (Eigen::Index v = 0; v < rest.rows(); ++v) {

@@ -188,6 +188,8 @@ LockingError ErrorAgainstFiner(const Positions& coarse_displacements,
                                const std::array<int, 3>& coarse,
                                const Positions& fine_displacements,
                                const std::array<int, 3>& fine) {
+  // The cells of kFinestBlock are multiples of those of kBlocks: every coarse vertex is a fine one,
+  // and nothing is interpolated, which would be an error of its own.
   std::vector<int> same;
   for (int k = 0; k <= coarse[2]; ++k) {
     for (int j = 0; j <= coarse[1]; ++j) {

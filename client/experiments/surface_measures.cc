@@ -45,6 +45,7 @@ double TwiceCutArea(const Eigen::Vector3d (&corners)[3], double height) {
   return cut ? falling.x() * rising.y() - falling.y() * rising.x() : 0.0;
 }
 
+// Neighbours always touch, and are no intersection.
 bool ShareVertex(const TriangleIndices& triangles, Eigen::Index a, Eigen::Index b) {
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
@@ -112,6 +113,8 @@ Eigen::Index CountSelfIntersections(const Positions& positions, const TriangleIn
   Eigen::Index count = 0;
   for (size_t i = 0; i < by_begin.size(); ++i) {
     const Eigen::Index a = by_begin[i];
+    // Sorted by where their boxes begin along x: past the first that begins behind the end of `a`
+    // none meets it.
     for (size_t j = i + 1; j < by_begin.size() && begin(by_begin[j]) <= end(a); ++j) {
       const Eigen::Index b = by_begin[j];
       if (boxes[static_cast<size_t>(a)].intersects(boxes[static_cast<size_t>(b)]) &&

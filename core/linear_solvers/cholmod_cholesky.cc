@@ -119,6 +119,10 @@ class CholmodCholesky : public SparseCholesky {
  public:
   explicit CholmodCholesky(int unknowns_per_node) : unknowns_per_node_(unknowns_per_node) {
     cholmod_start(&common_);
+    // METIS alone: measured on the largest bar of the benchmarks (262,701 vertices) its ordering
+    // gives a factor in 9.7 s, that of AMD in 26 s; to try several would cost all of them in every
+    // analysis. Always supernodal: CHOLMOD would choose otherwise for small matrices, and
+    // SupernodalSolver needs the dense blocks.
     common_.supernodal = CHOLMOD_SUPERNODAL;
     common_.nmethods = 1;
     common_.method[0].ordering = CHOLMOD_METIS;
@@ -208,6 +212,8 @@ class CholmodCholesky : public SparseCholesky {
             .values = std::vector<float>(values, values + factor_->xsize)};
   }
 
+  // The displacements of a vertex have the same neighbours, so an ordering of the vertices orders
+  // the unknowns, and its graph has b * b times fewer entries.
   void AnalyzeByNodes(const SparseMatrix& A, cholmod_sparse* view) {
     const int b = unknowns_per_node_;
     const SparseMatrix pattern = NodePattern(A, b);
@@ -228,6 +234,7 @@ class CholmodCholesky : public SparseCholesky {
     }
     common_.method[0].ordering = CHOLMOD_GIVEN;
     factor_ = cholmod_analyze_p(view, order.data(), nullptr, 0, &common_);
+    // For the next analysis, of whatever size.
     common_.method[0].ordering = CHOLMOD_METIS;
   }
 

@@ -23,7 +23,9 @@ struct EdgeWeight {
 };
 
 // With area vectors a_k of the facets opposite to corner k, grad phi_k = -a_k / (3 V), so that the
-// weight V grad phi_i . grad phi_j with its sign turned is -a_i . a_j / (9 V).
+// weight V grad phi_i . grad phi_j with its sign turned is -a_i . a_j / (9 V). Not by
+// core/operators, which lies above this folder, and from areas and volume: a flat tet, of which a
+// cotangent has no value, is one test.
 void AddTet(const TetMesh& mesh, Eigen::Index t, std::vector<EdgeWeight>* weights) {
   const auto tet = mesh.tets().row(t);
   std::array<Eigen::Vector3d, 4> corners;
@@ -45,11 +47,15 @@ void AddTet(const TetMesh& mesh, Eigen::Index t, std::vector<EdgeWeight>* weight
 }  // namespace
 
 CotangentWeightSigns CountNegativeCotangentWeights(const TetMesh& mesh) {
-  // Right angles sum up to zero only within rounding.
+  // Right angles, as in every grid of cubes, sum up to zero only within rounding. Terms of both
+  // signs cancel, so rounding is measured against their magnitudes and not against what is left of
+  // them.
   constexpr double kRounding = 16 * std::numeric_limits<double>::epsilon();
   std::vector<EdgeWeight> weights;
   weights.reserve(6 * mesh.num_tets());
   for (Eigen::Index t = 0; t < mesh.num_tets(); ++t) AddTet(mesh, t, &weights);
+  // Stable: the terms of an edge are summed in the order of the tets, whichever way the library
+  // sorts.
   std::stable_sort(weights.begin(), weights.end(),
                    [](const EdgeWeight& a, const EdgeWeight& b) { return a.edge < b.edge; });
   CotangentWeightSigns signs;

@@ -26,6 +26,8 @@ std::array<Vector3d, 3> CornersFrom(const TriangleMesh& surface, Eigen::Index tr
   return corners;
 }
 
+// atan2 and not atan: the denominator is negative where a triangle fills more than a quarter of the
+// view, as it does for a point close to it.
 double SolidAngle(const std::array<Vector3d, 3>& corners) {
   const auto& [a, b, c] = corners;
   const double la = a.norm();

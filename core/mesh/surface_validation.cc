@@ -53,6 +53,8 @@ std::array<Eigen::Vector3d, 3> CornersOf(const TriangleMesh& mesh, Eigen::Index 
 }
 
 void MeasureTriangles(const TriangleMesh& mesh, SurfaceReport* report) {
+  // From a vertex of the surface: seen from an origin far away the terms of the volume are large
+  // and cancel. Of a closed surface the sum is the same from everywhere.
   const Eigen::Vector3d origin = mesh.positions().row(0).transpose();
   double volume = 0;
   for (Eigen::Index f = 0; f < mesh.num_triangles(); ++f) {
@@ -119,6 +121,7 @@ std::vector<Eigen::Index> DegenerateTriangles(const TriangleMesh& mesh) {
     const Eigen::Vector3d p = b - a;
     const Eigen::Vector3d q = c - a;
     const double area = 0.5 * p.cross(q).norm();
+    // Against the edge and not in mm^2: a surface in other units has the same defects.
     const double longest = std::max({p.squaredNorm(), q.squaredNorm(), (p - q).squaredNorm()});
     // Also when numbers so large overflow.
     if (!(area > kDegenerateAreaRatio * longest)) degenerate.push_back(f);

@@ -44,6 +44,7 @@ Eigen::VectorXd TetVolumes(const Positions& positions, const TetIndices& tets) {
 }
 
 Eigen::Index RepairOrientation(const Positions& positions, TetIndices* tets) {
+  // Written so that a volume of zero or NaN, too, leaves the mesh to ValidateTetMesh.
   if (tets->rows() == 0 || !(TetVolumes(positions, *tets).array() < 0).all()) return 0;
   tets->col(2).swap(tets->col(3));
   return tets->rows();

@@ -18,6 +18,8 @@ class DisjointSets {
 
   int32_t Find(int32_t vertex) {
     while (parent_[vertex] != vertex) {
+      // Every second vertex on the way is hung higher: short ways without a rank to decide who is
+      // root, which must be the smallest.
       parent_[vertex] = parent_[parent_[vertex]];
       vertex = parent_[vertex];
     }
@@ -76,6 +78,8 @@ TriangleIndices BoundaryFacets(const TetMesh& mesh) {
       facets.push_back(facet);
     }
   }
+  // Sorting brings the copies of a facet side by side; one without a copy is boundary. The second
+  // sort brings back the order of the tets.
   std::sort(facets.begin(), facets.end(),
             [](const Facet& a, const Facet& b) { return a.key < b.key; });
   std::vector<Facet> boundary;

@@ -50,6 +50,7 @@ void FindBadVolumes(const TetMesh& mesh, MeshReport* report) {
   std::vector<Eigen::Index> degenerate;
   std::vector<Eigen::Index> inverted;
   for (Eigen::Index t = 0; t < mesh.num_tets(); ++t) {
+    // Against the edge and not in mm^3: a mesh in other units has the same defects.
     const double smallest = kDegenerateVolumeRatio * std::pow(LongestEdge(mesh, t), 3);
     if (!(std::abs(volumes[t]) > smallest)) {  // also when numbers so large overflow
       degenerate.push_back(t);
@@ -103,6 +104,7 @@ void FindOversharedFacets(const TetMesh& mesh, MeshReport* report) {
   std::sort(keys.begin(), keys.end());
   std::vector<Eigen::Index> third_tets;
   for (size_t k = 2; k < keys.size(); ++k) {
+    // Every facet counts once, at its third tet, however many more share it.
     const bool third = keys[k].first == keys[k - 2].first;
     const bool fourth = k >= 3 && keys[k].first == keys[k - 3].first;
     if (third && !fourth) {

@@ -15,6 +15,9 @@ std::vector<int32_t> FirstVertexAtSamePlace(const Positions& positions) {
   const auto place = [&](int32_t v) {
     return std::array<double, 3>{positions(v, 0), positions(v, 1), positions(v, 2)};
   };
+  // Compared as numbers, so that 0 and -0 are one place, and without a tolerance: vertices that are
+  // nearly at one place may well be meant. Stable: the first of several is the one with the lowest
+  // number.
   std::stable_sort(order.begin(), order.end(),
                    [&](int32_t a, int32_t b) { return place(a) < place(b); });
   std::vector<int32_t> first(order.size());

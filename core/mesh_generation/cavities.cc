@@ -20,7 +20,8 @@ namespace {
 using Eigen::Vector3d;
 using Corners = std::array<Vector3d, 3>;
 
-// From how many triangles of its wall a cavity is looked at.
+// From how many triangles of its wall a cavity is looked at. A ray looks at every triangle, without
+// a search tree; the number keeps that linear in the size of the surface.
 constexpr size_t kMostViews = 24;
 
 Corners CornersOf(const TriangleMesh& surface, Eigen::Index triangle) {
@@ -64,6 +65,9 @@ std::vector<Eigen::Index> Views(const TriangleMesh& surface, const SurfaceParts&
   return views;
 }
 
+// A normal of the wall points into the cavity, and up to the first triangle that the ray meets,
+// whether of the wall or of a part inside, there is nothing but cavity. Halfway along the widest of
+// these gaps there is the most room for rounding.
 Vector3d PointInside(const TriangleMesh& surface, const std::vector<Eigen::Index>& views,
                      double facing) {
   Vector3d point = Vector3d::Zero();

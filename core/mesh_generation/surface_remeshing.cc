@@ -38,11 +38,14 @@ using Tree =
     CGAL::AABB_tree<CGAL::AABB_traits<Kernel, CGAL::AABB_face_graph_triangle_primitive<Mesh>>>;
 using Eigen::Vector3d;
 
-// Lengths go down in steps of this factor; each step is remeshed in its own pass.
+// CGAL's remeshing takes one length for the faces that it is given. Lengths that change from place
+// to place therefore go down in steps of this factor, each remeshed in its own pass. The last one
+// is a hundredth of the full length.
 constexpr double kLengthStep = 0.75;
 constexpr int kMostSteps = 16;
 
-// A repair makes edges this much shorter, this many edges round what intersects.
+// A repair makes edges this much shorter, this many edges round what intersects. A little more than
+// a step shorter, so that rounding never leaves a length at its step, unless it is the last.
 constexpr double kRepairFactor = 0.7;
 constexpr double kRepairReach = 2;
 
@@ -122,6 +125,8 @@ class Remesher {
   void Remesh(const RemeshingOptions& options) {
     int finest = 0;
     for (int step = 0; step <= finest; ++step) {
+      // Chosen anew in every pass, since the one before has replaced the faces. A pass may show a
+      // place that wants to be finer still, because its centres lie elsewhere: then `finest` grows.
       std::vector<Face> chosen;
       for (const Face f : mesh_.faces()) {
         const int wanted = StepOf(WantedLength(options, CentreOf(mesh_, f)), options.edge_mm);
@@ -140,6 +145,7 @@ class Remesher {
     if (options.feature_angle_deg > 0) {
       PMP::detect_sharp_edges(mesh_, options.feature_angle_deg, is_feature);
     }
+    // Onto the surface as it was given, not as the last pass left it: distances do not add up.
     const auto onto_old = [this](Vertex v) { return tree_.closest_point(mesh_.point(v)); };
     PMP::isotropic_remeshing(chosen, length, mesh_,
                              CGAL::parameters::number_of_iterations(options.iterations)

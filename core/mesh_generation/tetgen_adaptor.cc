@@ -13,7 +13,9 @@
 namespace tissueform {
 namespace {
 
-// TetGen's switches; its defaults are not all quiet.
+// TetGen's switches; its defaults are not all quiet. p fills a surface, Q is quiet, q the quality,
+// Y keeps the surface, a bounds volumes (without a number: of the regions), A numbers the tets of
+// regions, m takes the lengths at the vertices.
 std::string Switches(const TetrahedralizationOptions& options) {
   std::string switches =
       absl::StrFormat("pQq%.6f/%.6f", options.max_radius_edge_ratio, options.min_dihedral_deg);

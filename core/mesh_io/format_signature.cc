@@ -84,6 +84,7 @@ bool IsCount(absl::string_view word) {
 // What the first characters tell; for XML the one of the two that its type says, .vtu by default.
 std::optional<MeshFormat> FormatOfStart(absl::string_view start) {
   if (absl::StartsWith(start, "\xEF\xBB\xBF")) start.remove_prefix(3);
+  // Before comments are left out: the first line of a legacy VTK file is a comment to all others.
   for (const Look& look : kLooks) {
     if (look.first_word.empty() || look.first_word == "<") continue;
     if (absl::StartsWith(start, look.first_word)) return look.format;
@@ -124,6 +125,7 @@ bool LooksLike(MeshFormat format, const Sample& sample, int64_t bytes) {
 absl::string_view MissingEnd(MeshFormat format, const Sample& sample, int64_t bytes) {
   switch (format) {
     case MeshFormat::kGmsh:
+      // Which section is the last one is free, and version 1 ends with $ENDELM.
       return absl::StartsWithIgnoreCase(LastLine(sample.end), "$End") ? "" : "$End...";
     case MeshFormat::kMedit:
       return LastLine(sample.end) == "End" ? "" : "End";

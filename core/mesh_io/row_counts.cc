@@ -77,6 +77,7 @@ class MeditLines {
     if (!Next() || !absl::SimpleAtoi(line_, &count) || count < 0) {
       return Error(absl::StrCat("the number of ", section.name, " is missing"));
     }
+    // Gmsh would pass over them without a word, and the tets would be taken for the whole body.
     if (count > 0 && (section.name == "Prisms" || section.name == "Pyramids")) {
       return absl::InvalidArgumentError(absl::StrCat("it holds ", count, " ", section.name,
                                                      "; only linear tetrahedra are taken"));
@@ -106,6 +107,8 @@ absl::Status CheckMeditLines(const std::string& path) {
       previous = section;
       if (const absl::Status status = lines.CheckSection(*section); !status.ok()) return status;
     } else if (previous != nullptr && !lines.line().empty() && lines.line()[0] != '#') {
+      // Numbers right behind a section are rows beyond its count. Of the rows after any other word
+      // nothing is known.
       if (CountNumbers(lines.line()) >= 0) {
         return lines.Error(absl::StrCat("more rows follow than ", previous->name, " announces"));
       }

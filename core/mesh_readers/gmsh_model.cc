@@ -36,6 +36,7 @@ struct Tet {
 using RowOfNumber = absl::flat_hash_map<size_t, Eigen::Index>;
 
 absl::Status Open(const std::string& path) {
+  // Without the user's configuration and on one thread: the mesh depends on the file alone.
   gmsh::initialize(0, nullptr, /*readConfigFiles=*/false);
   gmsh::option::setNumber("General.Terminal", 0);
   gmsh::option::setNumber("General.NumThreads", 1);
@@ -46,6 +47,7 @@ absl::Status Open(const std::string& path) {
   } catch (...) {  // numbers or texts, by version
     failed = true;
   }
+  // The log decides, whether Gmsh threw or not: it also goes on after an error that it has logged.
   std::vector<std::string> log;
   gmsh::logger::get(log);
   for (const std::string& line : log) {
@@ -57,7 +59,9 @@ absl::Status Open(const std::string& path) {
                 : absl::OkStatus();
 }
 
-// How many elements Gmsh says it has found in the file, of all dimensions.
+// How many elements Gmsh says it has found in the file, of all dimensions. Of several with one
+// number it keeps one and says nothing; its log ("Info: 12 elements") is the only place where the
+// count of the file stands.
 int64_t AnnouncedElements() {
   std::vector<std::string> log;
   gmsh::logger::get(log);

@@ -20,6 +20,8 @@ absl::Status PolygonFan::Add(absl::Span<const int64_t> corners) {
                                                      corner, ", which cannot exist"));
     }
   }
+  // Right for a convex face. Of others triangles may overlap, which is why the split faces are
+  // counted and reported.
   for (size_t k = 1; k + 1 < corners.size(); ++k) {
     for (const int64_t corner : {corners[0], corners[k], corners[k + 1]}) {
       corners_.push_back(static_cast<int32_t>(corner));

@@ -65,6 +65,8 @@ absl::Status MemoryBudget::Take(int64_t bytes, absl::string_view what) {
   if (TryTake(bytes)) {
     return absl::OkStatus();
   }
+  // Once more and no oftener: it has given back all that can be spared, and another may have taken
+  // that. No lock is held, since what is reclaimed comes back through GiveBack.
   if (reclaimer_) {
     reclaimer_();
     if (TryTake(bytes)) {
@@ -79,6 +81,7 @@ absl::Status MemoryBudget::Take(int64_t bytes, absl::string_view what) {
 
 bool MemoryBudget::TryTake(int64_t bytes) {
   MutexLock lock(mutex_);
+  // A difference, because the sum of what is asked and what is taken might overflow.
   if (bytes > limit_bytes_ - reserved_bytes_) {
     return false;
   }

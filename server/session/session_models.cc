@@ -65,6 +65,9 @@ absl::StatusOr<Deformer*> SessionModels::Prepare(DeformationModel model,
   if (const auto found = deformers_.find(model); found != deformers_.end()) {
     return found->second.get();
   }
+  // First an upper bound of what the model takes beside its factor; the factor comes on top,
+  // through the admission, as soon as its analysis has told its bytes; at the end Settle gives back
+  // what was too much.
   TF_RETURN_IF_ERROR(cancellation.Check());
   const TetMesh& mesh = preparation_->mesh();
   const bool makes_elastic = IsElastic(model) && !preparation_->has_elastic();
@@ -102,6 +105,7 @@ absl::StatusOr<VertexResponse*> SessionModels::PrepareResponse(const ResponseReq
     return responses_.front().response.get();
   }
   TF_RETURN_IF_ERROR(Prepare(request.model, cancellation).status());
+  // Before the new one is made, so that old and new need not fit together.
   while (responses_.size() >= kMostResponses) responses_.pop_back();
   TF_RETURN_IF_ERROR(Settle());
   absl::StatusOr<std::unique_ptr<VertexResponse>> response = CreateResponse(request, cancellation);

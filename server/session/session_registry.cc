@@ -71,12 +71,14 @@ void SessionRegistry::Make(const std::shared_ptr<Creation>& creation, SessionRec
     FinishCreation(creation, session.status());
     return;
   }
+  // After the session, so that no record tells of one that could not be made.
   store_->Create(std::move(record), kEpoch,
                  [this, creation, session = *std::move(session)](
                      const absl::StatusOr<SessionRecord>& stored) mutable {
                    if (stored.ok()) {
                      FinishCreation(creation, std::move(session));
                    } else {
+                     // Its memory is free before anybody hears of the failure and tries again.
                      session.reset();
                      FinishCreation(creation, stored.status());
                    }
@@ -91,6 +93,9 @@ SessionRegistry::Admission SessionRegistry::Admit(const SessionRecord& record,
     MutexLock lock(mutex_);
     full = Full();
   }
+  // Only now: nothing is forgotten while there is room. Not under the lock, which RemoveIdle takes
+  // and leaves before sessions end; others may come meanwhile, so whether there is room is asked
+  // again below.
   if (full) {
     RemoveIdle();
   }

@@ -58,6 +58,8 @@ void Strand::Post(WorkerPool::Job job) {
   {
     MutexLock lock(queue->mutex);
     queue->jobs.push_back(std::move(job));
+    // Set until the queue is empty: one RunOne of a strand is on its way at most, which keeps the
+    // order without a lock over a running job.
     if (queue->running) {
       return;
     }
