@@ -36,7 +36,8 @@ def git(root, *arguments, text_in=None):
 
 
 def of_interest(path):
-    return bool(SOURCE.search(path) or CONCERNS_ALL.search(path))
+    """The examples in docs are projects of their own, which this build's commands do not know."""
+    return not path.startswith("docs/") and bool(SOURCE.search(path) or CONCERNS_ALL.search(path))
 
 
 def contents_of_tree(root):
