@@ -66,11 +66,11 @@ vtkSmartPointer<vtkDataArray> ToVtk(const Attribute& attribute) {
 // As the codes of its letters: VTK has arrays of strings, but meshio stops at a file that holds
 // one.
 void AddNotice(vtkPointSet* data) {
-  constexpr absl::string_view kLetters = kNotMedicalDeviceNotice;
+  const absl::string_view letters = kNotMedicalDeviceNotice;
   vtkNew<vtkUnsignedCharArray> notice;
   notice->SetName("notice");
-  notice->SetNumberOfTuples(static_cast<vtkIdType>(kLetters.size()));
-  std::memcpy(notice->GetPointer(0), kLetters.data(), kLetters.size());
+  notice->SetNumberOfTuples(static_cast<vtkIdType>(letters.size()));
+  std::memcpy(notice->GetPointer(0), letters.data(), letters.size());
   data->GetFieldData()->AddArray(notice);
 }
 

@@ -40,7 +40,7 @@ from vtkmodules.vtkFiltersGeometry import vtkGeometryFilter
 from vtkmodules.vtkFiltersCore import vtkTriangleFilter
 from vtkmodules.vtkIOGeometry import vtkSTLReader
 from vtkmodules.vtkIOPLY import vtkPLYWriter
-from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader, vtkXMLUnstructuredGridWriter
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PARTS = ("data", "deform", "run", "check", "generate", "build")
@@ -131,6 +131,19 @@ def differences_of_files(before, now):
 
 # --- The two sides --------------------------------------------------------------------------------------------------
 
+def without_field_data(path):
+    """Writes the mesh again without what stands beside its arrays (the notice), which an older program may not read."""
+    reader = vtkXMLUnstructuredGridReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    reader.GetOutput().GetFieldData().Initialize()
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetFileName(str(path))
+    writer.SetInputData(reader.GetOutput())
+    if writer.Write() != 1:
+        raise Failure(f"cannot write {path}")
+
+
 class Side:
     """A build, the data it works on, and the folder of its answers."""
 
@@ -150,6 +163,9 @@ class Side:
         target = self.out / "plans" / plan
         if not target.is_dir():
             shutil.copytree(source / "plans" / plan, target)
+            if source != self.data:
+                for mesh in target.glob("*.vtu"):
+                    without_field_data(mesh)
         return target
 
 
