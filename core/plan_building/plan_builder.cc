@@ -135,6 +135,7 @@ absl::StatusOr<DividedBone> CutBone(const Anatomy& anatomy,
                                     const std::vector<RecipeSegment>& planned, Progress* progress) {
   progress->Begin("cutting the bone", 0.46, 0.5);
   std::vector<OsteotomySegment> cuts;
+  cuts.reserve(planned.size());
   for (const RecipeSegment& segment : planned) {
     cuts.push_back(segment.planes.empty()
                        ? DefaultSegment(segment.kind, segment.name, anatomy.landmarks)

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/ascii.h"
+#include "grpcpp/server_context.h"
 #include "spdlog/spdlog.h"
 
 #include "server/auth/identity.h"
