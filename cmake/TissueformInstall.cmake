@@ -135,7 +135,7 @@ function(tissueform_install_data)
   install(FILES "${PROJECT_SOURCE_DIR}/docs/plan.schema.json" "${PROJECT_SOURCE_DIR}/docs/recipe.schema.json"
           DESTINATION "${TISSUEFORM_INSTALL_DATA}")
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/proto/tissueform" DESTINATION "${TISSUEFORM_INSTALL_DATA}/proto"
-          FILES_MATCHING PATTERN "*.proto")
+          FILES_MATCHING PATTERN "*.proto" PATTERN "store" EXCLUDE)  # what a server keeps for itself is no interface
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/docs/examples" DESTINATION "${CMAKE_INSTALL_DOCDIR}")
   install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DOCDIR}")
 endfunction()
