@@ -24,5 +24,4 @@ EXPOSE 50051
 STOPSIGNAL SIGTERM
 # Whether the port answers; orchestrators ask the standard gRPC health service instead.
 HEALTHCHECK --interval=30s --timeout=3s CMD ["bash", "-c", "</dev/tcp/127.0.0.1/50051"]
-# All addresses of the container: its own loopback is not what -p publishes. Other containers on its network reach it, too.
-ENTRYPOINT ["tissueform-server", "--host", "0.0.0.0"]
+ENTRYPOINT ["tissueform-server"]
