@@ -205,7 +205,7 @@ TEST(VirtualDisplayTest, EndsAlsoWhenItsStarterIsKilled) {
   testing::KilledStarter starter([]() -> std::string {
     auto display = VirtualDisplay::Open();
     if (!display.ok()) return std::string(absl::StatusCodeToString(display.status().code()));
-    display->release();
+    [[maybe_unused]] const VirtualDisplay* kept_to_the_end = display->release();
     return std::getenv("DISPLAY");
   });
   if (starter.word() == "NOT_FOUND") GTEST_SKIP() << "without Xvfb";

@@ -30,8 +30,10 @@ TEST_F(CtVolumeReaderTest, SeveralMayBeReadAtOnceWhileOtherThreadsAllocate) {
   WriteSeries(PhantomSeries());
   ASSERT_OK_AND_ASSIGN(const CtVolume alone, Read());
   const testing::BusyThreads busy(3);
+  constexpr int kReaders = 4;
   std::vector<std::thread> readers;
-  for (int t = 0; t < 4; ++t) {
+  readers.reserve(kReaders);
+  for (int t = 0; t < kReaders; ++t) {
     readers.emplace_back([&] {
       for (int i = 0; i < 3; ++i) {
         const absl::StatusOr<CtVolume> volume = ReadCtVolume(Path());

@@ -110,8 +110,10 @@ TEST(HelperCallTest, MissingHelperIsToldWithWhatToDo) {
 
 TEST(HelperCallTest, ThreadsThatAllocateMayCallAtOnce) {
   const testing::BusyThreads busy(3);
+  constexpr int kCallers = 4;
   std::vector<std::thread> callers;
-  for (int t = 0; t < 4; ++t) {
+  callers.reserve(kCallers);
+  for (int t = 0; t < kCallers; ++t) {
     callers.emplace_back([t] {
       for (int i = 0; i < 10; ++i) {
         const std::string text = std::to_string(t) + "." + std::to_string(i);

@@ -95,7 +95,7 @@ class SessionMemoryTest : public ::testing::TestWithParam<Case> {
   }
 
   // Makes the model and gives it back. Returns the most that the process took on top.
-  static int64_t Prepare(const TetMesh& mesh, int handles, MemoryBudget* budget) {
+  int64_t Prepare(const TetMesh& mesh, int handles, MemoryBudget* budget) {
     const Eigen::VectorXd stiffness = Eigen::VectorXd::Constant(mesh.num_tets(), 1000.0);
     const ConstraintSet constraints = testing::StackedHandles(mesh, handles);
     const DeformationModel model = GetParam().model;
@@ -110,8 +110,8 @@ class SessionMemoryTest : public ::testing::TestWithParam<Case> {
     return ResidentBytes("VmHWM") - before;
   }
 
-  inline static int64_t held_ = 0;      // told
-  inline static int64_t resident_ = 0;  // measured
+  int64_t held_ = 0;      // told
+  int64_t resident_ = 0;  // measured
 };
 
 TEST_P(SessionMemoryTest, IsReservedBeforeItIsTakenAndToldAsItIs) {

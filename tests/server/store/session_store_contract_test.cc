@@ -225,6 +225,7 @@ TEST_P(SessionStoreContractTest, OfConcurrentWritersOfOneVersionExactlyOneWins) 
   for (int round = 0; round < kRounds; ++round) {
     std::vector<Result> results(kWriters, absl::UnknownError(""));
     std::vector<std::thread> writers;
+    writers.reserve(kWriters);
     for (int i = 0; i < kWriters; ++i) {
       writers.emplace_back([this, &results, i, record] {
         SessionRecord mine = record;
@@ -252,6 +253,7 @@ TEST_P(SessionStoreContractTest, OfConcurrentCreatorsOfOneIdExactlyOneWins) {
   constexpr int kWriters = 8;
   std::vector<Result> results(kWriters, absl::UnknownError(""));
   std::vector<std::thread> writers;
+  writers.reserve(kWriters);
   for (int i = 0; i < kWriters; ++i) {
     writers.emplace_back([this, &results, i] { results[i] = Create(Record("a")); });
   }
