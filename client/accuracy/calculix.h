@@ -21,7 +21,7 @@ struct CalculixResult {
   double seconds = 0;  // wall time of the program, reading and writing its files among it
 };
 
-// Solves the problem in a child process with one thread; its files (problem.inp, .dat, .log and
+// Solves the problem under the guard, with one thread; its files (problem.inp, .dat, .log and
 // what else it writes) are left in `folder`, which must exist.
 //
 // Errors: InvalidArgument (an array of the wrong length), NotFound (no program ccx; the message

@@ -4,9 +4,9 @@
 // tissueform-guard GRACE_MS PROGRAM [ARGUMENT]...
 //
 // Runs a program that is not ours, and so cannot watch a pipe itself, until it ends or standard
-// input does (guarded_program.h starts it). It has one thread and links nothing: fork is harmless
-// here, and PR_SET_PDEATHSIG means what one would think, because the thread that forks ends with
-// the process.
+// input does (guarded_program.h starts it). It has one thread and no library that could start one:
+// fork is harmless here, and PR_SET_PDEATHSIG means what one would think, because the thread that
+// forks ends with the process.
 
 #include <cerrno>
 #include <csignal>
