@@ -97,6 +97,7 @@ void SendRequest(const std::string& path, const CtReadOptions& options, PipeSend
   SendOptional(options.hu_offset, sender);
   sender->Text(options.axes);
   SendOptional(options.series_number, sender);
+  sender->Number(static_cast<int64_t>(options.join_series));
   sender->Bytes(&options.limits, sizeof(options.limits));
 }
 
@@ -111,6 +112,8 @@ absl::StatusOr<CtReadRequest> ReceiveRequest(PipeReceiver* receiver) {
   TF_RETURN_IF_ERROR(ReceiveOptional(receiver, &request.options.hu_offset));
   TF_ASSIGN_OR_RETURN(request.options.axes, receiver->Text());
   TF_RETURN_IF_ERROR(ReceiveOptional(receiver, &request.options.series_number));
+  TF_ASSIGN_OR_RETURN(const int64_t join, receiver->Number(2));
+  request.options.join_series = static_cast<JoinSeries>(join);
   static_assert(std::is_trivially_copyable_v<CtReadLimits>);
   TF_RETURN_IF_ERROR(receiver->Bytes(&request.options.limits, sizeof(request.options.limits)));
   return request;

@@ -22,6 +22,13 @@ struct CtReadLimits {
   int max_seconds = 300;                        // of its processor time
 };
 
+// Whether slices are one CT although their files name several series.
+enum class JoinSeries {
+  kAuto,    // those that fit by place, patient and kind
+  kAlways,  // all of the folder
+  kNever,
+};
+
 // What the file cannot say; keys of the recipe have the same names.
 struct CtReadOptions {
   // Added to the values of a file that does not state how they become HU: -1024 for HU + 1024.
@@ -34,6 +41,8 @@ struct CtReadOptions {
 
   // Which of several DICOM series in a folder.
   std::optional<int> series_number;
+
+  JoinSeries join_series = JoinSeries::kAuto;
 
   CtReadLimits limits;
 };

@@ -54,6 +54,17 @@ CtReadOptions ToCtOptions(const Json& json) {
   if (json.contains("hu_offset")) options.hu_offset = json.at("hu_offset").get<double>();
   options.axes = json.value("axes", "");
   if (json.contains("series_number")) options.series_number = json.at("series_number").get<int>();
+  const std::string join = json.value("join_series", "auto");
+  options.join_series = join == "always"  ? JoinSeries::kAlways
+                        : join == "never" ? JoinSeries::kNever
+                                          : JoinSeries::kAuto;
+  return options;
+}
+
+MetalOptions ToMetal(const Json& json) {
+  MetalOptions options;
+  options.correct = json != "off";
+  if (json.is_number()) options.threshold_hu = json.get<double>();
   return options;
 }
 
@@ -147,6 +158,7 @@ absl::StatusOr<Recipe> ToRecipe(const Json& json) {
   Recipe recipe;
   recipe.ct = ToCtOptions(json.value("ct", nothing));
   recipe.spacing_mm = json.value("spacing_mm", recipe.spacing_mm);
+  recipe.metal = ToMetal(json.value("metal", Json("auto")));
   recipe.segmentation = ToSegmentation(json.value("segmentation", nothing));
   TF_RETURN_IF_ERROR(ReadPlane(json, "occlusal_plane", "", &recipe.occlusal_plane));
   TF_RETURN_IF_ERROR(ReadSegments(json.at("segments"), &recipe));
@@ -183,6 +195,9 @@ Json CtToJson(const CtReadOptions& options) {
   if (options.hu_offset) json["hu_offset"] = *options.hu_offset;
   if (!options.axes.empty()) json["axes"] = options.axes;
   if (options.series_number) json["series_number"] = *options.series_number;
+  if (options.join_series != JoinSeries::kAuto) {
+    json["join_series"] = options.join_series == JoinSeries::kAlways ? "always" : "never";
+  }
   return json;
 }
 
@@ -267,6 +282,9 @@ std::string RecipeToJson(const Recipe& recipe) {
   add_plane(json["region_of_interest"], "above", recipe.above);
   add_plane(json["region_of_interest"], "below", recipe.below);
   if (recipe.contact_band_mm) json["contact_band_mm"] = *recipe.contact_band_mm;
+  // Only where it is not the default, so that a recipe of version 1 stays one.
+  if (!recipe.metal.correct) json["metal"] = "off";
+  if (recipe.metal.threshold_hu) json["metal"] = *recipe.metal.threshold_hu;
   json["version"] = RecipeSchema().LowestVersion(json);
   return json.dump(2);
 }

@@ -18,6 +18,7 @@
 #include "core/constraints/handle_pose.h"
 #include "core/ct/ct_volume_reader.h"
 #include "core/deformation/create_deformer.h"
+#include "core/metal/metal_reduction.h"
 
 namespace tissueform {
 
@@ -41,6 +42,7 @@ struct RecipeMesh {
 struct Recipe {
   std::string sha256;  // of the text that was parsed; empty for a recipe that was not read
   CtReadOptions ct;
+  MetalOptions metal;
   double spacing_mm = 1.5;
   HeadSegmentationOptions segmentation;
   std::optional<Plane> occlusal_plane;

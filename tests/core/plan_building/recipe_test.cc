@@ -114,6 +114,35 @@ TEST(RecipeTest, SenselessValuesAreRefused) {
               StatusIs(kInvalid, HasSubstr("hu_below")));
 }
 
+TEST(RecipeTest, KeysOfVersion2ArriveAndAreWrittenAgain) {
+  const auto parse = [](const std::string& keys) {
+    return ParseRecipe(R"({"format": "tissueform-recipe", "version": 2, "segments": [
+                         {"name": "chin", "osteotomy": "genioplasty"}], )" +
+                           keys + "}",
+                       "r");
+  };
+  ASSERT_OK_AND_ASSIGN(const Recipe given,
+                       parse(R"("ct": {"join_series": "never"}, "metal": 2800)"));
+  EXPECT_EQ(given.ct.join_series, JoinSeries::kNever);
+  EXPECT_EQ(given.metal.threshold_hu, 2800.0);
+  EXPECT_TRUE(given.metal.correct);
+  EXPECT_THAT(RecipeToJson(given), ::testing::AllOf(HasSubstr("\"metal\": 2800"),
+                                                    HasSubstr("\"join_series\": \"never\""),
+                                                    HasSubstr("\"version\": 2")));
+  ASSERT_OK_AND_ASSIGN(const Recipe off, parse(R"("metal": "off")"));
+  EXPECT_FALSE(off.metal.correct);
+  EXPECT_THAT(parse(R"("metal": "on")"), StatusIs(kInvalid, HasSubstr("/metal")));
+  EXPECT_THAT(parse(R"("metal": 300)"), StatusIs(kInvalid, HasSubstr("/metal")));
+}
+
+TEST(RecipeTest, Version1HasTheDefaultsOfLaterKeysAndRefusesThem) {
+  ASSERT_OK_AND_ASSIGN(const Recipe recipe, Parse(""));
+  EXPECT_EQ(recipe.ct.join_series, JoinSeries::kAuto);
+  EXPECT_TRUE(recipe.metal.correct);
+  EXPECT_THAT(RecipeToJson(recipe), HasSubstr("\"version\": 1"));
+  EXPECT_THAT(Parse(R"("metal": "off")"), StatusIs(kInvalid, HasSubstr("version")));
+}
+
 TEST(RecipeTest, TwoSegmentsOfOneNameAreRefused) {
   EXPECT_THAT(ParseRecipe(R"({"format": "tissueform-recipe", "version": 1, "segments": [
                 {"name": "a", "osteotomy": "bssro"}, {"name": "a", "osteotomy": "genioplasty"}]})",
