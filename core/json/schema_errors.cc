@@ -119,17 +119,27 @@ std::string UnknownKey(const std::string& key, const std::string& pointer, const
   return absl::StrCat("unknown key \"", key, "\" at ", pointer, "; ", AllowedKeys(subschema));
 }
 
-std::string AllowedValues(const Json& subschema) {
-  if (subschema.contains("const")) return subschema.at("const").dump();
-  std::vector<std::string> values;
-  for (const Json& value : subschema.at("enum")) values.push_back(value.dump());
-  return absl::StrJoin(values, " or ");
-}
-
 std::string TypeName(const Json& subschema) {
   const std::string type = subschema.value("type", "value of another type");
   if (type == "integer") return "a whole number without decimal point";
   return absl::StrCat(type == "array" || type == "object" ? "an " : "a ", type);
+}
+
+// A type with its bounds, where it has both.
+std::string TypeAndRange(const Json& subschema) {
+  if (!subschema.contains("minimum") || !subschema.contains("maximum")) return TypeName(subschema);
+  return absl::StrCat(TypeName(subschema), " from ", subschema.at("minimum").dump(), " to ",
+                      subschema.at("maximum").dump());
+}
+
+std::string AllowedValues(const Json& subschema) {
+  if (subschema.contains("const")) return subschema.at("const").dump();
+  std::vector<std::string> values;
+  for (const Json& value : subschema.value("enum", Json::array())) values.push_back(value.dump());
+  for (const Json& form : subschema.value("anyOf", Json::array())) {
+    values.push_back(form.contains("enum") ? AllowedValues(form) : TypeAndRange(form));
+  }
+  return absl::StrJoin(values, " or ");
 }
 
 std::string Meaning(const Json& subschema) {
