@@ -125,8 +125,9 @@ bool LooksLike(MeshFormat format, const Sample& sample, int64_t bytes) {
 absl::string_view MissingEnd(MeshFormat format, const Sample& sample, int64_t bytes) {
   switch (format) {
     case MeshFormat::kGmsh:
-      // Which section is the last one is free, and version 1 ends with $ENDELM.
-      return absl::StartsWithIgnoreCase(LastLine(sample.end), "$End") ? "" : "$End...";
+      // Which section is the last one is free.
+      if (absl::StartsWithIgnoreCase(LastLine(sample.end), "$End")) return "";
+      return absl::StartsWith(sample.start, kGmsh1Start) ? "$ENDELM" : "$End...";
     case MeshFormat::kMedit:
       return LastLine(sample.end) == "End" ? "" : "End";
     case MeshFormat::kStl:

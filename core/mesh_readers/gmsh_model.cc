@@ -52,6 +52,11 @@ absl::Status Open(const std::string& path) {
   gmsh::logger::get(log);
   for (const std::string& line : log) {
     if (!absl::StartsWith(line, "Error")) continue;
+    // A bare "Error loading" comes where numbers end before their count is reached, or go on.
+    if (absl::StrContains(line, "Error loading")) {
+      return absl::InvalidArgumentError(
+          "it is damaged: a count of nodes or elements does not fit the lines that follow it");
+    }
     return absl::InvalidArgumentError(
         absl::StrCat("it is damaged (", absl::StrReplaceAll(line, {{path, "the file"}}), ")"));
   }

@@ -130,6 +130,17 @@ TEST_F(Gmsh1FormTest, OtherSolidsAreNamedAndFacesLeftOut) {
   EXPECT_EQ(file.mesh.num_vertices(), 4);
 }
 
+TEST_F(Gmsh1FormTest, WhatIsMissingOfADamagedFileIsNamed) {
+  const std::string good = Slurp(TestDataPath("meshes/two_tets/gmsh1_ascii.msh"));
+  const std::string cut = good.substr(0, good.find("$ENDELM"));
+  EXPECT_THAT(Read("cut.msh", cut),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("$ENDELM")));
+  const std::string more = absl::StrReplaceAll(good, {{"$NOD\n5\n", "$NOD\n50\n"}});
+  ASSERT_NE(more, good);
+  EXPECT_THAT(Read("more.msh", more),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("count of nodes")));
+}
+
 TEST_F(Gmsh1FormTest, ElementOfAnotherLengthOrWithoutItsVertexIsRefused) {
   const std::string good = Slurp(TestDataPath("meshes/two_tets/gmsh1_ascii.msh"));
   for (const char* line : {"2 4 9 2 3 2 3 4", "2 4 9 2 5 2 3 4 5 1", "2 4 9 2 4 2 3 4 99"}) {
