@@ -35,7 +35,10 @@ void FakeCallState::Finish(grpc::Status status) {
   {
     MutexLock lock(mutex_);
     ++reactions_under_way_;
-    status_ = std::move(status);
+    // What the client sees: its own cancellation, whatever the server says after it. A read that
+    // fails before OnCancel looks to a reactor like the end of sending, and it may end well.
+    status_ = cancelled_ ? grpc::Status(grpc::StatusCode::CANCELLED, "cancelled by the client")
+                         : std::move(status);
   }
   // Not from here: the caller may hold locks of the reactor.
   pool_->Post([this] { Ended(); });
