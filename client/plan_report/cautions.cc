@@ -5,6 +5,8 @@
 
 #include "absl/strings/str_format.h"
 
+#include "client/plan_report/coverage_report.h"
+
 namespace tissueform {
 namespace {
 
@@ -17,7 +19,7 @@ constexpr double kLittleUnderChinMm = 15;
 }  // namespace
 
 std::vector<std::string> Cautions(const PlanBuild& build) {
-  std::vector<std::string> cautions;
+  std::vector<std::string> cautions = CoverageCautions(build.coverage);
   const double nose_mm = build.landmarks.nose_prominence_mm;
   if (nose_mm < kFlatNoseMm) {
     cautions.push_back(absl::StrFormat(

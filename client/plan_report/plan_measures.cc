@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "client/plan_report/coverage_report.h"
 #include "core/mesh/tet_quality.h"
 #include "core/mesh/validation.h"
 
@@ -97,7 +99,7 @@ Histogram SkinDistanceHistogram(const PlanMeasures& measures) {
 
 std::vector<QualityCheck> CheckQuality(const PlanBuild& build, const PlanMeasures& measures) {
   const double spacing_mm = build.head.hu.geometry.spacing_mm;
-  return {
+  std::vector<QualityCheck> checks = {
       {"Inverted tets", "none", absl::StrCat(measures.inverted_tets), measures.inverted_tets == 0},
       {"Tets whose smallest dihedral angle is 3 degrees or more", "at least 99.9 %",
        absl::StrFormat("%.3f %%", 100 * measures.share_over_3_deg),
@@ -107,6 +109,22 @@ std::vector<QualityCheck> CheckQuality(const PlanBuild& build, const PlanMeasure
       CheckVolume(measures),
       CheckSkin("mean", measures.skin_mean_voxels, kMostMeanVoxels, spacing_mm),
       CheckSkin("99 % of the vertices", measures.skin_p99_voxels, kMostP99Voxels, spacing_mm)};
+  for (QualityCheck& check : CheckCoverage(build.coverage)) checks.push_back(std::move(check));
+  return checks;
+}
+
+bool AllPassed(const std::vector<QualityCheck>& checks) {
+  return std::all_of(checks.begin(), checks.end(), [](const auto& check) { return check.passed; });
+}
+
+std::string FailedText(const std::vector<QualityCheck>& checks) {
+  std::string text;
+  for (const QualityCheck& check : checks) {
+    if (check.passed) continue;
+    absl::StrAppend(&text, text.empty() ? "" : "; ", check.name, ": ", check.measured, ", not ",
+                    check.required);
+  }
+  return text;
 }
 
 }  // namespace tissueform

@@ -41,7 +41,13 @@ struct QualityCheck {
 };
 
 // No inverted tet; 99.9 % of the tets over 3 degrees; one component; volume within 3 %; skin within
-// 0.6 voxels (mean) and 2 voxels (99 %).
+// 0.6 voxels (mean) and 2 voxels (99 %); and those of CheckCoverage.
 std::vector<QualityCheck> CheckQuality(const PlanBuild& build, const PlanMeasures& measures);
+
+// Whether a plan is ready to be used: all are passed.
+bool AllPassed(const std::vector<QualityCheck>& checks);
+
+// Those that are not, as one text; empty when there is none.
+std::string FailedText(const std::vector<QualityCheck>& checks);
 
 }  // namespace tissueform

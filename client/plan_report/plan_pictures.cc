@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "client/plan_report/coverage_report.h"
 #include "client/plan_report/label_colours.h"
 #include "client/plan_report/plan_scenes.h"
 #include "client/plan_report/slice_pictures.h"
@@ -90,6 +91,19 @@ absl::StatusOr<ReportPicture> DrawSkin(const PlanBuild& build, const std::string
   return picture;
 }
 
+absl::StatusOr<ReportPicture> DrawCoverage(const PlanBuild& build, const std::string& folder) {
+  ReportPicture picture{
+      "coverage.png", "The CT's own skin, and what of it the mesh lacks",
+      "The outer skin of the CT within the region of interest. Red is missing in the mesh.",
+      CoverageLegend(build.coverage)};
+  Figure figure(picture.title);
+  std::vector<Scene> scenes = CoverageScenes(build.coverage);
+  figure.AddRow(kSceneHeightPx, {scenes[0], scenes[1]});
+  figure.AddRow(kSceneHeightPx, {scenes[2], scenes[3]});
+  TF_RETURN_IF_ERROR(WriteFigure(picture, figure, folder));
+  return picture;
+}
+
 absl::StatusOr<ReportPicture> DrawConstraints(const PlanBuild& build, const std::string& folder) {
   ReportPicture picture{
       "constraints.png", "What holds and what moves the tissue",
@@ -160,7 +174,8 @@ absl::StatusOr<std::vector<ReportPicture>> DrawPlanPictures(const PlanBuild& bui
                                                             const PlanMeasures& measures,
                                                             const std::string& folder) {
   std::vector<ReportPicture> pictures;
-  for (const auto draw : {DrawSlices, DrawBone, DrawSkin, DrawConstraints, DrawTets}) {
+  for (const auto draw :
+       {DrawSlices, DrawBone, DrawSkin, DrawCoverage, DrawConstraints, DrawTets}) {
     TF_ASSIGN_OR_RETURN(ReportPicture picture, draw(build, folder));
     pictures.push_back(std::move(picture));
   }

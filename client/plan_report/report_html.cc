@@ -107,6 +107,12 @@ std::string SegmentText(const Json& segment) {
   return text;
 }
 
+std::string Title(const Json& report) {
+  return report["ready"].get<bool>()
+             ? "<h1>Planning model from a CT</h1>\n"
+             : "<h1>Planning model from a CT: <span class=\"failed\">not ready</span></h1>\n";
+}
+
 std::string Lead(const Json& report) {
   std::string segments;
   for (const Json& segment : report["segments"]) {
@@ -183,6 +189,7 @@ std::string Tables(const Json& report) {
       Section("Bone and how it was told apart", JsonTable(report["bone"])),
       Section("Mesh", JsonTable(report["mesh"])),
       Section("Distances", JsonTable(report["distances"])),
+      Section("The CT's skin in the mesh", JsonTable(report["coverage"])),
       Section("Stiffness", StiffnessHtml(report["stiffness"])),
       Section("Fixed, moved and free", JsonTable(report["regions"])),
       Section("Head and soft tissue", JsonTable(report["head"]) + JsonTable(report["soft_tissue"])),
@@ -196,7 +203,7 @@ std::string Tables(const Json& report) {
 
 std::string PlanReportHtml(const Json& report, const std::vector<ReportPicture>& pictures) {
   std::string html =
-      absl::StrCat(kHead, "<h1>Planning model from a CT</h1>\n", Lead(report), Facts(report),
+      absl::StrCat(kHead, Title(report), Lead(report), Facts(report),
                    QualitySection(report["quality"]), CautionsSection(report["cautions"]));
   for (const ReportPicture& picture : pictures) html += PictureHtml(picture);
   return absl::StrCat(html, Tables(report), kFoot);

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "client/plan_report/cautions.h"
+#include "client/plan_report/coverage_report.h"
 #include "client/plan_report/library_versions.h"
 #include "core/anatomy/skin_regions.h"
 #include "core/planning/json_values.h"
@@ -277,6 +278,7 @@ Json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
           {"version", 1},
           {"notice", "research software, not a medical device"},
           {"coordinate_system", "LPS"},
+          {"ready", AllPassed(CheckQuality(build, measures))},
           {"quality", QualityJson(build, measures)},
           {"cautions", Cautions(build)},
           {"program", ProgramJson(program_version)},
@@ -294,6 +296,7 @@ Json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
              "marrow, thin sheets"}}},
           {"mesh", MeshJson(build, measures)},
           {"distances", DistancesJson(build, measures)},
+          {"coverage", CoverageJson(build.coverage)},
           {"stiffness", StiffnessJson(build, measures)},
           {"regions", RegionsJson(build)},
           {"pictures", PicturesJson(pictures)},

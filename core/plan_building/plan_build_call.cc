@@ -59,7 +59,7 @@ absl::Status WaitFor(int answer, int cancel) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::string> ReceiveAnswer(int answer, const PlanBuildCallOptions& options) {
+absl::StatusOr<PlanBuildAnswer> ReceiveAnswer(int answer, const PlanBuildCallOptions& options) {
   PipeReceiver from(answer, std::numeric_limits<int64_t>::max());
   TF_RETURN_IF_ERROR(from.Outcome());  // whether it could begin
   for (;;) {
@@ -71,7 +71,12 @@ absl::StatusOr<std::string> ReceiveAnswer(int answer, const PlanBuildCallOptions
     if (options.tell) options.tell(stage, static_cast<double>(done) / kFractionUnits);
   }
   TF_RETURN_IF_ERROR(from.Outcome());
-  return from.Text();
+  PlanBuildAnswer made;
+  TF_ASSIGN_OR_RETURN(made.text, from.Text());
+  TF_ASSIGN_OR_RETURN(const int64_t ready, from.Number(1));
+  TF_ASSIGN_OR_RETURN(made.defects, from.Text());
+  made.ready = ready != 0;
+  return made;
 }
 
 absl::Status Explain(const ChildEnd& end) {
@@ -86,9 +91,9 @@ absl::Status Explain(const ChildEnd& end) {
 
 }  // namespace
 
-absl::StatusOr<std::string> CallPlanBuild(const PlanBuildRequest& request,
-                                          const PlanBuildCallOptions& options) {
-  std::string text;
+absl::StatusOr<PlanBuildAnswer> CallPlanBuild(const PlanBuildRequest& request,
+                                              const PlanBuildCallOptions& options) {
+  PlanBuildAnswer made;
   TF_RETURN_IF_ERROR(CallHelper(
       {.program = kProgram,
        .what = "building the plan",
@@ -96,10 +101,10 @@ absl::StatusOr<std::string> CallPlanBuild(const PlanBuildRequest& request,
        .explain = Explain},
       [&](PipeSender* to) { SendRequest(request, to); },
       [&](int answer) -> absl::Status {
-        TF_ASSIGN_OR_RETURN(text, ReceiveAnswer(answer, options));
+        TF_ASSIGN_OR_RETURN(made, ReceiveAnswer(answer, options));
         return absl::OkStatus();
       }));
-  return text;
+  return made;
 }
 
 int RunPlanBuildProgram(const PlanBuildWork& work) {
@@ -111,16 +116,18 @@ int RunPlanBuildProgram(const PlanBuildWork& work) {
           answer->Text(stage);
           answer->Number(std::llround(fraction * kFractionUnits));
         };
-        std::string text;
+        PlanBuildAnswer made;
         const absl::Status outcome =
             WithoutExceptions("building the plan", limits, [&]() -> absl::Status {
               TF_ASSIGN_OR_RETURN(const PlanBuildRequest request, ReceiveRequest(from));
-              TF_ASSIGN_OR_RETURN(text, work(request, tell));
+              TF_ASSIGN_OR_RETURN(made, work(request, tell));
               return absl::OkStatus();
             });
         answer->Number(kOutcome);
         answer->Outcome(outcome);
-        answer->Text(text);
+        answer->Text(made.text);
+        answer->Number(made.ready ? 1 : 0);
+        answer->Text(made.defects);
       });
 }
 

@@ -37,7 +37,14 @@ struct PlanBuildCallOptions {
   int cancel = -1;
 };
 
-// Fills request.folder and returns a text for the user: what was made, and what to mind. When this
+// What was made.
+struct PlanBuildAnswer {
+  std::string text;     // for the user: what was made, and what to mind
+  bool ready = false;   // whether it meets all requirements; report.json says the same
+  std::string defects;  // which it misses and by how much; empty when it is ready
+};
+
+// Fills request.folder, also with a plan that misses requirements. When this
 // function has returned nobody writes into the folder any longer; what an error leaves in it is the
 // caller's to take away (AtomicFolder does). Any thread may call it, many at once; when this
 // process dies, the work ends too.
@@ -45,11 +52,11 @@ struct PlanBuildCallOptions {
 // Errors: those of ReadRecipe, BuildPlan, WritePlan and WritePlanReport; Cancelled; Internal when a
 // library crashes, ResourceExhausted when the work is killed; NotFound when the program is not
 // there.
-absl::StatusOr<std::string> CallPlanBuild(const PlanBuildRequest& request,
-                                          const PlanBuildCallOptions& options = {});
+absl::StatusOr<PlanBuildAnswer> CallPlanBuild(const PlanBuildRequest& request,
+                                              const PlanBuildCallOptions& options = {});
 
 // The other side: what the program does with a request.
-using PlanBuildWork = std::function<absl::StatusOr<std::string>(
+using PlanBuildWork = std::function<absl::StatusOr<PlanBuildAnswer>(
     const PlanBuildRequest& request,
     const std::function<void(absl::string_view stage, double fraction)>& tell)>;
 

@@ -203,7 +203,7 @@ absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTiss
                                      const Anatomy& anatomy,
                                      const std::vector<BuiltSegment>& segments,
                                      const Recipe& recipe, int threads, Progress* progress) {
-  progress->Begin("stiffness and regions", 0.9, 1);
+  progress->Begin("stiffness and regions", 0.9, 0.98);
   const HeadSegmentation& head = anatomy.head;
   TF_ASSIGN_OR_RETURN(TetStiffness stiffness, ComputeTetStiffness(built.mesh, head.hu, head.bone,
                                                                   {.table = recipe.tissues}));
@@ -248,6 +248,12 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
   TF_ASSIGN_OR_RETURN(SoftTissueMesh mesh, Mesh(soft_tissue, anatomy.landmarks, recipe, &progress));
   TF_ASSIGN_OR_RETURN(Description description, Describe(mesh, soft_tissue, anatomy, bone.segments,
                                                         recipe, options.threads, &progress));
+  progress.Begin("comparing with the CT's skin", 0.98, 1);
+  TF_ASSIGN_OR_RETURN(
+      SkinCoverage coverage,
+      MeasureSkinCoverage(anatomy.head, anatomy.landmarks,
+                          {mesh.surface, description.released.regions, soft_tissue.region},
+                          ct.spacing_mm.maxCoeff()));
   TellStage(options.tell, "done", 1);
   return PlanBuild{.recipe = recipe,
                    .ct = std::move(ct.provenance),
@@ -264,7 +270,8 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                    .stiffness = std::move(description.stiffness),
                    .regions = std::move(description.released.regions),
                    .freed_by_trial = description.released.freed,
-                   .skin_distance = std::move(description.skin_distance)};
+                   .skin_distance = std::move(description.skin_distance),
+                   .coverage = std::move(coverage)};
 }
 
 }  // namespace tissueform

@@ -20,6 +20,7 @@
 #include "core/ct/ct_volume.h"
 #include "core/plan_building/planning_regions.h"
 #include "core/plan_building/recipe.h"
+#include "core/plan_building/skin_coverage.h"
 #include "core/plan_building/skin_distance.h"
 #include "core/plan_building/soft_tissue_mesh.h"
 #include "core/problem/plan_problem.h"
@@ -57,6 +58,7 @@ struct PlanBuild {
   PlanningRegions regions;
   int64_t freed_by_trial = 0;  // of regions.freed_by_contact, by ReleaseTornContacts
   SkinDistance skin_distance;
+  SkinCoverage coverage;
 };
 
 struct PlanBuildOptions {

@@ -183,9 +183,10 @@ TEST_F(OtherReadersTest, PlanBuild) {
                                    "back": {"point_mm": [0, 100, 0], "normal": [0, -1, 0]}},
             "segments": [{"name": "mandible", "osteotomy": "bssro",
                           "pose": {"translation_mm": [0, -4, 0]}}]})");
-  ASSERT_THAT(Run({"plan", "build", "--ct", TestDataPath("ct/headsq/headsq_quarter.nhdr"),
-                   "--recipe", "recipe.json", "--out", "head", "--no-pictures"}),
-              Succeeds());
+  ASSERT_THAT(
+      Run({"plan", "build", "--ct", TestDataPath("ct/headsq/headsq_quarter.nhdr"), "--recipe",
+           "recipe.json", "--out", "head", "--no-pictures", "--accept-defects"}),
+      Succeeds());
   ExpectOthersReadTheSame(Path("head/head.vtu"));
   ExpectOthersReadTheSame(Path("head/segments/mandible.stl"));
 }

@@ -33,6 +33,7 @@ struct PlanBuildArguments {
   std::string stats;
   int threads = 0;
   bool no_pictures = false;
+  bool accept_defects = false;
 };
 
 // The folder appears all at once, and holds no times: they go elsewhere.
@@ -73,11 +74,11 @@ absl::Status WriteStatsFile(const std::string& path, const StageTimes& times, in
 }
 
 // All or nothing: when it has returned an error nothing is left.
-absl::StatusOr<std::string> BuildIntoFolder(const PlanBuildArguments& arguments,
-                                            const EndingSignals& signals) {
+absl::StatusOr<PlanBuildAnswer> BuildIntoFolder(const PlanBuildArguments& arguments,
+                                                const EndingSignals& signals) {
   TF_ASSIGN_OR_RETURN(AtomicFolder folder, AtomicFolder::Create(arguments.out));
   StageTimes times;
-  TF_ASSIGN_OR_RETURN(std::string outcome,
+  TF_ASSIGN_OR_RETURN(PlanBuildAnswer made,
                       CallPlanBuild({.ct = arguments.ct,
                                      .recipe = arguments.recipe,
                                      .folder = folder.path(),
@@ -92,7 +93,15 @@ absl::StatusOr<std::string> BuildIntoFolder(const PlanBuildArguments& arguments,
     TF_RETURN_IF_ERROR(WriteStatsFile(arguments.stats, times, arguments.threads));
   }
   TF_RETURN_IF_ERROR(folder.Publish());
-  return outcome;
+  return made;
+}
+
+// The folder is kept: its report shows what is wrong, and it may be enough for what is asked.
+absl::Status CheckReady(const PlanBuildArguments& arguments, const PlanBuildAnswer& made) {
+  if (made.ready || arguments.accept_defects) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      absl::StrCat("the plan in ", arguments.out, " is not ready: ", made.defects, "; look at ",
+                   arguments.out, "/report.html, and give --accept-defects to go on all the same"));
 }
 
 absl::Status RunPlanBuild(PlanBuildArguments arguments) {
@@ -100,11 +109,11 @@ absl::Status RunPlanBuild(PlanBuildArguments arguments) {
   TF_RETURN_IF_ERROR(CheckStatsFile(arguments));
   if (arguments.threads == 0) arguments.threads = AvailableProcessors();
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<EndingSignals> signals, EndingSignals::Catch());
-  const absl::StatusOr<std::string> outcome = BuildIntoFolder(arguments, *signals);
+  const absl::StatusOr<PlanBuildAnswer> outcome = BuildIntoFolder(arguments, *signals);
   if (absl::IsCancelled(outcome.status())) signals->EndByArrived();
   TF_RETURN_IF_ERROR(outcome.status());
-  absl::PrintF("%s", *outcome);
-  return absl::OkStatus();
+  absl::PrintF("%s", outcome->text);
+  return CheckReady(arguments, *outcome);
 }
 
 constexpr char kFooter[] =
@@ -116,11 +125,14 @@ constexpr char kFooter[] =
     "other "
     "keys have defaults: docs/recipe-format.md. What a CT must be: docs/ct-input.md.\n\n"
     "DIR gets plan.json, head.vtu, segments/NAME.stl, report.html, report.json and pictures/, all "
-    "or nothing: an error or Ctrl-C leaves no folder.\n\n"
+    "or nothing: an error or Ctrl-C leaves no folder. A plan that misses a quality requirement "
+    "is\nkept, but it is not ready: report.json says so, and the command ends with 1 unless "
+    "--accept-defects is given.\n\n"
     "Examples:\n"
     "  tissueform plan build --ct series/ --recipe recipe.json --out head\n"
     "  tissueform plan build --ct head.nrrd --recipe recipe.json --out head --no-pictures\n"
-    "Exit codes: 0 done, 1 the work failed, 2 wrong use, 128 + signal when ended by one.";
+    "Exit codes: 0 done, 1 the work failed or the plan is not ready, 2 wrong use, 128 + signal "
+    "when ended by one.";
 
 }  // namespace
 
@@ -144,6 +156,9 @@ void AddPlanBuildCommand(CLI::App& app, CommandWork* work) {
                     "JSON file for the seconds of every stage and the memory; not in DIR");
   build->add_flag("--no-pictures", arguments->no_pictures,
                   "report without pictures: needs no display and no Xvfb");
+  build->add_flag("--accept-defects", arguments->accept_defects,
+                  "end with 0 also when the plan misses a quality requirement; the report still "
+                  "says that it is not ready");
   build->footer(kFooter);
   build->callback([arguments, work] { *work = [arguments] { return RunPlanBuild(*arguments); }; });
 }

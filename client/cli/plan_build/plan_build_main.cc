@@ -32,39 +32,33 @@ StageFunction Within(const StageFunction& tell, double from, double to) {
   };
 }
 
-std::string QualityText(const PlanBuild& build) {
-  std::string failed;
-  for (const QualityCheck& check : CheckQuality(build, MeasurePlan(build))) {
-    if (check.passed) continue;
-    absl::StrAppend(&failed, failed.empty() ? "" : "; ", check.name, ": ", check.measured, ", not ",
-                    check.required);
-  }
-  return failed.empty() ? "all quality requirements are met"
-                        : absl::StrCat("NOT all quality requirements are met: ", failed);
-}
-
-// What is printed when all went well.
-std::string Outcome(const PlanBuildRequest& request, const PlanBuild& build) {
-  std::string text =
-      absl::StrFormat("plan    %s/plan.json: %d vertices, %d tets\n", request.folder_name,
-                      build.mesh.mesh.num_vertices(), build.mesh.mesh.num_tets());
+// What is printed when a plan was made.
+PlanBuildAnswer Outcome(const PlanBuildRequest& request, const PlanBuild& build) {
+  const std::vector<QualityCheck> checks = CheckQuality(build, MeasurePlan(build));
+  PlanBuildAnswer made{.text = {}, .ready = AllPassed(checks), .defects = FailedText(checks)};
+  made.text = absl::StrFormat("plan    %s/plan.json: %d vertices, %d tets\n", request.folder_name,
+                              build.mesh.mesh.num_vertices(), build.mesh.mesh.num_tets());
   for (const BuiltSegment& segment : build.segments) {
-    absl::StrAppendFormat(&text, "  handle  %s (%s): %.1f cm3 of bone\n", segment.cut.name,
+    absl::StrAppendFormat(&made.text, "  handle  %s (%s): %.1f cm3 of bone\n", segment.cut.name,
                           OsteotomyKindName(segment.cut.kind), segment.volume_mm3 / 1000);
   }
-  absl::StrAppendFormat(&text, "report  %s/report.html: %s\n", request.folder_name,
-                        QualityText(build));
+  absl::StrAppendFormat(&made.text, "report  %s/report.html: %s\n", request.folder_name,
+                        made.ready
+                            ? "all quality requirements are met"
+                            : absl::StrCat("NOT all quality requirements are met: ", made.defects));
   for (const std::string& caution : Cautions(build)) {
-    absl::StrAppend(&text, "mind    ", caution, "\n");
+    absl::StrAppend(&made.text, "mind    ", caution, "\n");
   }
-  absl::StrAppendFormat(&text,
-                        "the plan is ready: tissueform deform %s/plan.json --out after.vtu\n",
+  absl::StrAppendFormat(&made.text,
+                        made.ready
+                            ? "the plan is ready: tissueform deform %s/plan.json --out after.vtu\n"
+                            : "the plan in %s is NOT ready: look at the report\n",
                         request.folder_name);
-  return text;
+  return made;
 }
 
-absl::StatusOr<std::string> BuildRequestedPlan(const PlanBuildRequest& request,
-                                               const StageFunction& tell) {
+absl::StatusOr<PlanBuildAnswer> BuildRequestedPlan(const PlanBuildRequest& request,
+                                                   const StageFunction& tell) {
   TF_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipe(request.recipe));
   // As deform does: the last digits would depend on their number, and with them what the trial of
   // the planned move finds torn. Threads that wait for each other also cost more than they give.

@@ -23,7 +23,8 @@ inline PlanBuild PlanBuildOfMesh(const TetMesh& mesh = Bar({1, 1, 1})) {
                    .report = {}},
           .stiffness = {},
           .regions = {},
-          .skin_distance = {}};
+          .skin_distance = {},
+          .coverage = {}};
 }
 
 }  // namespace tissueform::testing

@@ -16,6 +16,7 @@ namespace tissueform {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 // A bar of 3 x 3 x 4 cubes of 1 mm as if it were the soft tissue of a head.
 PlanBuild BuildOfBar(const TetMesh& mesh) {
@@ -58,11 +59,16 @@ TEST(PlanMeasuresTest, CubesAreMeasuredAsCubes) {
 
 TEST(PlanMeasuresTest, EveryRequirementCanFail) {
   PlanBuild build = BuildOfBar(testing::Bar({3, 3, 4}));
-  EXPECT_THAT(Passed(build), ElementsAre(true, true, true, true, true, true));
+  EXPECT_THAT(Passed(build),
+              ElementsAre(true, true, true, true, true, true, true, true, true, true));
   build.soft_tissue.volume_mm3 = 37.5;
   build.skin_distance.mean_mm = 1.3;
   build.skin_distance.p99_mm = 4.1;
-  EXPECT_THAT(Passed(build), ElementsAre(true, true, true, false, false, false));
+  EXPECT_THAT(Passed(build),
+              ElementsAre(true, true, true, false, false, false, true, true, true, true));
+  EXPECT_FALSE(AllPassed(CheckQuality(build, MeasurePlan(build))));
+  EXPECT_THAT(FailedText(CheckQuality(build, MeasurePlan(build))),
+              HasSubstr("mean: 0.65 voxels (1.30 mm), not at most 0.6 voxels; "));
 
   // An inverted tet, without an angle to speak of, that hangs on nothing.
   const TetMesh bar = testing::Bar({3, 3, 4});
@@ -72,7 +78,16 @@ TEST(PlanMeasuresTest, EveryRequirementCanFail) {
   const auto first = static_cast<int32_t>(bar.num_vertices());
   tets << bar.tets(), TetIndices{{first, first + 1, first + 2, first + 3}};
   build = BuildOfBar(*TetMesh::Create(positions, tets));
-  EXPECT_THAT(Passed(build), ElementsAre(false, false, false, true, true, true));
+  EXPECT_THAT(Passed(build),
+              ElementsAre(false, false, false, true, true, true, true, true, true, true));
+
+  build = BuildOfBar(bar);
+  build.coverage.whole.area_mm2 = 100;
+  build.coverage.regions[0].area_mm2 = 100;
+  build.coverage.gaps = {{SkinRegion::kNone, 100, 5, {}}};
+  build.coverage.holes = build.coverage.gaps;
+  EXPECT_THAT(Passed(build),
+              ElementsAre(true, true, true, true, true, true, false, false, false, false));
 }
 
 }  // namespace

@@ -17,6 +17,7 @@ constexpr char kAttack[] = "<script>alert(1)</script>\"'";
 
 nlohmann::ordered_json SmallReport(bool passed) {
   return nlohmann::ordered_json{
+      {"ready", passed},
       {"quality",
        {{{"requirement", kAttack}, {"required", kAttack}, {"measured", "1"}, {"passed", passed}}}},
       {"cautions", {kAttack}},
@@ -35,6 +36,7 @@ nlohmann::ordered_json SmallReport(bool passed) {
       {"soft_tissue", {{"volume_mm3", 5.0}}},
       {"mesh", {{"vertices", 1500}, {"tets", 6000}}},
       {"distances", {{"skin_to_ct", {{"mean_mm", 0.25}}}}},
+      {"coverage", {{"means", kAttack}}},
       {"stiffness", {{"tissues", {{{"name", kAttack}, {"source", kAttack}}}}}},
       {"regions", {{kAttack, 1}}},
       {"recipe", {{"name", kAttack}}}};
@@ -60,7 +62,9 @@ TEST(ReportHtmlTest, PageSaysWhatIsMetAndThatItIsNoMedicalDevice) {
   const std::string good = PlanReportHtml(SmallReport(true), {});
   EXPECT_THAT(good, AllOf(HasSubstr("all requirements are met"), Not(HasSubstr("not met")),
                           HasSubstr("moved by 5 mm and turned by 2°")));
-  EXPECT_THAT(PlanReportHtml(SmallReport(false), {}), HasSubstr("not met"));
+  EXPECT_THAT(good, Not(HasSubstr("not ready")));
+  EXPECT_THAT(PlanReportHtml(SmallReport(false), {}),
+              AllOf(HasSubstr("not met"), HasSubstr("not ready")));
   const std::string notice = "not a medical device";
   EXPECT_LT(good.find(notice), good.find("<h1>"));
   EXPECT_GT(good.rfind(notice), good.rfind("</section>"));

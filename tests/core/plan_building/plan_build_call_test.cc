@@ -80,13 +80,15 @@ class PlanBuildCallTest : public ::testing::Test {
 TEST_F(PlanBuildCallTest, FolderIsFilledStagesRiseAndTheTextNamesTheFolderAsAsked) {
   std::vector<std::string> stages;
   double done = 0;
-  const auto text = CallPlanBuild(request_, {.tell = [&](absl::string_view stage, double fraction) {
+  const auto made = CallPlanBuild(request_, {.tell = [&](absl::string_view stage, double fraction) {
                                     stages.emplace_back(stage);
                                     EXPECT_THAT(fraction, AllOf(Ge(done), Le(1)));
                                     done = fraction;
                                   }});
-  ASSERT_THAT(text, IsOk());
-  EXPECT_THAT(*text, AllOf(HasSubstr("shown/plan.json"), HasSubstr("handle  mandible")));
+  ASSERT_THAT(made, IsOk());
+  EXPECT_THAT(made->text, AllOf(HasSubstr("shown/plan.json"), HasSubstr("handle  mandible")));
+  EXPECT_FALSE(made->ready) << "edges of 8 mm cut off lips and chin";
+  EXPECT_THAT(made->defects, HasSubstr("Skin of the CT"));
   EXPECT_EQ(stages.front(), "reading the CT");
   EXPECT_TRUE(fs::is_regular_file(around_ / "folder/plan.json"));
   EXPECT_TRUE(fs::is_regular_file(around_ / "folder/report.html"));

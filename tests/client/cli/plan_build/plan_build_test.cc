@@ -88,21 +88,21 @@ TEST_F(PlanBuildTest, PlanIsBuiltReportedAndCanBeRun) {
   const ScopedEnvironment no_leak_check("LSAN_OPTIONS", "detect_leaks=0");  // as in ExperimentsTest
   WriteNamedCt();
   const ProcessResult result =
-      BuildFrom("Doe_Jane.nhdr", {"--out", "head", "--stats", "stats.json"});
+      BuildFrom("Doe_Jane.nhdr", {"--out", "head", "--stats", "stats.json", "--accept-defects"});
   ASSERT_THAT(result, Succeeds());
   EXPECT_THAT(result.out, AllOf(HasSubstr("head/plan.json"), HasSubstr("handle  mandible")));
 
   EXPECT_THAT(AllFiles("head"),
               ElementsAre("head.vtu", "pictures/bone.png", "pictures/constraints.png",
-                          "pictures/quality.png", "pictures/skin.png", "pictures/slices.png",
-                          "pictures/tets.png", "plan.json", "report.html", "report.json",
-                          "segments/mandible.stl"));
+                          "pictures/coverage.png", "pictures/quality.png", "pictures/skin.png",
+                          "pictures/slices.png", "pictures/tets.png", "plan.json", "report.html",
+                          "report.json", "segments/mandible.stl"));
   const auto report = nlohmann::json::parse(Read("head/report.json"));
   EXPECT_EQ(report["format"], "tissueform-plan-report");
   EXPECT_EQ(report["input"]["size_voxels"], nlohmann::json({64, 64, 93}));
   EXPECT_EQ(report["recipe"]["spacing_mm"], 4);
   EXPECT_EQ(report["recipe"]["poisson_ratio"], 0.45);  // which the recipe leaves out
-  EXPECT_EQ(report["quality"].size(), 6U);
+  EXPECT_EQ(report["quality"].size(), 10U);
   for (const auto& picture : report["pictures"]) {
     const std::string file = picture["file"];
     EXPECT_THAT(Read("head/" + file), StartsWith("\x89PNG"));
@@ -121,15 +121,34 @@ TEST_F(PlanBuildTest, PlanIsBuiltReportedAndCanBeRun) {
 }
 
 TEST_F(PlanBuildTest, SameInputGivesTheSameBytesWithAnyNumberOfThreads) {
-  ASSERT_THAT(Build({"--out", "one", "--no-pictures", "--threads", "1"}), Succeeds());
+  ASSERT_THAT(Build({"--out", "one", "--no-pictures", "--accept-defects", "--threads", "1"}),
+              Succeeds());
   std::filesystem::create_directory(folder_ / "two");  // an empty folder is filled, too
-  ASSERT_THAT(Build({"--out", "two", "--no-pictures", "--threads", "2"}), Succeeds());
+  ASSERT_THAT(Build({"--out", "two", "--no-pictures", "--accept-defects", "--threads", "2"}),
+              Succeeds());
   ASSERT_THAT(AllFiles("one"), ElementsAre("head.vtu", "plan.json", "report.html", "report.json",
                                            "segments/mandible.stl"));
   EXPECT_EQ(AllFiles("one"), AllFiles("two"));
   for (const std::string& file : AllFiles("one")) {
     EXPECT_TRUE(Read("one/" + file) == Read("two/" + file)) << file;
   }
+}
+
+// Edges of 8 mm cut off lips and chin.
+TEST_F(PlanBuildTest, PlanThatMissesARequirementIsKeptAndNotReady) {
+  const ProcessResult refused = Build();
+  EXPECT_THAT(refused,
+              FailsWith(1, AllOf(HasSubstr("the plan in head is not ready"),
+                                 HasSubstr("the upper lip"), HasSubstr("--accept-defects"))));
+  EXPECT_THAT(refused.out, AllOf(HasSubstr("NOT ready"), Not(HasSubstr("plan is ready"))));
+  EXPECT_EQ(nlohmann::json::parse(Read("head/report.json"))["ready"], false);
+  EXPECT_THAT(AllFiles("head"), ElementsAre("head.vtu", "plan.json", "report.html", "report.json",
+                                            "segments/mandible.stl"));
+
+  const ProcessResult accepted = Build({"--out", "accepted", "--no-pictures", "--accept-defects"});
+  EXPECT_THAT(accepted, Succeeds());
+  EXPECT_THAT(accepted.out, AllOf(HasSubstr("NOT ready"), HasSubstr("mind    The mesh lacks")));
+  EXPECT_TRUE(Read("head/report.json") == Read("accepted/report.json"));
 }
 
 // What the program wrote to stderr until it said `word`; then it is sent the signal.

@@ -1,0 +1,34 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nlohmann/json.hpp"
+
+#include "client/plan_report/plan_measures.h"
+#include "client/plan_report/plan_pictures.h"
+#include "client/rendering/panels.h"
+#include "core/plan_building/skin_coverage.h"
+
+namespace tissueform {
+
+// What the report tells of the skin of the CT that the mesh has or lacks.
+
+// 99 % of every region and of the whole within the tolerance, no large gap, no hole.
+std::vector<QualityCheck> CheckCoverage(const SkinCoverage& coverage);
+
+// A sentence for every region and gap that misses a requirement, and one when bone lies in the
+// mesh's skin: place and millimetres.
+std::vector<std::string> CoverageCautions(const SkinCoverage& coverage);
+
+// The key "coverage" of report.json (docs/recipe-format.md).
+nlohmann::ordered_json CoverageJson(const SkinCoverage& coverage);
+
+// The CT's skin, what is missing in red, from the front and both sides, and what its colours mean.
+std::vector<Scene> CoverageScenes(const SkinCoverage& coverage);
+std::vector<LegendEntry> CoverageLegend(const SkinCoverage& coverage);
+
+}  // namespace tissueform
