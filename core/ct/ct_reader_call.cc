@@ -53,6 +53,16 @@ absl::Status ReceiveSize(PipeReceiver* receiver, int64_t max_voxels, CtVolume* v
   return absl::OkStatus();
 }
 
+absl::Status ReceiveSliceOrigins(PipeReceiver* receiver, CtVolume* volume) {
+  TF_ASSIGN_OR_RETURN(const int64_t count, receiver->Number(volume->size[2]));
+  if (count != 0 && count != volume->size[2]) return PipeReceiver::BrokenOff();
+  volume->slice_origins_mm.resize(static_cast<size_t>(count));
+  for (Eigen::Vector3d& origin : volume->slice_origins_mm) {
+    TF_RETURN_IF_ERROR(receiver->Bytes(origin.data(), sizeof(origin)));
+  }
+  return absl::OkStatus();
+}
+
 void SendVolume(const absl::StatusOr<CtVolume>& volume, PipeSender* sender) {
   sender->Outcome(volume.status());
   if (!volume.ok()) return;
@@ -60,6 +70,10 @@ void SendVolume(const absl::StatusOr<CtVolume>& volume, PipeSender* sender) {
   sender->Bytes(volume->spacing_mm.data(), sizeof(volume->spacing_mm));
   sender->Bytes(volume->origin_mm.data(), sizeof(volume->origin_mm));
   sender->Bytes(volume->direction.data(), sizeof(volume->direction));
+  sender->Number(static_cast<int64_t>(volume->slice_origins_mm.size()));
+  for (const Eigen::Vector3d& origin : volume->slice_origins_mm) {
+    sender->Bytes(origin.data(), sizeof(origin));
+  }
   SendProvenance(volume->provenance, sender);
   sender->Bytes(volume->hu.data(), volume->hu.size() * sizeof(int16_t));
 }
@@ -73,6 +87,7 @@ absl::StatusOr<CtVolume> ReceiveVolume(int descriptor, int64_t max_voxels) {
   TF_RETURN_IF_ERROR(receiver.Bytes(volume.spacing_mm.data(), sizeof(volume.spacing_mm)));
   TF_RETURN_IF_ERROR(receiver.Bytes(volume.origin_mm.data(), sizeof(volume.origin_mm)));
   TF_RETURN_IF_ERROR(receiver.Bytes(volume.direction.data(), sizeof(volume.direction)));
+  TF_RETURN_IF_ERROR(ReceiveSliceOrigins(&receiver, &volume));
   TF_RETURN_IF_ERROR(ReceiveProvenance(&receiver, &volume.provenance));
   volume.hu.resize(static_cast<size_t>(volume.num_voxels()));
   TF_RETURN_IF_ERROR(receiver.Bytes(volume.hu.data(), volume.hu.size() * kVoxelBytes));

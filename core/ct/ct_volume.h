@@ -12,6 +12,18 @@
 
 namespace tissueform {
 
+// Between slices that are farther apart than this nobody has seen what a plan would be made of.
+inline constexpr double kFarApartMm = 5;
+
+// A part of a CT in which its slices (or the voxels of another axis) lie far apart: between two
+// heights along a direction, p . normal.
+struct SliceGap {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // of the slices, LPS
+  double from_mm = 0;
+  double to_mm = 0;
+  double largest_mm = 0;  // between neighbours in this part, square to the slices
+};
+
 // Where a volume came from, for the report. Holds no patient identifier and no path.
 struct CtProvenance {
   std::string format;  // "DICOM", "NIfTI", "NRRD", "MetaImage"
@@ -28,6 +40,10 @@ struct CtProvenance {
 
   // What a reader of the report should know, one sentence each.
   std::vector<std::string> notes;
+
+  // Where slices are farther apart than kFarApartMm, neighbouring gaps as one: no plan should rest
+  // on what was interpolated there.
+  std::vector<SliceGap> wide_gaps;
 };
 
 // A CT volume as it was read: nothing resampled, axes as in the file.
@@ -40,6 +56,11 @@ struct CtVolume {
   // is not square to the others where the gantry was tilted.
   Eigen::Matrix3d direction = Eigen::Matrix3d::Identity();
 
+  // Where slices lie unevenly, or beside the line of the others: the centre of voxel (0, 0, k) of
+  // each, rising along direction.col(0) x direction.col(1). Empty where they are even; otherwise
+  // spacing_mm[2] is their usual distance.
+  std::vector<Eigen::Vector3d> slice_origins_mm;
+
   std::vector<int16_t> hu;  // i fastest; at least -1024
 
   CtProvenance provenance;
@@ -48,8 +69,14 @@ struct CtVolume {
   int16_t At(int i, int j, int k) const {
     return hu[static_cast<size_t>(i + int64_t{size[0]} * (j + int64_t{size[1]} * k))];
   }
-  // Columns: from one voxel to the next, in mm. p = origin_mm + StepsMm() * (i, j, k).
+  // Columns: from one voxel to the next, in mm. p = origin_mm + StepsMm() * (i, j, k) where slices
+  // are even; along i and j always.
   Eigen::Matrix3d StepsMm() const { return direction * spacing_mm.asDiagonal(); }
+  // Where the centre of voxel (i, j, k) lies.
+  Eigen::Vector3d Place(int i, int j, int k) const {
+    if (slice_origins_mm.empty()) return origin_mm + StepsMm() * Eigen::Vector3d(i, j, k);
+    return slice_origins_mm[static_cast<size_t>(k)] + StepsMm() * Eigen::Vector3d(i, j, 0);
+  }
 };
 
 }  // namespace tissueform

@@ -10,6 +10,7 @@
 
 #include "core/ct/ct_reader_call.h"
 #include "core/ct/patient_axes.h"
+#include "core/ct/slice_gaps.h"
 
 namespace tissueform {
 namespace {
@@ -37,6 +38,7 @@ absl::StatusOr<CtVolume> ReadCtVolume(const std::string& path, const CtReadOptio
   }
   absl::StatusOr<CtVolume> volume = CallCtReader(path, options);
   if (!volume.ok()) return WithSubject(volume.status());
+  volume->provenance.wide_gaps = FindWideGaps(*volume);
   return volume;
 }
 

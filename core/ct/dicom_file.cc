@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <fstream>
 #include <gdcmImageReader.h>
 #include <gdcmReader.h>
 #include <limits>
@@ -169,6 +170,18 @@ bool HoldsAllPixels(const DicomHeader& header, const gdcm::Image& image,
   return contents.size() - header.pixel_offset >= image.GetBufferLength();
 }
 
+// No more than what a DICOM file begins with: 128 bytes, nearly always zeros, and "DICM". So ends
+// what was copied to a full disk.
+bool IsBeginning(const std::string& path) {
+  constexpr std::streamsize kBeginning = 132;
+  std::ifstream stream(path, std::ios::binary);
+  std::string bytes(kBeginning, '\0');
+  stream.read(bytes.data(), kBeginning);
+  bytes.resize(static_cast<size_t>(stream.gcount()));
+  if (absl::EndsWith(bytes, "DICM")) return true;
+  return bytes.size() < kBeginning && bytes.find_first_not_of('\0') == std::string::npos;
+}
+
 }  // namespace
 
 std::string NameOf(const DicomHeader& header) {
@@ -200,6 +213,8 @@ std::string DescribeKind(const DicomHeader& header) {
       return "no image";
     case DicomKind::kDirectory:
       return "a directory (DICOMDIR)";
+    case DicomKind::kDamaged:
+      return "a DICOM file that is cut off or damaged";
   }
   return "unknown";
 }
@@ -207,17 +222,18 @@ std::string DescribeKind(const DicomHeader& header) {
 std::optional<DicomHeader> ReadDicomHeader(const std::string& path) {
   gdcm::Reader reader;
   reader.SetFileName(path.c_str());
-  if (!reader.CanRead()) return std::nullopt;
-  // A skipped tag is left unread: the stream stands where its value begins.
-  const bool whole = reader.ReadUpToTag(kPixelData, {kPixelData});
   DicomHeader header;
   header.path = path;
+  header.kind = DicomKind::kDamaged;
+  if (!reader.CanRead()) return IsBeginning(path) ? std::optional(header) : std::nullopt;
+  // A skipped tag is left unread: the stream stands where its value begins.
+  const bool whole = reader.ReadUpToTag(kPixelData, {kPixelData});
   if (reader.GetFile().GetHeader().GetDataSetTransferSyntax() ==
       gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian) {
     header.kind = DicomKind::kDeflated;  // GDCM reads some of them only
     return header;
   }
-  if (!whole) return std::nullopt;
+  if (!whole) return header;
   const gdcm::DataSet& data = reader.GetFile().GetDataSet();
   header.pixel_offset = reader.GetStreamCurrentPosition();
   header.modality = TextOf(data, kModality).substr(0, 16);

@@ -25,6 +25,7 @@ enum class DicomKind {
   kDeflated,   // its whole data set is compressed (1.2.840.10008.1.2.1.99)
   kNoImage,    // a report, a dose sheet
   kDirectory,  // DICOMDIR
+  kDamaged,    // begins as a DICOM file but is none to its end, or is only zeros
 };
 
 // One file's header without anything that names a patient.

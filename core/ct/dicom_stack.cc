@@ -20,13 +20,18 @@ constexpr size_t kLeastSlices = 8;
 constexpr double kSameDirection = 1e-3;
 constexpr double kSamePositionMm = 0.01;
 constexpr double kPositionToleranceMm = 0.1;  // positions are rounded when they are written
+constexpr double kMostPositionMm = 1e5;       // beyond any scanner's table; sums stay finite
 constexpr double kLeastSpacingMm = 0.05;
 constexpr double kMostSpacingMm = 10;
+// Longer than any protocol of the head leaves out: then it is two scans.
+constexpr double kMostGapMm = 30;
 constexpr double kMostTiltDeg = 35;
 constexpr double kUprightDeg = 0.05;
 
 const char* MissingTag(const DicomHeader& slice) {
-  if (!slice.position_mm) return "position (ImagePositionPatient)";
+  if (!slice.position_mm || !(slice.position_mm->cwiseAbs().maxCoeff() <= kMostPositionMm)) {
+    return "position (ImagePositionPatient)";
+  }
   if (!slice.row_direction) return "orientation (ImageOrientationPatient)";
   if (!slice.pixel_spacing_mm) return "pixel spacing (PixelSpacing)";
   return nullptr;
@@ -34,18 +39,13 @@ const char* MissingTag(const DicomHeader& slice) {
 
 absl::Status CheckRescale(const DicomHeader& slice, bool has_offset) {
   const bool stated = slice.rescale_slope || slice.rescale_intercept;
-  if (stated && has_offset) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        NameOf(slice), " states how its values become HU (RescaleIntercept ",
-        slice.rescale_intercept.value_or(0), "); take \"hu_offset\" out of the recipe"));
-  }
   if (stated && slice.rescale_intercept && slice.rescale_slope.value_or(1) != 0) {
     return absl::OkStatus();
   }
   if (!stated && has_offset) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
       NameOf(slice), " does not say how its values become HU (RescaleSlope, RescaleIntercept)",
-      stated ? "" : "; state \"hu_offset\" in the recipe"));
+      stated ? "; export the series again" : "; state \"hu_offset\" in the recipe"));
 }
 
 absl::Status CheckTags(const std::vector<DicomHeader>& slices, bool has_offset) {
@@ -120,11 +120,16 @@ void SortAlong(const Eigen::Vector3d& normal, std::vector<DicomHeader>* slices) 
   });
 }
 
-std::vector<double> Gaps(const std::vector<DicomHeader>& slices) {
+// Where along the normal each slice lies.
+std::vector<double> Heights(const std::vector<DicomHeader>& slices, const Eigen::Vector3d& normal) {
+  std::vector<double> heights;
+  for (const DicomHeader& slice : slices) heights.push_back(slice.position_mm->dot(normal));
+  return heights;
+}
+
+std::vector<double> Gaps(const std::vector<double>& heights) {
   std::vector<double> gaps;
-  for (size_t i = 1; i < slices.size(); ++i) {
-    gaps.push_back((*slices[i].position_mm - *slices[i - 1].position_mm).norm());
-  }
+  for (size_t i = 1; i < heights.size(); ++i) gaps.push_back(heights[i] - heights[i - 1]);
   return gaps;
 }
 
@@ -135,43 +140,71 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-absl::Status CheckGaps(const std::vector<DicomHeader>& slices) {
-  const std::vector<double> gaps = Gaps(slices);
-  const double usual = Median(gaps);
+absl::Status CheckGaps(const std::vector<DicomHeader>& slices, const std::vector<double>& gaps) {
   for (size_t i = 0; i < gaps.size(); ++i) {
-    const std::string between =
-        absl::StrCat("between ", Place(slices[i]), " and ", Place(slices[i + 1]));
     if (gaps[i] < kSamePositionMm) {
       return absl::InvalidArgumentError(absl::StrCat(
           NameOf(slices[i]), " and ", Place(slices[i + 1]),
-          " lie at the same place: the folder holds a slice twice, or two phases of a scan"));
+          " lie at the same place, and nothing in their headers tells two scans apart: leave the "
+          "files of one scan in the folder"));
     }
-    if (std::abs(gaps[i] - usual) <= kPositionToleranceMm) continue;
-    const double missing = std::round(gaps[i] / usual) - 1;
-    if (missing >= 1 && std::abs(gaps[i] - (missing + 1) * usual) <= kPositionToleranceMm) {
-      return absl::InvalidArgumentError(
-          absl::StrFormat("%.0f slice%s missing %s: they are %.2f mm apart, the others %.2f mm",
-                          missing, missing > 1 ? "s are" : " is", between, gaps[i], usual));
+    if (gaps[i] > kMostGapMm) {
+      return absl::InvalidArgumentError(absl::StrFormat(
+          "there is no slice for %.0f mm between %s and %s: leave the files of one scan in the "
+          "folder",
+          gaps[i], Place(slices[i]), Place(slices[i + 1])));
     }
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "the slices lie unevenly: %.2f mm %s, usually %.2f mm", gaps[i], between, usual));
   }
   return absl::OkStatus();
 }
 
 // Each gap may be even within the tolerance and all of them drift: so every slice is held against
 // the line from the first to the last, too.
-absl::Status CheckOnLine(const std::vector<DicomHeader>& slices, const Eigen::Vector3d& step) {
+bool IsEven(const std::vector<DicomHeader>& slices, const std::vector<double>& gaps,
+            const Eigen::Vector3d& step) {
+  const double usual = Median(gaps);
   for (size_t i = 0; i < slices.size(); ++i) {
     const Eigen::Vector3d expected = *slices.front().position_mm + static_cast<double>(i) * step;
-    const double off_mm = (*slices[i].position_mm - expected).norm();
-    if (off_mm > kPositionToleranceMm) {
-      return absl::InvalidArgumentError(
-          absl::StrFormat("the slices lie unevenly: %s is %.2f mm off the even spacing of %.3f mm",
-                          Place(slices[i]), off_mm, step.norm()));
-    }
+    if ((*slices[i].position_mm - expected).norm() > kPositionToleranceMm) return false;
+    if (i > 0 && std::abs(gaps[i - 1] - usual) > kPositionToleranceMm) return false;
   }
-  return absl::OkStatus();
+  return true;
+}
+
+// "; 2 slices are missing between ... and ..." for the first gap that is a multiple of the usual.
+std::string MissingSlices(const std::vector<DicomHeader>& slices, const std::vector<double>& gaps) {
+  const double usual = Median(gaps);
+  for (size_t i = 0; i < gaps.size(); ++i) {
+    const double missing = std::round(gaps[i] / usual) - 1;
+    if (missing < 1 || std::abs(gaps[i] - (missing + 1) * usual) > kPositionToleranceMm) continue;
+    // Farther on the slices are as far apart as here: that is how they were taken.
+    if (i + 1 < gaps.size() && std::abs(gaps[i + 1] - gaps[i]) < kPositionToleranceMm) return "";
+    return absl::StrFormat("; %.0f slice%s missing between %s and %s", missing,
+                           missing > 1 ? "s are" : " is", Place(slices[i]), Place(slices[i + 1]));
+  }
+  return "";
+}
+
+std::string UnevenNote(const std::vector<DicomHeader>& slices, const std::vector<double>& gaps) {
+  const auto [least, most] = std::minmax_element(gaps.begin(), gaps.end());
+  return absl::StrFormat(
+      "the slices lie unevenly, %.2f to %.2f mm apart, usually %.2f mm: values between them are "
+      "interpolated%s",
+      *least, *most, Median(gaps), MissingSlices(slices, gaps));
+}
+
+// From one slice to the next, for one mm along the normal: the median, as some may lie beside the
+// line of the others.
+Eigen::Vector3d UsualSlope(const std::vector<DicomHeader>& slices, const std::vector<double>& gaps,
+                           const Eigen::Vector3d& row, const Eigen::Vector3d& column) {
+  std::vector<double> along_row;
+  std::vector<double> along_column;
+  for (size_t i = 0; i < gaps.size(); ++i) {
+    const Eigen::Vector3d step = *slices[i + 1].position_mm - *slices[i].position_mm;
+    along_row.push_back(step.dot(row) / gaps[i]);
+    along_column.push_back(step.dot(column) / gaps[i]);
+  }
+  return row.cross(column) + Median(along_row) * row + Median(along_column) * column;
 }
 
 // A tilted gantry stacks slices along a step that is not their normal: the turn about the row.
@@ -211,10 +244,15 @@ absl::Status ArrangeStack(bool has_offset, DicomStack* stack) {
   const Eigen::Vector3d column = slices.front().column_direction->normalized();
   const Eigen::Vector3d normal = row.cross(column);
   SortAlong(normal, &slices);
-  TF_RETURN_IF_ERROR(CheckGaps(slices));
-  const Eigen::Vector3d step = (*slices.back().position_mm - *slices.front().position_mm) /
-                               static_cast<double>(slices.size() - 1);
-  TF_RETURN_IF_ERROR(CheckOnLine(slices, step));
+  const std::vector<double> gaps = Gaps(Heights(slices, normal));
+  Eigen::Vector3d step = (*slices.back().position_mm - *slices.front().position_mm) /
+                         static_cast<double>(slices.size() - 1);
+  TF_RETURN_IF_ERROR(CheckGaps(slices, gaps));
+  if (!IsEven(slices, gaps, step)) {
+    step = Median(gaps) * UsualSlope(slices, gaps, row, column);
+    for (const DicomHeader& slice : slices) stack->slice_origins_mm.push_back(*slice.position_mm);
+    stack->notes.push_back(UnevenNote(slices, gaps));
+  }
   TF_RETURN_IF_ERROR(CheckStep(step, normal));
   const Eigen::Vector2d& pixel = *slices.front().pixel_spacing_mm;
   stack->spacing_mm = {pixel[1], pixel[0], step.norm()};

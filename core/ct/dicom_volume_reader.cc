@@ -70,6 +70,19 @@ absl::StatusOr<SeriesChoice> ChoiceOf(const std::string& path, const Folder& fol
       "the file is no DICOM file, and its ending is none of .nii .nii.gz .nrrd .nhdr .mha .mhd");
 }
 
+// A slice that nobody can read is missing from the stack, and it would be wrong to interpolate it
+// in silence.
+absl::Status CheckNoneDamaged(const std::vector<DicomHeader>& files, const DicomStack& stack) {
+  if (stack.slice_origins_mm.empty()) return absl::OkStatus();
+  for (const DicomHeader& file : files) {
+    if (file.kind != DicomKind::kDamaged) continue;
+    return absl::InvalidArgumentError(absl::StrCat(
+        NameOf(file), " is ", DescribeKind(file), ", and ", stack.notes.back(),
+        "; export the series again, or take that file out of the folder to go without it"));
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<DicomStack> FindStack(const std::string& path, const CtReadOptions& options) {
   const std::filesystem::path place(path);
   const bool is_folder = std::filesystem::is_directory(place);
@@ -84,6 +97,7 @@ absl::StatusOr<DicomStack> FindStack(const std::string& path, const CtReadOption
   }
   TF_ASSIGN_OR_RETURN(DicomStack stack, ChooseSeries(folder.files, choice));
   TF_RETURN_IF_ERROR(ArrangeStack(options.hu_offset.has_value(), &stack));
+  TF_RETURN_IF_ERROR(CheckNoneDamaged(folder.files, stack));
   if (folder.others > 0) {
     stack.notes.push_back(absl::StrCat("left aside: ", folder.others, " files that are no DICOM"));
   }
@@ -97,6 +111,7 @@ absl::StatusOr<CtVolume> EmptyVolume(const DicomStack& stack, int64_t max_voxels
   volume.spacing_mm = stack.spacing_mm;
   volume.origin_mm = *first.position_mm;
   volume.direction = stack.direction;
+  volume.slice_origins_mm = stack.slice_origins_mm;
   volume.provenance.format = "DICOM";
   volume.provenance.num_files = volume.size[2];
   volume.provenance.gantry_tilt_deg = stack.gantry_tilt_deg;
@@ -109,16 +124,43 @@ absl::StatusOr<CtVolume> EmptyVolume(const DicomStack& stack, int64_t max_voxels
   return volume;
 }
 
-// Appends the slice's HU, and its file's digest.
+// Appends the slice's HU, and its file's digest. `offset` is the recipe's.
 absl::Status AppendSlice(const DicomHeader& slice, double offset, int64_t* bytes_left,
                          CtVolume* volume, std::string* digests) {
   TF_ASSIGN_OR_RETURN(const std::string contents, ReadWholeFile(slice.path, bytes_left));
   absl::StrAppend(digests, Sha256Hex({contents}));
   TF_ASSIGN_OR_RETURN(const std::vector<double> values, DecodeDicomPixels(slice, contents));
   const double slope = slice.rescale_slope.value_or(1);
-  const double intercept = slice.rescale_intercept.value_or(offset);
+  const double intercept = slice.rescale_intercept.value_or(0) + offset;
   for (const double value : values) volume->hu.push_back(ToHu(slope * value + intercept));
   return absl::OkStatus();
+}
+
+absl::Status ReadSlices(const DicomStack& stack, double offset, int64_t max_bytes,
+                        CtVolume* volume) {
+  std::string digests;
+  volume->hu.clear();
+  for (const DicomHeader& slice : stack.slices) {
+    TF_RETURN_IF_ERROR(AppendSlice(slice, offset, &max_bytes, volume, &digests));
+  }
+  volume->provenance.sha256 = Sha256Hex({digests});
+  return absl::OkStatus();
+}
+
+bool StatesRescale(const DicomStack& stack) {
+  return stack.slices.front().rescale_intercept.has_value();
+}
+
+// Where the files say how their values become HU and the recipe says it, too, the values decide: an
+// offset is for those only that are no HU without it. Old scanners write RescaleIntercept 0 beside
+// HU + 1024. CheckHu, without an offset, asks for one in just the cases in which it is taken here,
+// so that no message takes back what another has asked for.
+absl::Status CheckOffsetIsNeeded(const CtVolume& volume) {
+  if (!CheckHu(volume.hu, std::nullopt).ok()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      "the files state how their values become HU (RescaleSlope, RescaleIntercept), and so they "
+      "are "
+      "HU of a body in air; take \"hu_offset\" out of the recipe");
 }
 
 }  // namespace
@@ -127,13 +169,15 @@ absl::StatusOr<CtVolume> ReadDicomVolume(const std::string& path, const CtReadOp
   TF_ASSIGN_OR_RETURN(const DicomStack stack, FindStack(path, options));
   TF_ASSIGN_OR_RETURN(CtVolume volume, EmptyVolume(stack, options.limits.max_voxels));
   TF_RETURN_IF_ERROR(PlaceVolume(true, "", options.axes, &volume));
-  std::string digests;
-  int64_t bytes_left = options.limits.max_file_bytes;
-  for (const DicomHeader& slice : stack.slices) {
-    TF_RETURN_IF_ERROR(
-        AppendSlice(slice, options.hu_offset.value_or(0), &bytes_left, &volume, &digests));
+  const int64_t max_bytes = options.limits.max_file_bytes;
+  if (options.hu_offset && StatesRescale(stack)) {
+    TF_RETURN_IF_ERROR(ReadSlices(stack, 0, max_bytes, &volume));
+    TF_RETURN_IF_ERROR(CheckOffsetIsNeeded(volume));
+    volume.provenance.notes.push_back(absl::StrCat(
+        "the files state a rescale (RescaleIntercept ", *stack.slices.front().rescale_intercept,
+        ") after which their values are no HU: \"hu_offset\" of the recipe is added"));
   }
-  volume.provenance.sha256 = Sha256Hex({digests});
+  TF_RETURN_IF_ERROR(ReadSlices(stack, options.hu_offset.value_or(0), max_bytes, &volume));
   return volume;
 }
 

@@ -70,6 +70,16 @@ absl::Status WithoutAir(const Histogram& histogram, std::optional<double> hu_off
                 : "; state \"hu_offset\" in the recipe"));
 }
 
+// Padding of -2000 beside HU + 1024 looks like air. But between true air and fat there are always
+// voxels, partly filled, while raw values have their soft tissue about 1050 and next to nothing at
+// 350 to 750, where every CT in HU has bone.
+bool HidesRawValues(const Histogram& histogram) {
+  const double tissue = ShareBetween(histogram, 850, 1250);
+  return ShareBetween(histogram, -1000, kAirBelow) < kLeastShare &&
+         ShareBetween(histogram, -100, 300) > kLeastShare && tissue > 0.02 &&
+         tissue > 3 * ShareBetween(histogram, 350, 750);
+}
+
 }  // namespace
 
 int16_t ToHu(double value) {
@@ -78,7 +88,7 @@ int16_t ToHu(double value) {
 
 absl::Status CheckHu(const std::vector<int16_t>& hu, std::optional<double> hu_offset) {
   const Histogram histogram = Count(hu);
-  if (ShareBetween(histogram, kLowest, kAirBelow) < kLeastShare) {
+  if (ShareBetween(histogram, kLowest, kAirBelow) < kLeastShare || HidesRawValues(histogram)) {
     return WithoutAir(histogram, hu_offset);
   }
   if (ShareBetween(histogram, kMatterFrom, kHighest) < kLeastShare) {
@@ -86,7 +96,8 @@ absl::Status CheckHu(const std::vector<int16_t>& hu, std::optional<double> hu_of
         absl::StrCat("the values show nothing but air: almost none lies above ", kMatterFrom, " HU",
                      hu_offset ? absl::StrCat(" after adding hu_offset ", *hu_offset,
                                               "; correct it in the recipe or leave it out")
-                               : ""));
+                               : "; if an offset was applied twice, state \"hu_offset\" in the "
+                                 "recipe to undo one"));
   }
   return absl::OkStatus();
 }

@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "absl/strings/str_cat.h"
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include "core/base/parallel_for.h"
+#include "core/ct/uneven_slices.h"
 
 namespace tissueform {
 namespace {
@@ -26,6 +28,7 @@ using Samples = std::array<int, 3>;
 
 // Box of the volume's voxels, upright in the patient.
 Eigen::AlignedBox3d BoxOf(const CtVolume& volume) {
+  if (!volume.slice_origins_mm.empty()) return UnevenSlices(volume).Box();
   const Eigen::Matrix3d steps = volume.StepsMm();
   Eigen::AlignedBox3d box;
   for (int corner = 0; corner < 8; ++corner) {
@@ -48,6 +51,16 @@ GridGeometry GridOver(const Eigen::AlignedBox3d& box, double spacing_mm) {
     grid.origin_mm[axis] = box.center()[axis] - (count - 1) / 2 * spacing_mm;
   }
   return grid;
+}
+
+// Into voxels of the volume; where slices lie unevenly the third counts smallest gaps, and only its
+// scale is used.
+Eigen::Matrix3d ToIndex(const CtVolume& volume) {
+  Eigen::Matrix3d steps = volume.StepsMm();
+  if (!volume.slice_origins_mm.empty()) {
+    steps.col(2) = volume.direction.col(2) * UnevenSlices(volume).smallest_gap_mm();
+  }
+  return steps.inverse();
 }
 
 // As many as the volume's own voxels under one of the grid's, so that none is passed over: sampled
@@ -77,10 +90,13 @@ class Sampler {
  public:
   Sampler(const CtVolume& volume, const GridGeometry& grid)
       : volume_(volume),
-        to_index_(volume.StepsMm().inverse()),
+        grid_(grid),
+        to_index_(ToIndex(volume)),
         start_(to_index_ * (grid.origin_mm - volume.origin_mm)),
         steps_(to_index_ * grid.spacing_mm),
-        samples_(SamplesPerVoxel(to_index_, grid.spacing_mm)) {}
+        samples_(SamplesPerVoxel(to_index_, grid.spacing_mm)) {
+    if (!volume.slice_origins_mm.empty()) uneven_.emplace(volume);
+  }
 
   // Mean over voxel (x, y, z) of the grid, of the samples that lie in the volume.
   int16_t Mean(int x, int y, int z) const {
@@ -90,7 +106,9 @@ class Sampler {
       for (int b = 0; b < samples_[1]; ++b) {
         for (int a = 0; a < samples_[0]; ++a) {
           const Eigen::Vector3d place(x + Offset(a, 0), y + Offset(b, 1), z + Offset(c, 2));
-          count += AddSample(start_ + steps_ * place, &sum) ? 1 : 0;
+          const bool inside =
+              uneven_ ? AddUnevenSample(place, &sum) : AddSample(start_ + steps_ * place, &sum);
+          count += inside ? 1 : 0;
         }
       }
     }
@@ -108,7 +126,17 @@ class Sampler {
     return true;
   }
 
+  // `place` in voxels of the grid.
+  bool AddUnevenSample(const Eigen::Vector3d& place, double* sum) const {
+    const std::optional<double> value =
+        uneven_->ValueAt(grid_.origin_mm + grid_.spacing_mm * place);
+    *sum += value.value_or(0);
+    return value.has_value();
+  }
+
   const CtVolume& volume_;
+  const GridGeometry& grid_;
+  std::optional<UnevenSlices> uneven_;
   Eigen::Matrix3d to_index_;
   Eigen::Vector3d start_;  // place of the grid's first voxel in the volume
   Eigen::Matrix3d steps_;  // from one voxel of the grid to the next, in voxels of the volume

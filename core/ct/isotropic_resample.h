@@ -18,7 +18,8 @@ struct ResampleOptions {
 // HU on an upright grid of cubic voxels that covers the volume's box (the box of its voxels, not
 // only of their centres): round(extent / spacing) voxels along each axis, centred on it, so that a
 // volume that is such a grid already stays as it is. Values are interpolated linearly between voxel
-// centres, also in sheared volumes (gantry tilt); up to half a voxel outside the outermost centres
+// centres, also in sheared volumes (gantry tilt) and, along the slices' normal, between slices that
+// lie unevenly; up to half a voxel (half of the first or last gap) outside the outermost centres
 // the border's values hold, and beyond that there is air (-1024).
 //
 // Where the grid is coarser than the volume, the value is the mean over the new voxel: of n samples

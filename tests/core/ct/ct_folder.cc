@@ -161,9 +161,7 @@ double WorstPhantomError(const CtVolume& volume) {
   for (int k = 0; k < volume.size[2]; ++k) {
     for (int j = 0; j < volume.size[1]; ++j) {
       for (int i = 0; i < volume.size[0]; ++i) {
-        const Eigen::Vector3d place =
-            volume.origin_mm + volume.StepsMm() * Eigen::Vector3d(i, j, k);
-        worst = std::max(worst, std::abs(volume.At(i, j, k) - PhantomHu(place)));
+        worst = std::max(worst, std::abs(volume.At(i, j, k) - PhantomHu(volume.Place(i, j, k))));
       }
     }
   }

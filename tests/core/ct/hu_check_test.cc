@@ -50,6 +50,15 @@ TEST(HuCheckTest, RawValuesAreRecognisedAndTheOffsetNamed) {
   EXPECT_THAT(CheckHu(Head(1000), std::nullopt), StatusIs(kInvalid, HasSubstr("HU + 1024")));
 }
 
+TEST(HuCheckTest, PaddingDoesNotHideRawValues) {
+  std::vector<int16_t> hu = Head(1024);
+  hu.resize(1500, ToHu(-2000));
+  EXPECT_THAT(CheckHu(hu, std::nullopt), StatusIs(kInvalid, HasSubstr("\"hu_offset\": -1024")));
+  hu = Head(0);
+  hu.resize(1500, ToHu(-2000));
+  EXPECT_THAT(CheckHu(hu, std::nullopt), IsOk());
+}
+
 TEST(HuCheckTest, OtherValuesAreNotGuessedAt) {
   for (const int add : {600, 5000}) {
     EXPECT_THAT(CheckHu(Head(add), std::nullopt),

@@ -97,6 +97,75 @@ TEST(IsotropicResampleTest, LinearFunctionOfPositionIsReproduced) {
   }
 }
 
+// Heights of two thicknesses, as old scanners took heads; every third slice beside the others.
+CtVolume Uneven(const Eigen::Matrix3d& direction, const Field& field) {
+  CtVolume volume = Filled({20, 24, 10}, {0.9, 1.3, 4}, direction, field);
+  const Eigen::Vector3d normal = direction.col(0).cross(direction.col(1));
+  const std::array<double, 10> heights = {0, 1, 2, 2.4, 3.5, 5, 11, 14, 17.5, 20};
+  volume.hu.clear();
+  for (int k = 0; k < 10; ++k) {
+    const Eigen::Vector3d beside = k % 3 == 0 ? Eigen::Vector3d(direction.col(0) * 1.7)
+                                              : Eigen::Vector3d(Eigen::Vector3d::Zero());
+    volume.slice_origins_mm.push_back(volume.origin_mm + beside +
+                                      normal * heights.at(static_cast<size_t>(k)));
+    for (int j = 0; j < 24; ++j) {
+      for (int i = 0; i < 20; ++i) {
+        volume.hu.push_back(static_cast<int16_t>(std::lround(field(volume.Place(i, j, k)))));
+      }
+    }
+  }
+  return volume;
+}
+
+TEST(IsotropicResampleTest, LinearFunctionIsReproducedBetweenUnevenSlices) {
+  for (const Eigen::Matrix3d& direction : {Directions()[0], Directions()[3], Directions()[4]}) {
+    const CtVolume volume = Uneven(direction, Linear);
+    for (const double spacing_mm : {0.8, 1.5}) {
+      ASSERT_OK_AND_ASSIGN(const HuGrid grid, ResampleIsotropic(volume, spacing_mm));
+      int inside = 0;
+      for (int z = 0; z < grid.geometry.size[2]; ++z) {
+        for (int y = 0; y < grid.geometry.size[1]; ++y) {
+          for (int x = 0; x < grid.geometry.size[0]; ++x) {
+            const Eigen::Vector3d place = grid.geometry.Centre(x, y, z);
+            const Eigen::Vector3d from = place - volume.slice_origins_mm[1];
+            const double height = direction.col(0).cross(direction.col(1)).dot(from) + 1;
+            const double across = direction.col(0).dot(from);
+            const double down = direction.col(1).dot(from);
+            if (height < 1.5 || height > 18.5 || across < 3.5 || across > 15 || down < 1.5 ||
+                down > 28) {
+              continue;
+            }
+            ++inside;
+            ASSERT_NEAR(grid.At(x, y, z), Linear(place), 1.001);
+          }
+        }
+      }
+      EXPECT_GT(inside, 500);
+    }
+  }
+}
+
+TEST(IsotropicResampleTest, UnevenSlicesAreExactWhereTheyLie) {
+  std::mt19937 random(5);
+  std::uniform_int_distribution<int> hu(-1024, 3000);
+  CtVolume volume = Filled({9, 8, 4}, {1, 1, 1}, Eigen::Matrix3d::Identity(),
+                           [&](const Eigen::Vector3d&) { return hu(random); });
+  for (const double height : {0, 1, 4, 5}) {
+    volume.slice_origins_mm.emplace_back(volume.origin_mm + Eigen::Vector3d(0, 0, height));
+  }
+  ASSERT_OK_AND_ASSIGN(const HuGrid grid, ResampleIsotropic(volume, 1));
+  ASSERT_THAT(grid.geometry.size, ElementsAre(9, 8, 6));
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 9; ++x) {
+      EXPECT_EQ(grid.At(x, y, 0), volume.At(x, y, 0));
+      EXPECT_EQ(grid.At(x, y, 1), volume.At(x, y, 1));
+      EXPECT_EQ(grid.At(x, y, 4), volume.At(x, y, 2));
+      EXPECT_EQ(grid.At(x, y, 5), volume.At(x, y, 3));
+      EXPECT_NEAR(grid.At(x, y, 2), (2.0 * volume.At(x, y, 1) + volume.At(x, y, 2)) / 3, 0.51);
+    }
+  }
+}
+
 TEST(IsotropicResampleTest, GridOfTheSameVoxelsIsTheVolume) {
   std::mt19937 random(3);
   std::uniform_int_distribution<int> hu(-1024, 3000);
