@@ -107,22 +107,20 @@ std::vector<QualityCheck> CheckCoverage(const SkinCoverage& coverage) {
   const double worst_share = coverage.regions[worst].share();
   const std::string within =
       absl::StrFormat("Skin of the CT within %.1f mm of the mesh's", coverage.tolerance_mm);
-  return {{absl::StrCat(within, ", as a whole"),
-           absl::StrFormat("at least %g %%", 100 * kLeastCovered),
-           absl::StrFormat("%.2f %%", 100 * coverage.whole.share()),
-           coverage.whole.share() >= kLeastCovered},
-          {absl::StrCat(within, ", in each region"),
-           absl::StrFormat("at least %g %%", 100 * kLeastCovered),
-           absl::StrFormat("%.2f %% in %s", 100 * worst_share,
-                           Words(static_cast<SkinRegion>(worst))),
-           worst_share >= kLeastCovered},
-          CheckParts(absl::StrFormat("Gaps: skin of the CT farther than %g mm", kGapMm),
-                     absl::StrFormat("none over %.1f cm2", kLargestGapMm2 / 100), coverage.gaps,
-                     kLargestGapMm2),
-          CheckParts(absl::StrFormat("Holes: skin of the CT farther than %.1f mm",
-                                     coverage.hole_mm),
-                     absl::StrFormat("none over %.1f cm2", kLargestHoleMm2 / 100), coverage.holes,
-                     kLargestHoleMm2)};
+  return {
+      {absl::StrCat(within, ", as a whole"), absl::StrFormat("at least %g %%", 100 * kLeastCovered),
+       absl::StrFormat("%.2f %%", 100 * coverage.whole.share()),
+       coverage.whole.share() >= kLeastCovered},
+      {absl::StrCat(within, ", in each region"),
+       absl::StrFormat("at least %g %%", 100 * kLeastCovered),
+       absl::StrFormat("%.2f %% in %s", 100 * worst_share, Words(static_cast<SkinRegion>(worst))),
+       worst_share >= kLeastCovered},
+      CheckParts(absl::StrFormat("Gaps: skin of the CT farther than %g mm", kGapMm),
+                 absl::StrFormat("none over %.1f cm2", kLargestGapMm2 / 100), coverage.gaps,
+                 kLargestGapMm2),
+      CheckParts(absl::StrFormat("Holes: skin of the CT farther than %.1f mm", coverage.hole_mm),
+                 absl::StrFormat("none over %.1f cm2", kLargestHoleMm2 / 100), coverage.holes,
+                 kLargestHoleMm2)};
 }
 
 std::vector<std::string> CoverageCautions(const SkinCoverage& coverage) {
@@ -152,10 +150,10 @@ std::vector<std::string> CoverageCautions(const SkinCoverage& coverage) {
 }
 
 Json CoverageJson(const SkinCoverage& coverage) {
-  Json json = {{"means",
-                "the CT's outer skin in the region of interest, by area, against the mesh's skin"},
-               {"tolerance_mm", coverage.tolerance_mm},
-               {"whole", PartJson(coverage.whole)}};
+  Json json = {
+      {"means", "the CT's outer skin in the region of interest, by area, against the mesh's skin"},
+      {"tolerance_mm", coverage.tolerance_mm},
+      {"whole", PartJson(coverage.whole)}};
   for (size_t r = 0; r < coverage.regions.size(); ++r) {
     const CoveredPart& part = coverage.regions[r];
     if (part.area_mm2 > 0) json["regions"][KeyOf(static_cast<SkinRegion>(r))] = PartJson(part);
@@ -173,8 +171,8 @@ std::vector<Scene> CoverageScenes(const SkinCoverage& coverage) {
       .positions = coverage.positions, .triangles = coverage.triangles, .edges = false};
   for (const double mm : coverage.distance_mm) {
     layer.triangle_colours.push_back(mm > std::max(kGapMm, coverage.tolerance_mm) ? kGapColour
-                                     : mm > coverage.tolerance_mm ? kMissingColour
-                                                                  : kCoveredColour);
+                                     : mm > coverage.tolerance_mm                 ? kMissingColour
+                                                                                  : kCoveredColour);
   }
   std::vector<Scene> scenes;
   for (const auto& [title, from] : {std::pair("from the front", Vector3d(0, -1, 0)),
@@ -188,10 +186,10 @@ std::vector<Scene> CoverageScenes(const SkinCoverage& coverage) {
 
 std::vector<LegendEntry> CoverageLegend(const SkinCoverage& coverage) {
   const double gap_mm = std::max(kGapMm, coverage.tolerance_mm);
-  return {{absl::StrFormat("within %.1f mm of the mesh's skin", coverage.tolerance_mm),
-           kCoveredColour},
-          {absl::StrFormat("missing: farther than %.1f mm", coverage.tolerance_mm), kMissingColour},
-          {absl::StrFormat("farther than %.1f mm", gap_mm), kGapColour}};
+  return {
+      {absl::StrFormat("within %.1f mm of the mesh's skin", coverage.tolerance_mm), kCoveredColour},
+      {absl::StrFormat("missing: farther than %.1f mm", coverage.tolerance_mm), kMissingColour},
+      {absl::StrFormat("farther than %.1f mm", gap_mm), kGapColour}};
 }
 
 }  // namespace tissueform

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -13,6 +14,7 @@
 #include "client/plan_report/coverage_report.h"
 #include "core/mesh/tet_quality.h"
 #include "core/mesh/validation.h"
+#include "core/plan_building/slice_gap_check.h"
 
 namespace tissueform {
 namespace {
@@ -69,6 +71,16 @@ QualityCheck CheckSkin(const std::string& what, double voxels, double limit_voxe
           voxels <= limit_voxels};
 }
 
+QualityCheck CheckSliceGaps(const PlanBuild& build) {
+  const std::optional<SliceGap> gap = WidestGapInRegion(build.ct.wide_gaps, build.soft_tissue);
+  return {"Distance of the CT's slices in the region of interest",
+          absl::StrFormat("at most %g mm", kFarApartMm),
+          gap ? absl::StrFormat("up to %.2f mm, from %.0f to %.0f mm along the slices' normal",
+                                gap->largest_mm, gap->from_mm, gap->to_mm)
+              : "within that",
+          !gap};
+}
+
 }  // namespace
 
 PlanMeasures MeasurePlan(const PlanBuild& build) {
@@ -108,7 +120,8 @@ std::vector<QualityCheck> CheckQuality(const PlanBuild& build, const PlanMeasure
        measures.components == 1},
       CheckVolume(measures),
       CheckSkin("mean", measures.skin_mean_voxels, kMostMeanVoxels, spacing_mm),
-      CheckSkin("99 % of the vertices", measures.skin_p99_voxels, kMostP99Voxels, spacing_mm)};
+      CheckSkin("99 % of the vertices", measures.skin_p99_voxels, kMostP99Voxels, spacing_mm),
+      CheckSliceGaps(build)};
   for (QualityCheck& check : CheckCoverage(build.coverage)) checks.push_back(std::move(check));
   return checks;
 }

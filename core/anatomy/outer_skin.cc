@@ -96,7 +96,8 @@ class NearestFirst {
       for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
           const float voxels = std::sqrt(static_cast<float>(dx * dx + dy * dy + dz * dz));
-          if (voxels > 0) Offer({voxel[0] + dx, voxel[1] + dy, voxel[2] + dz}, mm + step_mm * voxels);
+          if (voxels > 0)
+            Offer({voxel[0] + dx, voxel[1] + dy, voxel[2] + dz}, mm + step_mm * voxels);
         }
       }
     }
@@ -124,9 +125,8 @@ LabelGrid OutsideAir(const HeadSegmentation& head, const OuterSkinOptions& optio
   const double radius_mm = options.opening_radius_mm;
   const double voxel_mm = head.hu.geometry.spacing_mm;
   const int padding = static_cast<int>(std::ceil(radius_mm / voxel_mm)) + 2;
-  const LabelGrid air =
-      Padded(MaskWhere(head.hu, [&](int16_t hu) { return hu <= head.options.tissue_above_hu; }),
-             padding);
+  const LabelGrid air = Padded(
+      MaskWhere(head.hu, [&](int16_t hu) { return hu <= head.options.tissue_above_hu; }), padding);
   const LabelGrid tissue = MaskWhere(air, [](uint8_t value) { return value == 0; });
   const LabelGrid free = MaskWhere(DistanceMm(tissue), [=](float mm) { return mm > radius_mm; });
   const LabelGrid centres = LargestComponent(free, Neighbours::kFaces);

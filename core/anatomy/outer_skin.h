@@ -27,8 +27,8 @@ LabelGrid OutsideAir(const HeadSegmentation& head, const OuterSkinOptions& optio
 LabelGrid VoxelsFacing(const LabelGrid& outside_air, const LabelGrid& mask);
 
 // Distance from `seeds` on ways through the faces, edges and corners of the voxels of `mask`, up to
-// `reach_mm`; beyond it, and outside the mask, infinite. Steps are 1, sqrt 2 and sqrt 3 voxels long:
-// at most 8 % longer than the way itself.
+// `reach_mm`; beyond it, and outside the mask, infinite. Steps are 1, sqrt 2 and sqrt 3 voxels
+// long: at most 8 % longer than the way itself.
 VoxelGrid<float> DistanceWithin(const LabelGrid& mask, const LabelGrid& seeds, double reach_mm);
 
 }  // namespace tissueform

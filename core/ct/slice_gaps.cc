@@ -14,9 +14,8 @@ constexpr double kRoundingMm = 0.01;  // of positions in headers: 5.00 mm is not
 
 // Square to the voxels' other two axes, the way in which they grow along this one.
 Eigen::Vector3d NormalOf(const CtVolume& volume, int axis) {
-  const Eigen::Vector3d normal = volume.direction.col((axis + 1) % 3)
-                                     .cross(volume.direction.col((axis + 2) % 3))
-                                     .normalized();
+  const Eigen::Vector3d normal =
+      volume.direction.col((axis + 1) % 3).cross(volume.direction.col((axis + 2) % 3)).normalized();
   return normal.dot(volume.direction.col(axis)) < 0 ? Eigen::Vector3d(-normal) : normal;
 }
 
@@ -30,8 +29,8 @@ std::vector<double> HeightsAlong(const CtVolume& volume, int axis, const Eigen::
 }
 
 void AddGap(const SliceGap& gap, std::vector<SliceGap>* gaps) {
-  const bool goes_on = !gaps->empty() && gaps->back().normal == gap.normal &&
-                       gaps->back().to_mm == gap.from_mm;
+  const bool goes_on =
+      !gaps->empty() && gaps->back().normal == gap.normal && gaps->back().to_mm == gap.from_mm;
   if (!goes_on) {
     gaps->push_back(gap);
     return;

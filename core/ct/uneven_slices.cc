@@ -26,8 +26,7 @@ std::optional<double> UnevenSlices::ValueAt(const Eigen::Vector3d& place_mm) con
   const size_t last = heights_.size() - 1;
   const auto above = std::upper_bound(heights_.begin() + 1, heights_.end() - 1, height);
   const auto upper = static_cast<size_t>(above - heights_.begin());
-  const double part =
-      (height - heights_[upper - 1]) / (heights_[upper] - heights_[upper - 1]);
+  const double part = (height - heights_[upper - 1]) / (heights_[upper] - heights_[upper - 1]);
   if (part < -0.5 - kRounding || part > 1.5 + kRounding) return std::nullopt;
   const size_t nearest = part < 0.5 ? upper - 1 : std::min(upper, last);
   const Eigen::Vector2d at = InSlice(place_mm, nearest);

@@ -14,9 +14,9 @@
 namespace tissueform {
 
 // Values between the voxels of a volume whose slices lie unevenly or beside each other
-// (CtVolume::slice_origins_mm): linear in each of the two slices about a place, and along the normal
-// between them. At a slice it is that slice; a linear function of position is reproduced. Refers to
-// the volume.
+// (CtVolume::slice_origins_mm): linear in each of the two slices about a place, and along the
+// normal between them. At a slice it is that slice; a linear function of position is reproduced.
+// Refers to the volume.
 class UnevenSlices {
  public:
   explicit UnevenSlices(const CtVolume& volume);

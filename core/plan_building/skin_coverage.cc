@@ -114,8 +114,9 @@ absl::StatusOr<TriangleMesh> SkinOf(const MeshedSkin& mesh) {
   if (std::find(kept.begin(), kept.end(), true) != kept.end()) {
     return KeepTriangles(mesh.surface, kept);
   }
-  return absl::InvalidArgumentError("no part of the mesh's boundary is skin; move the planes of "
-                                    "the region of interest");
+  return absl::InvalidArgumentError(
+      "no part of the mesh's boundary is skin; move the planes of "
+      "the region of interest");
 }
 
 void Count(double area_mm2, double distance_mm, double tolerance_mm, const Eigen::Vector3d& place,
@@ -181,8 +182,8 @@ void CountBone(const MeshedSkin& mesh, const TriangleMesh& skin, SkinCoverage* c
 }  // namespace
 
 absl::StatusOr<SkinCoverage> MeasureSkinCoverage(const HeadSegmentation& head,
-                                                 const Landmarks& landmarks,
-                                                 const MeshedSkin& mesh, double ct_voxel_mm) {
+                                                 const Landmarks& landmarks, const MeshedSkin& mesh,
+                                                 double ct_voxel_mm) {
   TF_ASSIGN_OR_RETURN(const TriangleMesh skin, OuterSkin(head, mesh.region));
   TF_ASSIGN_OR_RETURN(const TriangleMesh mesh_skin, SkinOf(mesh));
   const TriangleSizes sizes = SizesOf(skin);
@@ -194,7 +195,8 @@ absl::StatusOr<SkinCoverage> MeasureSkinCoverage(const HeadSegmentation& head,
   for (size_t f = 0; f < names.size(); ++f) {
     const auto row = static_cast<Eigen::Index>(f);
     for (CoveredPart* part : {&coverage.whole, &coverage.regions[static_cast<size_t>(names[f])]}) {
-      Count(sizes.areas_mm2[f], distances[row], coverage.tolerance_mm, sizes.middles.row(row), part);
+      Count(sizes.areas_mm2[f], distances[row], coverage.tolerance_mm, sizes.middles.row(row),
+            part);
     }
   }
   coverage.distance_mm.assign(distances.begin(), distances.end());

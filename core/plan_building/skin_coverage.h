@@ -79,7 +79,7 @@ struct MeshedSkin {
 //
 // Errors: those of ExtractSurface; InvalidArgument when no outer skin lies in the region.
 absl::StatusOr<SkinCoverage> MeasureSkinCoverage(const HeadSegmentation& head,
-                                                 const Landmarks& landmarks,
-                                                 const MeshedSkin& mesh, double ct_voxel_mm);
+                                                 const Landmarks& landmarks, const MeshedSkin& mesh,
+                                                 double ct_voxel_mm);
 
 }  // namespace tissueform

@@ -22,8 +22,8 @@ struct TableRow {
   double energy_kev, weight, water, bone, silver, iron;
 };
 constexpr TableRow kTable[] = {
-    {30, 0.02, 0.3756, 1.331, 36.68, 8.176}, {40, 0.10, 0.2683, 0.6655, 17.20, 3.629},
-    {50, 0.18, 0.2269, 0.4242, 9.444, 1.958}, {60, 0.28, 0.2059, 0.3148, 5.766, 1.205},
+    {30, 0.02, 0.3756, 1.331, 36.68, 8.176},   {40, 0.10, 0.2683, 0.6655, 17.20, 3.629},
+    {50, 0.18, 0.2269, 0.4242, 9.444, 1.958},  {60, 0.28, 0.2059, 0.3148, 5.766, 1.205},
     {80, 0.27, 0.1837, 0.2229, 2.651, 0.5952}, {100, 0.15, 0.1707, 0.1855, 1.470, 0.3717}};
 
 // Densities in g/cm3. Amalgam is silver, tin and mercury, which differ by less than a fifth from
@@ -163,8 +163,8 @@ CtScanner::CtScanner(const ScannerOptions& options)
   // Half of it, because a full turn sees every line twice.
   for (int row = 0; row < options.num_channels; ++row) {
     for (int column = 0; column < options.num_channels; ++column) {
-      filter_(row, column) = static_cast<float>(
-          0.5 * options.channel_mm * SoftRamp(row - column, options.channel_mm));
+      filter_(row, column) =
+          static_cast<float>(0.5 * options.channel_mm * SoftRamp(row - column, options.channel_mm));
     }
   }
   for (int mm = 0; mm <= kLongestWaterMm; ++mm) {
@@ -253,7 +253,8 @@ Eigen::ArrayXXf CtScanner::WithMetal(const Eigen::ArrayXXf& free, const TissueSl
       if (metal_mm == 0) continue;
       const double water_mm = tissue.water.data()[ray] - no_water.data()[ray];
       const double bone_mm = tissue.bone.data()[ray] - no_bone.data()[ray];
-      const double share = Arriving(std::max(0.0, water_mm), std::max(0.0, bone_mm), metal_mm, metal);
+      const double share =
+          Arriving(std::max(0.0, water_mm), std::max(0.0, bone_mm), metal_mm, metal);
       all.data()[ray] +=
           static_cast<float>((share - free.data()[ray]) / static_cast<double>(layers.size()));
     }
@@ -296,8 +297,8 @@ std::vector<int16_t> CtScanner::Reconstruct(const Eigen::ArrayXXf& lengths, int 
   const auto num_pixels = static_cast<size_t>(size) * static_cast<size_t>(size);
   std::vector<float> density(num_pixels, 0);
   const auto magnify = static_cast<float>(options_.source_mm);
-  const Eigen::ArrayXf x_mm = Eigen::ArrayXf::LinSpaced(size, -0.5F, 0.5F) *
-                              static_cast<float>((size - 1) * pixel_mm);
+  const Eigen::ArrayXf x_mm =
+      Eigen::ArrayXf::LinSpaced(size, -0.5F, 0.5F) * static_cast<float>((size - 1) * pixel_mm);
   for (int view = 0; view < options_.num_views; ++view) {
     const Eigen::Vector2f s = to_source_[static_cast<size_t>(view)].cast<float>();
     const float* row = filtered.col(view).data();

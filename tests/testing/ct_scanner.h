@@ -95,15 +95,16 @@ class CtScanner {
   std::vector<int16_t> Reconstruct(const Eigen::ArrayXXf& lengths, int size, double pixel_mm) const;
 
  private:
-  Eigen::ArrayXXf Splat(const std::vector<MetalCell>& cells, const std::vector<float>& factor) const;
+  Eigen::ArrayXXf Splat(const std::vector<MetalCell>& cells,
+                        const std::vector<float>& factor) const;
   double WaterLength(double attenuation) const;
   double ChannelAt(double u_mm) const { return u_mm / options_.channel_mm + centre_; }
 
   ScannerOptions options_;
-  double centre_ = 0;                     // the channel of the central ray
+  double centre_ = 0;                       // the channel of the central ray
   std::vector<Eigen::Vector2d> to_source_;  // unit vectors, by view
-  Eigen::MatrixXf filter_;                // channels by channels
-  std::vector<double> water_attenuation_;  // of water 0, 1, 2 .. mm long
+  Eigen::MatrixXf filter_;                  // channels by channels
+  std::vector<double> water_attenuation_;   // of water 0, 1, 2 .. mm long
 };
 
 }  // namespace tissueform::testing

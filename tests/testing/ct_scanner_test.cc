@@ -106,7 +106,8 @@ TEST(CtScannerTest, ShadowOfAPinLiesWhereItsRayGoes) {
   const Eigen::ArrayXXf lengths = scanner.ProjectMetal(MetalDisc(3, 40, -25));
   for (int view = 0; view < options.num_views; view += 41) {
     const double angle = 2 * std::numbers::pi * view / options.num_views;
-    const Eigen::Vector2d source = options.source_mm * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    const Eigen::Vector2d source =
+        options.source_mm * Eigen::Vector2d(std::cos(angle), std::sin(angle));
     const Eigen::Vector2d across(-std::sin(angle), std::cos(angle));
     const Eigen::Vector2d ray = Eigen::Vector2d(40, -25) - source;
     const double u_mm = options.source_mm * ray.dot(across) / -ray.dot(source.normalized());

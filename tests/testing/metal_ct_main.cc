@@ -20,12 +20,11 @@ namespace {
 using tissueform::testing::SimulatedHeads;
 
 absl::Status WriteHeads(const std::string& folder) {
-  TF_ASSIGN_OR_RETURN(
-      const SimulatedHeads heads,
-      tissueform::testing::SimulateHeads(tissueform::AvailableProcessors()));
-  for (const auto& [name, head] : {std::pair("free", &heads.free),
-                                   std::pair("fillings", &heads.fillings),
-                                   std::pair("braces", &heads.braces)}) {
+  TF_ASSIGN_OR_RETURN(const SimulatedHeads heads,
+                      tissueform::testing::SimulateHeads(tissueform::AvailableProcessors()));
+  for (const auto& [name, head] :
+       {std::pair("free", &heads.free), std::pair("fillings", &heads.fillings),
+        std::pair("braces", &heads.braces)}) {
     TF_RETURN_IF_ERROR(tissueform::testing::WriteNrrd(folder + "/" + name + ".nrrd", *head));
   }
   return absl::OkStatus();

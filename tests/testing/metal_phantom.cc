@@ -9,10 +9,9 @@
 #include <fstream>
 #include <utility>
 
-#include <Eigen/Geometry>
-
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include <Eigen/Geometry>
 
 #include "core/base/parallel_for.h"
 #include "core/base/status_macros.h"
@@ -156,8 +155,7 @@ void RefineSlice(const int16_t* coarse, const std::vector<CubicTap>& across,
       row += tap.weights[static_cast<Eigen::Index>(n)] * rows.col(tap.from[n]);
     }
     for (Eigen::Index x = 0; x < width; ++x) {
-      fine[y * width + x] =
-          static_cast<int16_t>(std::lround(std::clamp(row[x], -1024.0, 3071.0)));
+      fine[y * width + x] = static_cast<int16_t>(std::lround(std::clamp(row[x], -1024.0, 3071.0)));
     }
   }
 }
@@ -166,9 +164,9 @@ void RefineSlice(const int16_t* coarse, const std::vector<CubicTap>& across,
 class CellGatherer {
  public:
   CellGatherer(const CtVolume& volume, int slice)
-      : middle_mm_(volume.origin_mm +
-                   volume.StepsMm() * Eigen::Vector3d(0.5 * (volume.size[0] - 1),
-                                                      0.5 * (volume.size[1] - 1), slice)),
+      : middle_mm_(volume.origin_mm + volume.StepsMm() * Eigen::Vector3d(0.5 * (volume.size[0] - 1),
+                                                                         0.5 * (volume.size[1] - 1),
+                                                                         slice)),
         direction_(volume.direction),
         half_(static_cast<int>(0.5 * volume.size[0] * volume.spacing_mm.x() / kCellMm)) {}
 
@@ -231,7 +229,8 @@ class CellGatherer {
 };
 
 bool HasMetal(const MetalLayers& layers) {
-  return std::any_of(layers.begin(), layers.end(), [](const auto& cells) { return !cells.empty(); });
+  return std::any_of(layers.begin(), layers.end(),
+                     [](const auto& cells) { return !cells.empty(); });
 }
 
 // One slice of all three heads. Without metal in it, a head's slice is that of the free one.

@@ -31,8 +31,8 @@ class OuterSkinTest : public ::testing::Test {
   // lower border of the CT cuts; a groove of 4 mm, 5 mm deep, in the chin's skin.
   static void Carve(HuGrid* ct) {
     ForEachVoxel(LabelGrid(ct->geometry, 1), [&](size_t index, const Eigen::Vector3d& p) {
-      const bool nostril = (IsNear(p, {6, -84, 0}, 4) || IsNear(p, {-6, -84, 0}, 4)) && p.z() < 4 &&
-                           p.z() > -40;
+      const bool nostril =
+          (IsNear(p, {6, -84, 0}, 4) || IsNear(p, {-6, -84, 0}, 4)) && p.z() < 4 && p.z() > -40;
       const bool windpipe = IsNear(p, {0, 10, 0}, 10) && p.z() < -60;
       const bool groove = std::abs(p.z() + 68) < 2 && p.y() < -66.5 && p.y() > -110;
       if (nostril || windpipe || groove) ct->values[index] = -1000;
@@ -64,8 +64,7 @@ TEST_F(OuterSkinTest, ItReachesIntoCreases) {
 
 TEST_F(OuterSkinTest, NoTissueIsAir) {
   for (size_t i = 0; i < outside_.values.size(); ++i) {
-    ASSERT_TRUE(outside_.values[i] == 0 ||
-                head_.hu.values[i] <= head_.options.tissue_above_hu);
+    ASSERT_TRUE(outside_.values[i] == 0 || head_.hu.values[i] <= head_.options.tissue_above_hu);
   }
 }
 

@@ -25,9 +25,8 @@ constexpr double kPi = std::numbers::pi;
 // A ball of soft tissue with a closed hollow of 15 mm; its skin is at -500 HU.
 HeadSegmentation Ball() {
   HeadSegmentation head;
-  head.hu = HuGrid({.size = {70, 70, 70},
-                    .origin_mm = Eigen::Vector3d::Constant(-51.7),
-                    .spacing_mm = 1.5});
+  head.hu = HuGrid(
+      {.size = {70, 70, 70}, .origin_mm = Eigen::Vector3d::Constant(-51.7), .spacing_mm = 1.5});
   ForEachVoxel(LabelGrid(head.hu.geometry, 1), [&](size_t index, const Eigen::Vector3d& place) {
     const double wall = std::min(kBallMm - place.norm(), place.norm() - 15);
     head.hu.values[index] =
