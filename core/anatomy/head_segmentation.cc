@@ -130,7 +130,7 @@ void RemoveObjects(const LabelGrid& tissue, HeadSegmentation* result) {
 
 absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
                                              const HeadSegmentationOptions& options,
-                                             const StageFunction& tell) {
+                                             const StageFunction& tell, const LabelGrid& metal) {
   TellStage(tell, "finding the head", 0);
   const auto is_tissue = [&](int16_t hu) { return hu > options.tissue_above_hu; };
   const LabelGrid body = LargestBody(MaskWhere(ct, is_tissue), options.opening_radius_mm);
@@ -141,6 +141,7 @@ absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
   result.options = options;
   result.head = Crop(body, box);
   result.hu = Crop(ct, box);
+  result.metal = metal.values.empty() ? LabelGrid(result.hu.geometry) : Crop(metal, box);
   RemoveObjects(MaskWhere(result.hu, is_tissue), &result);
 
   TellStage(tell, "finding bone", 0.6);

@@ -28,6 +28,9 @@ struct HeadSegmentation {
   HuGrid hu;
   LabelGrid head;  // tissue and bone, without airway, sinuses and the open mouth
   LabelGrid bone;  // subset of the head
+  // 1 for fillings, brackets and wires, which are bone as well: they belong to the teeth they sit
+  // on. All 0 where there is no metal.
+  LabelGrid metal;
   HeadSegmentationOptions options;
 
   double removed_mm3 = 0;  // tissue that was taken away: tubes, cords, head rest
@@ -38,10 +41,13 @@ struct HeadSegmentation {
 // Finds the largest body of tissue, opened by a ball so that what only touches it falls off, and
 // its bone.
 //
+// `metal` is a mask on the CT's grid, or has no voxels where there is none.
+//
 // Errors: InvalidArgument when there is too little tissue or bone for a head, or when no soft
 // tissue covers the bone (a skull, a phantom).
 absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
                                              const HeadSegmentationOptions& options = {},
-                                             const StageFunction& tell = nullptr);
+                                             const StageFunction& tell = nullptr,
+                                             const LabelGrid& metal = {});
 
 }  // namespace tissueform

@@ -11,7 +11,6 @@
 #include "core/anatomy/itk_filters.h"
 #include "core/anatomy/surface_extraction.h"
 #include "core/base/status_macros.h"
-#include "core/ct/isotropic_resample.h"
 #include "core/plan_building/contact_trial.h"
 
 namespace tissueform {
@@ -58,7 +57,7 @@ struct ResampledCt {
   CtProvenance provenance;
   std::array<int, 3> size = {0, 0, 0};  // of the CT as it was read
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Zero();
-  HuGrid hu;
+  CtWithMetal ct;
 };
 
 struct Anatomy {
@@ -83,19 +82,21 @@ absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Re
                                             int threads, Progress* progress) {
   progress->Begin("reading the CT", 0, 0.08);
   TF_ASSIGN_OR_RETURN(CtVolume volume, ReadCtVolume(ct_path, recipe.ct));
-  progress->Begin("resampling", 0.08, 0.12);
-  TF_ASSIGN_OR_RETURN(HuGrid hu,
-                      ResampleIsotropic(volume, recipe.spacing_mm, {.threads = threads}));
-  return ResampledCt{.provenance = std::move(volume.provenance),
+  progress->Begin("lessening the streaks of metal, resampling", 0.08, 0.12);
+  ResampledCt result{.provenance = std::move(volume.provenance),
                      .size = volume.size,
                      .spacing_mm = volume.spacing_mm,
-                     .hu = std::move(hu)};
+                     .ct = {}};
+  TF_ASSIGN_OR_RETURN(result.ct, ResampleWithoutStreaks(std::move(volume), recipe.spacing_mm,
+                                                        recipe.metal, threads));
+  return result;
 }
 
-absl::StatusOr<Anatomy> FindAnatomy(const HuGrid& ct, const Recipe& recipe, Progress* progress) {
+absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const Recipe& recipe,
+                                    Progress* progress) {
   progress->Begin("finding the head and its bone", 0.12, 0.3);
   TF_ASSIGN_OR_RETURN(HeadSegmentation head,
-                      SegmentHead(ct, recipe.segmentation, progress->Parts()));
+                      SegmentHead(ct.hu, recipe.segmentation, progress->Parts(), ct.metal));
   progress->Begin("telling the bones apart", 0.3, 0.42);
   TF_ASSIGN_OR_RETURN(BoneParts parts,
                       SeparateBoneParts(head, recipe.occlusal_plane, progress->Parts()));
@@ -240,8 +241,8 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                                     const PlanBuildOptions& options) {
   Progress progress(options.tell);
   TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(ct_path, recipe, options.threads, &progress));
-  TF_ASSIGN_OR_RETURN(Anatomy anatomy, FindAnatomy(ct.hu, recipe, &progress));
-  ct.hu = {};  // the head has its own: as large as the CT, and the next stages need the room
+  TF_ASSIGN_OR_RETURN(Anatomy anatomy, FindAnatomy(ct.ct, recipe, &progress));
+  ct.ct.hu = {};  // the head has its own: as large as the CT, and the next stages need the room
   TF_ASSIGN_OR_RETURN(DividedBone bone, CutBone(anatomy, recipe.segments, &progress));
   TF_ASSIGN_OR_RETURN(SoftTissue soft_tissue,
                       FindSoftTissue(anatomy, bone.labels, recipe, &progress));
@@ -259,6 +260,8 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                    .ct = std::move(ct.provenance),
                    .ct_size = ct.size,
                    .ct_spacing_mm = ct.spacing_mm,
+                   .metal = std::move(ct.ct.report),
+                   .before_correction = std::move(ct.ct.before),
                    .head = std::move(anatomy.head),
                    .parts = std::move(anatomy.parts),
                    .bone = std::move(bone.labels),

@@ -18,6 +18,7 @@
 #include "core/anatomy/soft_tissue.h"
 #include "core/anatomy/tet_stiffness.h"
 #include "core/ct/ct_volume.h"
+#include "core/metal/metal_reduction.h"
 #include "core/plan_building/planning_regions.h"
 #include "core/plan_building/recipe.h"
 #include "core/plan_building/skin_coverage.h"
@@ -46,7 +47,9 @@ struct PlanBuild {
   CtProvenance ct;
   std::array<int, 3> ct_size = {0, 0, 0};
   Eigen::Vector3d ct_spacing_mm = Eigen::Vector3d::Zero();
-  HeadSegmentation head;  // its geometry is the resampled CT's
+  MetalReport metal;
+  HuGrid before_correction;  // the resampled CT about the metal before its streaks were lessened
+  HeadSegmentation head;     // its geometry is the resampled CT's
   BoneParts parts;
   LabelGrid bone;  // 0 none, 1 stays, 2.. the segments; on the head's grid
   Landmarks landmarks;
