@@ -26,11 +26,14 @@ struct ContactTrial {
 struct ReleasedContacts {
   PlanningRegions regions;
   int64_t freed = 0;  // of regions.freed_by_contact, by the trial
+  int64_t still_torn =
+      0;  // tets that the last round found inverted, and nothing could be freed for
 };
 
-// Widens the contact band where it is too narrow for the planned moves: deforms the mesh by a third
-// more than planned, with gradient_field and linear_elastic, frees the constrained vertices of
-// inverted tets, and again, until no tet is inverted or after some rounds.
+// Widens the contact band where it is too narrow for the planned moves: deforms the mesh as planned
+// and by a third more, with gradient_field, linear_elastic and arap (neo_hookean never inverts a
+// tet), frees the constrained vertices of inverted tets, and again, until no tet is inverted or
+// after some rounds. Of an inverted tet without constrained vertices the nearest ones are freed.
 // What is narrow (the gap between teeth, the walls of a cut) is so given way where it must be, and
 // held elsewhere. Nothing is tried where nothing moves.
 //
