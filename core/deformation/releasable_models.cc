@@ -34,11 +34,10 @@ absl::Status Prepare(const std::vector<int32_t>& prescribed, int unknowns_per_no
     if (ever - kept <= kMostReleased) return (*system)->KeepOnly(prescribed);
     system->reset();
   }
-  TF_ASSIGN_OR_RETURN(*system,
-                      ReleasableSystem::Create(assemble(), prescribed,
-                                               {.backend = CholeskyBackend::kCholmod,
-                                                .admission = {},
-                                                .unknowns_per_node = unknowns_per_node}));
+  TF_ASSIGN_OR_RETURN(*system, ReleasableSystem::Create(assemble(), prescribed,
+                                                        {.backend = CholeskyBackend::kCholmod,
+                                                         .admission = {},
+                                                         .unknowns_per_node = unknowns_per_node}));
   return absl::OkStatus();
 }
 
@@ -115,10 +114,10 @@ absl::StatusOr<std::vector<Positions>> ReleasableModels::LinearElastic(
   std::vector<Positions> answers;
   for (const std::vector<HandlePose>& poses : pose_sets) {
     const HandleTargets targets = MakeHandleTargets(constraints, elements_.rest, poses);
-    TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd displacements,
-                        elastic_->Solve({}, Eigen::Map<const Eigen::VectorXd>(
-                                                targets.displacements.data(),
-                                                targets.displacements.size())));
+    TF_ASSIGN_OR_RETURN(
+        const Eigen::MatrixXd displacements,
+        elastic_->Solve({}, Eigen::Map<const Eigen::VectorXd>(targets.displacements.data(),
+                                                              targets.displacements.size())));
     const Eigen::MatrixXd by_vertex =
         Eigen::Map<const Positions>(displacements.data(), elements_.num_vertices(), 3);
     answers.push_back(ToPositions(constraints, elements_.rest, by_vertex, targets));

@@ -95,8 +95,8 @@ absl::Status ReleasableSystem::GrowSchurComplement(size_t first_new) {
 
 absl::StatusOr<Eigen::MatrixXd> ReleasableSystem::Solve(const Eigen::MatrixXd& rhs,
                                                         const Eigen::MatrixXd& values) {
-  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(first_prescribed_.size()),
-                                              values.cols());
+  Eigen::MatrixXd all =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(first_prescribed_.size()), values.cols());
   all(kept_, Eigen::all) = values;
   TF_ASSIGN_OR_RETURN(Eigen::MatrixXd solution, system_->Solve(rhs, all));
   if (released_.empty()) return solution;

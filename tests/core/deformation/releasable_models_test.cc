@@ -43,8 +43,7 @@ Positions ByDeformer(DeformationModel model, const TetMesh& bar, const Eigen::Ve
 // Few are released at first, then more than one factor is kept for.
 TEST(ReleasableModelsTest, AnswerAsTheDeformersWhileConstraintsBecomeFewer) {
   const TetMesh bar = testing::Bar({6, 6, 12}, 1.0, 0.2);
-  const Eigen::VectorXd stiffness =
-      Eigen::VectorXd::LinSpaced(bar.num_tets(), 5e3, 4e4);
+  const Eigen::VectorXd stiffness = Eigen::VectorXd::LinSpaced(bar.num_tets(), 5e3, 4e4);
   HandlePose pose;
   pose.translation_mm = {1, 0.5, -1};
   pose.rotation_vector = {0.2, 0, 0.5};

@@ -43,8 +43,7 @@ TEST(ReleasableSystemTest, AnswersAsAFactorThatNeverHadWhatIsReleased) {
   const Eigen::MatrixXd rhs = Eigen::MatrixXd::Random(K.rows(), 3);
   ASSERT_OK_AND_ASSIGN(const auto releasable, ReleasableSystem::Create(K, all, {}));
   std::vector<int32_t> prescribed = all;
-  for (const std::vector<int32_t>& gone :
-       {std::vector<int32_t>{}, {12}, {3, 13, 74}, {}, many}) {
+  for (const std::vector<int32_t>& gone : {std::vector<int32_t>{}, {12}, {3, 13, 74}, {}, many}) {
     prescribed = Without(prescribed, gone);
     const auto num = static_cast<Eigen::Index>(prescribed.size());
     const Eigen::MatrixXd values = Eigen::MatrixXd::Random(num, 3);
@@ -65,7 +64,8 @@ TEST(ReleasableSystemTest, WhatIsReleasedCannotBeHeldAgain) {
   ASSERT_OK_AND_ASSIGN(const auto system, ReleasableSystem::Create(BarLaplacian(), {3, 5, 9}, {}));
   EXPECT_THAT(system->KeepOnly({3, 4, 9}),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("unknown 4")));
-  EXPECT_THAT(system->KeepOnly({9, 3}), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("unknown")));
+  EXPECT_THAT(system->KeepOnly({9, 3}),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("unknown")));
   EXPECT_EQ(system->num_released(), 0);
   ASSERT_THAT(system->KeepOnly({3, 9}), IsOk());
   EXPECT_THAT(system->KeepOnly({3, 5}),
@@ -75,14 +75,19 @@ TEST(ReleasableSystemTest, WhatIsReleasedCannotBeHeldAgain) {
 TEST(ReleasableSystemTest, ReleasingTooMuchIsRefused) {
   // Positive definite only while its first unknown is held.
   SparseMatrix K(3, 3);
-  for (const auto& [i, j, k] : {std::tuple{0, 0, 0.5}, {0, 1, -1.0}, {1, 0, -1.0}, {1, 1, 2.0},
-                                {1, 2, -1.0}, {2, 1, -1.0}, {2, 2, 1.0}}) {
+  for (const auto& [i, j, k] : {std::tuple{0, 0, 0.5},
+                                {0, 1, -1.0},
+                                {1, 0, -1.0},
+                                {1, 1, 2.0},
+                                {1, 2, -1.0},
+                                {2, 1, -1.0},
+                                {2, 2, 1.0}}) {
     K.insert(i, j) = k;
   }
   K.makeCompressed();
   ASSERT_OK_AND_ASSIGN(const auto system, ReleasableSystem::Create(K, {0}, {}));
-  EXPECT_THAT(system->KeepOnly({}), StatusIs(absl::StatusCode::kFailedPrecondition,
-                                             HasSubstr("not positive definite")));
+  EXPECT_THAT(system->KeepOnly({}),
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("not positive definite")));
 }
 
 }  // namespace
