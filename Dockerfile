@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
 #   docker build -t tissueform .
-#   docker run --rm -p 127.0.0.1:50051:50051 tissueform
+#   docker run --rm -p 127.0.0.1:50051:50051 tissueform --host 0.0.0.0
 #
 # There is no login and no encryption yet: publish the port on loopback only, as above.
 

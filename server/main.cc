@@ -1,9 +1,11 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <memory>
+#include <semaphore.h>
 #include <signal.h>
 
 #include "CLI/CLI.hpp"
@@ -24,17 +26,32 @@ constexpr char kDescription[] =
 
 enum ExitCode : int { kExitDone = 0, kExitFailed = 1, kExitWrongUse = 2 };
 
-// Blocked before any thread starts, so that all inherit it and only sigwait sees them.
-sigset_t BlockTerminationSignals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  return signals;
+// How often the server was told to end. Handlers and a semaphore, instead of blocked signals and
+// sigwait: OpenBLAS starts threads before main(), which would not have the signals blocked, and a
+// second one, while the server drains, would end the process by them.
+sem_t told_to_end;
+
+void NoteSignal(int /*number*/) {
+  const int saved_errno = errno;
+  sem_post(&told_to_end);
+  errno = saved_errno;
 }
 
-ExitCode Serve(const tissueform::ServerOptions& options, const sigset_t& signals) {
+void CatchTerminationSignals() {
+  sem_init(&told_to_end, 0, 0);
+  struct sigaction action {};
+  action.sa_handler = NoteSignal;
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGINT, &action, nullptr);
+}
+
+void WaitForTerminationSignal() {
+  while (sem_wait(&told_to_end) != 0 && errno == EINTR) {
+  }
+}
+
+ExitCode Serve(const tissueform::ServerOptions& options) {
   const auto server = tissueform::TissueformServer::Start(options);
   if (!server.ok()) {
     std::fprintf(stderr, "tissueform-server: %s\n", std::string(server.status().message()).c_str());
@@ -42,8 +59,7 @@ ExitCode Serve(const tissueform::ServerOptions& options, const sigset_t& signals
   }
   std::printf("listening on %s:%d\n", options.host.c_str(), (*server)->port());
   std::fflush(stdout);
-  int signal_number = 0;
-  sigwait(&signals, &signal_number);
+  WaitForTerminationSignal();
   (*server)->Drain();
   spdlog::info("done");
   return kExitDone;
@@ -53,7 +69,7 @@ ExitCode Serve(const tissueform::ServerOptions& options, const sigset_t& signals
 
 int main(int argc, char** argv) {
   tissueform::ReturnFreedMemory();
-  const sigset_t signals = BlockTerminationSignals();
+  CatchTerminationSignals();
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe on stdout shall not end a server
   CLI::App app(kDescription, "tissueform-server");
   tissueform::ServerOptions options = tissueform::ServerOptions::Defaults();
@@ -68,5 +84,5 @@ int main(int argc, char** argv) {
   }
   spdlog::set_default_logger(spdlog::stderr_color_mt("tissueform"));
   spdlog::set_level(spdlog::level::from_str(options.log_level));
-  return Serve(options, signals);
+  return Serve(options);
 }

@@ -3,6 +3,7 @@
 
 #include "core/mesh_io/gmsh_reader.h"
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <string>
@@ -43,6 +44,8 @@ bool CanRenumber(absl::string_view text) {
          !absl::StrContains(text, "$ElementData");
 }
 
+constexpr char kBlanks[] = " \t";
+
 bool BeginsElements(absl::string_view line) {
   return absl::StartsWith(line, "$Elements") || absl::StartsWith(line, "$ELM");
 }
@@ -55,7 +58,8 @@ std::string Renumber(absl::string_view text) {
   while (!text.empty()) {
     const absl::string_view line = TakeLine(&text);
     if (absl::StartsWith(line, "$")) number = BeginsElements(line) ? 0 : -1;
-    const size_t rest = line.find_first_of(" \t");
+    const size_t first = std::min(line.find_first_not_of(kBlanks), line.size());
+    const size_t rest = line.find_first_of(kBlanks, first);
     if (number > 1 && rest != line.npos) {
       absl::StrAppend(&result, number - 1, line.substr(rest));
     } else {
@@ -83,7 +87,7 @@ absl::StatusOr<RawMesh> ReadGmsh(const CheckedMeshFile& file, const IsolationLim
   }
   TF_RETURN_IF_ERROR(names.Link(file.path, "a.msh"));
   absl::StatusOr<RawMesh> mesh = ReadUnderPlainName(names, "a.msh", file, limits);
-  if (!absl::IsFailedPrecondition(mesh.status())) return mesh;
+  if (!absl::IsAlreadyExists(mesh.status())) return mesh;
   const std::string text = Slurp(file.path);
   if (!CanRenumber(text)) return absl::InvalidArgumentError(mesh.status().message());
   TF_RETURN_IF_ERROR(names.Write("b.msh", Renumber(text)));

@@ -13,7 +13,7 @@ namespace tissueform {
 // Reads a file of any format but .vtu in a helper program (core/mesh_readers): file libraries
 // crash, loop, print and end the program on damaged files, and Gmsh knows one state for the whole
 // process. The helper is bound to the limits (memory beyond what it begins with, processor time)
-// and cannot write files. Any thread may call it. Internal to core/mesh_io.
+// and cannot put a byte into a file. Any thread may call it. Internal to core/mesh_io.
 //
 // Errors, without the name of the file: those of CallMeshReader.
 absl::StatusOr<RawMesh> ReadIsolated(const CheckedMeshFile& file, const MeshReadLimits& limits);

@@ -90,7 +90,7 @@ absl::StatusOr<int64_t> CountElements() {
   int64_t count = 0;
   for (const auto& of_type : elements) count += static_cast<int64_t>(of_type.size());
   if (count >= AnnouncedElements()) return count;
-  return absl::FailedPreconditionError(
+  return absl::AlreadyExistsError(
       absl::StrCat("it announces ", AnnouncedElements(), " elements, but only ", count,
                    " have a number of their own; renumber them (save the file again from Gmsh)"));
 }

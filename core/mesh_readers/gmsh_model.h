@@ -16,7 +16,8 @@ namespace tissueform {
 //
 // `path` must end with .msh or .mesh and hold no script: Gmsh runs what it does not know.
 //
-// Errors: InvalidArgument; FailedPrecondition when elements were lost because they repeat a number.
+// Errors: InvalidArgument; AlreadyExists, which nothing else on the way of a helper's answer says,
+// when elements were lost because they repeat a number.
 absl::StatusOr<RawMesh> ReadGmshModel(const std::string& path, bool is_medit);
 
 }  // namespace tissueform

@@ -48,7 +48,10 @@ absl::StatusOr<std::unique_ptr<GuardedProgram>> GuardedProgram::Start(
   TF_ASSIGN_OR_RETURN(words.emplace_back(), ProgramPath(options.program));
   words.insert(words.end(), options.arguments.begin(), options.arguments.end());
   options.arguments = std::move(words);
-  TF_ASSIGN_OR_RETURN(options.program, FindProgram("tissueform-guard"));
+  absl::StatusOr<std::string> guard_program = FindProgram("tissueform-guard");
+  // NotFound is for the foreign program: to install that does not bring ours back.
+  if (!guard_program.ok()) return absl::FailedPreconditionError(guard_program.status().message());
+  options.program = *std::move(guard_program);
   options.input = ChildStream::Pipe();
   options.own_group = true;
   TF_ASSIGN_OR_RETURN(std::unique_ptr<ChildProcess> guard, ChildProcess::Start(options));

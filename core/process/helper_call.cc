@@ -22,6 +22,12 @@ absl::Status ExplainEnd(const HelperCall& call, const ChildEnd& end) {
     return absl::FailedPreconditionError(absl::StrCat(
         "the program ", call.program, " does not start; a library that it needs is missing"));
   }
+  if (end.exit_code < 0 && end.signal == 0) {
+    return absl::InternalError(
+        absl::StrCat(call.what,
+                     " ended early, and the system does not say how: it keeps no account "
+                     "of children while SIGCHLD is ignored"));
+  }
   if (call.explain) return call.explain(end);
   if (end.signal == SIGXCPU || end.signal == SIGKILL) {
     return absl::ResourceExhaustedError(absl::StrCat(

@@ -72,6 +72,7 @@ absl::StatusOr<int64_t> PipeReceiver::Number(int64_t most) {
 
 absl::StatusOr<std::string> PipeReceiver::Text() {
   TF_ASSIGN_OR_RETURN(const int64_t size, Number(PipeSender::kMostTextBytes));
+  TF_RETURN_IF_ERROR(Reserve(size, 1));
   std::string text(static_cast<size_t>(size), '\0');
   TF_RETURN_IF_ERROR(Bytes(text.data(), text.size()));
   return text;

@@ -43,7 +43,8 @@ class PipeSender {
 };
 
 // Reads the same in the same order. DataLoss when the sender ended in the middle or sent what it
-// never would; nothing larger than `max_bytes` in all is taken (ResourceExhausted).
+// never would. Texts and entries, and what is asked by Reserve, take no more than `max_bytes` in
+// all (ResourceExhausted); Bytes goes where the caller has the room already.
 class PipeReceiver {
  public:
   PipeReceiver(int descriptor, int64_t max_bytes)

@@ -30,6 +30,12 @@ absl::Status TakenId(const std::string& id) {
       absl::StrCat("a session \"sessions/", id, "\" exists already; choose another session_id"));
 }
 
+absl::Status EndingId(const std::string& id) {
+  return absl::UnavailableError(absl::StrCat("the session \"sessions/", id,
+                                             "\" is being deleted; try again in a moment, or "
+                                             "choose another session_id"));
+}
+
 // This process is the only one that writes to its store; a store that outlives its server gives
 // each start an epoch of its own.
 constexpr int64_t kEpoch = 1;
@@ -106,6 +112,10 @@ SessionRegistry::Admission SessionRegistry::Admit(const SessionRecord& record,
   }
   if (IsTaken(record.id)) {
     admission.refusal = TakenId(record.id);
+    return admission;
+  }
+  if (ending_.find(record.id) != ending_.end()) {
+    admission.refusal = EndingId(record.id);
     return admission;
   }
   if (Full()) {
@@ -187,7 +197,9 @@ void SessionRegistry::Abandon(const std::shared_ptr<Session>& session) {
   {
     MutexLock lock(mutex_);
     const auto found = sessions_.find(session->id());
-    if (found == sessions_.end() || --found->second.claims > 0) {
+    // Clients choose ids: another session may have it by now.
+    if (found == sessions_.end() || found->second.session != session ||
+        --found->second.claims > 0) {
       return;
     }
     Take(session->id());
@@ -198,8 +210,18 @@ void SessionRegistry::Abandon(const std::shared_ptr<Session>& session) {
   });
 }
 
+void SessionRegistry::Forget(const std::string& id, std::function<void(absl::Status)> done) {
+  store_->Delete(id, "", kEpoch, [this, id, done = std::move(done)](const absl::Status& status) {
+    {
+      MutexLock lock(mutex_);
+      ending_.erase(id);
+    }
+    done(status);
+  });
+}
+
 void SessionRegistry::Forget(const std::string& id) {
-  store_->Delete(id, "", kEpoch, [](const absl::Status& status) {
+  Forget(id, [](const absl::Status& status) {
     if (!status.ok()) spdlog::warn("a session's record stays behind: {}", status.ToString());
   });
 }
@@ -226,7 +248,7 @@ void SessionRegistry::Delete(const std::string& id, std::function<void(absl::Sta
   }
   session->strand().Post([this, session, done = std::move(done)] {
     session->Close();
-    store_->Delete(session->id(), "", kEpoch, done);
+    Forget(session->id(), done);
   });
 }
 
@@ -278,6 +300,7 @@ std::shared_ptr<Session> SessionRegistry::Take(const std::string& id) {
   }
   std::shared_ptr<Session> session = std::move(found->second.session);
   sessions_.erase(found);
+  ending_.insert(id);
   return session;
 }
 

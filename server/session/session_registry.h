@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -104,8 +105,11 @@ class SessionRegistry {
   bool AllCancelled(const Creation& creation) const ABSL_LOCKS_EXCLUDED(mutex_);
   void FinishCreation(const std::shared_ptr<Creation>& creation,
                       absl::StatusOr<std::shared_ptr<Session>> result) ABSL_LOCKS_EXCLUDED(mutex_);
-  // Takes the record of a session that has ended out of the store.
-  void Forget(const std::string& id);
+  // Takes the record of a session that has ended out of the store; then its id is free again.
+  void Forget(const std::string& id, std::function<void(absl::Status)> done)
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  void Forget(const std::string& id) ABSL_LOCKS_EXCLUDED(mutex_);
+  // Whoever takes a session forgets it in the end.
   std::shared_ptr<Session> Take(const std::string& id) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   // Constant.
@@ -117,6 +121,7 @@ class SessionRegistry {
 
   mutable Mutex mutex_;
   std::map<std::string, Entry> sessions_ ABSL_GUARDED_BY(mutex_);
+  std::set<std::string> ending_ ABSL_GUARDED_BY(mutex_);  // taken out, but still in the store
   std::map<std::string, std::string> session_of_request_ ABSL_GUARDED_BY(mutex_);
   std::vector<std::shared_ptr<Creation>> creations_ ABSL_GUARDED_BY(mutex_);
 };

@@ -1,6 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include <csignal>
 #include <cstdlib>
 #include <future>
 #include <memory>
@@ -19,6 +20,7 @@
 #include <sys/socket.h>
 
 #include "client/cli/online/server_process.h"
+#include "core/process/child_process.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/killed_starter.h"
 #include "tests/testing/status_matchers.h"
@@ -118,6 +120,47 @@ TEST_F(ServerProgramTest, AnOpenStreamFinishesItsFramesWhileTheServerDrains) {
   EXPECT_FALSE((*stream)->Receive().has_value());
   EXPECT_THAT((*stream)->Finish(), IsOk());
   EXPECT_EQ(process_->WaitForExit(kPatience), 0);
+}
+
+// Not under the guard, which passes one signal on.
+TEST(ServerSignalsTest, ASecondSignalDoesNotCutTheDrainOff) {
+  auto child = ChildProcess::Start({.program = ProgramPath("tissueform-server"),
+                                    .arguments = {"--port", "0", "--log-level", "warn"},
+                                    .output = ChildStream::Pipe()});
+  ASSERT_THAT(child, IsOk());
+  std::string line;
+  char byte = 0;
+  while (byte != '\n' && read((*child)->answer(), &byte, 1) == 1) line += byte;
+  const std::string address =
+      line.substr(line.rfind(' ') + 1, line.find('\n') - line.rfind(' ') - 1);
+  auto client = TissueformClient::Connect(address, {});
+  ASSERT_THAT(client, IsOk());
+  const BarProblem problem{21};
+  const auto mesh = (*client)->UploadMesh(problem.mesh, problem.CellArrays());
+  ASSERT_THAT(mesh, IsOk());
+  const auto session = (*client)->CreateSession(problem.Request(mesh->name()));
+  ASSERT_THAT(session, IsOk());
+  auto stream = (*client)->OpenStream(session->name(), {});
+  ASSERT_THAT(stream, IsOk());
+  uint64_t sequence = 0;
+  const auto drag = [&] {
+    ASSERT_THAT((*stream)->SendPoses(++sequence, TopPose(SomePose(1))), IsOk());
+    ASSERT_TRUE((*stream)->Receive().has_value());
+    ASSERT_THAT((*stream)->Ack(sequence), IsOk());
+  };
+  (*child)->Signal(SIGTERM);
+  ASSERT_TRUE(Eventually([&] {
+    drag();
+    return (*stream)->server_is_draining() || ::testing::Test::HasFailure();
+  }));
+  for (const int signal : {SIGTERM, SIGINT, SIGTERM}) {
+    (*child)->Signal(signal);
+    for (int i = 0; i < 10; ++i) drag();
+  }
+  (*stream)->CloseSending();
+  EXPECT_FALSE((*stream)->Receive().has_value());
+  EXPECT_THAT((*stream)->Finish(), IsOk());
+  EXPECT_EQ((*child)->Wait().exit_code, 0);
 }
 
 TEST_F(ServerProgramTest, AStreamThatDoesNotEndIsCutAtTheDrainDeadline) {

@@ -62,6 +62,8 @@ def check_programs(prefix, scratch):
     demo = scratch / "demo"
     run(program, "demo", "--no-browser", "--seconds", "0.2", "--out", demo)
     check((demo / "result.vtu").is_file(), "demo, through the installed server")
+    if shutil.which("Xvfb"):
+        check((demo / "front.png").is_file(), "pictures, under the installed guard")
     # Formats whose libraries lie in modules or helper programs.
     run(program, "mesh", "check", demo / "skin.stl")
     gmsh = scratch / "tet.msh"

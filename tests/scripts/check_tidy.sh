@@ -44,7 +44,7 @@ esac
 
 # Findings in our files, whether included or not. The commands are GCC's: clang does not know all of its warnings.
 tidy() {
-  clang-tidy -p "$build_dir/tidy" --quiet --header-filter='/(core|server|client|tests)/.*\.(h|cc)$' \
+  clang-tidy -p "$build_dir/tidy" --quiet --header-filter='/(proto/conversion|core|server|client|tests)/.*\.(h|cc)$' \
     --extra-arg=-Wno-unknown-warning-option \
     --extra-arg=-Wthread-safety --extra-arg=-Werror=thread-safety "$@" 2>/dev/null
 }

@@ -10,7 +10,7 @@
 #
 # TISSUEFORM_BUILD_DIR  build folder (default: build/fuzz)
 # JOBS                  compilers at once (default: one a core)
-# FUZZ_SEED             where the search begins (default 1, so that continuous integration repeats itself; 0: anywhere)
+# FUZZ_SEED             where the search begins (default 1: a second run repeats the first; 0: anywhere)
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

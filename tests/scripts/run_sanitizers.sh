@@ -5,7 +5,7 @@
 # Builds and runs tests under sanitizers; ends with ctest's summary.
 #
 #   tests/scripts/run_sanitizers.sh asan [options of ctest]          AddressSanitizer, LeakSanitizer and
-#                                                                   UndefinedBehaviorSanitizer, all tests
+#                                                                   UndefinedBehaviorSanitizer, all tests but the oracle's
 #   tests/scripts/run_sanitizers.sh asan-inputs [options of ctest]   the same for the tests with the labels "inputs"
 #                                                                   (what reads from outside) and "server"
 #   tests/scripts/run_sanitizers.sh tsan [options of ctest]          ThreadSanitizer, tests with the label "server"

@@ -57,9 +57,9 @@ absl::Status ServerProcess::WaitUntilListening(std::chrono::milliseconds deadlin
   while (!absl::StrContains(text, "\n")) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
     pollfd readable{.fd = program_->answer(), .events = POLLIN, .revents = 0};
-    if (left.count() <= 0 || poll(&readable, 1, static_cast<int>(left.count())) == 0) {
-      return absl::UnavailableError("the server did not listen in time");
-    }
+    const int ready = left.count() <= 0 ? 0 : poll(&readable, 1, static_cast<int>(left.count()));
+    if (ready == 0) return absl::UnavailableError("the server did not listen in time");
+    if (ready < 0) return absl::CancelledError("interrupted");
     std::array<char, 256> buffer{};
     const ssize_t count = read(program_->answer(), buffer.data(), buffer.size());
     if (count > 0) {

@@ -10,8 +10,8 @@
 
 namespace tissueform {
 
-// A command whose work another program does, which lies beside `tissueform`: loading the libraries
-// that only few commands need (gRPC, VTK's rendering) takes longer than most predictions.
+// A command whose work another program does, which lies where FindProgram looks: loading the
+// libraries that only few commands need (gRPC, VTK's rendering) takes longer than most predictions.
 struct CompanionCommand {
   const char* name;
   const char* description;
@@ -32,7 +32,7 @@ inline constexpr CompanionCommand kExperimentsCommand = {
 void AddCompanionCommand(CLI::App& app, const CompanionCommand& companion,
                          std::vector<std::string> words, CommandWork* work);
 
-// Becomes the program of that name in the folder of this one, with `arguments`. Returns only when
+// Becomes the program of that name, where FindProgram finds it, with `arguments`. Returns only when
 // it cannot be started: NotFound, or what the system says.
 absl::Status BecomeProgram(const std::string& name, std::vector<std::string> arguments);
 

@@ -117,6 +117,15 @@ TEST_F(Gmsh1FormTest, RegionZeroAndElementsThatShareANumberAreRead) {
   EXPECT_EQ(FindAttribute(file.cell_data, "gmsh_physical"), nullptr);
 }
 
+TEST_F(Gmsh1FormTest, ElementsThatShareANumberMayBeIndented) {
+  const std::string text =
+      absl::StrReplaceAll(Slurp(TestDataPath("meshes/two_tets/gmsh1_ascii.msh")),
+                          {{"1 4 7 1 4 1 2 3 4", " 44 4 0 0 4 1 2 3 4"},
+                           {"2 4 9 2 4 2 3 4 5", "\t44 4 0 0 4 2 3 4 5"}});
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile file, Read("same.msh", text));
+  EXPECT_EQ(file.mesh.num_tets(), 2);
+}
+
 TEST_F(Gmsh1FormTest, OtherSolidsAreNamedAndFacesLeftOut) {
   const std::string nodes =
       "$NOD\n6\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n15 1 0 1\n16 0 1 1\n$ENDNOD\n";

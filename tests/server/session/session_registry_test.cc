@@ -316,6 +316,30 @@ TEST_F(SessionRegistryTest, AChosenIdIsTakenFromTheFirstCallOn) {
   EXPECT_THAT(first.get(), IsOk());
 }
 
+TEST_F(SessionRegistryTest, AnIdUnderDeletionIsNeitherThereNorFreeAndTheMessageSaysSo) {
+  ASSERT_THAT(Create({"", "", "chosen"}).get(), IsOk());
+  std::promise<void> go;
+  pool_->Post([&go] { go.get_future().wait(); });
+  std::promise<absl::Status> deleted;
+  registry_->Delete("chosen", [&](absl::Status status) { deleted.set_value(std::move(status)); });
+  EXPECT_THAT(Create({"", "", "chosen"}).get(),
+              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("being deleted")));
+  go.set_value();
+  EXPECT_THAT(deleted.get_future().get(), IsOk());
+  EXPECT_THAT(Create({"", "", "chosen"}).get(), IsOk());
+}
+
+TEST_F(SessionRegistryTest, ALateAbandonLeavesTheNextSessionOfTheIdAlone) {
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first, Create({"", "", "chosen"}).get());
+  ASSERT_THAT(Delete("chosen"), IsOk());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> second, Create({"", "", "chosen"}).get());
+  registry_->Abandon(first);
+  Drain();
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> found, registry_->Find("chosen"));
+  EXPECT_EQ(found, second);
+  EXPECT_THAT(Stored(), ::testing::ElementsAre("chosen"));
+}
+
 TEST_F(SessionRegistryTest, TheSameRequestWithTheSameChosenIdIsRepeatedSafely) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first,
                        Create({"id", "print", "chosen"}).get());
