@@ -1,16 +1,17 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include <cerrno>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
-#include <semaphore.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include "CLI/CLI.hpp"
 #include "spdlog/sinks/stdout_color_sinks.h"
 #include "spdlog/spdlog.h"
+#include <sys/syscall.h>
 
 #include "core/base/freed_memory.h"
 #include "server/server_options.h"
@@ -26,29 +27,30 @@ constexpr char kDescription[] =
 
 enum ExitCode : int { kExitDone = 0, kExitFailed = 1, kExitWrongUse = 2 };
 
-// How often the server was told to end. Handlers and a semaphore, instead of blocked signals and
-// sigwait: OpenBLAS starts threads before main(), which would not have the signals blocked, and a
-// second one, while the server drains, would end the process by them.
-sem_t told_to_end;
+constexpr uint64_t kTerminationSignals =
+    (uint64_t{1} << (SIGTERM - 1)) | (uint64_t{1} << (SIGINT - 1));
 
-void NoteSignal(int /*number*/) {
-  const int saved_errno = errno;
-  sem_post(&told_to_end);
-  errno = saved_errno;
+// Blocks SIGTERM and SIGINT for every thread that there will be. In main() it would be too late:
+// OpenBLAS starts threads when it is loaded, and a second signal, while the server drains, would
+// end the process by one of them. Handlers would not do either: METIS takes SIGTERM for a jump of
+// its own while it orders a matrix, and leaves a handler behind that lasts for one signal. The
+// system call itself, as nothing is initialised yet that the sanitizers' wrappers need.
+__attribute__((no_sanitize("address", "thread", "undefined"))) void BlockTerminationSignals() {
+  syscall(SYS_rt_sigprocmask, SIG_BLOCK, &kTerminationSignals, nullptr,
+          sizeof(kTerminationSignals));
 }
 
-void CatchTerminationSignals() {
-  sem_init(&told_to_end, 0, 0);
-  struct sigaction action {};
-  action.sa_handler = NoteSignal;
-  action.sa_flags = SA_RESTART;
-  sigaction(SIGTERM, &action, nullptr);
-  sigaction(SIGINT, &action, nullptr);
-}
+// What stands here runs before the libraries' own initialisation.
+__attribute__((section(".preinit_array"),
+               used)) void (*const run_first)() = BlockTerminationSignals;
 
 void WaitForTerminationSignal() {
-  while (sem_wait(&told_to_end) != 0 && errno == EINTR) {
-  }
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  int number = 0;
+  sigwait(&signals, &number);
 }
 
 ExitCode Serve(const tissueform::ServerOptions& options) {
@@ -69,7 +71,6 @@ ExitCode Serve(const tissueform::ServerOptions& options) {
 
 int main(int argc, char** argv) {
   tissueform::ReturnFreedMemory();
-  CatchTerminationSignals();
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe on stdout shall not end a server
   CLI::App app(kDescription, "tissueform-server");
   tissueform::ServerOptions options = tissueform::ServerOptions::Defaults();

@@ -124,9 +124,11 @@ TEST_F(ServerProgramTest, AnOpenStreamFinishesItsFramesWhileTheServerDrains) {
 
 // Not under the guard, which passes one signal on.
 TEST(ServerSignalsTest, ASecondSignalDoesNotCutTheDrainOff) {
-  auto child = ChildProcess::Start({.program = ProgramPath("tissueform-server"),
-                                    .arguments = {"--port", "0", "--log-level", "warn"},
-                                    .output = ChildStream::Pipe()});
+  ChildOptions options;
+  options.program = ProgramPath("tissueform-server");
+  options.arguments = {"--port", "0", "--log-level", "warn"};
+  options.output = ChildStream::Pipe();
+  auto child = ChildProcess::Start(options);
   ASSERT_THAT(child, IsOk());
   std::string line;
   char byte = 0;
@@ -160,7 +162,8 @@ TEST(ServerSignalsTest, ASecondSignalDoesNotCutTheDrainOff) {
   (*stream)->CloseSending();
   EXPECT_FALSE((*stream)->Receive().has_value());
   EXPECT_THAT((*stream)->Finish(), IsOk());
-  EXPECT_EQ((*child)->Wait().exit_code, 0);
+  const ChildEnd end = (*child)->Wait();
+  EXPECT_EQ(end.exit_code, 0) << "signal " << end.signal;
 }
 
 TEST_F(ServerProgramTest, AStreamThatDoesNotEndIsCutAtTheDrainDeadline) {
