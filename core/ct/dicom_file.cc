@@ -14,87 +14,58 @@
 #include <string_view>
 #include <type_traits>
 
-#include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_split.h"
+
+#include "core/ct/dicom_frames.h"
+#include "core/ct/dicom_tags.h"
 
 namespace tissueform {
 namespace {
 
 constexpr char kCtImageStorage[] = "1.2.840.10008.5.1.4.1.1.2";
 constexpr char kEnhancedCtImageStorage[] = "1.2.840.10008.5.1.4.1.1.2.1";
+constexpr char kLegacyEnhancedCtImageStorage[] = "1.2.840.10008.5.1.4.1.1.2.2";
 constexpr char kSecondaryCaptureStorage[] = "1.2.840.10008.5.1.4.1.1.7";  // and .7.1 to .7.4
 constexpr char kPhotographicStorage[] = "1.2.840.10008.5.1.4.1.1.77.1";   // and below
 constexpr char kDirectoryStorage[] = "1.2.840.10008.1.3.10";
 
-const gdcm::Tag kMediaStorageClass(0x0002, 0x0002);
-const gdcm::Tag kImageType(0x0008, 0x0008);
-const gdcm::Tag kSopClass(0x0008, 0x0016);
-const gdcm::Tag kModality(0x0008, 0x0060);
-const gdcm::Tag kSeriesUid(0x0020, 0x000e);
-const gdcm::Tag kSeriesNumber(0x0020, 0x0011);
-const gdcm::Tag kInstanceNumber(0x0020, 0x0013);
-const gdcm::Tag kPosition(0x0020, 0x0032);
-const gdcm::Tag kOrientation(0x0020, 0x0037);
-const gdcm::Tag kSamplesPerPixel(0x0028, 0x0002);
-const gdcm::Tag kPhotometricInterpretation(0x0028, 0x0004);
-const gdcm::Tag kNumberOfFrames(0x0028, 0x0008);
-const gdcm::Tag kRows(0x0028, 0x0010);
-const gdcm::Tag kColumns(0x0028, 0x0011);
-const gdcm::Tag kPixelSpacing(0x0028, 0x0030);
-const gdcm::Tag kRescaleIntercept(0x0028, 0x1052);
-const gdcm::Tag kRescaleSlope(0x0028, 0x1053);
-const gdcm::Tag kLossyImageCompression(0x0028, 0x2110);
+constexpr uint32_t kMediaStorageClass = 0x00020002;
+constexpr uint32_t kImageType = 0x00080008;
+constexpr uint32_t kSopClass = 0x00080016;
+constexpr uint32_t kModality = 0x00080060;
+constexpr uint32_t kSeriesDate = 0x00080021;
+constexpr uint32_t kAcquisitionDate = 0x00080022;
+constexpr uint32_t kContentDate = 0x00080023;
+constexpr uint32_t kAcquisitionDateTime = 0x0008002a;
+constexpr uint32_t kSeriesTime = 0x00080031;
+constexpr uint32_t kAcquisitionTime = 0x00080032;
+constexpr uint32_t kContentTime = 0x00080033;
+constexpr uint32_t kPatientName = 0x00100010;
+constexpr uint32_t kPatientId = 0x00100020;
+constexpr uint32_t kBirthDate = 0x00100030;
+constexpr uint32_t kVoltage = 0x00180060;
+constexpr uint32_t kKernel = 0x00181210;
+constexpr uint32_t kPatientPosition = 0x00185100;
+constexpr uint32_t kStudyUid = 0x0020000d;
+constexpr uint32_t kAcquisitionNumber = 0x00200012;
+constexpr uint32_t kFrameOfReference = 0x00200052;
+constexpr uint32_t kTemporalPosition = 0x00200100;
+constexpr uint32_t kSeriesUid = 0x0020000e;
+constexpr uint32_t kSeriesNumber = 0x00200011;
+constexpr uint32_t kInstanceNumber = 0x00200013;
+constexpr uint32_t kPosition = 0x00200032;
+constexpr uint32_t kOrientation = 0x00200037;
+constexpr uint32_t kSamplesPerPixel = 0x00280002;
+constexpr uint32_t kPhotometricInterpretation = 0x00280004;
+constexpr uint32_t kNumberOfFrames = 0x00280008;
+constexpr uint32_t kRows = 0x00280010;
+constexpr uint32_t kColumns = 0x00280011;
+constexpr uint32_t kPixelSpacing = 0x00280030;
+constexpr uint32_t kRescaleIntercept = 0x00281052;
+constexpr uint32_t kRescaleSlope = 0x00281053;
+constexpr uint32_t kLossyImageCompression = 0x00282110;
 const gdcm::Tag kPixelData(0x7fe0, 0x0010);
-
-// Values are taken as text and read strictly: a header may hold anything.
-std::string TextOf(const gdcm::DataSet& data, const gdcm::Tag& tag) {
-  if (!data.FindDataElement(tag)) return "";
-  const gdcm::ByteValue* const value = data.GetDataElement(tag).GetByteValue();
-  if (value == nullptr || value->GetPointer() == nullptr) return "";
-  std::string text(value->GetPointer(), value->GetLength());
-  while (!text.empty() && text.back() == '\0') text.pop_back();
-  absl::StripAsciiWhitespace(&text);
-  return text;
-}
-
-// A tag of type US, which GDCM keeps in this machine's byte order; 0 where there is none.
-int ShortOf(const gdcm::DataSet& data, const gdcm::Tag& tag) {
-  if (!data.FindDataElement(tag)) return 0;
-  const gdcm::ByteValue* const value = data.GetDataElement(tag).GetByteValue();
-  uint16_t number = 0;
-  if (value == nullptr || value->GetLength() < sizeof(number)) return 0;
-  std::memcpy(&number, value->GetPointer(), sizeof(number));
-  return number;
-}
-
-std::optional<int> IntegerOf(const gdcm::DataSet& data, const gdcm::Tag& tag) {
-  int number = 0;
-  if (!absl::SimpleAtoi(TextOf(data, tag), &number)) return std::nullopt;
-  return number;
-}
-
-// N finite numbers with backslashes between them, or nothing.
-template <int N>
-std::optional<Eigen::Matrix<double, N, 1>> NumbersOf(const gdcm::DataSet& data,
-                                                     const gdcm::Tag& tag) {
-  const std::vector<std::string> parts = absl::StrSplit(TextOf(data, tag), '\\');
-  if (parts.size() != N) return std::nullopt;
-  Eigen::Matrix<double, N, 1> numbers;
-  for (int i = 0; i < N; ++i) {
-    if (!absl::SimpleAtod(parts[static_cast<size_t>(i)], &numbers[i])) return std::nullopt;
-  }
-  if (!numbers.allFinite()) return std::nullopt;
-  return numbers;
-}
-
-std::optional<double> NumberOf(const gdcm::DataSet& data, const gdcm::Tag& tag) {
-  const auto numbers = NumbersOf<1>(data, tag);
-  if (!numbers) return std::nullopt;
-  return (*numbers)[0];
-}
 
 bool IsLocaliser(const gdcm::DataSet& data) {
   const std::string image_type = TextOf(data, kImageType);
@@ -116,8 +87,9 @@ DicomKind KindOf(const gdcm::File& file, const std::string& modality) {
   if (modality != "CT") {
     return ShortOf(data, kRows) == 0 ? DicomKind::kNoImage : DicomKind::kOtherModality;
   }
-  if (IntegerOf(data, kNumberOfFrames).value_or(1) > 1 || sop_class == kEnhancedCtImageStorage) {
-    return DicomKind::kMultiFrame;
+  if (IntegerOf(data, kNumberOfFrames).value_or(1) > 1 || sop_class == kEnhancedCtImageStorage ||
+      sop_class == kLegacyEnhancedCtImageStorage) {
+    return IsLocaliser(data) ? DicomKind::kLocaliser : DicomKind::kMultiFrame;
   }
   if (ShortOf(data, kRows) == 0 || ShortOf(data, kColumns) == 0) return DicomKind::kNoImage;
   if (ShortOf(data, kSamplesPerPixel) > 1 ||
@@ -132,12 +104,33 @@ DicomKind KindOf(const gdcm::File& file, const std::string& modality) {
 void ReadGeometry(const gdcm::DataSet& data, DicomHeader* header) {
   header->rows = ShortOf(data, kRows);
   header->columns = ShortOf(data, kColumns);
-  header->position_mm = NumbersOf<3>(data, kPosition);
-  header->pixel_spacing_mm = NumbersOf<2>(data, kPixelSpacing);
-  if (const auto directions = NumbersOf<6>(data, kOrientation)) {
+  if (const auto position = NumbersOf(data, kPosition, 3)) header->position_mm = *position;
+  if (const auto spacing = NumbersOf(data, kPixelSpacing, 2)) header->pixel_spacing_mm = *spacing;
+  if (const auto directions = NumbersOf(data, kOrientation, 6)) {
     header->row_direction = directions->head<3>();
     header->column_direction = directions->tail<3>();
   }
+}
+
+// What tells patients, scans and reconstructions apart.
+void ReadOrigin(const gdcm::DataSet& data, DicomHeader* header) {
+  header->series_uid = TextOf(data, kSeriesUid);
+  header->study_uid = TextOf(data, kStudyUid);
+  header->frame_of_reference = TextOf(data, kFrameOfReference);
+  header->patient = absl::StrCat(TextOf(data, kPatientId), "\n", TextOf(data, kPatientName), "\n",
+                                 TextOf(data, kBirthDate));
+  header->patient_position = TextOf(data, kPatientPosition);
+  header->reconstruction = absl::StrCat(TextOf(data, kKernel), "|", TextOf(data, kVoltage), "|",
+                                        TextOf(data, kTemporalPosition));
+  header->series_number = IntegerOf(data, kSeriesNumber);
+  header->instance_number = IntegerOf(data, kInstanceNumber);
+  header->acquisition_number = IntegerOf(data, kAcquisitionNumber);
+  header->acquisition_time_s = SecondsOf(data, kAcquisitionDate, kAcquisitionTime);
+  if (!header->acquisition_time_s) {
+    header->acquisition_time_s = SecondsOf(data, kAcquisitionDateTime);
+  }
+  header->series_time_s = SecondsOf(data, kSeriesDate, kSeriesTime);
+  header->content_time_s = SecondsOf(data, kContentDate, kContentTime);
 }
 
 absl::Status CannotDecode(const DicomHeader& header, absl::string_view why) {
@@ -146,16 +139,17 @@ absl::Status CannotDecode(const DicomHeader& header, absl::string_view why) {
 }
 
 template <typename T>
-absl::StatusOr<std::vector<double>> ValuesOf(const DicomHeader& header, const gdcm::Image& image) {
-  const size_t count = static_cast<size_t>(header.rows) * static_cast<size_t>(header.columns);
-  std::vector<T> values(count);
+absl::StatusOr<std::vector<float>> ValuesOf(const DicomHeader& header, const gdcm::Image& image) {
+  const size_t count = static_cast<size_t>(header.rows) * static_cast<size_t>(header.columns) *
+                       static_cast<size_t>(header.num_frames);
   if (image.GetBufferLength() != count * sizeof(T)) {
     return CannotDecode(header, "its pixels are not as many as rows and columns say");
   }
+  std::vector<T> values(count);
   if (!image.GetBuffer(reinterpret_cast<char*>(values.data()))) {
     return CannotDecode(header, "its pixels are cut off or damaged");
   }
-  return std::vector<double>(values.begin(), values.end());
+  return std::vector<float>(values.begin(), values.end());
 }
 
 // GDCM passes over pixels that are missing at the end of a file, and so does its JPEG decoder.
@@ -186,6 +180,7 @@ bool IsBeginning(const std::string& path) {
 
 std::string NameOf(const DicomHeader& header) {
   std::string name = absl::StrCat("file ", header.file_number, " of the folder");
+  if (header.num_frames > 1) absl::StrAppend(&name, ", frame ", header.frame + 1);
   if (header.instance_number) {
     absl::StrAppend(&name, " (instance number ", *header.instance_number, ")");
   }
@@ -204,7 +199,8 @@ std::string DescribeKind(const DicomHeader& header) {
       return header.modality == "CT" ? "no plain CT image"
                                      : absl::StrCat("of modality ", header.modality);
     case DicomKind::kMultiFrame:
-      return "a multi-frame (enhanced) image, which is not read: export it as single slices";
+      return "a multi-frame image that does not say where its frames lie: export it as single "
+             "slices";
     case DicomKind::kColour:
       return "a colour image";
     case DicomKind::kDeflated:
@@ -219,37 +215,39 @@ std::string DescribeKind(const DicomHeader& header) {
   return "unknown";
 }
 
-std::optional<DicomHeader> ReadDicomHeader(const std::string& path) {
+std::vector<DicomHeader> ReadDicomHeaders(const std::string& path) {
   gdcm::Reader reader;
   reader.SetFileName(path.c_str());
   DicomHeader header;
   header.path = path;
   header.kind = DicomKind::kDamaged;
-  if (!reader.CanRead()) return IsBeginning(path) ? std::optional(header) : std::nullopt;
+  if (!reader.CanRead()) {
+    return IsBeginning(path) ? std::vector<DicomHeader>{header} : std::vector<DicomHeader>{};
+  }
   // A skipped tag is left unread: the stream stands where its value begins.
   const bool whole = reader.ReadUpToTag(kPixelData, {kPixelData});
   if (reader.GetFile().GetHeader().GetDataSetTransferSyntax() ==
       gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian) {
     header.kind = DicomKind::kDeflated;  // GDCM reads some of them only
-    return header;
+    return {header};
   }
-  if (!whole) return header;
+  if (!whole) return {header};
   const gdcm::DataSet& data = reader.GetFile().GetDataSet();
   header.pixel_offset = reader.GetStreamCurrentPosition();
   header.modality = TextOf(data, kModality).substr(0, 16);
   header.kind = KindOf(reader.GetFile(), header.modality);
-  header.series_uid = TextOf(data, kSeriesUid);
-  header.series_number = IntegerOf(data, kSeriesNumber);
-  header.instance_number = IntegerOf(data, kInstanceNumber);
   header.rescale_slope = NumberOf(data, kRescaleSlope);
   header.rescale_intercept = NumberOf(data, kRescaleIntercept);
   header.was_lossy = TextOf(data, kLossyImageCompression) == "01";
+  ReadOrigin(data, &header);
   ReadGeometry(data, &header);
-  return header;
+  if (header.kind != DicomKind::kMultiFrame) return {header};
+  std::vector<DicomHeader> frames = FramesOf(data, header);
+  return frames.empty() ? std::vector<DicomHeader>{header} : frames;
 }
 
-absl::StatusOr<std::vector<double>> DecodeDicomPixels(const DicomHeader& header,
-                                                      const std::string& contents) {
+absl::StatusOr<std::vector<float>> DecodeDicomPixels(const DicomHeader& header,
+                                                     const std::string& contents) {
   std::istringstream stream(contents);
   gdcm::ImageReader reader;
   reader.SetStream(stream);

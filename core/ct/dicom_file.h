@@ -20,7 +20,7 @@ enum class DicomKind {
   kLocaliser,
   kSecondaryCapture,  // a photograph, or a copy of a screen
   kOtherModality,
-  kMultiFrame,
+  kMultiFrame,  // that does not say where its frames lie
   kColour,
   kDeflated,   // its whole data set is compressed (1.2.840.10008.1.2.1.99)
   kNoImage,    // a report, a dose sheet
@@ -28,16 +28,30 @@ enum class DicomKind {
   kDamaged,    // begins as a DICOM file but is none to its end, or is only zeros
 };
 
-// One file's header without anything that names a patient.
+// The header of one image: of a file, or of a frame of a multi-frame file.
 struct DicomHeader {
   std::string path;     // never in a message: it may name the patient
   int file_number = 0;  // place in the folder, in order of names, from 1
 
   DicomKind kind = DicomKind::kNoImage;
   std::string modality;
-  std::string series_uid;
+  int frame = 0;  // of the file's images, from 0
+  int num_frames = 1;
   std::optional<int> series_number;
   std::optional<int> instance_number;
+
+  // For comparison only, never in a message: they may name the patient.
+  std::string patient;
+  std::string series_uid;
+  std::string study_uid;
+  std::string frame_of_reference;
+
+  std::string patient_position;              // "HFS"
+  std::string reconstruction;                // kernel, voltage, phase: the same in one volume
+  std::optional<double> acquisition_time_s;  // all three from some day
+  std::optional<double> series_time_s;
+  std::optional<double> content_time_s;
+  std::optional<int> acquisition_number;
 
   int rows = 0;
   int columns = 0;
@@ -58,15 +72,16 @@ std::string NameOf(const DicomHeader& header);
 // "a photograph or copy of a screen (secondary capture)", "of modality MR", ...
 std::string DescribeKind(const DicomHeader& header);
 
-// Reads a header up to its pixels. nullopt when the file is no DICOM file. In a helper program
-// only: GDCM is not safe from damaged files. Internal to core/ct.
-std::optional<DicomHeader> ReadDicomHeader(const std::string& path);
+// Reads a header up to its pixels: one, or one for each frame of a multi-frame file. Empty when the
+// file is no DICOM file. In a helper program only: GDCM is not safe from damaged files. Internal to
+// core/ct.
+std::vector<DicomHeader> ReadDicomHeaders(const std::string& path);
 
-// Stored values of a slice, row after row, from the contents of its file: rescale not applied. In a
-// helper program only.
+// Stored values of a file's image, row after row, or of all its frames one after the other, from
+// its contents: rescale not applied. In a helper program only.
 //
 // Errors: InvalidArgument when the file is cut off or its pixels cannot be decoded.
-absl::StatusOr<std::vector<double>> DecodeDicomPixels(const DicomHeader& header,
-                                                      const std::string& contents);
+absl::StatusOr<std::vector<float>> DecodeDicomPixels(const DicomHeader& header,
+                                                     const std::string& contents);
 
 }  // namespace tissueform

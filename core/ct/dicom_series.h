@@ -4,27 +4,31 @@
 #pragma once
 
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
 
+#include "core/ct/ct_volume_reader.h"
 #include "core/ct/dicom_file.h"
 #include "core/ct/dicom_stack.h"
 
 namespace tissueform {
 
-// Which files of a folder to take: those of the series of one of them, or of a series number.
+// Which files of a folder to take: the scan of one of them, or of a series number.
 struct SeriesChoice {
-  std::string series_uid;            // empty: not chosen by a file
+  int file_number = 0;               // 0: not chosen by a file
   std::optional<int> series_number;  // the recipe's key
+  JoinSeries join = JoinSeries::kAuto;
 };
 
-// Finds the one series of CT slices among all DICOM files of a folder. Files and series of other
-// kinds (localiser, dose report, other modalities) are left aside, with a note.
+// Finds the one CT among all DICOM files of a folder: joins series that belong together
+// (slice_groups.h) and parts scans that lie among each other (slice_acquisitions.h), each with a
+// note. What is left aside (localiser, dose report, other modalities, series too short for a
+// volume, the smaller of two scans) is noted, too.
 //
 // Errors: InvalidArgument when there is none, with what there is instead; when there are several,
-// with a list; when the series that was asked for is not there or holds anything but CT slices.
+// with the largest of them and how to choose; when what was asked for is not there or holds
+// anything but CT slices.
 absl::StatusOr<DicomStack> ChooseSeries(const std::vector<DicomHeader>& files,
                                         const SeriesChoice& choice);
 

@@ -11,11 +11,11 @@
 #include <Eigen/Geometry>
 
 #include "core/base/status_macros.h"
+#include "core/ct/slice_groups.h"
 
 namespace tissueform {
 namespace {
 
-constexpr size_t kLeastSlices = 8;
 // Of unit vectors, and relative for spacings: what rounding in decimal headers leaves.
 constexpr double kSameDirection = 1e-3;
 constexpr double kSamePositionMm = 0.01;

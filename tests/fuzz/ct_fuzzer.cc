@@ -42,13 +42,29 @@ double FiniteNumber(ByteSource* source) {  // as ReadDicomHeader lets through
   return std::isfinite(number) ? number : 0;
 }
 
+// What tells scans, series and frames apart; torn apart in any way.
+void TakeOrigin(ByteSource* source, DicomHeader* header) {
+  const auto name = [source] { return std::string(1, source->Take<char>()); };
+  header->series_uid += name();
+  header->frame_of_reference = name();
+  header->reconstruction = name();
+  header->patient = std::string(source->Take<uint8_t>() % 2, 'p');
+  header->acquisition_time_s = MaybeNumber(source);
+  if (header->acquisition_time_s && !std::isfinite(*header->acquisition_time_s)) {
+    header->acquisition_time_s.reset();  // as SecondsOf
+  }
+  header->acquisition_number = source->Take<uint8_t>() % 4;
+  header->num_frames = 1 + source->Take<uint8_t>() % 3;
+  header->frame = header->num_frames - 1;
+}
+
 // Mostly a slice that belongs to the others; the bits of a byte say what does not.
 DicomHeader TakeHeader(int number, ByteSource* source) {
   const auto odd = source->Take<uint8_t>();
   DicomHeader header;
   header.file_number = number;
   header.kind = DicomKind::kCtSlice;
-  if ((odd & 1) != 0) header.kind = static_cast<DicomKind>(source->Take<uint8_t>() % 9);
+  if ((odd & 1) != 0) header.kind = static_cast<DicomKind>(source->Take<uint8_t>() % 10);
   header.modality = "CT";
   header.series_uid = (odd & 2) != 0 ? "1.3" : "1.2";
   header.series_number = 1;
@@ -66,6 +82,7 @@ DicomHeader TakeHeader(int number, ByteSource* source) {
   if ((odd & 128) != 0) {
     header.rescale_slope = MaybeNumber(source);
     header.rescale_intercept = MaybeNumber(source);
+    TakeOrigin(source, &header);
   }
   return header;
 }
@@ -76,7 +93,10 @@ DicomHeader TakeHeader(int number, ByteSource* source) {
 void FuzzDicomSeries(const uint8_t* data, size_t size) {
   ByteSource source(data, size);
   SeriesChoice choice;
-  if (source.Take<uint8_t>() % 4 == 1) choice.series_number = 1;
+  const auto chosen = source.Take<uint8_t>();
+  if (chosen % 4 == 1) choice.series_number = 1;
+  if (chosen % 4 == 2) choice.file_number = 1 + chosen % 7;
+  choice.join = static_cast<JoinSeries>(chosen / 4 % 3);
   const bool has_offset = source.Take<uint8_t>() % 2 == 1;
   std::vector<DicomHeader> files;
   while (source.left() > 0 && files.size() < 64) {
@@ -86,7 +106,14 @@ void FuzzDicomSeries(const uint8_t* data, size_t size) {
   Require(stack.ok() || !stack.status().message().empty());
   if (!stack.ok() || !ArrangeStack(has_offset, &*stack).ok()) return;
   Require(stack->spacing_mm.allFinite() && stack->spacing_mm.minCoeff() > 0);
-  Require(stack->direction.isUnitary(1e-3) && stack->slices.size() <= files.size());
+  // Sheared by the tilt at most; every slice has its place, rising.
+  for (int axis = 0; axis < 3; ++axis) {
+    Require(std::abs(stack->direction.col(axis).norm() - 1) < 1e-3);
+  }
+  Require(std::abs(stack->direction.determinant()) > 0.5);
+  Require(stack->slices.size() <= files.size());
+  Require(stack->slice_origins_mm.empty() ||
+          stack->slice_origins_mm.size() == stack->slices.size());
 }
 
 void FuzzVolumeHeader(const uint8_t* data, size_t size) {

@@ -9,6 +9,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "tests/testing/meshes.h"
+
 namespace tissueform::testing {
 namespace {
 
@@ -125,6 +127,33 @@ std::vector<DicomFile> PhantomSeries(const SeriesGeometry& geometry) {
     series.push_back(SliceHeader(geometry, k).Pixels(pixels));
   }
   return series;
+}
+
+std::vector<DicomFile> SeriesOf(const CtVolume& volume) {
+  SeriesGeometry geometry;
+  geometry.columns = volume.size[0];
+  geometry.rows = volume.size[1];
+  geometry.pixel_spacing_mm = {volume.spacing_mm[1], volume.spacing_mm[0]};
+  geometry.row_direction = volume.direction.col(0);
+  geometry.column_direction = volume.direction.col(1);
+  std::vector<DicomFile> series;
+  const auto count = static_cast<size_t>(volume.size[0]) * static_cast<size_t>(volume.size[1]);
+  for (int k = 0; k < volume.size[2]; ++k) {
+    std::vector<uint16_t> pixels(count);
+    for (size_t i = 0; i < count; ++i) {
+      pixels[i] = static_cast<uint16_t>(volume.hu[static_cast<size_t>(k) * count + i] + 1024);
+    }
+    geometry.origin_mm = volume.Place(0, 0, k) - k * geometry.step_mm;
+    series.push_back(SliceHeader(geometry, k).Pixels(pixels));
+  }
+  return series;
+}
+
+absl::StatusOr<CtVolume> ReadBundledHead() {
+  CtReadOptions options;
+  options.axes = "RPI";
+  options.hu_offset = -1024;
+  return ReadCtVolume(TestDataPath("ct/headsq/headsq_quarter.nhdr"), options);
 }
 
 void CtFolder::SetUp() {

@@ -27,8 +27,16 @@ class DicomFile {
   enum Tag : uint32_t {
     kSopClass = 0x00080016,
     kImageType = 0x00080008,
+    kSeriesTime = 0x00080031,
+    kAcquisitionTime = 0x00080032,
+    kContentTime = 0x00080033,
     kModality = 0x00080060,
     kPatientName = 0x00100010,
+    kPatientId = 0x00100020,
+    kKernel = 0x00181210,
+    kStudyUid = 0x0020000d,
+    kAcquisitionNumber = 0x00200012,
+    kFrameOfReference = 0x00200052,
     kSeriesUid = 0x0020000e,
     kSeriesNumber = 0x00200011,
     kInstanceNumber = 0x00200013,
@@ -78,6 +86,13 @@ double PhantomHu(const Eigen::Vector3d& position_mm);
 
 // The slices of the phantom as a scanner would write them: stored values are HU + 1024.
 std::vector<DicomFile> PhantomSeries(const SeriesGeometry& geometry = {});
+
+// A volume as the slices of a scanner: stored values are HU + 1024. Rows and columns lie as the
+// volume's first two axes.
+std::vector<DicomFile> SeriesOf(const CtVolume& volume);
+
+// The bundled head, tests/data/ct/headsq.
+absl::StatusOr<CtVolume> ReadBundledHead();
 
 // A folder of its own for every test.
 class CtFolder : public ::testing::Test {

@@ -236,9 +236,20 @@ TEST_F(DicomVolumeTest, SliceThatIsMissingBecauseItsFileIsDamagedIsRefused) {
   EXPECT_THAT(volume.provenance.notes, ElementsAre(HasSubstr("cut off or damaged")));
 }
 
-TEST_F(DicomVolumeTest, DuplicateSliceIsRefused) {
+TEST_F(DicomVolumeTest, CopyOfASliceIsLeftAside) {
   std::vector<DicomFile> series = PhantomSeries();
   series.push_back(series[3]);
+  WriteSeries(series);
+  ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
+  EXPECT_EQ(volume.size[2], 9);
+  EXPECT_EQ(WorstPhantomError(volume), 0);
+  EXPECT_THAT(volume.provenance.notes, ElementsAre(HasSubstr("1 files that are copies of others")));
+}
+
+TEST_F(DicomVolumeTest, OtherSliceAtTheSamePlaceIsRefused) {
+  std::vector<DicomFile> series = PhantomSeries();
+  series.push_back(series[3]);
+  series.back().Pixels(std::vector<uint16_t>(120, 1000));
   WriteSeries(series);
   Expect(Read(), "lie at the same place");
 }
