@@ -128,7 +128,8 @@ int ForEachItem(const gdcm::DataSet& data, uint32_t tag,
   if (!items) return 0;
   const auto count = static_cast<int>(items->GetNumberOfItems());
   for (int i = 0; i < count; ++i) {
-    visit(i, items->GetItem(static_cast<gdcm::SequenceOfItems::SizeType>(i) + 1).GetNestedDataSet());
+    visit(i,
+          items->GetItem(static_cast<gdcm::SequenceOfItems::SizeType>(i) + 1).GetNestedDataSet());
   }
   return count;
 }

@@ -48,7 +48,9 @@ Stack Sorted(Stack stack) {
   return stack;
 }
 
-bool IsSameStep(double a, double b) { return std::abs(a - b) <= std::min(0.2, 0.2 * std::max(a, b)); }
+bool IsSameStep(double a, double b) {
+  return std::abs(a - b) <= std::min(0.2, 0.2 * std::max(a, b));
+}
 
 // The longest chain of slices at regular steps, where a change of step costs kChangeOfStep: true
 // for the slices in it. Of all slices where nothing is wrong. Dynamic programming over the last
@@ -107,7 +109,8 @@ class RegularChain {
 };
 
 bool IsRegular(const Stack& stack) {
-  if (stack.size() < 3) return stack.size() < 2 || stack[1].height_mm - stack[0].height_mm >= kSamePlaceMm;
+  if (stack.size() < 3)
+    return stack.size() < 2 || stack[1].height_mm - stack[0].height_mm >= kSamePlaceMm;
   const std::vector<bool> in_it = RegularChain(stack).InIt();
   return std::all_of(in_it.begin(), in_it.end(), [](bool in) { return in; });
 }

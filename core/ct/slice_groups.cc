@@ -48,8 +48,7 @@ bool IsUniform(const SliceGroup& group) {
 bool IsWhole(const SliceGroup& group) { return group.slices.size() >= kLeastSlices; }
 
 bool AreOfOneImage(const SliceGroup& a, const SliceGroup& b) {
-  return CanBeOneVolume(a, b) &&
-         a.slices.front().reconstruction == b.slices.front().reconstruction;
+  return CanBeOneVolume(a, b) && a.slices.front().reconstruction == b.slices.front().reconstruction;
 }
 
 bool ShareFrame(const SliceGroup& a, const SliceGroup& b) {
@@ -95,9 +94,8 @@ void Join(SliceGroup* other, SliceGroup* into) {
 void JoinThoseThat(const Fits& fit, std::vector<SliceGroup>* groups) {
   std::vector<SliceGroup> joined;
   for (SliceGroup& group : *groups) {
-    const auto into = std::find_if(joined.begin(), joined.end(), [&](const SliceGroup& other) {
-      return fit(other, group);
-    });
+    const auto into = std::find_if(joined.begin(), joined.end(),
+                                   [&](const SliceGroup& other) { return fit(other, group); });
     if (into == joined.end()) {
       joined.push_back(std::move(group));
     } else {
@@ -156,11 +154,9 @@ void JoinAsTheyFit(std::vector<SliceGroup>* groups) {
       },
       &whole);
   AddFragments(&whole, groups);
-  JoinThoseThat(
-      [](const SliceGroup& a, const SliceGroup& b) {
-        return AreOfOneImage(a, b) && ShareFrame(a, b);
-      },
-      groups);
+  JoinThoseThat([](const SliceGroup& a,
+                   const SliceGroup& b) { return AreOfOneImage(a, b) && ShareFrame(a, b); },
+                groups);
   for (SliceGroup& group : Take(IsWhole, groups)) whole.push_back(std::move(group));
   JoinThoseThat(AreOfOneImage, groups);
   for (SliceGroup& group : whole) groups->push_back(std::move(group));

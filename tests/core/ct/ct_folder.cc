@@ -22,7 +22,7 @@ std::string LittleEndian(uint64_t value, int bytes) {
   return text;
 }
 
-bool HasLongLength(const std::string& vr) { return vr == "OB" || vr == "OW"; }
+bool HasLongLength(const std::string& vr) { return vr == "OB" || vr == "OW" || vr == "SQ"; }
 
 std::string ElementBytes(uint32_t tag, const std::string& vr, std::string value) {
   if (value.size() % 2 != 0) value += vr == "UI" || vr == "OB" ? '\0' : ' ';
@@ -87,6 +87,16 @@ DicomFile& DicomFile::Pixels(const std::vector<uint16_t>& values) {
   return Text(kPixelData, "OW", bytes);
 }
 
+DicomFile& DicomFile::Sequence(uint32_t tag, const std::vector<DicomFile>& items) {
+  std::string bytes;
+  for (const DicomFile& item : items) {
+    const std::string elements = item.Elements();
+    bytes += LittleEndian(0xfffe, 2) + LittleEndian(0xe000, 2) + LittleEndian(elements.size(), 4);
+    bytes += elements;
+  }
+  return Text(tag, "SQ", bytes);
+}
+
 DicomFile& DicomFile::Erase(uint32_t tag) {
   elements_.erase(tag);
   return *this;
@@ -102,8 +112,14 @@ std::string DicomFile::Bytes() const {
   meta += ElementBytes(0x00020012, "UI", "1.2.3");
   std::string bytes = std::string(128, '\0') + "DICM";
   bytes += ElementBytes(0x00020000, "UL", LittleEndian(meta.size(), 4)) + meta;
-  for (const auto& [tag, element] : elements_)
+  return bytes + Elements();
+}
+
+std::string DicomFile::Elements() const {
+  std::string bytes;
+  for (const auto& [tag, element] : elements_) {
     bytes += ElementBytes(tag, element.vr, element.value);
+  }
   return bytes;
 }
 
@@ -112,21 +128,74 @@ double PhantomHu(const Eigen::Vector3d& position_mm) {
   return position_mm[0] < -28 ? -1000 : std::round(hu);
 }
 
+// Of a slice whose first pixel lies there.
+static std::vector<uint16_t> PhantomPixels(const SeriesGeometry& geometry,
+                                           const Eigen::Vector3d& first) {
+  std::vector<uint16_t> pixels;
+  for (int j = 0; j < geometry.rows; ++j) {
+    for (int i = 0; i < geometry.columns; ++i) {
+      const Eigen::Vector3d place = first +
+                                    i * geometry.pixel_spacing_mm[1] * geometry.row_direction +
+                                    j * geometry.pixel_spacing_mm[0] * geometry.column_direction;
+      pixels.push_back(static_cast<uint16_t>(PhantomHu(place) + 1024));
+    }
+  }
+  return pixels;
+}
+
 std::vector<DicomFile> PhantomSeries(const SeriesGeometry& geometry) {
   std::vector<DicomFile> series;
   for (int k = 0; k < geometry.slices; ++k) {
-    std::vector<uint16_t> pixels;
-    for (int j = 0; j < geometry.rows; ++j) {
-      for (int i = 0; i < geometry.columns; ++i) {
-        const Eigen::Vector3d place = geometry.origin_mm + k * geometry.step_mm +
-                                      i * geometry.pixel_spacing_mm[1] * geometry.row_direction +
-                                      j * geometry.pixel_spacing_mm[0] * geometry.column_direction;
-        pixels.push_back(static_cast<uint16_t>(PhantomHu(place) + 1024));
-      }
-    }
-    series.push_back(SliceHeader(geometry, k).Pixels(pixels));
+    const Eigen::Vector3d first = geometry.origin_mm + k * geometry.step_mm;
+    series.push_back(SliceHeader(geometry, k).Pixels(PhantomPixels(geometry, first)));
   }
   return series;
+}
+
+DicomFile EnhancedPhantom(const SeriesGeometry& geometry, const std::vector<int>& slices,
+                          bool shared) {
+  const Eigen::Vector3d& row = geometry.row_direction;
+  const Eigen::Vector3d& column = geometry.column_direction;
+  const auto add_common = [&](DicomFile* groups) {
+    DicomFile measures;
+    measures.Text(DicomFile::kPixelSpacing, "DS",
+                  Numbers({geometry.pixel_spacing_mm[0], geometry.pixel_spacing_mm[1]}));
+    DicomFile plane;
+    plane.Text(DicomFile::kOrientation, "DS", Vector(row) + "\\" + Vector(column));
+    DicomFile values;
+    values.Text(DicomFile::kRescaleIntercept, "DS", "-1024")
+        .Text(DicomFile::kRescaleSlope, "DS", "1");
+    groups->Sequence(0x00289110, {measures})
+        .Sequence(0x00209116, {plane})
+        .Sequence(0x00289145, {values});
+  };
+  std::vector<DicomFile> frames;
+  std::vector<uint16_t> pixels;
+  for (const int k : slices) {
+    const Eigen::Vector3d first = geometry.origin_mm + k * geometry.step_mm;
+    DicomFile position;
+    position.Text(DicomFile::kPosition, "DS", Vector(first));
+    DicomFile frame;
+    frame.Sequence(0x00209113, {position});
+    if (!shared) add_common(&frame);
+    frames.push_back(frame);
+    const std::vector<uint16_t> image = PhantomPixels(geometry, first);
+    pixels.insert(pixels.end(), image.begin(), image.end());
+  }
+  DicomFile common;
+  if (shared) add_common(&common);
+  DicomFile file = SliceHeader(geometry, 0);
+  for (const uint32_t tag :
+       {DicomFile::kPosition, DicomFile::kOrientation, DicomFile::kPixelSpacing,
+        DicomFile::kRescaleIntercept, DicomFile::kRescaleSlope}) {
+    file.Erase(tag);
+  }
+  file.Text(DicomFile::kSopClass, "UI", "1.2.840.10008.5.1.4.1.1.2.1")
+      .Text(DicomFile::kNumberOfFrames, "IS", absl::StrCat(slices.size()))
+      .Sequence(DicomFile::kSharedGroups, {common})
+      .Sequence(DicomFile::kFrameGroups, frames)
+      .Pixels(pixels);
+  return file;
 }
 
 std::vector<DicomFile> SeriesOf(const CtVolume& volume) {

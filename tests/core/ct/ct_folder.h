@@ -50,12 +50,16 @@ class DicomFile {
     kPixelSpacing = 0x00280030,
     kRescaleIntercept = 0x00281052,
     kRescaleSlope = 0x00281053,
+    kSharedGroups = 0x52009229,
+    kFrameGroups = 0x52009230,
     kPixelData = 0x7fe00010,
   };
 
   DicomFile& Text(uint32_t tag, const std::string& vr, const std::string& value);
   DicomFile& Short(uint32_t tag, uint16_t value);
   DicomFile& Pixels(const std::vector<uint16_t>& values);
+  // A sequence; of an item only its elements count.
+  DicomFile& Sequence(uint32_t tag, const std::vector<DicomFile>& items);
   DicomFile& Erase(uint32_t tag);
 
   std::string Bytes() const;
@@ -65,6 +69,8 @@ class DicomFile {
     std::string vr;
     std::string value;
   };
+  std::string Elements() const;
+
   std::map<uint32_t, Element> elements_;
 };
 
@@ -86,6 +92,11 @@ double PhantomHu(const Eigen::Vector3d& position_mm);
 
 // The slices of the phantom as a scanner would write them: stored values are HU + 1024.
 std::vector<DicomFile> PhantomSeries(const SeriesGeometry& geometry = {});
+
+// Slices of the phantom, by number, as the frames of one file of Enhanced CT. Their pixel spacing,
+// orientation and rescale stand in the shared functional groups, or in those of each frame.
+DicomFile EnhancedPhantom(const SeriesGeometry& geometry, const std::vector<int>& slices,
+                          bool shared);
 
 // A volume as the slices of a scanner: stored values are HU + 1024. Rows and columns lie as the
 // volume's first two axes.

@@ -54,8 +54,9 @@ void SetEverywhere(uint32_t tag, const std::string& vr, const std::string& value
 void SetTimes(uint32_t tag, int from_s, Series* series) {
   for (size_t i = 0; i < series->size(); ++i) {
     const double seconds = from_s + 0.5 * static_cast<double>(i);
-    (*series)[i].Text(tag, "TM", absl::StrFormat("10%02d%06.3f", static_cast<int>(seconds) / 60,
-                                                 std::fmod(seconds, 60)));
+    (*series)[i].Text(
+        tag, "TM",
+        absl::StrFormat("10%02d%06.3f", static_cast<int>(seconds) / 60, std::fmod(seconds, 60)));
   }
 }
 
@@ -107,7 +108,8 @@ TEST_F(DicomSeriesTest, BundledHeadTornApartIsReadAsOne) {
   ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
   EXPECT_EQ(volume.hu, whole.hu);
   EXPECT_TRUE(volume.slice_origins_mm.empty());
-  EXPECT_THAT(volume.provenance.notes, ElementsAre(HasSubstr("93 slices of 93 series are read as")));
+  EXPECT_THAT(volume.provenance.notes,
+              ElementsAre(HasSubstr("93 slices of 93 series are read as")));
 }
 
 TEST_F(DicomSeriesTest, RescanAmongTheSlicesOfTheBundledHeadIsLeftOut) {
@@ -166,8 +168,7 @@ TEST_F(DicomSeriesTest, RawBundledHeadWithInterceptZeroSaysWhatToAddAndThenIsRea
 
 TEST_F(DicomSeriesTest, WhatTellsTwoScansApartIsFound) {
   const std::vector<std::pair<uint32_t, std::string>> times = {
-      {DicomFile::kAcquisitionTime, "acquisition time"},
-      {DicomFile::kContentTime, "content time"}};
+      {DicomFile::kAcquisitionTime, "acquisition time"}, {DicomFile::kContentTime, "content time"}};
   for (const double shift_mm : {0.5, 0.0}) {
     for (const auto& [tag, name] : times) {
       Series first = LongPhantom();
@@ -249,7 +250,8 @@ TEST_F(DicomSeriesTest, TwoReconstructionsOfOneScanAreTwoAlsoTornApart) {
   for (const bool torn : {false, true}) {
     if (torn) TearApart(&all);
     WriteSeries(all);
-    EXPECT_THAT(Read(), StatusIs(kInvalid, HasSubstr("series 2 (24 slices), series 5 (24 slices)")));
+    EXPECT_THAT(Read(),
+                StatusIs(kInvalid, HasSubstr("series 2 (24 slices), series 5 (24 slices)")));
     CtReadOptions options;
     options.series_number = 5;
     ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read(options));
@@ -345,7 +347,8 @@ TEST_F(DicomSeriesTest, SeriesTooShortForAVolumeDoNotStandInTheWay) {
 
 // 28 slices of a GE scanner (SOURCE.md of the data): 13 of 4.22 mm, then 13 of 7.38 mm, leaning.
 TEST_F(DicomSeriesTest, TwoThicknessesOfARealScannerAreRead) {
-  const std::string archive = SharedDataPath("ct_dicom_ge_two_thicknesses/ge_two_thicknesses.tar.xz");
+  const std::string archive =
+      SharedDataPath("ct_dicom_ge_two_thicknesses/ge_two_thicknesses.tar.xz");
   if (archive.empty()) GTEST_SKIP() << "without the large data sets";
   const std::string unpack = "tar -xJf '" + archive + "' -C '" + Path() + "' 2>/dev/null";
   if (std::system(unpack.c_str()) != 0) GTEST_SKIP() << "without tar and xz";

@@ -1,0 +1,80 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// Enhanced CT: a whole scan in one file.
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+#include "tests/core/ct/ct_folder.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using tissueform::testing::CtFolder;
+using tissueform::testing::DicomFile;
+using tissueform::testing::EnhancedPhantom;
+using tissueform::testing::SeriesGeometry;
+using tissueform::testing::StatusIs;
+using tissueform::testing::WorstPhantomError;
+
+constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+
+class MultiFrameTest : public CtFolder {};
+
+TEST_F(MultiFrameTest, FramesLieWhereTheirFunctionalGroupsSay) {
+  for (const bool shared : {true, false}) {
+    const SeriesGeometry geometry;
+    Write("ct", EnhancedPhantom(geometry, {8, 7, 6, 5, 0, 1, 2, 3, 4}, shared).Bytes());
+    ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
+    EXPECT_THAT(volume.size, ElementsAre(12, 10, 9));
+    EXPECT_TRUE(volume.spacing_mm.isApprox(Eigen::Vector3d(0.5, 0.75, 1.25), 1e-9));
+    EXPECT_TRUE(volume.origin_mm.isApprox(Eigen::Vector3d(-30, 20, 100), 1e-9));
+    EXPECT_EQ(WorstPhantomError(volume), 0);
+    EXPECT_EQ(volume.provenance.num_files, 1);
+    EXPECT_THAT(volume.provenance.notes, IsEmpty());
+    ASSERT_OK_AND_ASSIGN(const CtVolume by_file, Read({}, "ct"));
+    EXPECT_EQ(by_file.hu, volume.hu);
+  }
+}
+
+TEST_F(MultiFrameTest, ScanMayBeSpreadOverSeveralFiles) {
+  const SeriesGeometry geometry;
+  Write("a", EnhancedPhantom(geometry, {0, 2, 4, 6, 8}, true).Bytes());
+  Write("b", EnhancedPhantom(geometry, {1, 3, 5, 7}, true).Bytes());
+  ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
+  EXPECT_EQ(volume.size[2], 9);
+  EXPECT_EQ(WorstPhantomError(volume), 0);
+  EXPECT_EQ(volume.provenance.num_files, 2);
+}
+
+TEST_F(MultiFrameTest, FramesWithoutAPlaceAreNamed) {
+  const SeriesGeometry geometry;
+  const DicomFile whole = EnhancedPhantom(geometry, {0, 1, 2, 3, 4, 5, 6, 7, 8}, true);
+  DicomFile spoilt = whole;
+  Write("ct", spoilt.Erase(DicomFile::kFrameGroups).Bytes());
+  EXPECT_THAT(Read(), StatusIs(kInvalid, AllOf(HasSubstr("holds no CT slices"),
+                                               HasSubstr("does not say where its frames lie"))));
+  spoilt = whole;
+  Write("ct", spoilt.Text(DicomFile::kNumberOfFrames, "IS", "10").Bytes());
+  EXPECT_THAT(Read(), StatusIs(kInvalid, HasSubstr("does not say where its frames lie")));
+  spoilt = whole;
+  Write("ct", spoilt.Erase(DicomFile::kSharedGroups).Bytes());
+  EXPECT_THAT(Read(), StatusIs(kInvalid, AllOf(HasSubstr("file 1 of the folder, frame 1"),
+                                               HasSubstr("ImageOrientationPatient"))));
+}
+
+TEST_F(MultiFrameTest, CutOffFileIsRefusedWhereverItEnds) {
+  const std::string whole = EnhancedPhantom({}, {0, 1, 2, 3, 4, 5, 6, 7, 8}, false).Bytes();
+  for (size_t size = 0; size < whole.size(); size += 97) {
+    Write("ct", whole.substr(0, size));
+    EXPECT_EQ(Read().status().code(), kInvalid) << size;
+  }
+}
+
+}  // namespace
+}  // namespace tissueform
