@@ -125,10 +125,10 @@ MetalCluster Describe(const CtVolume& volume, const Voxels& voxels, double voxel
   cluster.top_hu = std::numeric_limits<int16_t>::min();
   for (const size_t index : voxels) {
     const auto at = static_cast<int64_t>(index);
-    const Eigen::Vector3d voxel(static_cast<double>(at % volume.size[0]),
-                                static_cast<double>(at / volume.size[0] % volume.size[1]),
-                                static_cast<double>(at / volume.size[0] / volume.size[1]));
-    const Eigen::Vector3d place = volume.origin_mm + volume.StepsMm() * voxel;
+    const Eigen::Vector3d place =
+        volume.Place(static_cast<int>(at % volume.size[0]),
+                     static_cast<int>(at / volume.size[0] % volume.size[1]),
+                     static_cast<int>(at / volume.size[0] / volume.size[1]));
     cluster.centre_mm += place / static_cast<double>(voxels.size());
     cluster.low_z_mm = std::min(cluster.low_z_mm, place.z());
     cluster.high_z_mm = std::max(cluster.high_z_mm, place.z());

@@ -12,6 +12,8 @@ namespace tissueform::testing {
 inline PlanBuild PlanBuildOfMesh(const TetMesh& mesh = Bar({1, 1, 1})) {
   return {.recipe = {},
           .ct = {},
+          .metal = {},
+          .before_correction = {},
           .head = {},
           .parts = {},
           .bone = {},
