@@ -93,7 +93,7 @@ absl::Status CheckTissue(const HuGrid& ct, const LabelGrid& body,
   }
   return absl::InvalidArgumentError(
       absl::StrFormat("the largest body above %d HU has %.0f cm3, a head more than %.0f; check "
-                      "that the values are HU",
+                      "that the values are HU, and that the CT is of a head (not of a denture)",
                       options.tissue_above_hu, volume_mm3 / 1e3, kSmallestHeadMm3 / 1e3));
 }
 

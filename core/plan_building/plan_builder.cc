@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_format.h"
 
+#include "core/anatomy/head_checks.h"
 #include "core/anatomy/itk_filters.h"
 #include "core/anatomy/surface_extraction.h"
 #include "core/base/status_macros.h"
@@ -98,11 +99,15 @@ absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const Recipe& recipe,
   TF_ASSIGN_OR_RETURN(HeadSegmentation head,
                       SegmentHead(ct.hu, recipe.segmentation, progress->Parts(), ct.metal));
   progress->Begin("telling the bones apart", 0.3, 0.42);
-  TF_ASSIGN_OR_RETURN(BoneParts parts,
-                      SeparateBoneParts(head, recipe.occlusal_plane, progress->Parts()));
+  absl::StatusOr<BoneParts> parts =
+      SeparateBoneParts(head, recipe.occlusal_plane, progress->Parts());
+  if (!parts.ok()) return ExplainMissingAnatomy(head, parts.status());
   progress->Begin("finding landmarks", 0.42, 0.46);
-  TF_ASSIGN_OR_RETURN(Landmarks landmarks, FindLandmarks(head, parts));
-  return Anatomy{.head = std::move(head), .parts = std::move(parts), .landmarks = landmarks};
+  const absl::StatusOr<Landmarks> landmarks = FindLandmarks(head, *parts);
+  const absl::Status found = landmarks.ok() ? CheckLandmarks(*landmarks) : landmarks.status();
+  if (!found.ok()) return ExplainMissingAnatomy(head, found);
+  TF_RETURN_IF_ERROR(CheckOneHead(ct.hu, head, *parts));
+  return Anatomy{.head = std::move(head), .parts = *std::move(parts), .landmarks = *landmarks};
 }
 
 absl::StatusOr<TriangleMesh> SegmentSurface(const LabelGrid& bone, uint8_t label) {

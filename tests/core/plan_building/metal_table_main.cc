@@ -1,0 +1,58 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+// Prints the table of docs/ct-input.md, plans of CTs with metal against the plan without:
+// tissueform-metal-table FOLDER [auto|off], where tissueform-metal-ct has written its files. With
+// one of the two words for the recipe's "metal", of that only. A line each plan, as soon as it is
+// there; the whole takes some minutes.
+
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "core/base/parallel_for.h"
+#include "core/base/status_macros.h"
+#include "core/linear_solvers/blas_threads.h"
+#include "tests/core/plan_building/plan_comparison.h"
+
+namespace tissueform::testing {
+namespace {
+
+absl::Status PrintTable(const std::string& folder, const std::vector<bool>& corrections) {
+  const PlanBuildOptions options{.threads = AvailableProcessors(), .tell = {}};
+  TF_ASSIGN_OR_RETURN(const PlanBuild truth,
+                      BuildPlan(folder + "/free.nrrd", MetalRecipe(true), options));
+  TF_ASSIGN_OR_RETURN(const PlanDifference none,
+                      ComparePlans(truth, truth, DeformationModel::kLinearElastic));
+  std::cout << TableHead() << TableRow("free", none) << std::flush;
+  for (const char* kind : {"fillings", "braces"}) {
+    for (const bool correct : corrections) {
+      TF_ASSIGN_OR_RETURN(const PlanBuild plan,
+                          BuildPlan(folder + "/" + kind + ".nrrd", MetalRecipe(correct), options));
+      TF_ASSIGN_OR_RETURN(const PlanDifference difference,
+                          ComparePlans(plan, truth, DeformationModel::kLinearElastic));
+      const std::string name = std::string(kind) + (correct ? ", corrected" : ", `metal` off");
+      std::cout << TableRow(name, difference) << std::flush;
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+}  // namespace tissueform::testing
+
+int main(int argc, char** argv) {
+  const std::string which = argc == 3 ? argv[2] : "";
+  if (argc < 2 || argc > 3 || (argc == 3 && which != "auto" && which != "off")) {
+    std::cerr << "usage: tissueform-metal-table FOLDER [auto|off]\n";
+    return 2;
+  }
+  std::vector<bool> corrections;
+  if (which != "auto") corrections.push_back(false);
+  if (which != "off") corrections.push_back(true);
+  tissueform::SetBlasThreads(1);
+  const absl::Status printed = tissueform::testing::PrintTable(argv[1], corrections);
+  if (printed.ok()) return 0;
+  std::cerr << printed.message() << '\n';
+  return 1;
+}
