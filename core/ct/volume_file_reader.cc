@@ -66,21 +66,31 @@ absl::Status ExplainFailure(const itk::ExceptionObject& exception) {
     return absl::InvalidArgumentError(
         "the file's axes are not square to each other; resample it upright");
   }
+  if (absl::StrContains(exception.GetDescription(), "nrrdSpacingStatusScalarWithSpace")) {
+    return absl::InvalidArgumentError(
+        "the header has \"spacings\" beside a \"space\", which needs \"space directions\"; take "
+        "the "
+        "line \"space\" out of it and state \"axes\" in the recipe");
+  }
   return Damaged();
 }
 
-// What the file and the data file beside it hold.
+// What the file and those beside it hold.
 struct FileContents {
   std::string file;
-  std::string data_file;  // empty without one
+  std::string data_file;  // where there is one
+  std::string digests;    // of all, one after the other
 };
 
 absl::StatusOr<FileContents> ReadContents(const std::string& path, const VolumeHeader& header,
                                           int64_t max_bytes) {
   FileContents contents;
   TF_ASSIGN_OR_RETURN(contents.file, ReadWholeFile(path, &max_bytes));
-  if (header.data_path.empty()) return contents;
-  TF_ASSIGN_OR_RETURN(contents.data_file, ReadWholeFile(header.data_path, &max_bytes));
+  contents.digests = Sha256Hex({contents.file});
+  for (const std::string& data_path : header.data_paths) {
+    TF_ASSIGN_OR_RETURN(contents.data_file, ReadWholeFile(data_path, &max_bytes));
+    contents.digests += Sha256Hex({contents.data_file});
+  }
   return contents;
 }
 
@@ -88,11 +98,8 @@ CtProvenance ProvenanceOf(VolumeFormat format, const VolumeHeader& header,
                           const FileContents& contents) {
   CtProvenance provenance;
   provenance.format = NameOf(format);
-  provenance.num_files = header.data_path.empty() ? 1 : 2;
-  provenance.sha256 = Sha256Hex({contents.file});
-  if (!header.data_path.empty()) {
-    provenance.sha256 = Sha256Hex({provenance.sha256 + Sha256Hex({contents.data_file})});
-  }
+  provenance.num_files = 1 + static_cast<int>(header.data_paths.size());
+  provenance.sha256 = header.data_paths.empty() ? contents.digests : Sha256Hex({contents.digests});
   return provenance;
 }
 
@@ -117,7 +124,7 @@ bool HoldsAllOfNifti(const std::string& file, const itk::ImageIOBase& io) {
 bool HoldsAllOfMetaImage(const VolumeHeader& header, const FileContents& contents,
                          const itk::ImageIOBase& io) {
   const auto bytes = static_cast<int64_t>(io.GetImageSizeInBytes());
-  const bool local = header.data_path.empty();
+  const bool local = header.data_paths.empty();
   absl::string_view data = contents.data_file;
   if (local) data = absl::string_view(contents.file).substr(header.data_offset);
   if (!header.compressed) return static_cast<int64_t>(data.size()) >= bytes;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 
@@ -18,7 +19,8 @@ std::optional<VolumeFormat> VolumeFormatOfPath(const std::string& path);
 
 // What ITK does not tell of a file of NRRD or MetaImage: said in the text at its head.
 struct VolumeHeader {
-  std::string data_path;  // of the voxels, beside the header; empty when they are in the same file
+  // Of the voxels, beside the header, in their order; empty when they are in the same file.
+  std::vector<std::string> data_paths;
 
   size_t data_offset = 0;   // in MetaImage: where the voxels begin when they are in the same file
   bool compressed = false;  // MetaImage's "CompressedData"
@@ -28,11 +30,15 @@ struct VolumeHeader {
   std::string orientation;
 };
 
-// Reads the text at the head of a file of NRRD or MetaImage.
+// Files that one NRRD header may name.
+inline constexpr int kMostDataFiles = 20000;
+
+// Reads the text at the head of a file of NRRD or MetaImage. Voxels may be spread over several
+// files in NRRD: numbered ("slice%03d.raw 1 93 1") or listed ("LIST").
 //
-// Errors: InvalidArgument when the file does not begin as its ending says; when the voxels are
-// spread over several files or lie in another folder (a header from outside must not choose what is
-// read).
+// Errors: InvalidArgument when the file does not begin as its ending says; when voxels lie in
+// another folder (a header from outside must not choose what is read); when a MetaImage's are
+// spread over several files. ResourceExhausted beyond kMostDataFiles.
 absl::StatusOr<VolumeHeader> ReadVolumeHeader(const std::string& path, VolumeFormat format);
 
 }  // namespace tissueform

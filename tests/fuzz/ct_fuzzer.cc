@@ -25,10 +25,12 @@ void Require(bool promise) {
 
 // A header from outside must not choose what is read.
 void CheckDataPath(const std::string& header_path, const VolumeHeader& header) {
-  if (header.data_path.empty()) return;
-  const std::filesystem::path data(header.data_path);
-  Require(data.parent_path() == std::filesystem::path(header_path).parent_path());
-  Require(data.filename() != ".." && data.filename() != ".");
+  Require(header.data_paths.size() <= kMostDataFiles);
+  for (const std::string& path : header.data_paths) {
+    const std::filesystem::path data(path);
+    Require(data.parent_path() == std::filesystem::path(header_path).parent_path());
+    Require(data.filename() != ".." && data.filename() != ".");
+  }
 }
 
 std::optional<double> MaybeNumber(ByteSource* source) {

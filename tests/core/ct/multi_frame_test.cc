@@ -3,8 +3,7 @@
 //
 // Enhanced CT: a whole scan in one file.
 
-#include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
+#include <random>
 
 #include "tests/core/ct/ct_folder.h"
 
@@ -74,6 +73,23 @@ TEST_F(MultiFrameTest, CutOffFileIsRefusedWhereverItEnds) {
     Write("ct", whole.substr(0, size));
     EXPECT_EQ(Read().status().code(), kInvalid) << size;
   }
+}
+
+TEST_F(MultiFrameTest, DamagedGroupsNeverEndThisProcess) {
+  const std::string whole = EnhancedPhantom({}, {0, 1, 2, 3, 4, 5, 6, 7, 8}, false).Bytes();
+  constexpr size_t kBegin = 132;
+  const size_t header_bytes = whole.size() - kBegin - size_t{2 * 12 * 10 * 9};
+  std::mt19937 random(21);
+  int refused = 0;
+  for (int round = 0; round < 25; ++round) {
+    std::string damaged = whole;
+    for (int i = 0; i < 4; ++i) {
+      damaged[kBegin + random() % header_bytes] = static_cast<char>(random() % 256);
+    }
+    Write("ct", damaged);
+    refused += Read().ok() ? 0 : 1;
+  }
+  EXPECT_GT(refused, 5);
 }
 
 }  // namespace

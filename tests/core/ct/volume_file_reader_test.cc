@@ -152,6 +152,89 @@ TEST_F(VolumeFileTest, DetachedDataIsReadAndBothFilesCount) {
   EXPECT_NE(changed.provenance.sha256, nrrd->provenance.sha256);
 }
 
+// The phantom in a file for each slice, "part01.raw" to "part09.raw".
+class SlicedNrrdTest : public VolumeFileTest {
+ protected:
+  void WriteParts() const {
+    const std::string voxels = PhantomBytes<int16_t>(UprightPlace);
+    const size_t bytes = voxels.size() / kSizeZ;
+    for (int k = 0; k < kSizeZ; ++k) {
+      Write(absl::StrCat("part0", k + 1, ".raw"),
+            voxels.substr(static_cast<size_t>(k) * bytes, bytes));
+    }
+  }
+  absl::StatusOr<CtVolume> ReadWith(const std::string& data_file) const {
+    std::string header = NrrdLps();
+    header.pop_back();  // the empty line before voxels
+    return ReadContents("v.nhdr", absl::StrCat(header, "data file: ", data_file, "\n"));
+  }
+};
+
+std::string ListOfParts() {
+  std::string list = "LIST";
+  for (int k = 1; k <= kSizeZ; ++k) absl::StrAppend(&list, "\npart0", k, ".raw");
+  return list;
+}
+
+TEST_F(SlicedNrrdTest, NumberedAndListedFilesAreReadAndAllCount) {
+  WriteParts();
+  const absl::StatusOr<CtVolume> numbered = ReadWith("part%02d.raw 1 9 1");
+  ExpectUprightPhantom(numbered, "NRRD");
+  EXPECT_EQ(numbered->provenance.num_files, 10);
+  ExpectUprightPhantom(ReadWith("part%02d.raw 1 9 1 2"), "NRRD");
+  ExpectUprightPhantom(ReadWith("part0%d.raw 1 9 1"), "NRRD");
+  ExpectUprightPhantom(ReadWith(ListOfParts()), "NRRD");
+  std::string part = PhantomBytes<int16_t>(UprightPlace).substr(0, 240);
+  part[5] ^= 1;
+  Write("part01.raw", part);
+  ASSERT_OK_AND_ASSIGN(const CtVolume changed, ReadWith("part%02d.raw 1 9 1"));
+  EXPECT_NE(changed.provenance.sha256, numbered->provenance.sha256);
+}
+
+// As VTK's own headsq has it: ITK reads no "spacings" beside a "space".
+TEST_F(SlicedNrrdTest, SpacingsBesideASpaceSayWhatToDo) {
+  const std::string header = NrrdHeader("space: 3D-left-handed\nspacings: 0.5 0.75 1.25\n\n");
+  EXPECT_THAT(ReadContents("v.nrrd", header + PhantomBytes<int16_t>(UprightPlace), "RPI"),
+              StatusIs(kInvalid, HasSubstr("take the line \"space\" out")));
+}
+
+TEST_F(SlicedNrrdTest, MissingShortAndTooFewFilesAreRefused) {
+  WriteParts();
+  EXPECT_THAT(ReadWith("part%02d.raw 1 8 1"), StatusIs(kInvalid, HasSubstr("cut off")));
+  EXPECT_THAT(ReadWith("part%02d.raw 1 10 1"), StatusIs(kInvalid, HasSubstr("cannot be opened")));
+  Write("part05.raw", std::string(100, 'x'));
+  EXPECT_THAT(ReadWith("part%02d.raw 1 9 1"), StatusIs(kInvalid, HasSubstr("cut off")));
+  EXPECT_THAT(ReadWith(ListOfParts()), StatusIs(kInvalid, HasSubstr("cut off")));
+}
+
+TEST_F(SlicedNrrdTest, FilesElsewhereAndStrangeNumbersAreRefused) {
+  WriteParts();
+  std::filesystem::create_directory(Path("inner"));
+  for (const char* data_file :
+       {"../part%02d.raw 1 9 1", "inner/part%02d.raw 1 9 1", "/etc/host%dname 1 9 1",
+        "LIST\n/etc/hostname", "LIST\npart01.raw\n../part02.raw", "LIST 2\n.."}) {
+    EXPECT_THAT(ReadWith(data_file), StatusIs(kInvalid, HasSubstr("another folder"))) << data_file;
+  }
+  for (const char* data_file :
+       {"part%s.raw 1 9 1", "part%n%d.raw 1 9 1", "part%02d%d.raw 1 9 1", "part%999d.raw 1 9 1",
+        "part%02d.raw 1 9", "part%02d.raw 1 9 0", "part%02d.raw 9 1 1", "part%02d.raw 1 9 1 2 3",
+        "part%02d.raw -1 9 1", "part%02d.raw a b c", "part%02.raw 1 9 1", "%",
+        "part%*d.raw 1 9 1"}) {
+    EXPECT_THAT(ReadWith(data_file), StatusIs(kInvalid, HasSubstr("are not numbered like")))
+        << data_file;
+  }
+  EXPECT_THAT(ReadWith("LIST"), StatusIs(kInvalid, HasSubstr("list of data files is empty")));
+  EXPECT_THAT(ReadWith("part%02d.raw 1 2000000000 1"),
+              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("20000 data files")));
+  CtReadOptions options;
+  options.limits.max_file_bytes = 2000;
+  std::string header = NrrdLps();
+  header.insert(header.size() - 1, "data file: part%02d.raw 1 9 1\n");
+  Write("v.nhdr", header);
+  EXPECT_THAT(Read(options, "v.nhdr"),
+              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("limit")));
+}
+
 TEST_F(VolumeFileTest, NiftiScalingIsApplied) {
   ASSERT_OK_AND_ASSIGN(
       const CtVolume volume,
@@ -251,7 +334,8 @@ TEST_F(VolumeFileTest, DataFileElsewhereIsNotRead) {
     nrrd.insert(nrrd.size() - 1, absl::StrCat("data file: ", name, "\n"));
     EXPECT_THAT(ReadContents("v.nhdr", nrrd),
                 StatusIs(kInvalid, ::testing::AnyOf(HasSubstr("another folder"),
-                                                    HasSubstr("several files"))));
+                                                    HasSubstr("cannot be opened"),
+                                                    HasSubstr("list of data files is empty"))));
     EXPECT_THAT(ReadContents("v.mhd", MetaHeader("AnatomicalOrientation = RAI\n") +
                                           absl::StrCat("ElementDataFile = ", name, "\n")),
                 StatusIs(kInvalid, ::testing::AnyOf(HasSubstr("another folder"),
