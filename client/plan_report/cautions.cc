@@ -31,7 +31,14 @@ std::vector<std::string> Cautions(const PlanBuild& build) {
   const GridGeometry& grid = build.head.hu.geometry;
   const double under_chin_mm =
       build.landmarks.menton.z() - (grid.origin_mm.z() - grid.spacing_mm / 2);
-  if (under_chin_mm < kLittleUnderChinMm) {
+  if (build.parts.cut_off_mm) {
+    cautions.push_back(absl::StrFormat(
+        "The CT's lower border cuts the chin: about %.1f mm of its bone and the skin under it are "
+        "missing. The neck, which holds the skin there, is missing, too; the chin may move too "
+        "much, "
+        "and its lower rim says little.",
+        *build.parts.cut_off_mm));
+  } else if (under_chin_mm < kLittleUnderChinMm) {
     cautions.push_back(
         absl::StrFormat("The CT ends %.0f mm under the bone of the chin: the neck, which holds the "
                         "skin there, is missing, and the skin under the chin may move too much.",

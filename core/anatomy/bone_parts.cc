@@ -12,6 +12,7 @@
 #include "absl/strings/str_format.h"
 
 #include "core/anatomy/bone_pieces.h"
+#include "core/anatomy/border_cut.h"
 #include "core/anatomy/itk_filters.h"
 #include "core/base/status_macros.h"
 
@@ -55,13 +56,18 @@ absl::Status NoLowerJaw() {
       kLowestMarkerHu, kHighestMarkerHu));
 }
 
-absl::Status CheckInView(const PieceShape& mandible, const GridGeometry& geometry) {
-  const double above_mm = mandible.low_mm.z() - geometry.origin_mm.z();
-  if (above_mm > 0.5 * geometry.spacing_mm) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrFormat(
-      "the lower jaw is cut off by the lower border of the image at z = %.1f mm; the "
-      "CT must reach below the chin",
-      geometry.origin_mm.z()));
+// A chin that lacks a little is planned on with a caution: its lower rim is not what a plan moves.
+constexpr double kMostCutOffMm = 3;
+
+absl::Status CheckInView(const BoneParts& parts) {
+  if (parts.cut_off_mm.value_or(0) <= kMostCutOffMm) return absl::OkStatus();
+  const bool known = std::isfinite(*parts.cut_off_mm);
+  return absl::InvalidArgumentError(
+      absl::StrFormat("about %s mm of the lower jaw are cut off by the lower border of the image "
+                      "at z = %.1f mm; the "
+                      "CT must reach below the chin (up to %g mm may be missing)",
+                      known ? absl::StrFormat("%.0f", *parts.cut_off_mm) : "many",
+                      parts.labels.geometry.origin_mm.z(), kMostCutOffMm));
 }
 
 // `chin_z_mm` is the lowest, `front_mm` the foremost of the lower jaw. The box is a generous one
@@ -239,13 +245,14 @@ absl::StatusOr<BoneParts> SeparateBoneParts(const HeadSegmentation& head,
   }
   if (!found.has_value()) return NoLowerJaw();
   const Markers& markers = *found;
-  TF_RETURN_IF_ERROR(CheckInView(markers.shape(), head.hu.geometry));
   TellStage(tell, "growing the parts of the bone", 0.5);
   result.marker_hu = markers.threshold_hu;
   const DentalCut* const used_cut = cut.has_value() ? &*cut : nullptr;
   const LabelGrid seeds = MarkerLabels(markers, PiecesWithoutNeck(head, markers, used_cut));
   result.labels = GrowMarkers(head, seeds);
   RelabelUnmarked(head.bone, seeds, markers.shape(), &result.labels);
+  result.cut_off_mm = CutOffBelowMm(result.labels, kMandible);
+  TF_RETURN_IF_ERROR(CheckInView(result));
   result.confidence = ShownBorder(result.labels);
   return result;
 }

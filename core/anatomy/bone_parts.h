@@ -37,6 +37,8 @@ struct BoneParts {
   // How sure: the share of the mandible's surface that the CT itself shows, bone beside no bone.
   // The rest touches the cranium, and the watershed or the plane decided where.
   double confidence = 0;
+  // Where the image's lower border cuts the lower jaw: how much of it is missing, an estimate.
+  std::optional<double> cut_off_mm;
 };
 
 // Separates the bone. Markers are the pieces of the bone above a high threshold, the lowest of 500,
@@ -44,8 +46,9 @@ struct BoneParts {
 // mask by a watershed, the densest voxel first. Teeth in occlusion make one piece of the jaws at
 // any threshold: then a plane cuts it. `given_cut` is used instead of looking for one.
 //
-// Errors: InvalidArgument when no piece looks like a lower jaw (it is not in view, or cut off by
-// the border of the image; or the teeth touch, and neither is there a plane between them).
+// Errors: InvalidArgument when no piece looks like a lower jaw (it is not in view; or the teeth
+// touch, and neither is there a plane between them), or the image's lower border has cut more than
+// 3 mm off it.
 absl::StatusOr<BoneParts> SeparateBoneParts(const HeadSegmentation& head,
                                             const std::optional<Plane>& given_cut = std::nullopt,
                                             const StageFunction& tell = nullptr);

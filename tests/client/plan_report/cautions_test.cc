@@ -35,6 +35,13 @@ TEST(CautionsTest, WhatIsMissingIsTold) {
               ElementsAre(HasSubstr("nose"), HasSubstr("ends 4 mm under the bone of the chin")));
 }
 
+TEST(CautionsTest, ChinThatTheBorderCutsIsTold) {
+  PlanBuild build = WholeHead();
+  build.landmarks.menton.z() = -100;
+  build.parts.cut_off_mm = 1.44;
+  EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("about 1.4 mm of its bone")));
+}
+
 TEST(CautionsTest, TeethThatWereCutApartAreToldUnlessTheRecipeSaysWhere) {
   PlanBuild build = WholeHead();
   build.parts.separation = JawSeparation::kAutomaticCut;
