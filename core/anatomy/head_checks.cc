@@ -220,11 +220,13 @@ absl::Status ExplainMissingAnatomy(const HeadSegmentation& head, const absl::Sta
   }
   const std::optional<Orientation> turn = FindTurn(head);
   if (!turn.has_value()) return error;
+  // Beside the error, not in its place: in a head without a jaw a turned arch of the skull's base
+  // passes for one, and nobody should turn a head that lies right.
   return absl::InvalidArgumentError(absl::StrFormat(
-      "the head does not lie as the CT says: its crown points to what is called the %s, its face "
-      "to what is called the %s; correct `axes` of the recipe, or what the file says of how it "
-      "lies",
-      CalledBy(*turn, 2, false), CalledBy(*turn, 1, true)));
+      "%s; or the head does not lie as the CT says: its crown points to what is called the %s, its "
+      "face to what is called the %s; correct `axes` of the recipe then, or what the file says of "
+      "how it lies",
+      error.message(), CalledBy(*turn, 2, false), CalledBy(*turn, 1, true)));
 }
 
 }  // namespace tissueform

@@ -73,11 +73,11 @@ TEST_F(CutHeadTest, BoneThatIsCutLittleIsAcceptedAndMuchIsRefused) {
   ASSERT_OK_AND_ASSIGN(const BoneParts whole, PartsFrom(0));
   EXPECT_FALSE(whole.cut_off_mm.has_value());
   int lowest = 0;  // layer of the jaw
-  while (!CutOffBelowMm(Crop(whole.labels, {{0, 0, lowest},
-                                            {whole.labels.geometry.size[0] - 1,
-                                             whole.labels.geometry.size[1] - 1,
-                                             whole.labels.geometry.size[2] - 1}}),
-                        kMandible)) {
+  while (!CutOffBelowMm(
+      Crop(whole.labels, {{0, 0, lowest},
+                          {whole.labels.geometry.size[0] - 1, whole.labels.geometry.size[1] - 1,
+                           whole.labels.geometry.size[2] - 1}}),
+      kMandible)) {
     ++lowest;
   }
   for (const int cut_layers : {0, 1}) {

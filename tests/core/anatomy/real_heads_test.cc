@@ -203,6 +203,43 @@ TEST(RealHeadsTest, ACadaverWithTeethInOcclusionIsTakenApart) {
   ExpectBonesWhereTheyBelong(a, 0.35);           // teeth are missing on the left
 }
 
+// Tilted slices of two distances, from the upper jaw up.
+TEST(RealHeadsTest, AHeadWithoutABodyOfTheJawIsReadAndThenRefusedForWantOfIt) {
+  const std::string archive =
+      SharedDataPath("ct_dicom_ge_two_thicknesses/ge_two_thicknesses.tar.xz");
+  if (archive.empty()) GTEST_SKIP() << "the shared data sets are not here";
+  const UnpackedArchive files(archive, "'*'");
+  ASSERT_TRUE(files.ok());
+  ASSERT_OK_AND_ASSIGN(const CtVolume volume, ReadCtVolume(files.Path("")));
+  EXPECT_EQ(volume.slice_origins_mm.size(), 28U);
+  ASSERT_OK_AND_ASSIGN(const HuGrid ct, ResampleIsotropic(volume, 2));
+  ASSERT_OK_AND_ASSIGN(const HeadSegmentation head, SegmentHead(ct));
+  EXPECT_THAT(SeparateBoneParts(head),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("no lower jaw in view")));
+}
+
+// The bundled head as such a CT: without its lower half, thin slices and then thick ones.
+TEST(RealHeadsTest, UnevenSlicesWithoutAJawAreRefusedForWantOfIt) {
+  CtReadOptions options;
+  options.hu_offset = -1024;
+  options.axes = "RPI";
+  ASSERT_OK_AND_ASSIGN(const CtVolume whole,
+                       ReadCtVolume(TestDataPath("ct/headsq/headsq_quarter.nhdr"), options));
+  CtVolume upper = whole;
+  upper.hu.clear();
+  const auto slice = static_cast<int64_t>(whole.size[0]) * whole.size[1];
+  for (int k = 0; k < 52; k += k < 28 ? 4 : 2) {
+    upper.slice_origins_mm.push_back(whole.Place(0, 0, k));
+    upper.hu.insert(upper.hu.end(), whole.hu.begin() + k * slice,
+                    whole.hu.begin() + (k + 1) * slice);
+  }
+  upper.size[2] = static_cast<int>(upper.slice_origins_mm.size());
+  ASSERT_OK_AND_ASSIGN(const HuGrid ct, ResampleIsotropic(upper, 2));
+  ASSERT_OK_AND_ASSIGN(const HeadSegmentation head, SegmentHead(ct));
+  EXPECT_THAT(SeparateBoneParts(head),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("no lower jaw in view")));
+}
+
 TEST(RealHeadsTest, APlasticSkullIsRefusedForWantOfSkin) {
   const std::string archive =
       SharedDataPath("ct_dicom_philips_tilt/philips_plastic_skull_tilt.tar.xz");
