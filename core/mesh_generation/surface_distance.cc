@@ -11,6 +11,8 @@
 #include <CGAL/AABB_triangle_primitive.h>
 #include <CGAL/Simple_cartesian.h>
 
+#include "core/base/parallel_for.h"
+
 namespace tissueform {
 namespace {
 
@@ -19,13 +21,16 @@ using Triangles = std::vector<Kernel::Triangle_3>;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
 using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 
+constexpr Eigen::Index kGrain = 512;
+
 Kernel::Point_3 PointOf(const Positions& positions, Eigen::Index row) {
   return {positions(row, 0), positions(row, 1), positions(row, 2)};
 }
 
 }  // namespace
 
-Eigen::VectorXd DistancesToSurface(const Positions& points, const TriangleMesh& surface) {
+Eigen::VectorXd DistancesToSurface(const Positions& points, const TriangleMesh& surface,
+                                   int threads) {
   Triangles triangles;
   for (const auto& t : surface.triangles().rowwise()) {
     triangles.emplace_back(PointOf(surface.positions(), t[0]), PointOf(surface.positions(), t[1]),
@@ -34,9 +39,14 @@ Eigen::VectorXd DistancesToSurface(const Positions& points, const TriangleMesh& 
   Tree tree(triangles.begin(), triangles.end());
   tree.accelerate_distance_queries();
   Eigen::VectorXd distances(points.rows());
-  for (Eigen::Index p = 0; p < points.rows(); ++p) {
-    distances[p] = std::sqrt(tree.squared_distance(PointOf(points, p)));
-  }
+  if (points.rows() == 0) return distances;
+  // What the tree makes when it is first asked is made before threads ask it.
+  tree.squared_distance(PointOf(points, 0));
+  ParallelFor(threads, points.rows(), kGrain, [&](Eigen::Index begin, Eigen::Index end) {
+    for (Eigen::Index p = begin; p < end; ++p) {
+      distances[p] = std::sqrt(tree.squared_distance(PointOf(points, p)));
+    }
+  });
   return distances;
 }
 

@@ -9,9 +9,10 @@
 namespace tissueform {
 
 // Distances of points (#P by 3) to the nearest point of a surface, #P, in mm. By a search tree
-// (CGAL).
+// (CGAL). They do not depend on `threads`.
 //
 // REQUIRES: positions are finite.
-Eigen::VectorXd DistancesToSurface(const Positions& points, const TriangleMesh& surface);
+Eigen::VectorXd DistancesToSurface(const Positions& points, const TriangleMesh& surface,
+                                   int threads = 1);
 
 }  // namespace tissueform

@@ -179,7 +179,7 @@ std::vector<FineRegion> LipsAndChin(const Landmarks& landmarks, double edge_mm) 
 }
 
 absl::StatusOr<SoftTissueMesh> Mesh(const SoftTissue& soft_tissue, const Landmarks& landmarks,
-                                    const Recipe& recipe, Progress* progress) {
+                                    const Recipe& recipe, int threads, Progress* progress) {
   progress->Begin("meshing", 0.62, 0.9);
   SoftTissueMeshOptions options;
   options.edge_mm = recipe.mesh.edge_mm;
@@ -187,6 +187,7 @@ absl::StatusOr<SoftTissueMesh> Mesh(const SoftTissue& soft_tissue, const Landmar
   options.interior_edge_factor = recipe.mesh.interior_edge_factor;
   options.min_dihedral_deg = recipe.mesh.min_dihedral_deg;
   options.min_cavity_volume_mm3 = recipe.soft_tissue.smallest_cavity_mm3;
+  options.threads = threads;
   int stages = 0;
   options.on_stage = [&](absl::string_view stage) {
     progress->Parts()(stage, std::min(0.9, 0.15 * stages++));
@@ -251,7 +252,8 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
   TF_ASSIGN_OR_RETURN(DividedBone bone, CutBone(anatomy, recipe.segments, &progress));
   TF_ASSIGN_OR_RETURN(SoftTissue soft_tissue,
                       FindSoftTissue(anatomy, bone.labels, recipe, &progress));
-  TF_ASSIGN_OR_RETURN(SoftTissueMesh mesh, Mesh(soft_tissue, anatomy.landmarks, recipe, &progress));
+  TF_ASSIGN_OR_RETURN(SoftTissueMesh mesh,
+                      Mesh(soft_tissue, anatomy.landmarks, recipe, options.threads, &progress));
   TF_ASSIGN_OR_RETURN(Description description, Describe(mesh, soft_tissue, anatomy, bone.segments,
                                                         recipe, options.threads, &progress));
   progress.Begin("comparing with the CT's skin", 0.98, 1);

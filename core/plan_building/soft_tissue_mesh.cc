@@ -24,6 +24,10 @@ namespace {
 // triangles with area, at the cost of a twentieth of a voxel.
 constexpr double kClearance = 0.05;
 
+// Two more take a third more time, and change the angles of the triangles by less than half a
+// degree on average. (Measured on three real heads.)
+constexpr int kRemeshingIterations = 3;
+
 absl::Status CheckOptions(const SoftTissueMeshOptions& options) {
   if (options.interior_edge_factor >= 1 && options.max_attempts >= 1 && options.retry_factor > 0 &&
       options.retry_factor < 1 && options.min_dihedral_deg >= 0 && options.min_dihedral_deg <= 18) {
@@ -50,6 +54,8 @@ RemeshingOptions Remeshing(const SoftTissueMeshOptions& options, double shrinkin
   RemeshingOptions remeshing;
   remeshing.edge_mm = shrinking * options.edge_mm;
   remeshing.fine_regions = options.fine_regions;
+  remeshing.iterations = kRemeshingIterations;
+  remeshing.threads = options.threads;
   for (FineRegion& region : remeshing.fine_regions) region.edge_mm *= shrinking;
   return remeshing;
 }
@@ -81,7 +87,7 @@ double EnclosedVolume(const TriangleMesh& surface) {
   return volume;
 }
 
-void Measure(const TriangleMesh& isosurface, SoftTissueMesh* made) {
+void Measure(const TriangleMesh& isosurface, int threads, SoftTissueMesh* made) {
   SoftTissueMeshReport& report = made->report;
   report.surface_vertices = made->surface.num_vertices();
   const auto parts = FindSurfaceParts(made->surface).volumes_mm3;
@@ -90,8 +96,10 @@ void Measure(const TriangleMesh& isosurface, SoftTissueMesh* made) {
   report.tets_below_3_deg = CountBelow(made->mesh, 3);
   report.grid_volume_mm3 = EnclosedVolume(isosurface);
   report.volume_ratio = report.quality.total_volume_mm3 / report.grid_volume_mm3;
-  report.to_isosurface = Summarize(DistancesToSurface(made->surface.positions(), isosurface));
-  report.from_isosurface = Summarize(DistancesToSurface(isosurface.positions(), made->surface));
+  report.to_isosurface =
+      Summarize(DistancesToSurface(made->surface.positions(), isosurface, threads));
+  report.from_isosurface =
+      Summarize(DistancesToSurface(isosurface.positions(), made->surface, threads));
 }
 
 absl::StatusOr<SoftTissueMesh> Attempt(const TriangleMesh& isosurface,
@@ -132,7 +140,7 @@ absl::StatusOr<SoftTissueMesh> MeshSoftTissue(const VoxelGrid<float>& heights,
     TF_RETURN_IF_ERROR(made.status());
     made->report.attempts = attempt;
     TF_RETURN_IF_ERROR(Announce(options, "measuring the mesh"));
-    Measure(isosurface, &*made);
+    Measure(isosurface, options.threads, &*made);
     return made;
   }
 }

@@ -34,6 +34,8 @@ struct SoftTissueMeshOptions {
   int max_attempts = 4;
   double retry_factor = 0.8;
 
+  int threads = 1;  // the mesh does not depend on it
+
   IsolationLimits limits{.max_memory_bytes = int64_t{4} << 30, .max_seconds = 300};
 
   // Called with what begins: "surface of the soft tissue", ... An error ends the work with it.

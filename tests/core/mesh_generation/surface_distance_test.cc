@@ -15,7 +15,7 @@ namespace {
 TEST(SurfaceDistanceTest, DistanceToABoxIsThatOfItsFormula) {
   const TriangleMesh box = testing::BoxSurface({-1, -2, -3}, {1, 2, 3}, 4);
   std::mt19937 generator(2);
-  Positions points(200, 3);
+  Positions points(2000, 3);
   for (double& c : points.reshaped()) c = 10 * (generator() / 4294967295.0) - 5;
   const Eigen::VectorXd distances = DistancesToSurface(points, box);
   for (Eigen::Index p = 0; p < points.rows(); ++p) {
@@ -24,6 +24,7 @@ TEST(SurfaceDistanceTest, DistanceToABoxIsThatOfItsFormula) {
     const double expected = beyond.maxCoeff() < 0 ? -beyond.maxCoeff() : beyond.cwiseMax(0).norm();
     EXPECT_NEAR(distances[p], expected, 1e-9);
   }
+  EXPECT_EQ(DistancesToSurface(points, box, 3), distances);
 }
 
 TEST(SurfaceDistanceTest, VerticesLieOnTheirSurface) {
