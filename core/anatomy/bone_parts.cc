@@ -14,6 +14,7 @@
 #include "core/anatomy/bone_pieces.h"
 #include "core/anatomy/border_cut.h"
 #include "core/anatomy/itk_filters.h"
+#include "core/anatomy/metal_in_bone.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -251,6 +252,7 @@ absl::StatusOr<BoneParts> SeparateBoneParts(const HeadSegmentation& head,
   const LabelGrid seeds = MarkerLabels(markers, PiecesWithoutNeck(head, markers, used_cut));
   result.labels = GrowMarkers(head, seeds);
   RelabelUnmarked(head.bone, seeds, markers.shape(), &result.labels);
+  AssignMetal(head, used_cut, &result.labels);
   result.cut_off_mm = CutOffBelowMm(result.labels, kMandible);
   TF_RETURN_IF_ERROR(CheckInView(result));
   result.confidence = ShownBorder(result.labels);

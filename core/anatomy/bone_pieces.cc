@@ -79,6 +79,8 @@ std::vector<PieceShape> MeasurePieces(const Components& components) {
 
 Pieces DensePieces(const HeadSegmentation& head, int threshold_hu, const DentalCut* cut) {
   LabelGrid dense = MaskWhere(head.hu, [=](int16_t hu) { return hu > threshold_hu; });
+  // Fillings that bite on each other would hold the jaws together, and a wire the teeth.
+  ForEachVoxel(head.metal, [&](size_t index, const Eigen::Vector3d&) { dense.values[index] = 0; });
   if (cut != nullptr) {
     const double half_mm = kCutHalfWidthVoxels * dense.geometry.spacing_mm;
     ForEachVoxel(dense, [&](size_t index, const Eigen::Vector3d& place) {

@@ -44,8 +44,8 @@ struct DentalCut {
   DentalBox box;
 };
 
-// The pieces above a threshold that hang together over faces, without what the cut, unless null,
-// takes away; specks are left out.
+// The pieces above a threshold that hang together over faces, without metal and without what the
+// cut, unless null, takes away; specks are left out.
 Pieces DensePieces(const HeadSegmentation& head, int threshold_hu, const DentalCut* cut);
 
 // The number of the largest piece with size and shape of a mandible: an arch, 70 to 150 mm wide,

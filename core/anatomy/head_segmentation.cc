@@ -10,6 +10,7 @@
 #include "absl/strings/str_format.h"
 
 #include "core/anatomy/itk_filters.h"
+#include "core/anatomy/metal_in_bone.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -148,6 +149,7 @@ absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
   const LabelGrid dense =
       MaskWhere(result.hu, [&](int16_t hu) { return hu > options.bone_above_hu; });
   result.bone = WithoutSpecks(dense, options.smallest_bone_mm3);
+  result.streaks_mm3 = RemoveStreaks(&result);
   TF_RETURN_IF_ERROR(CheckBone(result.bone, options.bone_above_hu));
   TellStage(tell, "looking for skin", 0.8);
   result.bare_fraction = BareFraction(result.head, result.bone);

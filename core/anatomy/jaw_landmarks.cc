@@ -15,6 +15,7 @@
 #include <Eigen/Geometry>
 
 #include "core/anatomy/grid_operations.h"
+#include "core/anatomy/itk_filters.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -34,6 +35,16 @@ Places PlacesOf(const LabelGrid& parts, uint8_t part) {
     if (parts.values[index] == part) places.push_back(place);
   });
   return places;
+}
+
+// Without what lies within 6 mm of metal, where crowns are and no ramus.
+LabelGrid OffMetal(LabelGrid parts, const LabelGrid& metal) {
+  if (CountVoxels(metal) == 0) return parts;
+  const FloatGrid from_metal = DistanceMm(metal);
+  for (size_t i = 0; i < parts.values.size(); ++i) {
+    if (from_metal.values[i] < 6) parts.values[i] = 0;
+  }
+  return parts;
 }
 
 template <typename Predicate>
@@ -64,12 +75,26 @@ absl::Status Farthest(const Places& places, const Eigen::Vector3d& direction,
   return absl::OkStatus();
 }
 
+// From the rearmost on to the front, as far as no gap of 4 mm lies between: what is before that is
+// no ramus, but a streak beside a molar.
+Places WithoutIslandsBefore(Places places) {
+  std::sort(places.begin(), places.end(), [](const auto& a, const auto& b) {
+    return std::make_tuple(-a.y(), a.x(), a.z()) < std::make_tuple(-b.y(), b.x(), b.z());
+  });
+  const auto gap = std::adjacent_find(
+      places.begin(), places.end(), [](const auto& a, const auto& b) { return a.y() - b.y() > 4; });
+  if (gap != places.end()) places.erase(gap + 1, places.end());
+  return places;
+}
+
 // Bounds in mm are of adult jaws with room to spare. The order matters: each landmark narrows where
 // the next is looked for, from the chin, which nothing else can be taken for, to the joints.
 class JawLandmarkFinder {
  public:
-  JawLandmarkFinder(const LabelGrid& parts, Landmarks* landmarks)
+  JawLandmarkFinder(const LabelGrid& parts, const LabelGrid& metal, Landmarks* landmarks)
       : mandible_(PlacesOf(parts, kMandible)),
+        has_metal_(CountVoxels(metal) > 0),
+        mandible_off_metal_(PlacesOf(OffMetal(parts, metal), kMandible)),
         cranium_(PlacesOf(parts, kCranium)),
         landmarks_(*landmarks) {}
 
@@ -177,12 +202,14 @@ class JawLandmarkFinder {
     const Eigen::Vector3d back_and_down = -(l.lower_teeth.normal + l.ForwardOf(l.lower_teeth));
     TF_RETURN_IF_ERROR(
         Farthest(half, back_and_down.normalized(), "the angle of the jaw", &(l.gonion.*member)));
-    const Places ramus = Where(half, [&](const auto& p) {
+    // A filling, or what its blur has left beside it, stands before the ramus and as high.
+    const Places ramus = Where(mandible_off_metal_, [&](const auto& p) {
       const double height = l.lower_teeth.HeightMm(p);
       // Beside the molars, whose crowns and metal streaks reach over the plane too.
       return height > 3 && height < 5 && side * Lateral(p) > 32 && p.y() > l.lower_incisor.y() + 25;
     });
-    TF_RETURN_IF_ERROR(Farthest(ramus, kFront, "the front of the ramus", &(l.ramus_front.*member)));
+    TF_RETURN_IF_ERROR(Farthest(has_metal_ ? WithoutIslandsBefore(ramus) : ramus, kFront,
+                                "the front of the ramus", &(l.ramus_front.*member)));
     return FindCondyle(half, &(l.condyle.*member));
   }
 
@@ -233,21 +260,28 @@ class JawLandmarkFinder {
     const auto middle = tops.begin() + static_cast<int64_t>(tops.size() / 2);
     std::nth_element(tops.begin(), middle, tops.end(),
                      [](const auto& a, const auto& b) { return a.z() < b.z(); });
-    l.nasal_floor = *middle;
+    // Many columns have that height: any one of them would be a place by chance.
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& top : tops) sum += top;
+    l.nasal_floor = sum / static_cast<double>(tops.size());
+    l.nasal_floor.z() = middle->z();
     return absl::OkStatus();
   }
 
   static constexpr double kThinGapMm = 3;
 
   Places mandible_;
+  bool has_metal_;
+  Places mandible_off_metal_;
   Places cranium_;
   Landmarks& landmarks_;
 };
 
 }  // namespace
 
-absl::Status FindJawLandmarks(const LabelGrid& parts, Landmarks* landmarks) {
-  return JawLandmarkFinder(parts, landmarks).FindAll();
+absl::Status FindJawLandmarks(const LabelGrid& parts, const LabelGrid& metal,
+                              Landmarks* landmarks) {
+  return JawLandmarkFinder(parts, metal, landmarks).FindAll();
 }
 
 }  // namespace tissueform

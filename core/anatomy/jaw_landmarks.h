@@ -9,7 +9,8 @@
 
 namespace tissueform {
 
-// The landmarks of bone and teeth, and the planes. Internal to core/anatomy.
-absl::Status FindJawLandmarks(const LabelGrid& parts, Landmarks* landmarks);
+// The landmarks of bone and teeth, and the planes. `metal` is a mask on the grid of the parts, or
+// has no voxels. Internal to core/anatomy.
+absl::Status FindJawLandmarks(const LabelGrid& parts, const LabelGrid& metal, Landmarks* landmarks);
 
 }  // namespace tissueform

@@ -44,7 +44,7 @@ absl::StatusOr<Landmarks> FindLandmarks(const HeadSegmentation& head, const Bone
       2;
   Landmarks landmarks;
   landmarks.midsagittal = FindSymmetryPlane(FacialBone(parts.labels, mandible), start_x_mm);
-  TF_RETURN_IF_ERROR(FindJawLandmarks(parts.labels, &landmarks));
+  TF_RETURN_IF_ERROR(FindJawLandmarks(parts.labels, head.metal, &landmarks));
   TF_RETURN_IF_ERROR(FindSkinLandmarks(head, &landmarks));
   return landmarks;
 }

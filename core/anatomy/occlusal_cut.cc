@@ -66,11 +66,19 @@ class HeightProfile {
     solid_.resize(size);
     teeth_.resize(size);
     for (const Sample& sample : samples) {
-      const double height = through_middle.HeightMm(sample.place_mm) / step_mm;
-      const auto bin = static_cast<int>(std::lround(height)) + half_;
-      if (bin < 0 || bin > 2 * half_) continue;
-      solid_[static_cast<size_t>(bin)] += sample.weight;
-      if (sample.tooth) teeth_[static_cast<size_t>(bin)] += 1;
+      // Shared out between the two nearest bins. Rows of voxels that lie half-way between bins
+      // would otherwise fill every second one twice, and a plane through the empty ones look clear.
+      const double height = through_middle.HeightMm(sample.place_mm) / step_mm + half_;
+      const auto lower = static_cast<int>(std::floor(height));
+      if (lower < 0 || lower >= 2 * half_) continue;
+      const auto bin = static_cast<size_t>(lower);
+      const double part = height - lower;
+      solid_[bin] += (1 - part) * sample.weight;
+      solid_[bin + 1] += part * sample.weight;
+      if (sample.tooth) {
+        teeth_[bin] += 1 - part;
+        teeth_[bin + 1] += part;
+      }
     }
   }
 
@@ -91,6 +99,18 @@ class HeightProfile {
         std::min(Sum(solid_, bin - beside(), bin - 1), Sum(solid_, bin + 1, bin + beside())) /
         beside();
     return least > 0 ? std::max(0.0, 1 - solid_[static_cast<size_t>(bin)] / least) : 0;
+  }
+
+  // Where between the bin and its neighbours the clearance is best, by a parabola through the
+  // three; in bins, -0.5 to 0.5, so that a plane does not jump by a voxel where the grid does.
+  double PeakBeside(int bin) const {
+    if (bin == 0 || bin + 1 == num_bins()) return 0;
+    const double below = Clearance(bin - 1);
+    const double here = Clearance(bin);
+    const double above = Clearance(bin + 1);
+    const double bend = below - 2 * here + above;
+    if (bend >= 0 || here < std::max(below, above)) return 0;
+    return std::clamp((below - above) / (2 * bend), -0.5, 0.5);
   }
 
  private:
@@ -138,7 +158,8 @@ std::vector<Candidate> AllCandidates(const std::vector<Sample>& samples, const D
       const Plane plane = TurnedPlane(middle, pitch_deg, roll_deg);
       const HeightProfile profile(samples, plane, step_mm, reach_mm);
       for (int bin = 0; bin < profile.num_bins(); ++bin) {
-        const Plane moved = {middle + profile.HeightMm(bin) * plane.normal, plane.normal};
+        const double height_mm = profile.HeightMm(bin) + step_mm * profile.PeakBeside(bin);
+        const Plane moved = {middle + height_mm * plane.normal, plane.normal};
         const double tilt_deg = std::abs(pitch_deg) + std::abs(roll_deg);
         candidates.push_back({{moved, profile.Clearance(bin)}, profile.TeethBeside(bin), tilt_deg});
       }

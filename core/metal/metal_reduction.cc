@@ -135,12 +135,14 @@ class VolumeCorrection {
     ForEachPixel(slice, [&](size_t pixel, size_t voxel) {
       densities[pixel] = std::max(0.0F, 1 + static_cast<float>(volume_.hu[voxel]) / 1000);
     });
-    // The first prior is the slice itself: where metal shades a whole arch (brackets), a slice
-    // with all its rays interpolated, which Meyer et al. begin with, has no arch left.
     std::vector<float> image = densities;
     const MetalSlice corrected(*beam_, std::move(densities), std::move(metal));
+    // The first prior comes from the slice as it is: where metal shades a whole arch (brackets),
+    // one with its rays interpolated, which Meyer et al. begin with, has no arch left.
+    const std::vector<float> nothing(image.size(), 0.0F);
+    const std::vector<float> interpolated = corrected.Corrected(nothing);
     for (int pass = 0; pass < kPasses; ++pass) {
-      image = corrected.Corrected(MakePrior(image, shape_, kPriorSmoothMm));
+      image = corrected.Corrected(MakePrior(image, interpolated, shape_, kPriorSmoothMm));
     }
     Write(slice, corrected.metal(), image);
   }

@@ -21,6 +21,8 @@ constexpr float kTissueBegins = 0.85F;
 constexpr float kTissueEnds = 1.2F;
 constexpr float kBoneBegins = 1.4F;
 constexpr float kTissue = 1.03F;  // muscle
+constexpr float kHalfTissue = 0.6F;
+constexpr float kBrightestStreak = 1.5F;
 
 float ClassOf(float density) {
   if (density < kAirEnds) return 0;
@@ -96,6 +98,13 @@ void SmoothAlong(int length, int lines, size_t step, size_t to_next_line, double
   }
 }
 
+std::vector<float> Smoothed(std::vector<float> image, const SliceShape& shape, double sigma_mm) {
+  const auto width = static_cast<size_t>(shape.width);
+  SmoothAlong(shape.width, shape.height, 1, width, sigma_mm / shape.pixel_width_mm, &image);
+  SmoothAlong(shape.height, shape.width, width, 1, sigma_mm / shape.pixel_height_mm, &image);
+  return image;
+}
+
 }  // namespace
 
 MetalSlice::MetalSlice(const ParallelBeam& beam, std::vector<float> densities,
@@ -134,13 +143,17 @@ std::vector<float> MetalSlice::Corrected(const std::vector<float>& prior) const 
   return corrected;
 }
 
-std::vector<float> MakePrior(const std::vector<float>& densities, const SliceShape& shape,
+std::vector<float> MakePrior(const std::vector<float>& densities,
+                             const std::vector<float>& interpolated, const SliceShape& shape,
                              double smooth_mm) {
-  std::vector<float> prior = densities;
-  const auto width = static_cast<size_t>(shape.width);
-  SmoothAlong(shape.width, shape.height, 1, width, smooth_mm / shape.pixel_width_mm, &prior);
-  SmoothAlong(shape.height, shape.width, width, 1, smooth_mm / shape.pixel_height_mm, &prior);
-  for (float& density : prior) density = ClassOf(density);
+  std::vector<float> prior = Smoothed(densities, shape, smooth_mm);
+  const std::vector<float> calm = Smoothed(interpolated, shape, 1.5 * smooth_mm);
+  for (size_t i = 0; i < prior.size(); ++i) {
+    const bool shadow = prior[i] < kTissueBegins && calm[i] >= kTissueBegins;
+    const bool streak = prior[i] > kTissueEnds && prior[i] < kBrightestStreak &&
+                        calm[i] > kHalfTissue && calm[i] < kTissueEnds;
+    prior[i] = shadow || streak ? kTissue : ClassOf(prior[i]);
+  }
   return prior;
 }
 

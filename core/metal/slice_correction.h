@@ -42,8 +42,12 @@ class MetalSlice {
 // What a slice would be without metal and streaks, as far as it shows: air, tissue of one density,
 // and bone and teeth as they are, of the slice smoothed by a Gaussian of that deviation. Densities
 // between those classes stay between them, so that the rays along an edge are those of the slice.
-// Pixels of metal become tissue or bone by what the slice has there.
-std::vector<float> MakePrior(const std::vector<float>& densities, const SliceShape& shape,
+//
+// `interpolated` is the slice corrected with a prior of nothing: without streaks, but also without
+// whatever metal shades from all sides. What it shows as tissue is not air, nor bone of up to 500
+// HU: so dark is a shadow between two fillings, and so bright a streak. Denser bone, teeth, stays.
+std::vector<float> MakePrior(const std::vector<float>& densities,
+                             const std::vector<float>& interpolated, const SliceShape& shape,
                              double smooth_mm);
 
 }  // namespace tissueform
