@@ -75,8 +75,9 @@ QualityCheck CheckSliceGaps(const PlanBuild& build) {
   const std::optional<SliceGap> gap = WidestGapInRegion(build.ct.wide_gaps, build.soft_tissue);
   return {"Distance of the CT's slices in the region of interest",
           absl::StrFormat("at most %g mm", kFarApartMm),
-          gap ? absl::StrFormat("up to %.2f mm, from %.0f to %.0f mm along the slices' normal",
-                                gap->largest_mm, gap->from_mm, gap->to_mm)
+          gap ? absl::StrFormat("up to %.2f mm, from %.0f to %.0f mm along (%.2f, %.2f, %.2f)",
+                                gap->largest_mm, gap->from_mm, gap->to_mm, gap->normal.x(),
+                                gap->normal.y(), gap->normal.z())
               : "within that",
           !gap};
 }

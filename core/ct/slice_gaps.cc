@@ -12,11 +12,14 @@ namespace {
 
 constexpr double kRoundingMm = 0.01;  // of positions in headers: 5.00 mm is not far apart
 
-// Square to the voxels' other two axes, the way in which they grow along this one.
+// Square to the voxels' other two axes, toward the patient's head, back or left, so that heights
+// along upright slices are LPS coordinates.
 Eigen::Vector3d NormalOf(const CtVolume& volume, int axis) {
   const Eigen::Vector3d normal =
       volume.direction.col((axis + 1) % 3).cross(volume.direction.col((axis + 2) % 3)).normalized();
-  return normal.dot(volume.direction.col(axis)) < 0 ? Eigen::Vector3d(-normal) : normal;
+  Eigen::Index largest = 0;
+  normal.cwiseAbs().maxCoeff(&largest);
+  return normal[largest] < 0 ? Eigen::Vector3d(-normal) : normal;
 }
 
 std::vector<double> HeightsAlong(const CtVolume& volume, int axis, const Eigen::Vector3d& normal) {
@@ -25,6 +28,7 @@ std::vector<double> HeightsAlong(const CtVolume& volume, int axis, const Eigen::
     const std::array<int, 3> voxel = {axis == 0 ? i : 0, axis == 1 ? i : 0, axis == 2 ? i : 0};
     heights.push_back(normal.dot(volume.Place(voxel[0], voxel[1], voxel[2])));
   }
+  std::sort(heights.begin(), heights.end());
   return heights;
 }
 

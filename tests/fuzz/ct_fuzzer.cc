@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/LU>
+
 #include "core/ct/dicom_series.h"
 #include "core/ct/dicom_stack.h"
 #include "core/ct/file_bytes.h"

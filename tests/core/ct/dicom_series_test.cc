@@ -150,6 +150,10 @@ TEST_F(DicomSeriesTest, TwoThicknessesOfTheBundledHeadAreRead) {
   }
   ASSERT_EQ(volume.provenance.wide_gaps.size(), 1U);
   EXPECT_NEAR(volume.provenance.wide_gaps[0].largest_mm, 6, 1e-6);
+  // In LPS, although the head's slices are counted from the top.
+  EXPECT_TRUE(volume.provenance.wide_gaps[0].normal.isApprox(Eigen::Vector3d::UnitZ(), 1e-9));
+  EXPECT_NEAR(volume.provenance.wide_gaps[0].to_mm, 0, 1e-6);
+  EXPECT_NEAR(volume.provenance.wide_gaps[0].from_mm, -1.5 * 48, 1e-6);
 }
 
 TEST_F(DicomSeriesTest, RawBundledHeadWithInterceptZeroSaysWhatToAddAndThenIsRead) {
