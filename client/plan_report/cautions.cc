@@ -10,8 +10,7 @@
 namespace tissueform {
 namespace {
 
-// The bundled head's nose stands 11.9 mm before the skin 10 mm beside its tip; one that a CT has
-// cut off, 1.7 mm.
+// The bundled head's nose stands 12 mm before the skin under it; one that a CT has cut off, 1.3 mm.
 constexpr double kFlatNoseMm = 3;
 // Below, skin follows freely where the neck would hold it.
 constexpr double kLittleUnderChinMm = 15;
@@ -24,7 +23,7 @@ std::vector<std::string> Cautions(const PlanBuild& build) {
   if (nose_mm < kFlatNoseMm) {
     cautions.push_back(absl::StrFormat(
         "The nose is cut off or pressed flat in this CT: its foremost skin stands %.1f mm before "
-        "the skin 10 mm beside it. There is no tip to predict, and what is called nose lies near "
+        "the skin under it. There is no tip to predict, and what is called nose lies near "
         "the upper lip and moves more than a tip does.",
         nose_mm));
   }

@@ -16,7 +16,6 @@ namespace tissueform {
 namespace {
 
 constexpr double kCornerFromMidlineMm = 25;
-constexpr double kBesideNoseMm = 10;
 constexpr double kAirHu = -1000;
 
 // Rays from the front, not the foremost voxels: so the skin's place is true to a part of a voxel,
@@ -61,19 +60,6 @@ class FaceProfile {
     return absl::OkStatus();
   }
 
-  // How far a point of the midline lies along `front` before the skin beside it at its height.
-  double Prominence(const Eigen::Vector3d& point, const Eigen::Vector3d& front) const {
-    double sum = 0;
-    int sides = 0;
-    for (const double left_mm : {kBesideNoseMm, -kBesideNoseMm}) {
-      const std::optional<Eigen::Vector3d> beside = SkinAt(point.z(), left_mm);
-      if (!beside.has_value()) continue;
-      sum += front.dot(point - *beside);
-      ++sides;
-    }
-    return sides == 0 ? 0 : sum / sides;
-  }
-
  private:
   Eigen::Vector3d Place(double y_mm, double z_mm, double left_mm) const {
     const Eigen::Vector3d& normal = midsagittal_.normal;
@@ -102,9 +88,9 @@ absl::Status FindSkinLandmarks(const HeadSegmentation& head, Landmarks* landmark
   TF_RETURN_IF_ERROR(
       profile.Farthest(upper_mm + 16, upper_mm + 50, upper_front, "the nose", &l.nose_tip));
   const double nose_mm = l.nose_tip.z();
-  l.nose_prominence_mm = profile.Prominence(l.nose_tip, upper_front);
   TF_RETURN_IF_ERROR(profile.Farthest(upper_mm + 0.2 * (nose_mm - upper_mm), nose_mm, -upper_front,
                                       "the nose", &l.subnasale));
+  l.nose_prominence_mm = upper_front.dot(l.nose_tip - l.subnasale);
   TF_RETURN_IF_ERROR(
       profile.Farthest(upper_mm - 2, l.subnasale.z(), upper_front, "the upper lip", &l.upper_lip));
   TF_RETURN_IF_ERROR(profile.Farthest(lower_mm - 0.25 * (lower_mm - chin_mm), lower_mm + 3,

@@ -11,6 +11,7 @@
 
 #include "core/anatomy/itk_filters.h"
 #include "core/anatomy/metal_in_bone.h"
+#include "core/anatomy/outer_skin.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -25,6 +26,10 @@ constexpr double kSmallestSkullMm3 = 20e3;
 constexpr double kBareWithinMm = 2.5;
 constexpr double kLargestBareFraction = 0.35;
 constexpr int kMarginVoxels = 3;
+
+// Radii of the balls that a nostril does not let in, and that a nose holds.
+constexpr double kNostrilMm = 5;
+constexpr double kHollowPartMm = 10;
 
 double VolumeMm3(const LabelGrid& mask) {
   return static_cast<double>(CountVoxels(mask)) * VoxelVolumeMm3(mask.geometry);
@@ -47,6 +52,22 @@ LabelGrid LargestBody(const LabelGrid& tissue, double radius_mm) {
   const LabelGrid core = LargestComponent(Erode(tissue, radius_mm), Neighbours::kFaces);
   const LabelGrid near = Dilate(core, radius_mm + tissue.geometry.spacing_mm);
   return LargestComponent(Both(near, tissue), Neighbours::kFaces);
+}
+
+// The body and what of the tissue is the wall of a hollow part of it. The walls of a nose are 2 to
+// 3 mm thin, and the opening takes them off like a tube; but with the air that it holds, which a
+// ball from outside does not reach, it is as thick as a thumb. What a tube holds on to the skin
+// with is thinner.
+LabelGrid WithHollowParts(const LabelGrid& tissue, LabelGrid body) {
+  const LabelGrid air = MaskWhere(tissue, [](uint8_t value) { return value == 0; });
+  const LabelGrid reached = AirReachedByBall(air, kNostrilMm);
+  const LabelGrid solid = MaskWhere(reached, [](uint8_t value) { return value == 0; });
+  const LabelGrid core = LargestComponent(Erode(solid, kHollowPartMm), Neighbours::kFaces);
+  const LabelGrid near = Dilate(core, kHollowPartMm + tissue.geometry.spacing_mm);
+  for (size_t i = 0; i < body.values.size(); ++i) {
+    if (tissue.values[i] != 0 && near.values[i] != 0) body.values[i] = 1;
+  }
+  return LargestComponent(body, Neighbours::kFaces);
 }
 
 LabelGrid WithoutSpecks(const LabelGrid& mask, double smallest_mm3) {
@@ -134,8 +155,10 @@ absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
                                              const StageFunction& tell, const LabelGrid& metal) {
   TellStage(tell, "finding the head", 0);
   const auto is_tissue = [&](int16_t hu) { return hu > options.tissue_above_hu; };
-  const LabelGrid body = LargestBody(MaskWhere(ct, is_tissue), options.opening_radius_mm);
-  TF_RETURN_IF_ERROR(CheckTissue(ct, body, options));
+  const LabelGrid tissue = MaskWhere(ct, is_tissue);
+  const LabelGrid opened = LargestBody(tissue, options.opening_radius_mm);
+  TF_RETURN_IF_ERROR(CheckTissue(ct, opened, options));
+  const LabelGrid body = WithHollowParts(tissue, opened);
   const VoxelBox box = Grown(BoundingBox(body), kMarginVoxels, ct.geometry);
 
   HeadSegmentation result;

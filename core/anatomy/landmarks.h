@@ -50,7 +50,8 @@ struct Landmarks {
   Eigen::Vector3d upper_lip = Eigen::Vector3d::Zero();  // foremost of the lip in the midline
   Eigen::Vector3d lower_lip = Eigen::Vector3d::Zero();
   Eigen::Vector3d skin_pogonion = Eigen::Vector3d::Zero();  // foremost of the soft chin
-  // How far the tip of the nose stands before the skin 10 mm beside it, the mean of both sides.
+  // How far the tip of the nose stands before the subnasale. (Not before the skin beside it: there
+  // are the wings of a nose that is whole.)
   // Near 0 where the CT's field of view has cut the nose off, or something has pressed it flat.
   double nose_prominence_mm = 0;
   LeftAndRight mouth_corner;  // an estimate: the skin 25 mm beside the midline between the lips

@@ -46,7 +46,8 @@ LabelGrid Both(LabelGrid a, const LabelGrid& b) {
   return a;
 }
 
-// Dijkstra's search over the 26 neighbours.
+// Dijkstra's search over the 26 neighbours; not across an edge or a corner of what is not in the
+// mask, or a thin wall that runs askew through the grid would leak.
 class NearestFirst {
  public:
   NearestFirst(const LabelGrid& mask, double reach_mm)
@@ -96,11 +97,25 @@ class NearestFirst {
       for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
           const float voxels = std::sqrt(static_cast<float>(dx * dx + dy * dy + dz * dz));
-          if (voxels > 0)
-            Offer({voxel[0] + dx, voxel[1] + dy, voxel[2] + dz}, mm + step_mm * voxels);
+          if (voxels == 0 || !IsOpen(voxel, {dx, dy, dz})) continue;
+          Offer({voxel[0] + dx, voxel[1] + dy, voxel[2] + dz}, mm + step_mm * voxels);
         }
       }
     }
+  }
+
+  // Whether all voxels of the block from a voxel to its neighbour lie in the mask, but the first.
+  bool IsOpen(const Voxel& from, const Voxel& step) const {
+    for (unsigned corner = 1; corner < 8; ++corner) {
+      Voxel at = from;
+      for (unsigned axis = 0; axis < 3; ++axis) {
+        if ((corner >> axis & 1U) != 0) at[axis] += step[axis];
+      }
+      if (at == from) continue;
+      const auto [x, y, z] = at;
+      if (!mask_.geometry.Contains(x, y, z) || mask_.At(x, y, z) == 0) return false;
+    }
+    return true;
   }
 
   using Entry = std::pair<float, Voxel>;
@@ -121,27 +136,28 @@ bool HasFaceOn(const LabelGrid& mask, int x, int y, int z) {
 
 }  // namespace
 
-LabelGrid OutsideAir(const HeadSegmentation& head, const OuterSkinOptions& options) {
-  const double radius_mm = options.opening_radius_mm;
-  const double voxel_mm = head.hu.geometry.spacing_mm;
-  const int padding = static_cast<int>(std::ceil(radius_mm / voxel_mm)) + 2;
-  const LabelGrid air = Padded(
-      MaskWhere(head.hu, [&](int16_t hu) { return hu <= head.options.tissue_above_hu; }), padding);
-  const LabelGrid tissue = MaskWhere(air, [](uint8_t value) { return value == 0; });
+LabelGrid AirReachedByBall(const LabelGrid& air, double radius_mm) {
+  const int padding = static_cast<int>(std::ceil(radius_mm / air.geometry.spacing_mm)) + 2;
+  const LabelGrid padded = Padded(air, padding);
+  const LabelGrid tissue = MaskWhere(padded, [](uint8_t value) { return value == 0; });
   const LabelGrid free = MaskWhere(DistanceMm(tissue), [=](float mm) { return mm > radius_mm; });
   const LabelGrid centres = LargestComponent(free, Neighbours::kFaces);
-  const LabelGrid opened =
-      Both(MaskWhere(DistanceMm(centres), [=](float mm) { return mm <= radius_mm; }), air);
-  const VoxelGrid<float> beyond = DistanceWithin(air, opened, options.crease_mm);
-  const LabelGrid outside = MaskWhere(beyond, [](float mm) { return std::isfinite(mm); });
+  const LabelGrid reached =
+      MaskWhere(DistanceMm(centres), [=](float mm) { return mm <= radius_mm; });
   VoxelBox inner;
   for (size_t axis = 0; axis < 3; ++axis) {
     inner.first[axis] = padding;
-    inner.last[axis] = padding + head.hu.geometry.size[axis] - 1;
+    inner.last[axis] = padding + air.geometry.size[axis] - 1;
   }
-  LabelGrid result = Crop(outside, inner);
-  result.geometry = head.hu.geometry;  // without the rounding of the way there and back
-  return result;
+  return Both(air, Crop(reached, inner));
+}
+
+LabelGrid OutsideAir(const HeadSegmentation& head, const OuterSkinOptions& options) {
+  const LabelGrid air =
+      MaskWhere(head.hu, [&](int16_t hu) { return hu <= head.options.tissue_above_hu; });
+  const LabelGrid reached = AirReachedByBall(air, options.opening_radius_mm);
+  return MaskWhere(DistanceWithin(air, reached, options.crease_mm),
+                   [](float mm) { return std::isfinite(mm); });
 }
 
 LabelGrid VoxelsFacing(const LabelGrid& outside_air, const LabelGrid& mask) {

@@ -9,6 +9,8 @@
 #include "absl/strings/str_format.h"
 
 #include "core/anatomy/osteotomy.h"
+#include "core/anatomy/outer_skin.h"
+#include "core/anatomy/skin_shell.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -91,6 +93,13 @@ LabelGrid WithoutBrain(const LabelGrid& soft, double neck_mm, double joint_z_mm)
   return MaskWhere(parts, [](uint8_t part) { return part == kFaceMarker; });
 }
 
+LabelGrid Either(LabelGrid a, const LabelGrid& b) {
+  for (size_t i = 0; i < a.values.size(); ++i) {
+    if (b.values[i] != 0) a.values[i] = 1;
+  }
+  return a;
+}
+
 LabelGrid Inside(const LabelGrid& mask, const std::vector<Plane>& planes) {
   LabelGrid inside(mask.geometry);
   ForEachVoxel(mask, [&](size_t index, const Eigen::Vector3d& place) {
@@ -126,11 +135,25 @@ double FieldOfHu(double hu, const HeadSegmentationOptions& thresholds, double vo
   return std::clamp(nearest / kHuPerVoxel, -1.0, 1.0) * voxel_mm;
 }
 
+// Keeps what was filled behind the skin off the air before it: there the surface is the CT's, also
+// where the voxel behind it is bone that was filled.
+void EndAtTheSkin(const HuGrid& hu, double tissue_above_hu, const LabelGrid& open_air,
+                  FloatGrid* field) {
+  const double voxel_mm = hu.geometry.spacing_mm;
+  const LabelGrid behind =
+      VoxelsFacing(open_air, MaskWhere(open_air, [](uint8_t value) { return value == 0; }));
+  for (size_t i = 0; i < field->values.size(); ++i) {
+    const double to_skin = (hu.values[i] - tissue_above_hu) / kHuPerVoxel * voxel_mm;
+    if (open_air.values[i] == 0 && (behind.values[i] == 0 || to_skin <= 0)) continue;
+    field->values[i] = std::min(field->values[i], static_cast<float>(to_skin));
+  }
+}
+
 // The field of the CT alone, positive in what was filled too. A voxel without a border beside it
 // gets the largest value: the HU of muscle are near those of bone, and would draw the planes of the
 // region in.
 FloatGrid UncutField(const HuGrid& hu, const HeadSegmentationOptions& thresholds,
-                     const LabelGrid& mask) {
+                     const LabelGrid& mask, const LabelGrid& open_air) {
   const double voxel_mm = hu.geometry.spacing_mm;
   FloatGrid field(hu.geometry);
   LabelGrid filled(hu.geometry);
@@ -143,6 +166,7 @@ FloatGrid UncutField(const HuGrid& hu, const HeadSegmentationOptions& thresholds
   for (size_t i = 0; i < field.values.size(); ++i) {
     field.values[i] = std::max(field.values[i], inner.values[i]);
   }
+  EndAtTheSkin(hu, thresholds.tissue_above_hu, open_air, &field);
   const FloatGrid to_border = DistanceMm(MaskWhere(field, [](float mm) { return mm <= 0; }));
   for (size_t i = 0; i < field.values.size(); ++i) {
     if (to_border.values[i] > kDiagonalVoxels * voxel_mm) {
@@ -153,9 +177,10 @@ FloatGrid UncutField(const HuGrid& hu, const HeadSegmentationOptions& thresholds
 }
 
 FloatGrid SurfaceField(const HuGrid& hu, const HeadSegmentationOptions& thresholds,
-                       const LabelGrid& mask, const std::vector<Plane>& planes) {
+                       const LabelGrid& mask, const LabelGrid& open_air,
+                       const std::vector<Plane>& planes) {
   const auto voxel_mm = static_cast<float>(hu.geometry.spacing_mm);
-  FloatGrid field = UncutField(hu, thresholds, mask);
+  FloatGrid field = UncutField(hu, thresholds, mask, open_air);
   const FloatGrid outer = TolerantDistance(mask);
   ForEachVoxel(LabelGrid(hu.geometry, 1), [&](size_t index, const Eigen::Vector3d& place) {
     const auto height = static_cast<float>(LeastHeightMm(planes, place));
@@ -204,13 +229,20 @@ absl::StatusOr<SoftTissue> ExtractSoftTissue(
   const double joint_z_mm = std::max(landmarks.condyle.left.z(), landmarks.condyle.right.z());
   const LabelGrid face = WithoutBrain(soft, options.narrowest_neck_mm, joint_z_mm);
 
+  TellStage(tell, "finding the outer skin", 0.45);
+  const LabelGrid outside_air = OutsideAir(head);
+  const LabelGrid shell = SkinShell(head, outside_air, landmarks, options.thinnest_mm);
+
   TellStage(tell, "cutting the region of interest", 0.6);
   const LabelGrid region_soft = Inside(face, planes);
   TF_RETURN_IF_ERROR(CheckVolume(VolumeMm3(region_soft)));
-  const VoxelBox box = Grown(BoundingBox(region_soft), kMarginVoxels, head.hu.geometry);
-  // Sheets thinner than a tet (a nostril's wall, an eyelid) would make slivers or tear the surface.
+  const LabelGrid region_shell = Inside(shell, planes);
+  const VoxelBox box =
+      Grown(BoundingBox(Either(region_soft, region_shell)), kMarginVoxels, head.hu.geometry);
+  // Sheets thinner than a tet (a turbinate) would make slivers or tear the surface.
   const LabelGrid kept = Open(Crop(region_soft, box), options.thinnest_mm / 2);
-  LabelGrid mask = LargestComponent(kept, Neighbours::kFaces);
+  const LabelGrid thick = WithoutSingleLayers(Either(kept, Crop(region_shell, box)));
+  LabelGrid mask = LargestComponent(thick, Neighbours::kFaces);
   FillSmallCavities(options.smallest_cavity_mm3, &mask);
 
   TellStage(tell, "finding its surface", 0.8);
@@ -218,13 +250,21 @@ absl::StatusOr<SoftTissue> ExtractSoftTissue(
   result.region = region;
   result.volume_mm3 = VolumeMm3(mask);
   TF_RETURN_IF_ERROR(CheckVolume(result.volume_mm3));
-  result.field = SurfaceField(Crop(head.hu, box), head.options, mask, planes);
+  LabelGrid open_air = Crop(outside_air, box);
+  for (size_t i = 0; i < mask.values.size(); ++i) {
+    if (mask.values[i] != 0) open_air.values[i] = 0;
+  }
+  result.field = SurfaceField(Crop(head.hu, box), head.options, mask, open_air, planes);
   result.labels = Crop(bone_labels, box);
   for (size_t i = 0; i < mask.values.size(); ++i) {
     if (mask.values[i] != 0) result.labels.values[i] = kSoftTissue;
   }
-  const double all_mm3 = VolumeMm3(Inside(Crop(soft, box), planes));
-  result.left_out_mm3 = std::max(0.0, all_mm3 - result.volume_mm3);
+  const LabelGrid all_soft = Inside(Crop(soft, box), planes);
+  const double voxel_mm3 = VoxelVolumeMm3(mask.geometry);
+  for (size_t i = 0; i < mask.values.size(); ++i) {
+    if (all_soft.values[i] != 0 && mask.values[i] == 0) result.left_out_mm3 += voxel_mm3;
+    if (all_soft.values[i] == 0 && mask.values[i] != 0) result.filled_mm3 += voxel_mm3;
+  }
   return result;
 }
 

@@ -31,7 +31,9 @@ struct RegionOfInterest {
 RegionOfInterest DefaultRegion(const Landmarks& landmarks, const GridGeometry& geometry);
 
 struct SoftTissueOptions {
-  double thinnest_mm = 3;            // sheets and strings that are thinner are left out
+  // Behind the outer skin there is at least so much tissue, if need be in place of air or bone;
+  // other sheets and strings that are thinner are left out.
+  double thinnest_mm = 3;
   double narrowest_neck_mm = 16;     // through less than that the brain hangs on the face
   double smallest_cavity_mm3 = 150;  // air and specks of bone that are smaller are filled
 };
@@ -55,6 +57,7 @@ struct SoftTissue {
 
   double volume_mm3 = 0;    // of the soft tissue's voxels
   double left_out_mm3 = 0;  // soft voxels in the box that are not in it: brain, marrow, thin sheets
+  double filled_mm3 = 0;    // voxels in it that are not soft: behind thin skin, small cavities
   RegionOfInterest region;
 };
 

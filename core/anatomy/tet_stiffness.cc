@@ -35,6 +35,7 @@ class CtNumbers {
   CtNumbers(const HuGrid& hu, const LabelGrid& bone, double air_below_hu)
       : hu_(hu), bone_(bone), air_below_hu_(air_below_hu) {}
 
+  double air_below_hu() const { return air_below_hu_; }
   double At(int x, int y, int z) const { return hu_.At(x, y, z); }
 
   // The partial-volume effect: a voxel at a border holds some of both sides, and fat beside air or
@@ -164,7 +165,11 @@ Mean Choose(const TetMeans& means, const Eigen::Vector3d& barycentre, const CtNu
     return mean;
   }
   ++result->from_mixed_voxels;
-  return means.mixed.empty() ? numbers.Interpolate(barycentre, true) : means.mixed;
+  const Mean mixed = means.mixed.empty() ? numbers.Interpolate(barycentre, true) : means.mixed;
+  // No model holds air: where the CT has it, thin skin was thickened.
+  Mean tissue;
+  tissue.Add(std::max(mixed.value(), numbers.air_below_hu()));
+  return tissue;
 }
 
 }  // namespace

