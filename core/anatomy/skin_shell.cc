@@ -73,9 +73,9 @@ LabelGrid SkinShell(const HeadSegmentation& head, const LabelGrid& outside_air,
   // The centre of a voxel of air lies half a voxel before the skin.
   const double reach_mm = thickness_mm + voxel_mm / 2;
   const FloatGrid depth = DistanceMm(outside_air);
-  const LabelGrid air = MaskWhere(head.hu, [&](int16_t hu) { return hu <= head.options.tissue_above_hu; });
-  const VoxelGrid<float> way =
-      DistanceWithin(air, outside_air, kStraight * (reach_mm + voxel_mm));
+  const LabelGrid air =
+      MaskWhere(head.hu, [&](int16_t hu) { return hu <= head.options.tissue_above_hu; });
+  const VoxelGrid<float> way = DistanceWithin(air, outside_air, kStraight * (reach_mm + voxel_mm));
 
   const LabelGrid facing =
       VoxelsFacing(outside_air, MaskWhere(air, [](uint8_t value) { return value == 0; }));

@@ -14,15 +14,15 @@ namespace tissueform {
 // of the nose or the mouth, or bone: the walls of a nose are 2 to 3 mm thin, and so is the skin of
 // its bridge. A model without them has no nose, or holes to the bone.
 //
-// Not behind the skin is air that reaches the outside by a straight way (the end of a nostril is not
-// plugged), and what lies behind teeth that are exposed in an open mouth, nor these.
+// Not behind the skin is air that reaches the outside by a straight way (the end of a nostril is
+// not plugged), and what lies behind teeth that are exposed in an open mouth, nor these.
 //
 // `outside_air` is OutsideAir(head).
 LabelGrid SkinShell(const HeadSegmentation& head, const LabelGrid& outside_air,
                     const Landmarks& landmarks, double thickness_mm);
 
-// The voxels that are part of a block of 2 x 2 x 2 in the mask: without hairs and free sheets of one
-// voxel.
+// The voxels that are part of a block of 2 x 2 x 2 in the mask: without hairs and free sheets of
+// one voxel.
 LabelGrid WithoutSingleLayers(const LabelGrid& mask);
 
 }  // namespace tissueform

@@ -22,10 +22,9 @@ constexpr double kVoxelMm = 0.75;
 // A ball of soft tissue with what `hu` says of a place in it.
 HeadSegmentation Ball(const std::function<int(const Vector3d&)>& hu) {
   HeadSegmentation head;
-  head.hu = HuGrid({.size = {100, 100, 100},
-                    .origin_mm = Vector3d::Constant(-37.2),
-                    .spacing_mm = kVoxelMm},
-                   -1000);
+  head.hu = HuGrid(
+      {.size = {100, 100, 100}, .origin_mm = Vector3d::Constant(-37.2), .spacing_mm = kVoxelMm},
+      -1000);
   head.head = LabelGrid(head.hu.geometry);
   head.bone = LabelGrid(head.hu.geometry);
   ForEachVoxel(LabelGrid(head.hu.geometry, 1), [&](size_t index, const Vector3d& place) {
@@ -63,8 +62,7 @@ Depths DepthsOf(const LabelGrid& shell, const std::function<bool(const Vector3d&
       double depth = 0;
       // From half a voxel behind the skin, where its first voxel is.
       for (; depth < 20; depth += 0.1) {
-        const Vector3d at = shell.geometry.ToVoxels(
-            (kBallMm - kVoxelMm - depth) * direction);
+        const Vector3d at = shell.geometry.ToVoxels((kBallMm - kVoxelMm - depth) * direction);
         const Eigen::Vector3i voxel = at.array().round().cast<int>();
         if (shell.At(voxel.x(), voxel.y(), voxel.z()) == 0) break;
       }
@@ -109,9 +107,8 @@ TEST(SkinShellTest, ANostrilIsNotPlugged) {
   const auto in_nostril = [](const Vector3d& p) {
     return std::hypot(p.x(), p.y()) < 4 && p.z() < 0;
   };
-  const HeadSegmentation head = Ball([&](const Vector3d& p) {
-    return p.norm() < 27 || in_nostril(p) ? -1000 : 40;
-  });
+  const HeadSegmentation head =
+      Ball([&](const Vector3d& p) { return p.norm() < 27 || in_nostril(p) ? -1000 : 40; });
   const LabelGrid shell = Shell(head);
   ForEachVoxel(shell, [&](size_t /*index*/, const Vector3d& place) {
     // The rim is thickened, the middle stays open.

@@ -1,0 +1,225 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// The face that the CT shows is in the mesh, and where it is not, no measure says that it is: on the
+// bundled head, and on the same head with a nose of thin walls.
+
+#include <array>
+#include <cmath>
+#include <random>
+#include <utility>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "client/plan_report/coverage_report.h"
+#include "core/anatomy/bone_parts.h"
+#include "core/anatomy/osteotomy.h"
+#include "core/anatomy/outer_skin.h"
+#include "core/anatomy/skin_regions.h"
+#include "core/base/status_macros.h"
+#include "core/ct/ct_volume_reader.h"
+#include "core/ct/isotropic_resample.h"
+#include "core/mesh/tet_topology.h"
+#include "core/plan_building/planning_regions.h"
+#include "core/plan_building/skin_coverage.h"
+#include "core/plan_building/soft_tissue_mesh.h"
+#include "tests/testing/meshes.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using Eigen::Vector3d;
+using testing::TestDataPath;
+
+constexpr double kBundledVoxelMm = 3.2;
+
+// What building a plan finds before it cuts bone, and the mesh that it makes.
+struct Face {
+  HeadSegmentation head;
+  Landmarks landmarks;
+  SoftTissue tissue;
+  SoftTissueMesh mesh;
+  PlanningRegions regions;
+
+  absl::StatusOr<SkinCoverage> Coverage(const TriangleMesh& surface,
+                                        const PlanningRegions& of_surface,
+                                        double ct_voxel_mm) const {
+    return MeasureSkinCoverage(head, landmarks, {surface, of_surface, tissue.region}, ct_voxel_mm);
+  }
+};
+
+absl::StatusOr<HuGrid> BundledCt(double spacing_mm) {
+  CtReadOptions options;
+  options.hu_offset = -1024;
+  options.axes = "RPI";
+  TF_ASSIGN_OR_RETURN(const CtVolume volume,
+                      ReadCtVolume(TestDataPath("ct/headsq/headsq_quarter.nhdr"), options));
+  return ResampleIsotropic(volume, spacing_mm, {.threads = 2});
+}
+
+absl::StatusOr<Face> FaceOf(const HuGrid& ct) {
+  TF_ASSIGN_OR_RETURN(HeadSegmentation head, SegmentHead(ct));
+  TF_ASSIGN_OR_RETURN(const BoneParts parts, SeparateBoneParts(head));
+  TF_ASSIGN_OR_RETURN(const Landmarks landmarks, FindLandmarks(head, parts));
+  const OsteotomySegment cut = DefaultSegment(OsteotomyKind::kBssro, "mandible", landmarks);
+  TF_ASSIGN_OR_RETURN(const LabelGrid bone, CutSegments(parts.labels, {cut}));
+  TF_ASSIGN_OR_RETURN(
+      SoftTissue tissue,
+      ExtractSoftTissue(head, bone, landmarks, DefaultRegion(landmarks, bone.geometry)));
+  SoftTissueMeshOptions options;
+  options.edge_mm = 3.5;
+  for (const Vector3d& centre : {landmarks.upper_lip, landmarks.lower_lip, landmarks.skin_pogonion}) {
+    options.fine_regions.push_back({.centre_mm = centre, .radius_mm = 24, .edge_mm = 2.5});
+  }
+  TF_ASSIGN_OR_RETURN(SoftTissueMesh mesh, MeshSoftTissue(tissue.field, options));
+  const auto tissue_above_hu = static_cast<double>(head.options.tissue_above_hu);
+  TF_ASSIGN_OR_RETURN(PlanningRegions regions,
+                      AssignRegions(mesh.mesh, mesh.surface.num_vertices(), tissue, {"mandible"}, 3,
+                                    landmarks, {head.hu, tissue_above_hu}));
+  return Face{.head = std::move(head),
+              .landmarks = landmarks,
+              .tissue = std::move(tissue),
+              .mesh = std::move(mesh),
+              .regions = std::move(regions)};
+}
+
+// All but what is deeper than `wall_mm` behind the skin of the nose's lower part is air.
+void HollowNose(double wall_mm, HuGrid* ct) {
+  const HeadSegmentation head = SegmentHead(*ct).value();
+  const BoneParts parts = SeparateBoneParts(head).value();
+  const Landmarks l = FindLandmarks(head, parts).value();
+  LabelGrid tissue = MaskWhere(*ct, [&](int16_t hu) { return hu > -500; });
+  const LabelGrid outside = MaskWhere(
+      DistanceWithin(MaskWhere(tissue, [](uint8_t v) { return v == 0; }),
+                     AirReachedByBall(MaskWhere(tissue, [](uint8_t v) { return v == 0; }), 6), 4),
+      [](float mm) { return std::isfinite(mm); });
+  const FloatGrid depth = DistanceMm(outside);
+  const double deeper_than_mm = wall_mm + ct->geometry.spacing_mm / 2;
+  ForEachVoxel(tissue, [&](size_t index, const Vector3d& p) {
+    const Vector3d from_tip = p - l.nose_tip;
+    const bool in_nose = std::abs(from_tip.x()) < 17 && p.z() > l.subnasale.z() &&
+                         from_tip.z() < 14 && p.y() < l.subnasale.y() + 12;
+    if (in_nose && depth.values[index] > deeper_than_mm) ct->values[index] = -1000;
+  });
+}
+
+bool IsReady(const SkinCoverage& coverage) { return AllPassed(CheckCoverage(coverage)); }
+
+// How far the foremost place of the nose lies before the CT's landmark of it, along the front.
+double NoseTipErrorMm(const Face& face) {
+  const Vector3d front = face.landmarks.ForwardOf(face.landmarks.upper_teeth);
+  double foremost_mm = -1e9;
+  for (const auto& row : face.mesh.surface.positions().rowwise()) {
+    const Vector3d p = row.transpose();
+    if ((p - face.landmarks.nose_tip).norm() < 6) foremost_mm = std::max(foremost_mm, front.dot(p));
+  }
+  return foremost_mm - front.dot(face.landmarks.nose_tip);
+}
+
+class WholeFaceTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    const absl::StatusOr<HuGrid> ct = BundledCt(1.5);
+    ASSERT_TRUE(ct.ok()) << ct.status();
+    absl::StatusOr<Face> face = FaceOf(*ct);
+    ASSERT_TRUE(face.ok()) << face.status();
+    face_ = new Face(*std::move(face));
+  }
+  static void TearDownTestSuite() {
+    delete face_;
+    face_ = nullptr;
+  }
+
+  // The boundary of what is left of the mesh without the tets that have a corner in a ball. It has
+  // no skin where it had none.
+  static absl::StatusOr<SkinCoverage> CoverageWithoutBall(const Vector3d& centre,
+                                                          double radius_mm) {
+    const TetMesh& whole = face_->mesh.mesh;
+    TetIndices kept(whole.num_tets(), 4);
+    Eigen::Index num_kept = 0;
+    for (const auto& tet : whole.tets().rowwise()) {
+      bool near = false;
+      for (const int32_t v : tet) {
+        near = near || (whole.positions().row(v).transpose() - centre).norm() < radius_mm;
+      }
+      if (!near) kept.row(num_kept++) = tet;
+    }
+    kept.conservativeResize(num_kept, 4);
+    TF_ASSIGN_OR_RETURN(const TetMesh rest, TetMesh::Create(whole.positions(), kept));
+    TF_ASSIGN_OR_RETURN(const TriangleMesh surface,
+                        TriangleMesh::Create(whole.positions(), BoundaryFacets(rest)));
+    return face_->Coverage(surface, face_->regions, kBundledVoxelMm);
+  }
+
+  static Face* face_;
+};
+
+Face* WholeFaceTest::face_ = nullptr;
+
+TEST_F(WholeFaceTest, TheBundledHeadIsReadyAndItsNoseWhole) {
+  ASSERT_OK_AND_ASSIGN(const SkinCoverage coverage,
+                       face_->Coverage(face_->mesh.surface, face_->regions, kBundledVoxelMm));
+  EXPECT_TRUE(IsReady(coverage)) << FailedText(CheckCoverage(coverage));
+  EXPECT_NEAR(NoseTipErrorMm(*face_), 0, 0.5);
+  EXPECT_LT(coverage.mesh_skin_on_bone_mm2, 0.01 * coverage.mesh_skin_mm2);
+}
+
+// Places of the face, by chance: of the named regions of the mesh's skin; the nose's tip and wings,
+// the lips and the chin are among them.
+TEST_F(WholeFaceTest, NoPlanPassesWithoutAPieceOf10MmOrMore) {
+  std::vector<Vector3d> places = {face_->landmarks.nose_tip, face_->landmarks.upper_lip,
+                                  face_->landmarks.lower_lip, face_->landmarks.skin_pogonion,
+                                  face_->landmarks.mouth_corner.left};
+  std::vector<Eigen::Index> named;
+  const std::vector<SkinRegion> names =
+      NameSkinRegions(face_->mesh.surface.positions(), face_->landmarks);
+  const LabelGrid outside = OutsideAir(face_->head);
+  const FloatGrid to_outside = DistanceMm(outside);
+  for (size_t v = 0; v < names.size(); ++v) {
+    const Vector3d p = face_->mesh.surface.positions().row(static_cast<Eigen::Index>(v));
+    if (names[v] != SkinRegion::kNone && Interpolate(to_outside, p) < 1.5) {
+      named.push_back(static_cast<Eigen::Index>(v));
+    }
+  }
+  ASSERT_GT(named.size(), 1000U);
+  std::mt19937 random(20261122);  // NOLINT: the same pieces every time
+  for (int i = 0; i < 25; ++i) {
+    places.push_back(face_->mesh.surface.positions().row(
+        named[std::uniform_int_distribution<size_t>(0, named.size() - 1)(random)]));
+  }
+  std::uniform_real_distribution<double> radius_mm(5, 9);
+  for (size_t i = 0; i < places.size(); ++i) {
+    const double radius = i % 3 == 0 ? 5 : radius_mm(random);
+    ASSERT_OK_AND_ASSIGN(const SkinCoverage coverage, CoverageWithoutBall(places[i], radius));
+    EXPECT_FALSE(IsReady(coverage)) << "piece of " << 2 * radius << " mm at "
+                                    << places[i].transpose();
+    EXPECT_GT(coverage.whole.largest_mm, 3) << places[i].transpose();
+  }
+}
+
+// The walls of a nose are thin, and what is thin was taken away: nose, wings and all.
+TEST(ThinNoseTest, ANoseWithWallsOf2MmIsMeshedWhole) {
+  ASSERT_OK_AND_ASSIGN(HuGrid ct, BundledCt(1));
+  HollowNose(2, &ct);
+  CtVolume volume;
+  volume.size = ct.geometry.size;
+  volume.spacing_mm = Vector3d::Ones();
+  volume.origin_mm = ct.geometry.origin_mm;
+  volume.hu = ct.values;
+  ASSERT_OK_AND_ASSIGN(const HuGrid resampled, ResampleIsotropic(volume, 1.5, {.threads = 2}));
+  ASSERT_OK_AND_ASSIGN(const Face face, FaceOf(resampled));
+  ASSERT_OK_AND_ASSIGN(const SkinCoverage coverage,
+                       face.Coverage(face.mesh.surface, face.regions, 1));
+  EXPECT_EQ(coverage.tolerance_mm, 1.5);
+  for (const CoveredPart& part : coverage.regions) EXPECT_GE(part.share(), 0.99);
+  EXPECT_GT(coverage.regions[static_cast<size_t>(SkinRegion::kNose)].area_mm2, 1200);
+  EXPECT_TRUE(IsReady(coverage)) << FailedText(CheckCoverage(coverage));
+  EXPECT_NEAR(NoseTipErrorMm(face), 0, 0.5);
+  // The hollow is there: of the nose's tissue much was made.
+  EXPECT_GT(face.tissue.filled_mm3, 1000);
+}
+
+}  // namespace
+}  // namespace tissueform
