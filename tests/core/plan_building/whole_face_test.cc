@@ -1,8 +1,8 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
-// The face that the CT shows is in the mesh, and where it is not, no measure says that it is: on the
-// bundled head, and on the same head with a nose of thin walls.
+// The face that the CT shows is in the mesh, and where it is not, no measure says that it is: on
+// the bundled head, and on the same head with a nose of thin walls.
 
 #include <array>
 #include <cmath>
@@ -70,7 +70,8 @@ absl::StatusOr<Face> FaceOf(const HuGrid& ct) {
       ExtractSoftTissue(head, bone, landmarks, DefaultRegion(landmarks, bone.geometry)));
   SoftTissueMeshOptions options;
   options.edge_mm = 3.5;
-  for (const Vector3d& centre : {landmarks.upper_lip, landmarks.lower_lip, landmarks.skin_pogonion}) {
+  for (const Vector3d& centre :
+       {landmarks.upper_lip, landmarks.lower_lip, landmarks.skin_pogonion}) {
     options.fine_regions.push_back({.centre_mm = centre, .radius_mm = 24, .edge_mm = 2.5});
   }
   TF_ASSIGN_OR_RETURN(SoftTissueMesh mesh, MeshSoftTissue(tissue.field, options));
@@ -193,8 +194,8 @@ TEST_F(WholeFaceTest, NoPlanPassesWithoutAPieceOf10MmOrMore) {
   for (size_t i = 0; i < places.size(); ++i) {
     const double radius = i % 3 == 0 ? 5 : radius_mm(random);
     ASSERT_OK_AND_ASSIGN(const SkinCoverage coverage, CoverageWithoutBall(places[i], radius));
-    EXPECT_FALSE(IsReady(coverage)) << "piece of " << 2 * radius << " mm at "
-                                    << places[i].transpose();
+    EXPECT_FALSE(IsReady(coverage))
+        << "piece of " << 2 * radius << " mm at " << places[i].transpose();
     EXPECT_GT(coverage.whole.largest_mm, 3) << places[i].transpose();
   }
 }
