@@ -123,6 +123,7 @@ bool HoldsFile(const Candidate& candidate, int file_number) {
 
 std::vector<SliceGroup> GroupsOf(const std::vector<Candidate>& candidates) {
   std::vector<SliceGroup> groups;
+  groups.reserve(candidates.size());
   for (const Candidate& candidate : candidates) groups.push_back(candidate.group);
   return groups;
 }

@@ -3,7 +3,6 @@
 
 #include "core/ct/dicom_tags.h"
 
-#include <cmath>
 #include <cstring>
 #include <gdcmDataSet.h>
 #include <gdcmSequenceOfItems.h>
@@ -42,8 +41,8 @@ double DaysOf(absl::string_view date) {
   if (!year || !month || !day) return 0;
   const int shifted_year = *year - (*month <= 2 ? 1 : 0);
   const int shifted_month = (*month + 9) % 12;
-  return 365.0 * shifted_year + std::floor(shifted_year / 4) - std::floor(shifted_year / 100) +
-         std::floor(shifted_year / 400) + (153 * shifted_month + 2) / 5 + *day;
+  const int leap_days = shifted_year / 4 - shifted_year / 100 + shifted_year / 400;
+  return 365 * shifted_year + leap_days + (153 * shifted_month + 2) / 5 + *day;
 }
 
 // HHMMSS.ffffff, of which all but the hours may be missing.

@@ -141,6 +141,7 @@ std::vector<Stack> Assemble(const Stack& stack, const Labels& labels) {
   std::map<int, Stack> by_label;
   for (const Placed& placed : stack) by_label[labels[placed.slice]].push_back(placed);
   std::vector<Stack> parts;
+  parts.reserve(by_label.size());
   for (auto& [label, part] : by_label) parts.push_back(std::move(part));
   std::stable_sort(parts.begin(), parts.end(),
                    [](const Stack& a, const Stack& b) { return a.size() > b.size(); });
@@ -198,6 +199,7 @@ std::optional<Labels> LabelsOfJumps(const std::vector<DicomHeader>& slices, Time
 // more.
 std::vector<double> LargestJumps(const std::vector<DicomHeader>& slices, Time time) {
   std::vector<double> times;
+  times.reserve(slices.size());
   for (const DicomHeader& slice : slices) times.push_back((slice.*time).value_or(0));
   std::sort(times.begin(), times.end());
   std::vector<double> jumps;

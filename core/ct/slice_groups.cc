@@ -171,6 +171,7 @@ std::vector<SliceGroup> GroupBySeries(const std::vector<DicomHeader>& files) {
     by_series[{file.patient, file.series_uid, file.series_number}].slices.push_back(file);
   }
   std::vector<SliceGroup> groups;
+  groups.reserve(by_series.size());
   for (auto& [name, group] : by_series) groups.push_back(std::move(group));
   SortByNumber(&groups);
   return groups;

@@ -70,6 +70,20 @@ DicomFile SliceHeader(const SeriesGeometry& geometry, int slice) {
   return file;
 }
 
+// Of a slice whose first pixel lies there.
+std::vector<uint16_t> PhantomPixels(const SeriesGeometry& geometry, const Eigen::Vector3d& first) {
+  std::vector<uint16_t> pixels;
+  for (int j = 0; j < geometry.rows; ++j) {
+    for (int i = 0; i < geometry.columns; ++i) {
+      const Eigen::Vector3d place = first +
+                                    i * geometry.pixel_spacing_mm[1] * geometry.row_direction +
+                                    j * geometry.pixel_spacing_mm[0] * geometry.column_direction;
+      pixels.push_back(static_cast<uint16_t>(PhantomHu(place) + 1024));
+    }
+  }
+  return pixels;
+}
+
 }  // namespace
 
 DicomFile& DicomFile::Text(uint32_t tag, const std::string& vr, const std::string& value) {
@@ -126,21 +140,6 @@ std::string DicomFile::Elements() const {
 double PhantomHu(const Eigen::Vector3d& position_mm) {
   const double hu = 4 * position_mm[0] + 16 * position_mm[1] - 8 * position_mm[2] + 800;
   return position_mm[0] < -28 ? -1000 : std::round(hu);
-}
-
-// Of a slice whose first pixel lies there.
-static std::vector<uint16_t> PhantomPixels(const SeriesGeometry& geometry,
-                                           const Eigen::Vector3d& first) {
-  std::vector<uint16_t> pixels;
-  for (int j = 0; j < geometry.rows; ++j) {
-    for (int i = 0; i < geometry.columns; ++i) {
-      const Eigen::Vector3d place = first +
-                                    i * geometry.pixel_spacing_mm[1] * geometry.row_direction +
-                                    j * geometry.pixel_spacing_mm[0] * geometry.column_direction;
-      pixels.push_back(static_cast<uint16_t>(PhantomHu(place) + 1024));
-    }
-  }
-  return pixels;
 }
 
 std::vector<DicomFile> PhantomSeries(const SeriesGeometry& geometry) {
