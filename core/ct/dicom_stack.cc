@@ -123,6 +123,7 @@ void SortAlong(const Eigen::Vector3d& normal, std::vector<DicomHeader>* slices) 
 // Where along the normal each slice lies.
 std::vector<double> Heights(const std::vector<DicomHeader>& slices, const Eigen::Vector3d& normal) {
   std::vector<double> heights;
+  heights.reserve(slices.size());
   for (const DicomHeader& slice : slices) heights.push_back(slice.position_mm->dot(normal));
   return heights;
 }
