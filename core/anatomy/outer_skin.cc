@@ -82,12 +82,14 @@ class NearestFirst {
     }
   }
 
-  void Offer(const Voxel& voxel, float mm) {
+  bool IsNearer(const Voxel& voxel, float mm) const {
     const auto [x, y, z] = voxel;
-    if (mm > reach_mm_ || !mask_.geometry.Contains(x, y, z) || mask_.At(x, y, z) == 0) return;
-    float& best = distance_.At(x, y, z);
-    if (mm >= best) return;
-    best = mm;
+    return mm <= reach_mm_ && mask_.geometry.Contains(x, y, z) && mask_.At(x, y, z) != 0 &&
+           mm < distance_.At(x, y, z);
+  }
+
+  void Put(const Voxel& voxel, float mm) {
+    distance_.At(voxel[0], voxel[1], voxel[2]) = mm;
     queue_.push({mm, voxel});
   }
 
@@ -97,8 +99,10 @@ class NearestFirst {
       for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
           const float voxels = std::sqrt(static_cast<float>(dx * dx + dy * dy + dz * dz));
-          if (voxels == 0 || !IsOpen(voxel, {dx, dy, dz})) continue;
-          Offer({voxel[0] + dx, voxel[1] + dy, voxel[2] + dz}, mm + step_mm * voxels);
+          const Voxel to = {voxel[0] + dx, voxel[1] + dy, voxel[2] + dz};
+          const float to_mm = mm + step_mm * voxels;
+          // What is near already is most of it, and is asked first.
+          if (IsNearer(to, to_mm) && IsOpen(voxel, {dx, dy, dz})) Put(to, to_mm);
         }
       }
     }
