@@ -35,8 +35,6 @@ struct RemeshingOptions {
 
   // Rounds in which intersections are taken out by remeshing round them with shorter edges.
   int max_repairs = 8;
-
-  int threads = 1;  // the result does not depend on it
 };
 
 struct RemeshedSurface {
@@ -47,9 +45,8 @@ struct RemeshedSurface {
 
 // A closed surface with triangles of the wanted size and a good shape, vertices on the old surface:
 // isotropic remeshing (Botsch and Kobbelt 2004) through CGAL, once for the whole and again for the
-// parts where edges shall be shorter; a large surface in slabs, at the same time. Coarse triangles
-// may cut through each other where the surface is thin or sharply bent; there edges are made
-// shorter until they do not. Deterministic.
+// parts where edges shall be shorter. Coarse triangles may cut through each other where the surface
+// is thin or sharply bent; there edges are made shorter until they do not. Deterministic.
 //
 // Errors: InvalidArgument when an option makes no sense, when the surface is not closed and
 // manifold (the defect is named), or when intersections remain after the last repair.

@@ -55,7 +55,6 @@ RemeshingOptions Remeshing(const SoftTissueMeshOptions& options, double shrinkin
   remeshing.edge_mm = shrinking * options.edge_mm;
   remeshing.fine_regions = options.fine_regions;
   remeshing.iterations = kRemeshingIterations;
-  remeshing.threads = options.threads;
   for (FineRegion& region : remeshing.fine_regions) region.edge_mm *= shrinking;
   return remeshing;
 }

@@ -34,7 +34,7 @@ struct SoftTissueMeshOptions {
   int max_attempts = 4;
   double retry_factor = 0.8;
 
-  int threads = 1;  // the mesh does not depend on it
+  int threads = 1;  // nothing depends on it
 
   IsolationLimits limits{.max_memory_bytes = int64_t{4} << 30, .max_seconds = 300};
 

@@ -93,41 +93,6 @@ TEST(SurfaceRemeshingTest, ThinShellIsRepairedByShorterEdges) {
   EXPECT_LT(MeanEdge(remeshed.mesh), 3.5);
 }
 
-// Large enough to be remeshed in slabs.
-TEST(SurfaceRemeshingTest, LargeSurfaceHasNoSeamsToBeSeen) {
-  const TriangleMesh sphere = SphereSurface({1, 2, 3}, 40, 60);
-  RemeshingOptions options = EdgesOf(4);
-  options.fine_regions = {{Vector3d(41, 2, 3), 8, 2}};
-  ASSERT_OK_AND_ASSIGN(const RemeshedSurface remeshed, RemeshSurface(sphere, options));
-  EXPECT_THAT(CheckMeshable(FindSurfaceDefects(remeshed.mesh)), IsOk());
-  EXPECT_THAT(remeshed.repaired_pairs, IsEmpty());
-  EXPECT_NEAR(MeanEdge(remeshed.mesh, 40), 2, 0.4);
-  // All round, wherever the slabs ended: none of the short edges of the old surface is left.
-  ForEachEdge(remeshed.mesh.triangles(), [&](EdgeUses uses) {
-    const Eigen::RowVector3d a = remeshed.mesh.positions().row(uses[0].edge[0]);
-    const Eigen::RowVector3d b = remeshed.mesh.positions().row(uses[0].edge[1]);
-    if (a.x() > 15) return;
-    EXPECT_GT((a - b).norm(), 1.8);
-    EXPECT_LT((a - b).norm(), 6.5);
-  });
-}
-
-TEST(SurfaceRemeshingTest, ResultDoesNotDependOnThreads) {
-  // Thin, so that it is repaired, too, in some of its slabs or all.
-  const TriangleMesh shell =
-      Together(SphereSurface({0, 0, 0}, 30, 48), InsideOut(SphereSurface({0, 0, 0}, 29.7, 48)));
-  RemeshingOptions options = EdgesOf(7);
-  options.iterations = 2;
-  ASSERT_OK_AND_ASSIGN(const RemeshedSurface alone, RemeshSurface(shell, options));
-  EXPECT_THAT(alone.repaired_pairs, Not(IsEmpty()));
-  EXPECT_THAT(CheckMeshable(FindSurfaceDefects(alone.mesh)), IsOk());
-  options.threads = 3;
-  ASSERT_OK_AND_ASSIGN(const RemeshedSurface together, RemeshSurface(shell, options));
-  EXPECT_EQ(together.repaired_pairs, alone.repaired_pairs);
-  EXPECT_EQ(together.mesh.positions(), alone.mesh.positions());
-  EXPECT_EQ(together.mesh.triangles(), alone.mesh.triangles());
-}
-
 TEST(SurfaceRemeshingTest, IntersectionsOfTheOldSurfaceRemainAndAreRefused) {
   const TriangleMesh crossing =
       Together(SphereSurface({0, 0, 0}, 5, 6), SphereSurface({6, 1, 0.5}, 5, 6));

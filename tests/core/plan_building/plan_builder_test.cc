@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <limits>
 
 #include "gmock/gmock.h"
@@ -152,6 +154,60 @@ TEST(PlanBuilderTest, FirstErrorIsTold) {
                        HasSubstr("segment \"mandible\" moves some of its bone by 300.0 mm")));
 }
 
+constexpr DeformationModel kModels[] = {DeformationModel::kGradientField, DeformationModel::kArap,
+                                        DeformationModel::kLinearElastic,
+                                        DeformationModel::kNeoHookean};
+
+// The demo drags the bundled jaw to 8 mm.
+TEST(PlanBuilderTest, PlanMadeAnewCanBeDraggedFartherThanPlannedByAnyModel) {
+  SetBlasThreads(1);
+  ASSERT_OK_AND_ASSIGN(const Recipe recipe, ReadRecipe(TestDataPath("plans/head/recipe.json")));
+  ASSERT_OK_AND_ASSIGN(const PlanBuild build,
+                       BuildPlan(BundledCt(), recipe, {.threads = 2, .tell = {}}));
+  ASSERT_OK_AND_ASSIGN(PlanProblem problem, ToPlanProblem(build));
+  problem.deformer.preparation.threads = 2;
+  for (const double translation_mm : {6.0, 8.0}) {
+    problem.poses[0].translation_mm = {0, -translation_mm, 0};
+    for (const DeformationModel model : kModels) {
+      problem.deformer.model = model;
+      ASSERT_OK_AND_ASSIGN(
+          const auto deformer,
+          CreateDeformer(*problem.mesh, problem.stiffness, problem.constraints, problem.deformer));
+      ASSERT_OK_AND_ASSIGN(const Deformation answer, deformer->Deform(problem.poses));
+      EXPECT_EQ(MeasureDeformation(*problem.mesh, answer.positions).inverted_tets, 0)
+          << std::string(ModelName(model)) << " " << translation_mm;
+    }
+  }
+}
+
+std::string BytesOf(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST(PlanBuilderTest, BytesDoNotDependOnThreads) {
+  SetBlasThreads(1);
+  Recipe recipe = CoarseRecipe();
+  const std::string folder = ::testing::TempDir() + "plan_threads_test";
+  std::vector<std::string> plans;
+  std::vector<std::string> meshes;
+  for (const int threads : {1, 2, 3}) {
+    ASSERT_OK_AND_ASSIGN(const PlanBuild build,
+                         BuildPlan(BundledCt(), recipe, {.threads = threads, .tell = {}}));
+    std::filesystem::remove_all(folder);
+    std::filesystem::create_directories(folder);
+    ASSERT_THAT(WritePlan(build, folder), IsOk());
+    plans.push_back(BytesOf(folder + "/plan.json"));
+    meshes.push_back(BytesOf(folder + "/head.vtu"));
+  }
+  std::filesystem::remove_all(folder);
+  EXPECT_GT(meshes[0].size(), 100000U);
+  for (size_t i = 1; i < plans.size(); ++i) {
+    EXPECT_EQ(plans[i], plans[0]);
+    EXPECT_TRUE(meshes[i] == meshes[0]);
+  }
+}
+
 // What issue-tracker and README promise of the bundled plans.
 class BundledHeadTest : public ::testing::TestWithParam<const char*> {};
 
@@ -160,8 +216,7 @@ TEST_P(BundledHeadTest, PlannedMoveInvertsNoTetAndMovesTheBoneExactly) {
                        ReadPlan(TestDataPath(std::string("plans/") + GetParam() + "/plan.json")));
   ASSERT_OK_AND_ASSIGN(PlanProblem problem, ResolvePlan(plan));
   problem.deformer.preparation.threads = 2;
-  for (const DeformationModel model :
-       {DeformationModel::kGradientField, DeformationModel::kLinearElastic}) {
+  for (const DeformationModel model : kModels) {
     problem.deformer.model = model;
     ASSERT_OK_AND_ASSIGN(
         const auto deformer,
