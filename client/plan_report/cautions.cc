@@ -3,9 +3,12 @@
 
 #include "client/plan_report/cautions.h"
 
+#include <utility>
+
 #include "absl/strings/str_format.h"
 
 #include "client/plan_report/coverage_report.h"
+#include "client/plan_report/metal_report.h"
 
 namespace tissueform {
 namespace {
@@ -19,6 +22,7 @@ constexpr double kLittleUnderChinMm = 15;
 
 std::vector<std::string> Cautions(const PlanBuild& build) {
   std::vector<std::string> cautions = CoverageCautions(build.coverage);
+  for (std::string& caution : MetalCautions(build)) cautions.push_back(std::move(caution));
   const double nose_mm = build.landmarks.nose_prominence_mm;
   if (nose_mm < kFlatNoseMm) {
     cautions.push_back(absl::StrFormat(

@@ -10,6 +10,7 @@
 
 #include "client/plan_report/coverage_report.h"
 #include "client/plan_report/label_colours.h"
+#include "client/plan_report/metal_report.h"
 #include "client/plan_report/plan_scenes.h"
 #include "client/plan_report/slice_pictures.h"
 #include "client/rendering/figure.h"
@@ -60,6 +61,21 @@ absl::StatusOr<ReportPicture> DrawSlices(const PlanBuild& build, const std::stri
   Figure figure(picture.title);
   figure.AddRow(640, {panels[0], panels[1]});
   figure.AddRow(640, {panels[2], panels[3]});
+  TF_RETURN_IF_ERROR(WriteFigure(picture, figure, folder));
+  return picture;
+}
+
+absl::StatusOr<ReportPicture> DrawMetal(const PlanBuild& build, const std::string& folder) {
+  ReportPicture picture{
+      "metal.png",
+      "Metal, before and after its streaks were lessened",
+      "Slices of the resampled CT through the largest pieces of metal: above as the scanner made "
+      "them, below as the plan was made from them.",
+      {}};
+  MetalSlices slices = DrawMetalSlices(build);
+  Figure figure(picture.title);
+  figure.AddRow(480, std::move(slices.before));
+  figure.AddRow(480, std::move(slices.after));
   TF_RETURN_IF_ERROR(WriteFigure(picture, figure, folder));
   return picture;
 }
@@ -178,6 +194,10 @@ absl::StatusOr<std::vector<ReportPicture>> DrawPlanPictures(const PlanBuild& bui
        {DrawSlices, DrawBone, DrawSkin, DrawCoverage, DrawConstraints, DrawTets}) {
     TF_ASSIGN_OR_RETURN(ReportPicture picture, draw(build, folder));
     pictures.push_back(std::move(picture));
+  }
+  if (build.metal.any()) {
+    TF_ASSIGN_OR_RETURN(ReportPicture metal, DrawMetal(build, folder));
+    pictures.insert(pictures.begin() + 1, std::move(metal));
   }
   TF_ASSIGN_OR_RETURN(ReportPicture quality, DrawHistograms(measures, folder));
   pictures.push_back(std::move(quality));

@@ -183,10 +183,18 @@ std::string StiffnessHtml(const Json& stiffness) {
   return JsonColumns(stiffness["tissues"]) + JsonTable(rest);
 }
 
+std::string MetalSection(const Json& report) {
+  const Json metal = report.value("metal", Json::object());
+  if (!metal.value("found", false)) return "";
+  Json rest = metal;
+  rest.erase("pieces");
+  return Section("Metal", JsonTable(rest) + JsonColumns(metal["pieces"]));
+}
+
 std::string Tables(const Json& report) {
   return absl::StrCat(
       Section("Segments", SegmentTables(report["segments"])),
-      Section("Bone and how it was told apart", JsonTable(report["bone"])),
+      Section("Bone and how it was told apart", JsonTable(report["bone"])), MetalSection(report),
       Section("Mesh", JsonTable(report["mesh"])),
       Section("Distances", JsonTable(report["distances"])),
       Section("The CT's skin in the mesh", JsonTable(report["coverage"])),

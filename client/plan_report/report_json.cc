@@ -11,6 +11,7 @@
 #include "client/plan_report/cautions.h"
 #include "client/plan_report/coverage_report.h"
 #include "client/plan_report/library_versions.h"
+#include "client/plan_report/metal_report.h"
 #include "core/anatomy/skin_regions.h"
 #include "core/planning/json_values.h"
 
@@ -86,7 +87,9 @@ Json BoneJson(const PlanBuild& build, const PlanMeasures& measures) {
   bone["confidence"] = build.parts.confidence;
   bone["confidence_means"] =
       "share of the lower jaw's surface that the CT itself shows, bone beside no bone; where the "
-      "rest touches the cranium the watershed or the plane decided";
+      "rest touches the cranium the watershed or the plane decided, and what lies within 3 mm of "
+      "metal "
+      "is not seen";
   return bone;
 }
 
@@ -283,6 +286,7 @@ Json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
           {"cautions", Cautions(build)},
           {"program", ProgramJson(program_version)},
           {"input", InputJson(build)},
+          {"metal", MetalJson(build)},
           {"head", HeadJson(build)},
           {"bone", BoneJson(build, measures)},
           {"landmarks", LandmarksJson(build.landmarks)},

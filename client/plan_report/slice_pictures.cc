@@ -86,10 +86,6 @@ Colour Grey(const HuGrid& hu, const Vector3d& place_mm) {
   return Colour::Constant(brightness);
 }
 
-SlicePlane Axial(const std::string& title, const Vector3d& through_mm) {
-  return {title, through_mm, Vector3d::UnitX(), Vector3d::UnitY(), "R", "L", "A", "P"};
-}
-
 SlicePlane Coronal(const std::string& title, const Vector3d& through_mm) {
   return {title, through_mm, Vector3d::UnitX(), -Vector3d::UnitZ(), "R", "L", "S", "I"};
 }
@@ -99,12 +95,33 @@ SlicePlane Sagittal(const std::string& title, const Plane& plane) {
   return {title, plane.point_mm, back, back.cross(plane.normal), "A", "P", "S", "I"};
 }
 
+Picture EmptyPicture(const SlicePlane& plane, const PixelGrid& pixels) {
+  return {.title = plane.title,
+          .width = pixels.width,
+          .height = pixels.height,
+          .rgb = {},
+          .at_left = plane.at_left,
+          .at_right = plane.at_right,
+          .at_top = plane.at_top,
+          .at_bottom = plane.at_bottom};
+}
+
+void Append(const Colour& colour, Picture* picture) {
+  for (const double channel : colour) {
+    picture->rgb.push_back(static_cast<uint8_t>(std::lround(255 * channel)));
+  }
+}
+
 }  // namespace
+
+SlicePlane AxialSlice(const std::string& title, const Vector3d& through_mm) {
+  return {title, through_mm, Vector3d::UnitX(), Vector3d::UnitY(), "R", "L", "A", "P"};
+}
 
 std::vector<SlicePlane> PlanSlices(const Landmarks& landmarks) {
   constexpr double kBelowEdgeMm = 4;  // of the incisor, where the crowns are wide
-  return {Axial("axial, through the lower teeth",
-                landmarks.lower_incisor - Vector3d(0, 0, kBelowEdgeMm)),
+  return {AxialSlice("axial, through the lower teeth",
+                     landmarks.lower_incisor - Vector3d(0, 0, kBelowEdgeMm)),
           Coronal("coronal, through the lower molars",
                   (landmarks.lower_molar.left + landmarks.lower_molar.right) / 2),
           Coronal("coronal, through the condyles",
@@ -112,17 +129,22 @@ std::vector<SlicePlane> PlanSlices(const Landmarks& landmarks) {
           Sagittal("midsagittal", landmarks.midsagittal)};
 }
 
+Picture DrawPlainSlice(const HuGrid& hu, const GridGeometry& over, const SlicePlane& plane) {
+  const PixelGrid pixels = PixelsOver(over, plane);
+  Picture picture = EmptyPicture(plane, pixels);
+  for (int row = 0; row < pixels.height; ++row) {
+    for (int column = 0; column < pixels.width; ++column) {
+      Append(Grey(hu, pixels.origin_mm + kPixelMm * (column * plane.right + row * plane.down)),
+             &picture);
+    }
+  }
+  return picture;
+}
+
 Picture DrawSlice(const PlanBuild& build, const SlicePlane& plane) {
   const PixelGrid pixels = PixelsOver(build.head.hu.geometry, plane);
   const std::vector<uint8_t> labels = SampleLabels(build, plane, pixels);
-  Picture picture{.title = plane.title,
-                  .width = pixels.width,
-                  .height = pixels.height,
-                  .rgb = {},
-                  .at_left = plane.at_left,
-                  .at_right = plane.at_right,
-                  .at_top = plane.at_top,
-                  .at_bottom = plane.at_bottom};
+  Picture picture = EmptyPicture(plane, pixels);
   picture.rgb.reserve(3 * labels.size());
   size_t pixel = 0;
   for (int row = 0; row < pixels.height; ++row) {
@@ -136,9 +158,7 @@ Picture DrawSlice(const PlanBuild& build, const SlicePlane& plane) {
         const double tint = outline ? 1 : kTint;
         colour = (1 - tint) * colour + tint * ColourOfLabel(label);
       }
-      for (const double channel : colour) {
-        picture.rgb.push_back(static_cast<uint8_t>(std::lround(255 * channel)));
-      }
+      Append(colour, &picture);
     }
   }
   return picture;

@@ -28,6 +28,12 @@ struct SlicePlane {
 // sagittal slice looks to the left of the picture.
 std::vector<SlicePlane> PlanSlices(const Landmarks& landmarks);
 
+// Radiological convention, as above.
+SlicePlane AxialSlice(const std::string& title, const Eigen::Vector3d& through_mm);
+
+// A CT in grey (-300 to 900 HU) over the extent of that grid.
+Picture DrawPlainSlice(const HuGrid& hu, const GridGeometry& over, const SlicePlane& plane);
+
 // The CT in grey (-300 to 900 HU) with soft tissue, fixed bone and segments in their colours, each
 // with its outline, over the whole extent of the head's grid.
 Picture DrawSlice(const PlanBuild& build, const SlicePlane& plane);

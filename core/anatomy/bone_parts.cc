@@ -23,6 +23,8 @@ namespace {
 // A piece with more than this above the plane holds upper teeth, so it is both jaws in one; a speck
 // of an upper tooth, or what the plane's tilt leaves of the lower crowns, is less.
 constexpr double kSmallestUpperTeethMm3 = 400;
+// So near to metal an edge is its blur's or a streak's.
+constexpr double kNotSeenMm = 3;
 constexpr double kFaceDepthMm = 50;  // from the foremost bone of the head to the chin
 
 struct Markers {
@@ -48,7 +50,18 @@ std::optional<Markers> FindMarkers(const HeadSegmentation& head, const DentalCut
   return std::nullopt;
 }
 
-absl::Status NoLowerJaw() {
+// From so much on metal may be why: a full set of brackets has 1000 mm3, six large crowns 3000.
+constexpr double kHidingMetalMm3 = 500;
+
+absl::Status NoLowerJaw(double metal_mm3) {
+  if (metal_mm3 > kHidingMetalMm3) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "metal (%.1f cm3) hides the teeth, and no lower jaw was found beside it; give "
+        "\"occlusal_plane\" in the recipe, between the upper and the lower teeth, and the planes "
+        "of "
+        "the segments",
+        metal_mm3 / 1000));
+  }
   return absl::InvalidArgumentError(absl::StrFormat(
       "no lower jaw in view: above none of the thresholds %d to %d HU is there a piece of bone "
       "shaped "
@@ -186,21 +199,24 @@ LabelGrid GrowMarkers(const HeadSegmentation& head, const LabelGrid& markers) {
 // Of the faces of the mandible's voxels toward other labels, the share toward no bone. A measure of
 // doubt that needs no truth to compare with: a face toward air or flesh is seen in the CT, one
 // toward other bone was decided by the watershed or a plane.
-double ShownBorder(const LabelGrid& labels) {
+double ShownBorder(const LabelGrid& labels, const LabelGrid& metal) {
+  const bool has_metal = CountVoxels(metal) > 0;
+  const FloatGrid from_metal = has_metal ? DistanceMm(metal) : FloatGrid();
   int64_t shown = 0;
   int64_t decided = 0;
   const std::array<int, 3>& size = labels.geometry.size;
-  const auto count = [&](uint8_t a, uint8_t b) {
+  const auto count = [&](uint8_t a, uint8_t b, bool seen) {
     if ((a == kMandible) == (b == kMandible)) return;
-    ++(a == 0 || b == 0 ? shown : decided);
+    ++(seen && (a == 0 || b == 0) ? shown : decided);
   };
   for (int z = 0; z + 1 < size[2]; ++z) {
     for (int y = 0; y + 1 < size[1]; ++y) {
       for (int x = 0; x + 1 < size[0]; ++x) {
         const uint8_t label = labels.At(x, y, z);
-        count(label, labels.At(x + 1, y, z));
-        count(label, labels.At(x, y + 1, z));
-        count(label, labels.At(x, y, z + 1));
+        const bool seen = !has_metal || from_metal.At(x, y, z) > kNotSeenMm;
+        count(label, labels.At(x + 1, y, z), seen);
+        count(label, labels.At(x, y + 1, z), seen);
+        count(label, labels.At(x, y, z + 1), seen);
       }
     }
   }
@@ -244,7 +260,10 @@ absl::StatusOr<BoneParts> SeparateBoneParts(const HeadSegmentation& head,
     TellStage(tell, "cutting between the teeth", 0.3);
     found = FindMarkers(head, &*cut);
   }
-  if (!found.has_value()) return NoLowerJaw();
+  if (!found.has_value()) {
+    const auto metal = static_cast<double>(CountVoxels(head.metal));
+    return NoLowerJaw(metal * VoxelVolumeMm3(head.hu.geometry));
+  }
   const Markers& markers = *found;
   TellStage(tell, "growing the parts of the bone", 0.5);
   result.marker_hu = markers.threshold_hu;
@@ -255,7 +274,7 @@ absl::StatusOr<BoneParts> SeparateBoneParts(const HeadSegmentation& head,
   AssignMetal(head, used_cut, &result.labels);
   result.cut_off_mm = CutOffBelowMm(result.labels, kMandible);
   TF_RETURN_IF_ERROR(CheckInView(result));
-  result.confidence = ShownBorder(result.labels);
+  result.confidence = ShownBorder(result.labels, head.metal);
   return result;
 }
 

@@ -35,7 +35,8 @@ struct BoneParts {
   std::optional<Plane> occlusal_plane;
   double occlusal_clearance = 0;  // see OcclusalCut; 0 without a plane
   // How sure: the share of the mandible's surface that the CT itself shows, bone beside no bone.
-  // The rest touches the cranium, and the watershed or the plane decided where.
+  // The rest touches the cranium, and the watershed or the plane decided where, or lies within 3 mm
+  // of metal.
   double confidence = 0;
   // Where the image's lower border cuts the lower jaw: how much of it is missing, an estimate.
   std::optional<double> cut_off_mm;
