@@ -1,9 +1,10 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-// Writes the bundled head as a scanner would show it, without metal, with fillings and with braces:
-// tissueform-metal-ct FOLDER makes FOLDER/{free,fillings,braces}.nrrd, which need no key of "ct" in
-// a recipe.
+// Writes the bundled head as a scanner would show it, without metal (twice, with other
+// noise), with fillings and with braces:
+// tissueform-metal-ct FOLDER makes FOLDER/{free,again,fillings,braces}.nrrd, which need no key of
+// "ct" in a recipe.
 
 #include <iostream>
 #include <string>
@@ -23,8 +24,8 @@ absl::Status WriteHeads(const std::string& folder) {
   TF_ASSIGN_OR_RETURN(const SimulatedHeads heads,
                       tissueform::testing::SimulateHeads(tissueform::AvailableProcessors()));
   for (const auto& [name, head] :
-       {std::pair("free", &heads.free), std::pair("fillings", &heads.fillings),
-        std::pair("braces", &heads.braces)}) {
+       {std::pair("free", &heads.free), std::pair("again", &heads.again),
+        std::pair("fillings", &heads.fillings), std::pair("braces", &heads.braces)}) {
     TF_RETURN_IF_ERROR(tissueform::testing::WriteNrrd(folder + "/" + name + ".nrrd", *head));
   }
   return absl::OkStatus();

@@ -30,8 +30,12 @@ constexpr double kCellMm = 0.2;
 
 constexpr int kFiner = 4;
 
+constexpr uint32_t kOtherNoise = 1000;  // more than there are slices, whose numbers are the seeds
+
 // A place on the front of a tooth of the bundled head, where its bone falls under 1000 HU, and the
-// direction out of the mouth there.
+// direction out of the mouth there. Brackets push lips out; those of the bundled head lie on bare
+// teeth. So where little of the lip lies over a front (four incisors), it is set deeper or higher,
+// and over every bracket 3 mm of lip or more are left.
 struct ToothFront {
   Eigen::Vector3d place_mm;
   Eigen::Vector3d out;
@@ -43,8 +47,8 @@ const std::array<ToothFront, 12> kUpperFronts = {{{{-66.7, 65.9, -82.0}, {0.96, 
                                                   {{-72.4, 51.4, -87.5}, {0.93, -0.36, 0}},
                                                   {{-75.3, 43.9, -89.5}, {0.75, -0.66, 0}},
                                                   {{-84.3, 42.0, -91.0}, {0.42, -0.91, 0}},
-                                                  {{-91.0, 39.2, -91.0}, {0.17, -0.99, 0}},
-                                                  {{-100.2, 38.7, -91.0}, {-0.08, -1.00, 0}},
+                                                  {{-91.2, 40.2, -89.0}, {0.17, -0.99, 0}},
+                                                  {{-100.1, 39.2, -89.0}, {-0.08, -1.00, 0}},
                                                   {{-107.5, 42.1, -91.0}, {-0.39, -0.92, 0}},
                                                   {{-116.4, 44.4, -90.0}, {-0.79, -0.62, 0}},
                                                   {{-119.6, 51.2, -88.5}, {-0.92, -0.39, 0}},
@@ -54,9 +58,9 @@ const std::array<ToothFront, 12> kLowerFronts = {{{{-71.8, 69.3, -95.0}, {0.80, 
                                                   {{-75.9, 63.2, -99.5}, {0.88, -0.47, 0}},
                                                   {{-77.9, 58.2, -101.5}, {0.92, -0.38, 0}},
                                                   {{-81.5, 51.6, -105.0}, {0.66, -0.75, 0}},
-                                                  {{-89.2, 47.7, -105.5}, {0.34, -0.94, 0}},
+                                                  {{-89.9, 49.7, -105.5}, {0.34, -0.94, 0}},
                                                   {{-95.8, 47.8, -106.0}, {0.09, -1.00, 0}},
-                                                  {{-101.6, 48.4, -106.0}, {-0.28, -0.96, 0}},
+                                                  {{-101.5, 48.9, -106.0}, {-0.28, -0.96, 0}},
                                                   {{-105.8, 52.5, -106.0}, {-0.58, -0.82, 0}},
                                                   {{-111.5, 53.8, -105.5}, {-0.77, -0.64, 0}},
                                                   {{-113.8, 58.0, -103.0}, {-0.87, -0.49, 0}},
@@ -241,20 +245,21 @@ void ScanSlice(const CtScanner& scanner, const CtVolume& fine, int k, SimulatedH
   const TissueSlice tissue = TissueOfHu(&fine.hu[first], size, pixel_mm);
   const TissueLengths lengths = scanner.ProjectTissue(tissue);
   const Eigen::ArrayXXf free = scanner.Transmission(lengths);
-  const auto scan = [&](const Eigen::ArrayXXf& transmission) {
-    return scanner.Reconstruct(scanner.Measure(transmission, static_cast<uint32_t>(k)), size,
-                               pixel_mm);
+  const auto seed = static_cast<uint32_t>(k);
+  const auto scan = [&](const Eigen::ArrayXXf& transmission, uint32_t of_noise) {
+    return scanner.Reconstruct(scanner.Measure(transmission, of_noise), size, pixel_mm);
   };
   const auto write = [first](const std::vector<int16_t>& hu, CtVolume* head) {
     std::copy(hu.begin(), hu.end(), head->hu.begin() + static_cast<std::ptrdiff_t>(first));
   };
-  const std::vector<int16_t> without = scan(free);
+  const std::vector<int16_t> without = scan(free, seed);
   write(without, &heads->free);
+  write(scan(free, seed + kOtherNoise), &heads->again);
   for (const auto& [work, head] :
        {std::pair(Fillings(), &heads->fillings), std::pair(Braces(), &heads->braces)}) {
     const MetalLayers layers = LayersOf(work, fine, k);
     write(layers.empty() ? without
-                         : scan(scanner.WithMetal(free, tissue, lengths, work.metal, layers)),
+                         : scan(scanner.WithMetal(free, tissue, lengths, work.metal, layers), seed),
           head);
   }
 }
@@ -327,7 +332,7 @@ MetalLayers LayersOf(const MetalWork& work, const CtVolume& volume, int slice) {
 
 absl::StatusOr<SimulatedHeads> SimulateHeads(int threads, const std::vector<int>& only) {
   TF_ASSIGN_OR_RETURN(const CtVolume fine, FineHead());
-  SimulatedHeads heads{.free = fine, .fillings = fine, .braces = fine, .slices = {}};
+  SimulatedHeads heads{.free = fine, .again = fine, .fillings = fine, .braces = fine, .slices = {}};
   const MetalWork fillings = Fillings();
   const MetalWork braces = Braces();
   for (int k = 0; k < fine.size[2]; ++k) {

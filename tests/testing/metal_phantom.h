@@ -47,13 +47,14 @@ MetalLayers LayersOf(const MetalWork& work, const CtVolume& volume, int slice);
 
 struct SimulatedHeads {
   CtVolume free;
+  CtVolume again;  // free of metal as well, with other noise: how much a plan differs by that alone
   CtVolume fillings;
   CtVolume braces;
   std::vector<int> slices;  // that were scanned: the metal's, of either kind
 };
 
-// All three with the same scanner and the same noise; of `only`, where it is not empty, the slices
-// with metal. About 10 s on one core; the result does not depend on the threads.
+// All with the same scanner, and but for `again` with the same noise; of `only`, where it is not
+// empty, the slices with metal. About 10 s on one core; the result does not depend on the threads.
 absl::StatusOr<SimulatedHeads> SimulateHeads(int threads, const std::vector<int>& only = {});
 
 // As NRRD with its place in the patient, values in HU.
