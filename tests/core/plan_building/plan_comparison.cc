@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
+#include <set>
 #include <utility>
 
 #include "absl/strings/str_format.h"
@@ -22,6 +23,12 @@ namespace {
 // Round a vertex near the skin: one and a half edges of the mesh, so that the other plan's vertices
 // of the same bone are within it.
 constexpr double kRoundMm = 5;
+
+// Of two plans of one head that differ by the scanner's noise alone: vertices on bone lie a third
+// of a voxel deeper or less deep.
+constexpr double kDepthNoiseMm = 0.5;
+
+constexpr double kOnOuterSkinMm = 1;
 
 std::vector<std::pair<std::string, Eigen::Vector3d>> Named(const Landmarks& l) {
   return {{"menton", l.menton},
@@ -91,21 +98,21 @@ absl::StatusOr<TriangleMesh> SkinOf(const PlanBuild& build) {
   return TriangleMesh::Create(surface.positions(), surface.triangles()(rows, Eigen::all));
 }
 
-// Vertices on bone, and how deep under their mesh's skin they lie.
+// Vertices on bone, and how deep under the outer skin they lie. Walls of nose and mouth are no
+// outer skin: bone lies under them by a millimetre or two in every head.
 struct BoneDepths {
   Positions places;
   Eigen::VectorXd mm;
 };
 
-absl::StatusOr<BoneDepths> DepthsOfBone(const PlanBuild& build) {
-  TF_ASSIGN_OR_RETURN(const TriangleMesh skin, SkinOf(build));
+BoneDepths DepthsOfBone(const PlanBuild& build, const TriangleMesh& outer_skin) {
   std::vector<Eigen::Index> rows;
   for (Eigen::Index v = 0; v < build.mesh.surface.num_vertices(); ++v) {
     if (build.regions.on_bone[static_cast<size_t>(v)]) rows.push_back(v);
   }
   BoneDepths bone;
   bone.places = build.mesh.surface.positions()(rows, Eigen::all);
-  bone.mm = DistancesToSurface(bone.places, skin);
+  bone.mm = DistancesToSurface(bone.places, outer_skin);
   return bone;
 }
 
@@ -117,7 +124,7 @@ void CompareBoneNearSkin(const BoneDepths& plan, const BoneDepths& truth,
     const auto round =
         (truth.places.rowwise() - plan.places.row(v)).rowwise().squaredNorm().array() <
         kRoundMm * kRoundMm;
-    if ((round && truth.mm.array() < kNearSkinMm).any()) continue;
+    if ((round && truth.mm.array() < kNearSkinMm + kDepthNoiseMm).any()) continue;
     ++difference->bone_near_skin;
     if (plan.mm[v] < difference->nearest_bone.mm) {
       difference->nearest_bone = {plan.mm[v], plan.places.row(v).transpose(), ""};
@@ -147,17 +154,21 @@ absl::Status CompareSkin(const PlanBuild& plan, const PlanBuild& truth,
 // moved in.
 struct Foot {
   double squared_mm = std::numeric_limits<double>::infinity();
-  Eigen::RowVector3i corners;
-  Eigen::Vector3d parts;
+  Eigen::RowVector3i corners = Eigen::RowVector3i::Zero();
+  Eigen::Vector3d parts = Eigen::Vector3d::Zero();  // without a triangle: nothing moves there
 };
 
-Foot FootOn(const TriangleMesh& skin, const Eigen::Vector3d& point) {
+// Of the triangles that face `towards`, within 60 degrees: lips that touch face each other, and one
+// moves with the jaw.
+Foot FootOn(const TriangleMesh& skin, const Eigen::Vector3d& point,
+            const Eigen::Vector3d& towards) {
   Foot nearest;
   for (const auto& corners : skin.triangles().rowwise()) {
     const Eigen::Vector3d a = skin.positions().row(corners[0]);
     const Eigen::Vector3d ab = skin.positions().row(corners[1]).transpose() - a;
     const Eigen::Vector3d ac = skin.positions().row(corners[2]).transpose() - a;
     const Eigen::Vector3d normal = ab.cross(ac);
+    if (normal.dot(towards) < 0.5 * normal.norm() * towards.norm()) continue;
     const double area = normal.squaredNorm();
     const Eigen::Vector3d ap = point - a;
     Eigen::Vector3d parts(0, ap.cross(ac).dot(normal) / area, ab.cross(ap).dot(normal) / area);
@@ -168,6 +179,18 @@ Foot FootOn(const TriangleMesh& skin, const Eigen::Vector3d& point) {
     if (squared < nearest.squared_mm) nearest = {squared, corners, parts};
   }
   return nearest;
+}
+
+// Sums of the normals of the triangles about each vertex.
+Positions NormalsOf(const TriangleMesh& surface) {
+  Positions normals = Positions::Zero(surface.num_vertices(), 3);
+  for (const auto& corners : surface.triangles().rowwise()) {
+    const Eigen::RowVector3d a = surface.positions().row(corners[0]);
+    const Eigen::RowVector3d ab = surface.positions().row(corners[1]) - a;
+    const Eigen::RowVector3d ac = surface.positions().row(corners[2]) - a;
+    for (const int32_t corner : corners) normals.row(corner) += ab.cross(ac);
+  }
+  return normals;
 }
 
 absl::StatusOr<Positions> MovementsOf(const PlanBuild& build, DeformationModel model) {
@@ -185,17 +208,26 @@ bool IsLipOrChin(uint8_t region) {
          named == SkinRegion::kChin;
 }
 
+// Only where the truth's outer skin is: what shows of tongue and teeth between open lips counts as
+// lips, too, and moves by millimetres more or less as the scanner's noise opens a slit or closes
+// it.
 absl::Status CompareMovements(const PlanBuild& plan, const PlanBuild& truth, DeformationModel model,
-                              PlanDifference* difference) {
+                              const TriangleMesh& outer_skin, PlanDifference* difference) {
   TF_ASSIGN_OR_RETURN(const Positions of_plan, MovementsOf(plan, model));
   TF_ASSIGN_OR_RETURN(const Positions of_truth, MovementsOf(truth, model));
   TF_ASSIGN_OR_RETURN(const TriangleMesh skin, SkinOf(plan));
+  TF_ASSIGN_OR_RETURN(const TriangleMesh skin_of_truth, SkinOf(truth));
+  const auto corners = skin_of_truth.triangles().reshaped();
+  const Positions normals = NormalsOf(skin_of_truth);
+  const Eigen::VectorXd from_outside =
+      DistancesToSurface(truth.mesh.surface.positions(), outer_skin);
   double sum = 0;
   int64_t count = 0;
-  for (Eigen::Index v = 0; v < truth.mesh.surface.num_vertices(); ++v) {
+  for (const int32_t v : std::set<int32_t>(corners.begin(), corners.end())) {
     if (!IsLipOrChin(truth.regions.skin_region[static_cast<size_t>(v)])) continue;
+    if (from_outside[v] > kOnOuterSkinMm) continue;
     const Eigen::Vector3d place = truth.mesh.surface.positions().row(v);
-    const Foot foot = FootOn(skin, place);
+    const Foot foot = FootOn(skin, place, normals.row(v).transpose());
     Eigen::Vector3d there = Eigen::Vector3d::Zero();
     for (int corner = 0; corner < 3; ++corner) {
       there += foot.parts[corner] * of_plan.row(foot.corners[corner]).transpose();
@@ -231,11 +263,11 @@ absl::StatusOr<PlanDifference> ComparePlans(const PlanBuild& plan, const PlanBui
   PlanDifference difference;
   CompareSegments(plan.segments[0].surface, truth.segments[0].surface, &difference);
   difference.landmark = WorstLandmark(plan.landmarks, truth.landmarks);
-  TF_ASSIGN_OR_RETURN(const BoneDepths of_plan, DepthsOfBone(plan));
-  TF_ASSIGN_OR_RETURN(const BoneDepths of_truth, DepthsOfBone(truth));
-  CompareBoneNearSkin(of_plan, of_truth, &difference);
+  TF_ASSIGN_OR_RETURN(const TriangleMesh outer_skin,
+                      TriangleMesh::Create(truth.coverage.positions, truth.coverage.triangles));
+  CompareBoneNearSkin(DepthsOfBone(plan, outer_skin), DepthsOfBone(truth, outer_skin), &difference);
   TF_RETURN_IF_ERROR(CompareSkin(plan, truth, &difference));
-  TF_RETURN_IF_ERROR(CompareMovements(plan, truth, model, &difference));
+  TF_RETURN_IF_ERROR(CompareMovements(plan, truth, model, outer_skin, &difference));
   return difference;
 }
 

@@ -31,8 +31,8 @@ struct PlanDifference {
 
   WorstAt landmark;
 
-  // Vertices on bone within kNearSkinMm of their mesh's skin where the other plan's bone lies
-  // deeper than that all round, and the one with the least skin over it.
+  // Vertices on bone within kNearSkinMm of the outer skin of the CT without metal where the other
+  // plan's bone lies deeper than that all round, and the one with the least skin over it.
   int64_t bone_near_skin = 0;
   WorstAt nearest_bone;
 
@@ -41,7 +41,7 @@ struct PlanDifference {
   double least_covered = 1;
   std::string least_covered_region;
 
-  // Between the predicted movements of the skin of lips and chin.
+  // Between the predicted movements of the outer skin of lips and chin.
   double movement_mean_mm = 0;
   WorstAt movement;
 };
