@@ -1,9 +1,9 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
-// The proof that metal does not spoil a plan: the bundled head as a scanner shows it without metal,
-// with fillings and with braces (tests/testing/metal_phantom.h). The tests share one build each, so
-// the whole program is one test of ctest.
+// What metal does to a plan, with its streaks lessened and without: the bundled head as a scanner
+// shows it without metal, with fillings and with braces (tests/testing/metal_phantom.h). The tests
+// share one build each, so the whole program is one test of ctest.
 
 #include <array>
 #include <filesystem>
@@ -26,12 +26,11 @@ namespace {
 
 constexpr int kThreads = 2;
 
-// What a correction must reach, and does not without.
+// What a correction must reach.
 constexpr double kSegmentMeanMm = 0.8;
 constexpr double kSegmentP95Mm = 2.5;
 constexpr double kLandmarkMm = 2;
 constexpr double kMovementMeanMm = 0.3;
-constexpr double kMovementWorstMm = 1;
 
 absl::StatusOr<PlanBuild> BuildFrom(const CtVolume& ct, bool correct) {
   const std::string path = absl::StrCat(::testing::TempDir(), "metal_plan_", getpid(), ".nrrd");
@@ -91,37 +90,31 @@ TEST_F(MetalPlanTest, APlanIsEqualToItself) {
   EXPECT_LT(none.movement.mm, 1e-9);
 }
 
-// What docs/ct-input.md tells of landmarks, of the least covered region, of single vertices near
-// the skin and of the largest difference of movements is not asked here: other noise in a CT
-// without metal changes them as much as metal does.
-void ExpectAsWithoutMetal(const PlanDifference& corrected) {
+// Three of the bounds only, and they hold without the correction, too: they keep it from doing
+// harm, and do not show that it helps. What is not reached, docs/ct-input.md tells.
+void ExpectSegmentAndMeanMovementKept(const PlanDifference& corrected) {
   SCOPED_TRACE(TableRow("corrected", corrected));
   EXPECT_LE(corrected.segment_mean_mm, kSegmentMeanMm);
   EXPECT_LE(corrected.segment_p95_mm, kSegmentP95Mm);
   EXPECT_LE(corrected.movement_mean_mm, kMovementMeanMm);
 }
 
-TEST_F(MetalPlanTest, FillingsLeaveThePlanAsItIsWithoutMetal) {
-  ExpectAsWithoutMetal(built_->fillings[0]);
+TEST_F(MetalPlanTest, FillingsKeepTheSegmentAndTheMeanMovement) {
+  ExpectSegmentAndMeanMovementKept(built_->fillings[0]);
 }
 
-TEST_F(MetalPlanTest, BracesLeaveThePlanAsItIsWithoutMetal) {
-  ExpectAsWithoutMetal(built_->braces[0]);
+TEST_F(MetalPlanTest, BracesKeepTheSegmentAndTheMeanMovement) {
+  ExpectSegmentAndMeanMovementKept(built_->braces[0]);
   // The brackets count as their teeth, and the nearest has 3.2 mm of lip over it; that leaves its
   // blur to be told from it, which is finer than a voxel.
   EXPECT_GE(built_->braces[0].nearest_bone.mm, kNearSkinMm - 0.5);
 }
 
-TEST_F(MetalPlanTest, WithoutCorrectionFillingsSpoilThePlan) {
+TEST_F(MetalPlanTest, WithoutCorrectionFillingsMisleadALandmark) {
   const PlanDifference& spoilt = built_->fillings[1];
   SCOPED_TRACE(TableRow("fillings, off", spoilt));
   EXPECT_GT(spoilt.landmark.mm, 5 * kLandmarkMm);
-}
-
-TEST_F(MetalPlanTest, WithoutCorrectionBracesSpoilThePlan) {
-  const PlanDifference& spoilt = built_->braces[1];
-  SCOPED_TRACE(TableRow("braces, off", spoilt));
-  EXPECT_TRUE(spoilt.landmark.mm > kLandmarkMm || spoilt.movement.mm > kMovementWorstMm);
+  EXPECT_LT(built_->fillings[0].landmark.mm, spoilt.landmark.mm / 5);
 }
 
 }  // namespace
