@@ -8,6 +8,7 @@
 #include "absl/strings/str_format.h"
 
 #include "client/plan_report/coverage_report.h"
+#include "client/plan_report/lips_report.h"
 #include "client/plan_report/metal_report.h"
 
 namespace tissueform {
@@ -23,6 +24,10 @@ constexpr double kLittleUnderChinMm = 15;
 std::vector<std::string> Cautions(const PlanBuild& build) {
   std::vector<std::string> cautions = CoverageCautions(build.coverage);
   for (std::string& caution : MetalCautions(build)) cautions.push_back(std::move(caution));
+  for (std::string& caution :
+       LipsCautions(MeasureLipContact(build.soft_tissue.labels, build.landmarks))) {
+    cautions.push_back(std::move(caution));
+  }
   const double nose_mm = build.landmarks.nose_prominence_mm;
   if (nose_mm < kFlatNoseMm) {
     cautions.push_back(absl::StrFormat(

@@ -11,6 +11,7 @@
 #include "client/plan_report/cautions.h"
 #include "client/plan_report/coverage_report.h"
 #include "client/plan_report/library_versions.h"
+#include "client/plan_report/lips_report.h"
 #include "client/plan_report/metal_report.h"
 #include "core/anatomy/skin_regions.h"
 #include "core/planning/json_values.h"
@@ -301,6 +302,7 @@ Json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
             {"filled_mm3", build.soft_tissue.filled_mm3},
             {"filled_means",
              "modelled though it is no soft voxel: air or bone behind thin skin, small cavities"}}},
+          {"lips", LipsJson(MeasureLipContact(build.soft_tissue.labels, build.landmarks))},
           {"mesh", MeshJson(build, measures)},
           {"distances", DistancesJson(build, measures)},
           {"coverage", CoverageJson(build.coverage)},
