@@ -30,7 +30,8 @@ nlohmann::ordered_json LipsJson(const LipContact& contact) {
 std::vector<std::string> LipsCautions(const LipContact& contact) {
   if (contact.width_mm < kLeastWidthMm) return {};
   return {absl::StrFormat(
-      "The lips are closed in this CT and one piece of tissue in the model: over %.0f of the middle "
+      "The lips are closed in this CT and one piece of tissue in the model: over %.0f of the "
+      "middle "
       "%.0f mm of the mouth, %.0f mm deep on average (%.0f mm2), about (%.0f, %.0f, %.0f) mm. They "
       "move together: what parts them, or lets one slide on the other, is not predicted.",
       contact.width_mm, contact.examined_mm, contact.depth_mm, contact.area_mm2,

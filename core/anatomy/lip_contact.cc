@@ -50,7 +50,9 @@ class MouthView {
 
   Met Look(const Eigen::Vector3d& place) const {
     Met met;
-    for (double mm = -kBeforeLipsMm; mm < kBehindLipsMm; mm += step_mm_) {
+    const int steps = static_cast<int>((kBeforeLipsMm + kBehindLipsMm) / step_mm_);
+    for (int step = 0; step < steps; ++step) {
+      const double mm = step * step_mm_ - kBeforeLipsMm;
       const uint8_t label = LabelAt(place + mm * back_);
       const bool is_tissue = label == kSoftTissue;
       if (is_tissue && met.depth_mm == 0) met.start_mm = mm;

@@ -10,8 +10,8 @@
 
 namespace tissueform {
 
-// Where upper and lower lip are one piece of tissue. In a CT with a closed mouth nothing shows where
-// one lip ends; a model of it cannot part them.
+// Where upper and lower lip are one piece of tissue. In a CT with a closed mouth nothing shows
+// where one lip ends; a model of it cannot part them.
 struct LipContact {
   double examined_mm = 0;  // along the mouth, about its middle
   double width_mm = 0;     // of it, where no air parts the lips

@@ -42,7 +42,8 @@ double DaysOf(absl::string_view date) {
   const int shifted_year = *year - (*month <= 2 ? 1 : 0);
   const int shifted_month = (*month + 9) % 12;
   const int leap_days = shifted_year / 4 - shifted_year / 100 + shifted_year / 400;
-  return 365 * shifted_year + leap_days + (153 * shifted_month + 2) / 5 + *day;
+  const int month_days = (153 * shifted_month + 2) / 5;
+  return 365 * shifted_year + leap_days + month_days + *day;
 }
 
 // HHMMSS.ffffff, of which all but the hours may be missing.

@@ -22,8 +22,9 @@ constexpr size_t kColumnsAtATime = 32;
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<ReleasableSystem>> ReleasableSystem::Create(
-    SparseMatrix K, std::vector<int32_t> prescribed, const DirichletSystem::Options& options) {
-  auto releasable = absl::WrapUnique(new ReleasableSystem(std::move(K)));
+    const SparseMatrix& K, std::vector<int32_t> prescribed,
+    const DirichletSystem::Options& options) {
+  auto releasable = absl::WrapUnique(new ReleasableSystem(K));
   TF_ASSIGN_OR_RETURN(releasable->system_,
                       DirichletSystem::Create(releasable->K_, prescribed, options));
   releasable->kept_.resize(prescribed.size());

@@ -27,7 +27,8 @@ class ReleasableSystem {
  public:
   // As DirichletSystem::Create, with its errors.
   static absl::StatusOr<std::unique_ptr<ReleasableSystem>> Create(
-      SparseMatrix K, std::vector<int32_t> prescribed, const DirichletSystem::Options& options);
+      const SparseMatrix& K, std::vector<int32_t> prescribed,
+      const DirichletSystem::Options& options);
 
   // Releases all unknowns that are prescribed now and not in `prescribed`, which is rising.
   // Errors: InvalidArgument (an unknown that was not prescribed, or was released already; nothing
@@ -41,7 +42,7 @@ class ReleasableSystem {
   Eigen::Index num_released() const { return static_cast<Eigen::Index>(released_.size()); }
 
  private:
-  explicit ReleasableSystem(SparseMatrix K) : K_(std::move(K)) {}
+  explicit ReleasableSystem(const SparseMatrix& K) : K_(K) {}
 
   // (K x)_r for the released unknowns, a row for each.
   Eigen::MatrixXd ForcesOnReleased(const Eigen::MatrixXd& x) const;

@@ -49,11 +49,13 @@ PlanBuildAnswer Outcome(const PlanBuildRequest& request, const PlanBuild& build)
   for (const std::string& caution : Cautions(build)) {
     absl::StrAppend(&made.text, "mind    ", caution, "\n");
   }
-  absl::StrAppendFormat(&made.text,
-                        made.ready
-                            ? "the plan is ready: tissueform deform %s/plan.json --out after.vtu\n"
-                            : "the plan in %s is NOT ready: look at the report\n",
-                        request.folder_name);
+  if (made.ready) {
+    absl::StrAppend(&made.text, "the plan is ready: tissueform deform ", request.folder_name,
+                    "/plan.json --out after.vtu\n");
+  } else {
+    absl::StrAppend(&made.text, "the plan in ", request.folder_name,
+                    " is NOT ready: look at the report\n");
+  }
   return made;
 }
 

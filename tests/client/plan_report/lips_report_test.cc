@@ -15,11 +15,8 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 TEST(LipsReportTest, ClosedLipsAreToldWithPlaceAndSize) {
-  const LipContact contact{.examined_mm = 31,
-                           .width_mm = 24,
-                           .area_mm2 = 192,
-                           .depth_mm = 8,
-                           .place_mm = {12, -60, 31}};
+  const LipContact contact{
+      .examined_mm = 31, .width_mm = 24, .area_mm2 = 192, .depth_mm = 8, .place_mm = {12, -60, 31}};
   EXPECT_THAT(LipsCautions(contact), ElementsAre(AllOf(HasSubstr("24"), HasSubstr("192 mm2"),
                                                        HasSubstr("(12, -60, 31) mm"))));
   EXPECT_EQ(LipsJson(contact)["joined_mm2"], 192);

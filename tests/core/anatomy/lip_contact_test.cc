@@ -17,9 +17,9 @@ constexpr double kGapMm = 4;       // between the lips
 constexpr double kLipDepthMm = 9;  // from the skin to the teeth
 
 // A slab of lips before a slab of teeth, as labels: skin at y = -9, teeth from y = 0 to 6, behind
-// them the mouth's air and, from y = 16, a tongue. The gap between the lips about z = 0 goes through
-// to the mouth; where `is_joined` holds of x, tissue bridges it from y = -9 + `notch_mm` to the
-// teeth.
+// them the mouth's air and, from y = 16, a tongue. The gap between the lips about z = 0 goes
+// through to the mouth; where `is_joined` holds of x, tissue bridges it from y = -9 + `notch_mm` to
+// the teeth.
 template <typename Joined>
 LabelGrid Mouth(Joined is_joined, double notch_mm = 0) {
   GridGeometry geometry;
@@ -57,8 +57,8 @@ TEST(LipContactTest, PartedLipsHaveNoneThoughATongueLiesBehind) {
 
 // The bridge's own size: as wide as it was made, as deep as the lips are behind their notch.
 TEST(LipContactTest, ABridgeHasItsWidthItsDepthAndItsPlace) {
-  const LipContact contact = MeasureLipContact(
-      Mouth([](double x) { return x >= 2 && x <= 11; }, 3), MouthLandmarks());
+  const LipContact contact =
+      MeasureLipContact(Mouth([](double x) { return x >= 2 && x <= 11; }, 3), MouthLandmarks());
   EXPECT_NEAR(contact.width_mm, 10, 1);
   EXPECT_NEAR(contact.area_mm2, 10 * (kLipDepthMm - 3), 15);
   EXPECT_NEAR(contact.depth_mm, kLipDepthMm - 3, 1);
