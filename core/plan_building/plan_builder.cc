@@ -280,6 +280,7 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                    .stiffness = std::move(description.stiffness),
                    .regions = std::move(description.released.regions),
                    .freed_by_trial = description.released.freed,
+                   .still_torn = description.released.still_torn,
                    .skin_distance = std::move(description.skin_distance),
                    .coverage = std::move(coverage)};
 }

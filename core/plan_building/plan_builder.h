@@ -60,6 +60,7 @@ struct PlanBuild {
   TetStiffness stiffness;
   PlanningRegions regions;
   int64_t freed_by_trial = 0;  // of regions.freed_by_contact, by ReleaseTornContacts
+  int64_t still_torn = 0;      // tets that it could not keep from turning inside out
   SkinDistance skin_distance;
   SkinCoverage coverage;
 };

@@ -150,7 +150,8 @@ void AddPlanBuildCommand(CLI::App& app, CommandWork* work) {
       ->required();
   build
       ->add_option("--threads", arguments->threads,
-                   "for resampling; 0, the default: all processors. The plan does not depend on it")
+                   "for metal, resampling, the contact trial and distances; 0, the default: all "
+                   "processors. The plan does not depend on it")
       ->check(CLI::Range(0, 1024));
   build->add_option("--stats", arguments->stats,
                     "JSON file for the seconds of every stage and the memory; not in DIR");

@@ -42,6 +42,12 @@ TEST(CautionsTest, ChinThatTheBorderCutsIsTold) {
   EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("about 1.4 mm of its bone")));
 }
 
+TEST(CautionsTest, TetsThatStayTornAreTold) {
+  PlanBuild build = WholeHead();
+  build.still_torn = 3;
+  EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("3 tets turn inside out")));
+}
+
 TEST(CautionsTest, TeethThatWereCutApartAreToldUnlessTheRecipeSaysWhere) {
   PlanBuild build = WholeHead();
   build.parts.separation = JawSeparation::kAutomaticCut;
