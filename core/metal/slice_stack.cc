@@ -45,8 +45,10 @@ std::array<int, 3> SliceStack::Place(size_t index) const {
 }
 
 void FillHoles(const SliceStack& stack, int slice, double largest_mm2, std::vector<uint8_t>* mask) {
-  const auto [width, height, pixel_width_mm, pixel_height_mm] = stack.shape;
-  const auto largest = static_cast<size_t>(largest_mm2 / (pixel_width_mm * pixel_height_mm));
+  const int width = stack.shape.width;
+  const int height = stack.shape.height;
+  const auto largest =
+      static_cast<size_t>(largest_mm2 / (stack.shape.pixel_width_mm * stack.shape.pixel_height_mm));
   std::vector<int> searches(stack.shape.num_pixels(), 0);  // that came by, 0 none
   int search = 0;
   std::vector<std::array<int, 2>> part;

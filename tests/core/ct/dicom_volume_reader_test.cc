@@ -285,6 +285,7 @@ TEST_F(DicomVolumeTest, UnevenSlicesKeepTheirPlaces) {
 // Each gap is nearly the usual one, all together not.
 TEST_F(DicomVolumeTest, DriftingSlicesKeepTheirPlaces) {
   std::vector<double> heights;
+  heights.reserve(9);
   for (int i = 0; i < 9; ++i) heights.push_back(100 + 1.25 * i + (i > 4 ? 0.09 * (i - 4) : 0));
   WriteSeries(SlicesAt(heights));
   ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());

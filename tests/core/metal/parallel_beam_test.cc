@@ -31,8 +31,10 @@ std::vector<float> Drawn(const Disc& disc, const SliceShape& shape) {
     for (int x = 0; x < shape.width; ++x) {
       int inside = 0;
       for (int sample = 0; sample < 64; ++sample) {
-        const double u = (x + (sample % 8 + 0.5) / 8 - shape.width / 2.0) * shape.pixel_width_mm;
-        const double v = (y + (sample / 8 + 0.5) / 8 - shape.height / 2.0) * shape.pixel_height_mm;
+        const int column = sample % 8;
+        const int row = sample / 8;
+        const double u = (x + (column + 0.5) / 8 - shape.width / 2.0) * shape.pixel_width_mm;
+        const double v = (y + (row + 0.5) / 8 - shape.height / 2.0) * shape.pixel_height_mm;
         if (std::hypot(u - disc.x_mm, v - disc.y_mm) < disc.radius_mm) ++inside;
       }
       image.push_back(static_cast<float>(inside) / 64);
