@@ -55,7 +55,7 @@ class MetalPlanTest : public ::testing::Test {
     const absl::Status made = Make();
     ASSERT_TRUE(made.ok()) << made;
   }
-  static void TearDownTestSuite() { built_.reset(); }
+  static void TearDownTestSuite() { shared_build.reset(); }
 
   static absl::Status Make() {
     TF_ASSIGN_OR_RETURN(const SimulatedHeads heads, SimulateHeads(kThreads));
@@ -70,20 +70,21 @@ class MetalPlanTest : public ::testing::Test {
                             ComparePlans(build, *built->free, DeformationModel::kLinearElastic));
       }
     }
-    built_ = std::move(built);
+    shared_build = std::move(built);
     return absl::OkStatus();
   }
 
-  void SetUp() override { ASSERT_NE(built_, nullptr); }
+  void SetUp() override { ASSERT_NE(shared_build, nullptr); }
 
-  static std::unique_ptr<Built> built_;
+  static std::unique_ptr<Built> shared_build;
 };
 
-std::unique_ptr<Built> MetalPlanTest::built_;
+std::unique_ptr<Built> MetalPlanTest::shared_build;
 
 TEST_F(MetalPlanTest, APlanIsEqualToItself) {
-  ASSERT_OK_AND_ASSIGN(const PlanDifference none, ComparePlans(*built_->free, *built_->free,
-                                                               DeformationModel::kLinearElastic));
+  ASSERT_OK_AND_ASSIGN(
+      const PlanDifference none,
+      ComparePlans(*shared_build->free, *shared_build->free, DeformationModel::kLinearElastic));
   EXPECT_EQ(none.segment_p95_mm, 0);
   EXPECT_EQ(none.landmark.mm, 0);
   EXPECT_EQ(none.bone_near_skin, 0);
@@ -100,21 +101,21 @@ void ExpectSegmentAndMeanMovementKept(const PlanDifference& corrected) {
 }
 
 TEST_F(MetalPlanTest, FillingsKeepTheSegmentAndTheMeanMovement) {
-  ExpectSegmentAndMeanMovementKept(built_->fillings[0]);
+  ExpectSegmentAndMeanMovementKept(shared_build->fillings[0]);
 }
 
 TEST_F(MetalPlanTest, BracesKeepTheSegmentAndTheMeanMovement) {
-  ExpectSegmentAndMeanMovementKept(built_->braces[0]);
+  ExpectSegmentAndMeanMovementKept(shared_build->braces[0]);
   // The brackets count as their teeth, and the nearest has 3.2 mm of lip over it; that leaves its
   // blur to be told from it, which is finer than a voxel.
-  EXPECT_GE(built_->braces[0].nearest_bone.mm, kNearSkinMm - 0.5);
+  EXPECT_GE(shared_build->braces[0].nearest_bone.mm, kNearSkinMm - 0.5);
 }
 
 TEST_F(MetalPlanTest, WithoutCorrectionFillingsMisleadALandmark) {
-  const PlanDifference& spoilt = built_->fillings[1];
+  const PlanDifference& spoilt = shared_build->fillings[1];
   SCOPED_TRACE(TableRow("fillings, off", spoilt));
   EXPECT_GT(spoilt.landmark.mm, 5 * kLandmarkMm);
-  EXPECT_LT(built_->fillings[0].landmark.mm, spoilt.landmark.mm / 5);
+  EXPECT_LT(shared_build->fillings[0].landmark.mm, spoilt.landmark.mm / 5);
 }
 
 }  // namespace

@@ -126,18 +126,18 @@ class WholeFaceTest : public ::testing::Test {
     ASSERT_TRUE(ct.ok()) << ct.status();
     absl::StatusOr<Face> face = FaceOf(*ct);
     ASSERT_TRUE(face.ok()) << face.status();
-    face_ = new Face(*std::move(face));
+    shared_face = new Face(*std::move(face));
   }
   static void TearDownTestSuite() {
-    delete face_;
-    face_ = nullptr;
+    delete shared_face;
+    shared_face = nullptr;
   }
 
   // The boundary of what is left of the mesh without the tets that have a corner in a ball. It has
   // no skin where it had none.
   static absl::StatusOr<SkinCoverage> CoverageWithoutBall(const Vector3d& centre,
                                                           double radius_mm) {
-    const TetMesh& whole = face_->mesh.mesh;
+    const TetMesh& whole = shared_face->mesh.mesh;
     TetIndices kept(whole.num_tets(), 4);
     Eigen::Index num_kept = 0;
     for (const auto& tet : whole.tets().rowwise()) {
@@ -151,35 +151,37 @@ class WholeFaceTest : public ::testing::Test {
     TF_ASSIGN_OR_RETURN(const TetMesh rest, TetMesh::Create(whole.positions(), kept));
     TF_ASSIGN_OR_RETURN(const TriangleMesh surface,
                         TriangleMesh::Create(whole.positions(), BoundaryFacets(rest)));
-    return face_->Coverage(surface, face_->regions, kBundledVoxelMm);
+    return shared_face->Coverage(surface, shared_face->regions, kBundledVoxelMm);
   }
 
-  static Face* face_;
+  static Face* shared_face;
 };
 
-Face* WholeFaceTest::face_ = nullptr;
+Face* WholeFaceTest::shared_face = nullptr;
 
 TEST_F(WholeFaceTest, TheBundledHeadIsReadyAndItsNoseWhole) {
-  ASSERT_OK_AND_ASSIGN(const SkinCoverage coverage,
-                       face_->Coverage(face_->mesh.surface, face_->regions, kBundledVoxelMm));
+  ASSERT_OK_AND_ASSIGN(
+      const SkinCoverage coverage,
+      shared_face->Coverage(shared_face->mesh.surface, shared_face->regions, kBundledVoxelMm));
   EXPECT_TRUE(IsReady(coverage)) << FailedText(CheckCoverage(coverage));
-  EXPECT_NEAR(NoseTipErrorMm(*face_), 0, 0.5);
+  EXPECT_NEAR(NoseTipErrorMm(*shared_face), 0, 0.5);
   EXPECT_LT(coverage.mesh_skin_on_bone_mm2, 0.01 * coverage.mesh_skin_mm2);
 }
 
 // Places of the face, by chance: of the named regions of the mesh's skin; the nose's tip and wings,
 // the lips and the chin are among them.
 TEST_F(WholeFaceTest, NoPlanPassesWithoutAPieceOf10MmOrMore) {
-  std::vector<Vector3d> places = {face_->landmarks.nose_tip, face_->landmarks.upper_lip,
-                                  face_->landmarks.lower_lip, face_->landmarks.skin_pogonion,
-                                  face_->landmarks.mouth_corner.left};
+  std::vector<Vector3d> places = {shared_face->landmarks.nose_tip, shared_face->landmarks.upper_lip,
+                                  shared_face->landmarks.lower_lip,
+                                  shared_face->landmarks.skin_pogonion,
+                                  shared_face->landmarks.mouth_corner.left};
   std::vector<Eigen::Index> named;
   const std::vector<SkinRegion> names =
-      NameSkinRegions(face_->mesh.surface.positions(), face_->landmarks);
-  const LabelGrid outside = OutsideAir(face_->head);
+      NameSkinRegions(shared_face->mesh.surface.positions(), shared_face->landmarks);
+  const LabelGrid outside = OutsideAir(shared_face->head);
   const FloatGrid to_outside = DistanceMm(outside);
   for (size_t v = 0; v < names.size(); ++v) {
-    const Vector3d p = face_->mesh.surface.positions().row(static_cast<Eigen::Index>(v));
+    const Vector3d p = shared_face->mesh.surface.positions().row(static_cast<Eigen::Index>(v));
     if (names[v] != SkinRegion::kNone && Interpolate(to_outside, p) < 1.5) {
       named.push_back(static_cast<Eigen::Index>(v));
     }
@@ -187,7 +189,7 @@ TEST_F(WholeFaceTest, NoPlanPassesWithoutAPieceOf10MmOrMore) {
   ASSERT_GT(named.size(), 1000U);
   std::mt19937 random(20261122);  // NOLINT: the same pieces every time
   for (int i = 0; i < 25; ++i) {
-    places.push_back(face_->mesh.surface.positions().row(
+    places.push_back(shared_face->mesh.surface.positions().row(
         named[std::uniform_int_distribution<size_t>(0, named.size() - 1)(random)]));
   }
   std::uniform_real_distribution<double> radius_mm(5, 9);
