@@ -46,4 +46,15 @@ double VoxelVolumeMm3(const GridGeometry& geometry) {
   return geometry.spacing_mm * geometry.spacing_mm * geometry.spacing_mm;
 }
 
+double VolumeMm3(const LabelGrid& mask) {
+  return static_cast<double>(CountVoxels(mask)) * VoxelVolumeMm3(mask.geometry);
+}
+
+LabelGrid Both(LabelGrid a, const LabelGrid& b) {
+  for (size_t i = 0; i < a.values.size(); ++i) {
+    a.values[i] = a.values[i] != 0 && b.values[i] != 0 ? 1 : 0;
+  }
+  return a;
+}
+
 }  // namespace tissueform

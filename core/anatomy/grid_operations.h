@@ -38,6 +38,12 @@ int64_t CountVoxels(const LabelGrid& mask);
 
 double VoxelVolumeMm3(const GridGeometry& geometry);
 
+// Of all voxels that are not 0, together.
+double VolumeMm3(const LabelGrid& mask);
+
+// 1 where both are not 0. REQUIRES: one geometry.
+LabelGrid Both(LabelGrid a, const LabelGrid& b);
+
 // The part of a grid inside the box, with the same places.
 // REQUIRES: the box lies inside the grid and is not empty.
 template <typename T>

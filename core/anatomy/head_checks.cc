@@ -149,10 +149,6 @@ std::optional<Orientation> FindTurn(const HeadSegmentation& head) {
   return std::nullopt;
 }
 
-double VolumeMm3(const LabelGrid& mask) {
-  return static_cast<double>(CountVoxels(mask)) * VoxelVolumeMm3(mask.geometry);
-}
-
 double TissueMm3(const HuGrid& ct, const HeadSegmentationOptions& options) {
   const auto voxels = std::count_if(ct.values.begin(), ct.values.end(), [&options](int16_t hu) {
     return hu > options.tissue_above_hu;

@@ -31,17 +31,6 @@ constexpr int kMarginVoxels = 3;
 constexpr double kNostrilMm = 5;
 constexpr double kHollowPartMm = 10;
 
-double VolumeMm3(const LabelGrid& mask) {
-  return static_cast<double>(CountVoxels(mask)) * VoxelVolumeMm3(mask.geometry);
-}
-
-LabelGrid Both(LabelGrid a, const LabelGrid& b) {
-  for (size_t i = 0; i < a.values.size(); ++i) {
-    a.values[i] = a.values[i] != 0 && b.values[i] != 0 ? 1 : 0;
-  }
-  return a;
-}
-
 // An opening by a ball, but not a plain one: eroded, only the largest piece is kept, so that a head
 // rest or a tube that touches the skin falls off with what is thinner than the ball. A plain
 // opening would also round off what is thin on the head itself.

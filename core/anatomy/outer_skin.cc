@@ -39,13 +39,6 @@ LabelGrid Padded(const LabelGrid& mask, int voxels) {
   return padded;
 }
 
-LabelGrid Both(LabelGrid a, const LabelGrid& b) {
-  for (size_t i = 0; i < a.values.size(); ++i) {
-    a.values[i] = a.values[i] != 0 && b.values[i] != 0 ? 1 : 0;
-  }
-  return a;
-}
-
 // Dijkstra's search over the 26 neighbours; not across an edge or a corner of what is not in the
 // mask, or a thin wall that runs askew through the grid would leak.
 class NearestFirst {

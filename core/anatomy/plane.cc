@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -92,6 +93,12 @@ Plane FindSymmetryPlane(const LabelGrid& mask, double start_x_mm) {
     if (least >= before) step /= 2;
   }
   return MovedPlane(middle, best);
+}
+
+double LeastHeightMm(const std::vector<Plane>& planes, const Eigen::Vector3d& place) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Plane& plane : planes) least = std::min(least, plane.HeightMm(place));
+  return least;
 }
 
 }  // namespace tissueform

@@ -3,6 +3,8 @@
 
 #pragma once
 
+#include <vector>
+
 #include <Eigen/Core>
 
 #include "core/ct/voxel_grid.h"
@@ -18,6 +20,10 @@ struct Plane {
   // How far p lies on the side of the normal, in mm; negative on the other.
   double HeightMm(const Eigen::Vector3d& p) const { return normal.dot(p - point_mm); }
 };
+
+// How far a place lies on the side of all normals: the least of its heights; infinite without a
+// plane.
+double LeastHeightMm(const std::vector<Plane>& planes, const Eigen::Vector3d& place);
 
 // The plane in which the mask is most like its mirror image: it minimises the mean distance (at
 // most 6 mm each) of the mirrored voxels from the mask. Found by a search that halves its steps,

@@ -39,16 +39,6 @@ constexpr double kCutSigmaVoxels = 0.8;
 
 constexpr double kDiagonalVoxels = 1.75;  // longer than that of a voxel
 
-double VolumeMm3(const LabelGrid& mask) {
-  return static_cast<double>(CountVoxels(mask)) * VoxelVolumeMm3(mask.geometry);
-}
-
-double LeastHeightMm(const std::vector<Plane>& planes, const Eigen::Vector3d& place) {
-  double least = planes.front().HeightMm(place);
-  for (const Plane& plane : planes) least = std::min(least, plane.HeightMm(place));
-  return least;
-}
-
 // Head without bone; marrow and other hollows of the bone that are closed to within two voxels
 // count as bone.
 LabelGrid SoftVoxels(const LabelGrid& head, const LabelGrid& bone_labels) {

@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 
 #include "core/anatomy/outer_skin.h"
+#include "core/anatomy/plane.h"
 #include "core/anatomy/skin_regions.h"
 #include "core/anatomy/surface_extraction.h"
 #include "core/base/status_macros.h"
@@ -41,12 +42,6 @@ TriangleSizes SizesOf(const TriangleMesh& surface) {
     sizes.areas_mm2.push_back((corner(1) - corner(0)).cross(corner(2) - corner(0)).norm() / 2);
   }
   return sizes;
-}
-
-double LeastHeightMm(const std::vector<Plane>& planes, const Eigen::Vector3d& place) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const Plane& plane : planes) least = std::min(least, plane.HeightMm(place));
-  return least;
 }
 
 // A vertex of the isosurface lies on an edge of the grid between two voxels: whether one of them is
