@@ -23,17 +23,17 @@ constexpr int kAirBelow = -500;
 constexpr int kMatterFrom = -200;
 constexpr double kLeastShare = 0.001;
 
-using Histogram = std::array<int64_t, kNumBins>;
+using HuHistogram = std::array<int64_t, kNumBins>;
 
 size_t BinOf(int hu) { return static_cast<size_t>((std::max(hu, kLowest) - kLowest) / kBinWidth); }
 
-Histogram Count(const std::vector<int16_t>& hu) {
-  Histogram histogram{};
+HuHistogram Count(const std::vector<int16_t>& hu) {
+  HuHistogram histogram{};
   for (const int16_t value : hu) ++histogram[BinOf(value)];
   return histogram;
 }
 
-double ShareBetween(const Histogram& histogram, int low, int high) {
+double ShareBetween(const HuHistogram& histogram, int low, int high) {
   int64_t all = 0;
   int64_t inside = 0;
   for (size_t bin = 0; bin < kNumBins; ++bin) {
@@ -44,7 +44,7 @@ double ShareBetween(const Histogram& histogram, int low, int high) {
 }
 
 // The value from `low` to `high` that is most frequent, to one bin.
-int MostFrequent(const Histogram& histogram, int low, int high) {
+int MostFrequent(const HuHistogram& histogram, int low, int high) {
   const auto first = histogram.begin() + static_cast<std::ptrdiff_t>(BinOf(low));
   const auto last = histogram.begin() + static_cast<std::ptrdiff_t>(BinOf(high)) + 1;
   const auto bin = std::max_element(first, last) - histogram.begin();
@@ -54,7 +54,7 @@ int MostFrequent(const Histogram& histogram, int low, int high) {
 // Stored values of most scanners are HU + 1024: air near 0, soft tissue (HU 0 to 100, the most
 // frequent matter) near 1050. Then the message can give the offset; it is not applied by itself,
 // because a guess of a unit must be the user's.
-absl::Status WithoutAir(const Histogram& histogram, std::optional<double> hu_offset) {
+absl::Status WithoutAir(const HuHistogram& histogram, std::optional<double> hu_offset) {
   constexpr int kLeastTissueMode = 900;
   constexpr int kMostTissueMode = 1200;
   const int mode = MostFrequent(histogram, 500, 2000);
@@ -73,7 +73,7 @@ absl::Status WithoutAir(const Histogram& histogram, std::optional<double> hu_off
 // Padding of -2000 beside HU + 1024 looks like air. But between true air and fat there are always
 // voxels, partly filled, while raw values have their soft tissue about 1050 and next to nothing at
 // 350 to 750, where every CT in HU has bone.
-bool HidesRawValues(const Histogram& histogram) {
+bool HidesRawValues(const HuHistogram& histogram) {
   const double tissue = ShareBetween(histogram, 850, 1250);
   return ShareBetween(histogram, -1000, kAirBelow) < kLeastShare &&
          ShareBetween(histogram, -100, 300) > kLeastShare && tissue > 0.02 &&
@@ -87,7 +87,7 @@ int16_t ToHu(double value) {
 }
 
 absl::Status CheckHu(const std::vector<int16_t>& hu, std::optional<double> hu_offset) {
-  const Histogram histogram = Count(hu);
+  const HuHistogram histogram = Count(hu);
   if (ShareBetween(histogram, kLowest, kAirBelow) < kLeastShare || HidesRawValues(histogram)) {
     return WithoutAir(histogram, hu_offset);
   }

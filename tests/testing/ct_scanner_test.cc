@@ -60,8 +60,11 @@ MeanAndDeviation Of(const std::vector<int16_t>& hu, double radius_mm, double x_m
 std::vector<MetalCell> MetalDisc(double radius_mm, double x_mm, double y_mm) {
   constexpr double kStep = 0.1;
   std::vector<MetalCell> cells;
-  for (double y = -radius_mm; y <= radius_mm; y += kStep) {
-    for (double x = -radius_mm; x <= radius_mm; x += kStep) {
+  const int steps = static_cast<int>(radius_mm / kStep);
+  for (int i = -steps; i <= steps; ++i) {
+    for (int j = -steps; j <= steps; ++j) {
+      const double x = kStep * j;
+      const double y = kStep * i;
       if (std::hypot(x, y) > radius_mm) continue;
       cells.push_back({static_cast<float>(x_mm + x), static_cast<float>(y_mm + y), kStep * kStep});
     }

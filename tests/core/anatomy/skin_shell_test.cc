@@ -54,8 +54,10 @@ struct Depths {
 };
 Depths DepthsOf(const LabelGrid& shell, const std::function<bool(const Vector3d&)>& asked) {
   Depths depths;
-  for (double latitude = -1.4; latitude < 1.4; latitude += 0.07) {
-    for (double longitude = 0; longitude < 6.28; longitude += 0.07) {
+  for (int i = -20; i < 20; ++i) {
+    for (int j = 0; j < 90; ++j) {
+      const double latitude = 0.07 * i;
+      const double longitude = 0.07 * j;
       const Vector3d direction(std::cos(latitude) * std::cos(longitude),
                                std::cos(latitude) * std::sin(longitude), std::sin(latitude));
       if (!asked(direction)) continue;
