@@ -4,6 +4,7 @@
 #include "core/anatomy/itk_filters.h"
 
 #include <algorithm>
+#include <cmath>
 #include <itkConnectedComponentImageFilter.h>
 #include <itkDiscreteGaussianImageFilter.h>
 #include <itkImage.h>
@@ -11,9 +12,9 @@
 #include <itkMultiThreaderBase.h>
 #include <itkObject.h>
 #include <itkRelabelComponentImageFilter.h>
-#include <itkSignedMaurerDistanceMapImageFilter.h>
 #include <limits>
 
+#include "core/anatomy/distance_transform.h"
 #include "core/anatomy/grid_operations.h"
 
 namespace tissueform {
@@ -55,6 +56,10 @@ VoxelGrid<T> Copy(const Image<T>& image, const GridGeometry& geometry) {
   return grid;
 }
 
+int FilterThreads() {
+  return static_cast<int>(itk::MultiThreaderBase::GetGlobalDefaultNumberOfThreads());
+}
+
 LabelGrid Complement(const LabelGrid& mask) {
   return MaskWhere(mask, [](uint8_t value) { return value == 0; });
 }
@@ -64,6 +69,10 @@ bool IsEmpty(const LabelGrid& mask) {
 }
 
 }  // namespace
+
+void SetFilterThreads(int threads) {
+  itk::MultiThreaderBase::SetGlobalDefaultNumberOfThreads(static_cast<itk::ThreadIdType>(threads));
+}
 
 LabelGrid Components::Mask(int32_t component) const {
   return MaskWhere(labels, [=](int32_t label) { return label == component; });
@@ -90,16 +99,13 @@ LabelGrid LargestComponent(const LabelGrid& mask, Neighbours neighbours) {
 
 FloatGrid DistanceMm(const LabelGrid& mask) {
   if (IsEmpty(mask)) return FloatGrid(mask.geometry, std::numeric_limits<float>::max());
-  auto distance = itk::SignedMaurerDistanceMapImageFilter<Image<uint8_t>, Image<float>>::New();
-  distance->SetInput(View(mask));
-  distance->SetSquaredDistance(false);
-  distance->SetUseImageSpacing(true);
-  distance->Update();
-  FloatGrid grid = Copy(*distance->GetOutput(), mask.geometry);
-  for (float& value : grid.values) {
-    value = std::max(value, 0.0F);  // inside, the filter goes on with negative numbers
-  }
-  return grid;
+  const VoxelGrid<int32_t> squares = SquaredDistanceVoxels(mask, FilterThreads());
+  FloatGrid distance(mask.geometry);
+  const double square_mm2 = mask.geometry.spacing_mm * mask.geometry.spacing_mm;
+  std::transform(
+      squares.values.begin(), squares.values.end(), distance.values.begin(),
+      [=](int32_t square) { return static_cast<float>(std::sqrt(square_mm2 * square)); });
+  return distance;
 }
 
 // From the border between voxels, half a voxel from the centres on either side of it: the distances

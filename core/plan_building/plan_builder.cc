@@ -246,6 +246,7 @@ absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTiss
 absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& recipe,
                                     const PlanBuildOptions& options) {
   Progress progress(options.tell);
+  SetFilterThreads(options.threads);
   TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(ct_path, recipe, options.threads, &progress));
   TF_ASSIGN_OR_RETURN(Anatomy anatomy, FindAnatomy(ct.ct, recipe, &progress));
   ct.ct.hu = {};  // the head has its own: as large as the CT, and the next stages need the room
