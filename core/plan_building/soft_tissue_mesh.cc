@@ -54,6 +54,7 @@ RemeshingOptions Remeshing(const SoftTissueMeshOptions& options, double shrinkin
   RemeshingOptions remeshing;
   remeshing.edge_mm = shrinking * options.edge_mm;
   remeshing.fine_regions = options.fine_regions;
+  remeshing.threads = options.threads;
   remeshing.iterations = kRemeshingIterations;
   for (FineRegion& region : remeshing.fine_regions) region.edge_mm *= shrinking;
   return remeshing;

@@ -61,12 +61,25 @@ TEST(SurfaceRemeshingTest, SphereGetsEdgesOfTheWantedLengthOnTheOldSurface) {
   }
 }
 
-TEST(SurfaceRemeshingTest, SameSurfaceGivesTheSameTriangles) {
+TEST(SurfaceRemeshingTest, SameSurfaceGivesTheSameTrianglesOnAnyNumberOfThreads) {
   const TriangleMesh sphere = SphereSurface({0, 0, 0}, 20, 24);
   ASSERT_OK_AND_ASSIGN(const RemeshedSurface first, RemeshSurface(sphere, EdgesOf(4)));
-  ASSERT_OK_AND_ASSIGN(const RemeshedSurface second, RemeshSurface(sphere, EdgesOf(4)));
-  EXPECT_EQ(first.mesh.positions(), second.mesh.positions());
-  EXPECT_EQ(first.mesh.triangles(), second.mesh.triangles());
+  for (const int threads : {1, 2, 3}) {
+    RemeshingOptions options = EdgesOf(4);
+    options.threads = threads;
+    ASSERT_OK_AND_ASSIGN(const RemeshedSurface again, RemeshSurface(sphere, options));
+    EXPECT_EQ(first.mesh.positions(), again.mesh.positions());
+    EXPECT_EQ(first.mesh.triangles(), again.mesh.triangles());
+  }
+}
+
+TEST(SurfaceRemeshingTest, ThinPartsAreNotEatenFromTheirTips) {
+  // A third of an edge thick.
+  const TriangleMesh plate = BoxSurface({0, 0, 0}, {12, 1, 12}, 24);
+  ASSERT_OK_AND_ASSIGN(const RemeshedSurface remeshed, RemeshSurface(plate, EdgesOf(3)));
+  const Eigen::RowVector3d highest = remeshed.mesh.positions().colwise().maxCoeff();
+  EXPECT_GT(highest.x(), 11.5);
+  EXPECT_GT(highest.z(), 11.5);
 }
 
 TEST(SurfaceRemeshingTest, EdgesAreShorterInAFineRegion) {
