@@ -33,14 +33,14 @@ constexpr double kMostTurn = 0.6;
 // Two triangles whose diagonal is flipped may bend by less than this, as cosine.
 constexpr double kMostBend = 0.7;
 
-// A flip may make the worse of two triangles so much worse, where it brings the numbers of neighbours
-// nearer to six; elsewhere it has to make it better by so much.
+// A flip may make the worse of two triangles so much worse, where it brings the numbers of
+// neighbours nearer to six; elsewhere it has to make it better by so much.
 constexpr double kWorseShape = 0.6;
 constexpr double kBetterShape = 1.1;
 
-// A collapse may leave what it takes away so far from the surface, as part of the wanted length: tips
-// of thin parts stay. Without it up to 11 mm of them were lost on heads, with less than a fifth the
-// edges become shorter than is asked for.
+// A collapse may leave what it takes away so far from the surface, as part of the wanted length:
+// tips of thin parts stay. Without it up to 11 mm of them were lost on heads, with less than a
+// fifth the edges become shorter than is asked for.
 constexpr double kMostLost = 0.25;
 
 constexpr Eigen::Index kGrain = 1024;
@@ -217,8 +217,8 @@ class Passes {
   }
 
   // Every vertex towards the mean of its neighbours as they lay before, along the surface, and back
-  // onto the old one. It stays where that would turn a triangle, or take it through a thin wall onto
-  // the other side.
+  // onto the old one. It stays where that would turn a triangle, or take it through a thin wall
+  // onto the other side.
   void Relax() {
     std::vector<Vector3d> places(surface_.num_vertices());
     ParallelFor(options_.threads, surface_.num_vertices(), kGrain,
@@ -256,8 +256,8 @@ class Passes {
     if (hit.normal.dot(normal) < 0) return place;
     bool turns = false;
     surface_.ForEachOut(v, [&](int32_t out) {
-      turns = turns || !TurnsLittle(surface_.Normal(out), surface_.NormalWith(out, hit.place),
-                                    kMostTurn);
+      turns = turns ||
+              !TurnsLittle(surface_.Normal(out), surface_.NormalWith(out, hit.place), kMostTurn);
     });
     return turns ? place : hit.place;
   }

@@ -24,9 +24,8 @@ namespace {
 // triangles with area, at the cost of a twentieth of a voxel.
 constexpr double kClearance = 0.05;
 
-// With five, the median of the tets' smallest angles was up to half a degree larger on three real
-// heads, and the work longer; no requirement on a plan notices.
-constexpr int kRemeshingIterations = 3;
+// With five tets are no better than with four, and with three a little worse (docs/performance.md).
+constexpr int kRemeshingIterations = 4;
 
 absl::Status CheckOptions(const SoftTissueMeshOptions& options) {
   if (options.interior_edge_factor >= 1 && options.max_attempts >= 1 && options.retry_factor > 0 &&
