@@ -10,6 +10,7 @@
 #include "client/plan_report/coverage_report.h"
 #include "client/plan_report/lips_report.h"
 #include "client/plan_report/metal_report.h"
+#include "client/plan_report/objects_report.h"
 
 namespace tissueform {
 namespace {
@@ -23,6 +24,7 @@ constexpr double kLittleUnderChinMm = 15;
 
 std::vector<std::string> Cautions(const PlanBuild& build) {
   std::vector<std::string> cautions = CoverageCautions(build.coverage);
+  for (std::string& caution : ObjectsCautions(build)) cautions.push_back(std::move(caution));
   for (std::string& caution : MetalCautions(build)) cautions.push_back(std::move(caution));
   for (std::string& caution :
        LipsCautions(MeasureLipContact(build.soft_tissue.labels, build.landmarks))) {

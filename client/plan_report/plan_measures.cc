@@ -12,6 +12,7 @@
 #include "absl/strings/str_format.h"
 
 #include "client/plan_report/coverage_report.h"
+#include "client/plan_report/objects_report.h"
 #include "core/mesh/tet_quality.h"
 #include "core/mesh/validation.h"
 #include "core/plan_building/slice_gap_check.h"
@@ -124,6 +125,7 @@ std::vector<QualityCheck> CheckQuality(const PlanBuild& build, const PlanMeasure
       CheckSkin("99 % of the vertices", measures.skin_p99_voxels, kMostP99Voxels, spacing_mm),
       CheckSliceGaps(build)};
   for (QualityCheck& check : CheckCoverage(build.coverage)) checks.push_back(std::move(check));
+  checks.push_back(CheckObjects(build));
   return checks;
 }
 

@@ -13,6 +13,7 @@
 #include "client/plan_report/library_versions.h"
 #include "client/plan_report/lips_report.h"
 #include "client/plan_report/metal_report.h"
+#include "client/plan_report/objects_report.h"
 #include "core/anatomy/skin_regions.h"
 #include "core/planning/json_values.h"
 
@@ -58,6 +59,7 @@ Json HeadJson(const PlanBuild& build) {
           {"volume_mm3", static_cast<double>(CountVoxels(build.head.head)) * VoxelVolumeMm3(grid)},
           {"removed_mm3", build.head.removed_mm3},
           {"removed_means", "tissue that was taken away: tubes, cords, head rest"},
+          {"removed_objects", ObjectsJson(build)},
           {"bare_fraction", build.head.bare_fraction},
           {"bare_means",
            "share of the outer surface nearer than 2.5 mm to bone; a living head has 0 to 0.1"}};

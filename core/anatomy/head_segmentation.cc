@@ -31,32 +31,28 @@ constexpr int kMarginVoxels = 3;
 constexpr double kNostrilMm = 5;
 constexpr double kHollowPartMm = 10;
 
-// An opening by a ball, but not a plain one: eroded, only the largest piece is kept, so that a head
-// rest or a tube that touches the skin falls off with what is thinner than the ball. A plain
+// The largest body that survives an erosion, and what of the tissue lies close to it. Not a plain
+// opening: a head rest that touches the skin falls off with what is thinner than the ball. A plain
 // opening would also round off what is thin on the head itself.
-//
-// The largest body that survives the opening, and what of the tissue lies close to it: ears and
-// lips, which the ball has rounded off, but only the stump of a tube.
-LabelGrid LargestBody(const LabelGrid& tissue, double radius_mm) {
-  const LabelGrid core = LargestComponent(Erode(tissue, radius_mm), Neighbours::kFaces);
-  const LabelGrid near = Dilate(core, radius_mm + tissue.geometry.spacing_mm);
-  return LargestComponent(Both(near, tissue), Neighbours::kFaces);
+struct ThickPart {
+  LabelGrid core;
+  LabelGrid near;
+};
+
+ThickPart ThickPartOf(const LabelGrid& tissue, double radius_mm) {
+  ThickPart part;
+  part.core = LargestComponent(Erode(tissue, radius_mm), Neighbours::kFaces);
+  const LabelGrid near = Dilate(part.core, radius_mm + tissue.geometry.spacing_mm);
+  part.near = LargestComponent(Both(near, tissue), Neighbours::kFaces);
+  return part;
 }
 
-// The body and what of the tissue is the wall of a hollow part of it. The walls of a nose are 2 to
-// 3 mm thin, and the opening takes them off like a tube; but with the air that it holds, which a
-// ball from outside does not reach, it is as thick as a thumb. What a tube holds on to the skin
-// with is thinner.
-LabelGrid WithHollowParts(const LabelGrid& tissue, LabelGrid body) {
-  const LabelGrid air = MaskWhere(tissue, [](uint8_t value) { return value == 0; });
-  const LabelGrid reached = AirReachedByBall(air, kNostrilMm);
-  const LabelGrid solid = MaskWhere(reached, [](uint8_t value) { return value == 0; });
+// The head with its hollow parts, and a voxel round it. The walls of a nose are 2 to 3 mm thin, but
+// with the air that it holds, which a ball from outside does not reach, it is as thick as a thumb.
+LabelGrid HullOf(const LabelGrid& outside) {
+  const LabelGrid solid = MaskWhere(outside, [](uint8_t value) { return value == 0; });
   const LabelGrid core = LargestComponent(Erode(solid, kHollowPartMm), Neighbours::kFaces);
-  const LabelGrid near = Dilate(core, kHollowPartMm + tissue.geometry.spacing_mm);
-  for (size_t i = 0; i < body.values.size(); ++i) {
-    if (tissue.values[i] != 0 && near.values[i] != 0) body.values[i] = 1;
-  }
-  return LargestComponent(body, Neighbours::kFaces);
+  return Dilate(core, kHollowPartMm + outside.geometry.spacing_mm);
 }
 
 LabelGrid WithoutSpecks(const LabelGrid& mask, double smallest_mm3) {
@@ -145,14 +141,23 @@ absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
   TellStage(tell, "finding the head", 0);
   const auto is_tissue = [&](int16_t hu) { return hu > options.tissue_above_hu; };
   const LabelGrid tissue = MaskWhere(ct, is_tissue);
-  const LabelGrid opened = LargestBody(tissue, options.opening_radius_mm);
-  TF_RETURN_IF_ERROR(CheckTissue(ct, opened, options));
-  const LabelGrid body = WithHollowParts(tissue, opened);
-  const VoxelBox box = Grown(BoundingBox(body), kMarginVoxels, ct.geometry);
+  const ThickPart thick = ThickPartOf(tissue, options.opening_radius_mm);
+  TF_RETURN_IF_ERROR(CheckTissue(ct, thick.near, options));
+  const LabelGrid air = MaskWhere(tissue, [](uint8_t value) { return value == 0; });
+  const LabelGrid outside = AirReachedByBall(air, kNostrilMm);
+  HeadWithoutObjects parted = PartObjects({.hu = ct,
+                                           .tissue = tissue,
+                                           .core = thick.core,
+                                           .radius_mm = options.opening_radius_mm,
+                                           .thick = thick.near,
+                                           .outside = outside,
+                                           .hull = HullOf(outside)});
+  const VoxelBox box = Grown(BoundingBox(parted.head), kMarginVoxels, ct.geometry);
 
   HeadSegmentation result;
   result.options = options;
-  result.head = Crop(body, box);
+  result.objects = std::move(parted.objects);
+  result.head = Crop(parted.head, box);
   result.hu = Crop(ct, box);
   result.metal = metal.values.empty() ? LabelGrid(result.hu.geometry) : Crop(metal, box);
   RemoveObjects(MaskWhere(result.hu, is_tissue), &result);

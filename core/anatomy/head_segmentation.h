@@ -4,9 +4,11 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "absl/status/statusor.h"
 
+#include "core/anatomy/attached_objects.h"
 #include "core/anatomy/grid_operations.h"
 #include "core/ct/voxel_grid.h"
 
@@ -16,7 +18,8 @@ struct HeadSegmentationOptions {
   // Half-way between air (-1000) and skin (about 0): where a scanner's blur leaves the surface.
   int16_t tissue_above_hu = -500;
   int16_t bone_above_hu = 250;
-  // Tubes, cords and sheets that are thinner than twice this are no head.
+  // What is thicker than twice this and hangs together is head; of what is thinner, what hangs on
+  // it and is no object (core/anatomy/attached_objects.h).
   double opening_radius_mm = 4;
   double smallest_bone_mm3 = 150;
 };
@@ -35,12 +38,13 @@ struct HeadSegmentation {
 
   double streaks_mm3 = 0;  // dense as bone, but taken for what metal's streaks have left
   double removed_mm3 = 0;  // tissue that was taken away: tubes, cords, head rest
+  std::vector<AttachedObject> objects;  // of it what touched the head, by falling volume
   double bare_fraction =
       0;  // of the outer surface: nearer than 2.5 mm to bone; a living head 0..0.1
 };
 
-// Finds the largest body of tissue, opened by a ball so that what only touches it falls off, and
-// its bone.
+// Finds the largest body of tissue with the thin parts that hang on it (ears, the walls of a nose),
+// without objects that touch it, and its bone.
 //
 // `metal` is a mask on the CT's grid, or has no voxels where there is none.
 //

@@ -60,12 +60,12 @@ TEST(PlanMeasuresTest, CubesAreMeasuredAsCubes) {
 TEST(PlanMeasuresTest, EveryRequirementCanFail) {
   PlanBuild build = BuildOfBar(testing::Bar({3, 3, 4}));
   EXPECT_THAT(Passed(build),
-              ElementsAre(true, true, true, true, true, true, true, true, true, true, true));
+              ElementsAre(true, true, true, true, true, true, true, true, true, true, true, true));
   build.soft_tissue.volume_mm3 = 37.5;
   build.skin_distance.mean_mm = 1.3;
   build.skin_distance.p99_mm = 4.1;
-  EXPECT_THAT(Passed(build),
-              ElementsAre(true, true, true, false, false, false, true, true, true, true, true));
+  EXPECT_THAT(Passed(build), ElementsAre(true, true, true, false, false, false, true, true, true,
+                                         true, true, true));
   EXPECT_FALSE(AllPassed(CheckQuality(build, MeasurePlan(build))));
   EXPECT_THAT(FailedText(CheckQuality(build, MeasurePlan(build))),
               HasSubstr("mean: 0.65 voxels (1.30 mm), not at most 0.6 voxels; "));
@@ -78,23 +78,34 @@ TEST(PlanMeasuresTest, EveryRequirementCanFail) {
   const auto first = static_cast<int32_t>(bar.num_vertices());
   tets << bar.tets(), TetIndices{{first, first + 1, first + 2, first + 3}};
   build = BuildOfBar(*TetMesh::Create(positions, tets));
-  EXPECT_THAT(Passed(build),
-              ElementsAre(false, false, false, true, true, true, true, true, true, true, true));
+  EXPECT_THAT(Passed(build), ElementsAre(false, false, false, true, true, true, true, true, true,
+                                         true, true, true));
 
   build = BuildOfBar(bar);
   build.coverage.whole.area_mm2 = 100;
   build.coverage.regions[0].area_mm2 = 100;
   build.coverage.gaps = {{SkinRegion::kNone, 100, 5, {}}};
   build.coverage.holes = build.coverage.gaps;
-  EXPECT_THAT(Passed(build),
-              ElementsAre(true, true, true, true, true, true, true, false, false, false, false));
+  EXPECT_THAT(Passed(build), ElementsAre(true, true, true, true, true, true, true, false, false,
+                                         false, false, true));
 
   build = BuildOfBar(bar);
   build.soft_tissue.labels = LabelGrid({.size = {1, 1, 1}}, kSoftTissue);
   build.ct.wide_gaps = {{Eigen::Vector3d::UnitZ(), -4, 3, 7}};
   EXPECT_THAT(Passed(build),
-              ElementsAre(true, true, true, true, true, true, false, true, true, true, true));
+              ElementsAre(true, true, true, true, true, true, false, true, true, true, true, true));
   EXPECT_THAT(FailedText(CheckQuality(build, MeasurePlan(build))), HasSubstr("up to 7.00 mm"));
+
+  build = BuildOfBar(bar);
+  build.soft_tissue.region = {{{0, 9, 0}, -Eigen::Vector3d::UnitY()},
+                              {{0, 0, 9}, -Eigen::Vector3d::UnitZ()},
+                              {{0, 0, -9}, Eigen::Vector3d::UnitZ()}};
+  AttachedObject piece;
+  piece.contact_mm = {Eigen::Vector3d::Zero()};
+  piece.face_mm2 = 30;
+  build.head.objects = {piece};
+  EXPECT_THAT(Passed(build),
+              ElementsAre(true, true, true, true, true, true, true, true, true, true, true, false));
 }
 
 }  // namespace

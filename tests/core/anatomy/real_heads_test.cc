@@ -138,6 +138,41 @@ TEST(RealHeadsTest, TheBreathingTubeIsReplacedByAir) {
   EXPECT_LT(tissue_after, tissue_before / 3);
 }
 
+// The skin that it lies on: from the lip over the chin to the lower border.
+TEST(RealHeadsTest, TheBreathingTubeIsToldWithItsPlace) {
+  for (const double spacing_mm : {1.5, 2.0}) {
+    SCOPED_TRACE(spacing_mm);
+    ASSERT_OK_AND_ASSIGN(const HuGrid ct, LivingHead(spacing_mm));
+    ASSERT_OK_AND_ASSIGN(const HeadSegmentation head, SegmentHead(ct));
+    ASSERT_EQ(head.objects.size(), 1U);
+    const AttachedObject& tube = head.objects.front();
+    EXPECT_EQ(tube.kind, ObjectKind::kTube);
+    EXPECT_NEAR(tube.volume_mm3, 1850, 400);
+    EXPECT_LT((tube.middle_mm - Eigen::Vector3d(-88, 44, -117)).norm(), 8);
+    EXPECT_GT(static_cast<double>(tube.contact_mm.size()) * tube.face_mm2, 200);
+    for (const Eigen::Vector3d& place : tube.contact_mm) {
+      EXPECT_LT(std::hypot(place.x() + 88, place.y() - 46), 15);
+    }
+  }
+}
+
+// They are 4 mm thin, and fall off with cords when the head is opened by a ball of 4 mm.
+TEST(RealHeadsTest, TheEarsAreKept) {
+  ASSERT_OK_AND_ASSIGN(const HuGrid ct, LivingHead(2));
+  ASSERT_OK_AND_ASSIGN(const HeadSegmentation head, SegmentHead(ct));
+  int64_t tissue = 0;
+  int64_t kept = 0;
+  ForEachVoxel(LabelGrid(ct.geometry, 1), [&](size_t index, const Eigen::Vector3d& place) {
+    const bool at_ear = (place.x() > -29 || place.x() < -167) && place.y() > 104 &&
+                        place.y() < 131 && place.z() > -62 && place.z() < -10;
+    if (!at_ear || ct.values[index] <= head.options.tissue_above_hu) return;
+    ++tissue;
+    if (Interpolate(head.hu, place) > head.options.tissue_above_hu) ++kept;
+  });
+  EXPECT_GT(static_cast<double>(tissue) * 8, 8000);
+  EXPECT_GT(kept, tissue * 99 / 100);
+}
+
 TEST(RealHeadsTest, AHeadCutOffOverTheJawIsRefused) {
   ASSERT_OK_AND_ASSIGN(const HuGrid ct, LivingHead(2.5));
   VoxelBox upper;
