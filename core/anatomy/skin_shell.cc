@@ -19,6 +19,13 @@ constexpr double kCrownMm = 10;
 constexpr double kFrontTeethMm = 20;
 constexpr double kLipMm = 4;
 
+// The edge of a tooth is a voxel of tissue by its HU, half tooth and half air; taken for skin, it
+// would turn the tooth behind it into a lip of 3 mm that ties the upper lip to the tongue. Only
+// what has a face on bone, and only near a place where bone itself shows: a lip over a bracket is 3
+// mm thin.
+constexpr double kBlurVoxels = 1.1;
+constexpr double kToothMm = 8;
+
 // Ways from voxel to voxel are up to 8 % longer than straight ones, and end at centres.
 constexpr double kStraight = 1.1;
 
@@ -66,6 +73,24 @@ LabelGrid WithoutSingleLayers(const LabelGrid& mask) {
   return kept;
 }
 
+LabelGrid ExposedTeeth(const HeadSegmentation& head, const LabelGrid& outside_air,
+                       const Landmarks& landmarks) {
+  const LabelGrid solid =
+      MaskWhere(head.hu, [&](int16_t hu) { return hu > head.options.tissue_above_hu; });
+  LabelGrid teeth = VoxelsFacing(outside_air, solid);
+  const MouthWindow mouth(landmarks);
+  ForEachVoxel(LabelGrid(teeth), [&](size_t i, const Eigen::Vector3d& place) {
+    if (!mouth.Contains(place)) teeth.values[i] = 0;
+  });
+  const FloatGrid to_bone = DistanceMm(head.bone);
+  const FloatGrid to_shown = DistanceMm(Both(teeth, head.bone));
+  const double blur_mm = kBlurVoxels * head.hu.geometry.spacing_mm;
+  for (size_t i = 0; i < teeth.values.size(); ++i) {
+    if (to_bone.values[i] > blur_mm || to_shown.values[i] > kToothMm) teeth.values[i] = 0;
+  }
+  return teeth;
+}
+
 LabelGrid SkinShell(const HeadSegmentation& head, const LabelGrid& outside_air,
                     const Landmarks& landmarks, double thickness_mm) {
   const double voxel_mm = head.hu.geometry.spacing_mm;
@@ -77,16 +102,12 @@ LabelGrid SkinShell(const HeadSegmentation& head, const LabelGrid& outside_air,
       MaskWhere(head.hu, [&](int16_t hu) { return hu <= head.options.tissue_above_hu; });
   const VoxelGrid<float> way = DistanceWithin(air, outside_air, kStraight * (reach_mm + voxel_mm));
 
-  const LabelGrid facing =
+  const LabelGrid teeth = ExposedTeeth(head, outside_air, landmarks);
+  LabelGrid skin =
       VoxelsFacing(outside_air, MaskWhere(air, [](uint8_t value) { return value == 0; }));
-  const MouthWindow mouth(landmarks);
-  LabelGrid teeth(facing.geometry);
-  LabelGrid skin = facing;
-  ForEachVoxel(facing, [&](size_t i, const Eigen::Vector3d& place) {
-    if (head.bone.values[i] == 0 || !mouth.Contains(place)) return;
-    teeth.values[i] = 1;
-    skin.values[i] = 0;
-  });
+  for (size_t i = 0; i < skin.values.size(); ++i) {
+    if (teeth.values[i] != 0) skin.values[i] = 0;
+  }
   const FloatGrid to_teeth = DistanceMm(teeth);
   const FloatGrid to_skin = DistanceMm(skin);
 

@@ -9,6 +9,11 @@
 
 namespace tissueform {
 
+// The voxels (1) that carry the outer skin where it is that of teeth which an open mouth shows:
+// near bone, and behind and between the lips. With their blur, which is as thin as no lip.
+LabelGrid ExposedTeeth(const HeadSegmentation& head, const LabelGrid& outside_air,
+                       const Landmarks& landmarks);
+
 // The tissue behind the outer skin (core/anatomy/outer_skin.h): all voxels (1) that lie up to
 // `thickness_mm` behind it, whatever the CT has there. Where skin is thinner than that, this is air
 // of the nose or the mouth, or bone: the walls of a nose are 2 to 3 mm thin, and so is the skin of

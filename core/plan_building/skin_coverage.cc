@@ -14,6 +14,7 @@
 #include "core/anatomy/outer_skin.h"
 #include "core/anatomy/plane.h"
 #include "core/anatomy/skin_regions.h"
+#include "core/anatomy/skin_shell.h"
 #include "core/anatomy/surface_extraction.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/surface_parts.h"
@@ -45,17 +46,17 @@ TriangleSizes SizesOf(const TriangleMesh& surface) {
 }
 
 // A vertex of the isosurface lies on an edge of the grid between two voxels: whether one of them is
-// outside air.
-bool TouchesAir(const LabelGrid& outside_air, const Eigen::Vector3d& vertex) {
-  const Eigen::Vector3d at = outside_air.geometry.ToVoxels(vertex);
+// in the mask.
+bool Touches(const LabelGrid& mask, const Eigen::Vector3d& vertex) {
+  const Eigen::Vector3d at = mask.geometry.ToVoxels(vertex);
   Eigen::Index axis = 0;
   (at.array() - at.array().round()).abs().maxCoeff(&axis);
   for (const double end : {std::floor(at[axis]), std::ceil(at[axis])}) {
     Eigen::Vector3d voxel = at.array().round();
     voxel[axis] = end;
     const Eigen::Vector3i index = voxel.cast<int>();
-    if (outside_air.geometry.Contains(index.x(), index.y(), index.z()) &&
-        outside_air.At(index.x(), index.y(), index.z()) != 0) {
+    if (mask.geometry.Contains(index.x(), index.y(), index.z()) &&
+        mask.At(index.x(), index.y(), index.z()) != 0) {
       return true;
     }
   }
@@ -68,8 +69,8 @@ TriangleMesh KeepTriangles(const TriangleMesh& surface, const std::vector<bool>&
   return KeepParts(surface, parts, {false, true});
 }
 
-// The outer skin of the CT within the region of interest.
-absl::StatusOr<TriangleMesh> OuterSkin(const HeadSegmentation& head,
+// The outer skin of the CT within the region of interest; teeth that an open mouth shows are none.
+absl::StatusOr<TriangleMesh> OuterSkin(const HeadSegmentation& head, const Landmarks& landmarks,
                                        const RegionOfInterest& region) {
   FloatGrid hu(head.hu.geometry);
   std::copy(head.hu.values.begin(), head.hu.values.end(), hu.values.begin());
@@ -79,9 +80,11 @@ absl::StatusOr<TriangleMesh> OuterSkin(const HeadSegmentation& head,
   extraction.min_cavity_volume_mm3 = std::numeric_limits<double>::infinity();
   TF_ASSIGN_OR_RETURN(const TriangleMesh surface, ExtractSurface(hu, extraction));
   const LabelGrid outside_air = OutsideAir(head);
+  const LabelGrid teeth = ExposedTeeth(head, outside_air, landmarks);
   std::vector<bool> is_outer;
   for (const auto& position : surface.positions().rowwise()) {
-    is_outer.push_back(TouchesAir(outside_air, position.transpose()));
+    is_outer.push_back(Touches(outside_air, position.transpose()) &&
+                       !Touches(teeth, position.transpose()));
   }
   const std::vector<Plane> planes = region.planes();
   const double margin_mm = head.hu.geometry.spacing_mm;
@@ -179,7 +182,7 @@ void CountBone(const MeshedSkin& mesh, const TriangleMesh& skin, SkinCoverage* c
 absl::StatusOr<SkinCoverage> MeasureSkinCoverage(const HeadSegmentation& head,
                                                  const Landmarks& landmarks, const MeshedSkin& mesh,
                                                  double ct_voxel_mm) {
-  TF_ASSIGN_OR_RETURN(const TriangleMesh skin, OuterSkin(head, mesh.region));
+  TF_ASSIGN_OR_RETURN(const TriangleMesh skin, OuterSkin(head, landmarks, mesh.region));
   TF_ASSIGN_OR_RETURN(const TriangleMesh mesh_skin, SkinOf(mesh));
   const TriangleSizes sizes = SizesOf(skin);
   const Eigen::VectorXd distances = DistancesToSurface(sizes.middles, mesh_skin);

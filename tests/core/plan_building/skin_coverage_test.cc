@@ -32,6 +32,7 @@ HeadSegmentation Ball() {
     head.hu.values[index] =
         static_cast<int16_t>(std::lround(-500 + 1000 * std::clamp(wall / 3, -0.5, 0.5)));
   });
+  head.bone = LabelGrid(head.hu.geometry);
   return head;
 }
 
