@@ -102,7 +102,7 @@ TEST_F(PlanBuildTest, PlanIsBuiltReportedAndCanBeRun) {
   EXPECT_EQ(report["input"]["size_voxels"], nlohmann::json({64, 64, 93}));
   EXPECT_EQ(report["recipe"]["spacing_mm"], 4);
   EXPECT_EQ(report["recipe"]["poisson_ratio"], 0.45);  // which the recipe leaves out
-  EXPECT_EQ(report["quality"].size(), 11U);
+  EXPECT_EQ(report["quality"].size(), 12U);
   for (const auto& picture : report["pictures"]) {
     const std::string file = picture["file"];
     EXPECT_THAT(Read("head/" + file), StartsWith("\x89PNG"));
