@@ -38,9 +38,10 @@ struct ThinPieces {
   // this, or hardly so, is thin: noses, ears, lids, and what is no head.
   const LabelGrid& core;
   double radius_mm = 0;
-  const LabelGrid& thick;    // what of the tissue lies near the core
-  const LabelGrid& outside;  // air that a ball from outside reaches, which a nostril does not let in
-  const LabelGrid& hull;     // the head with its hollow parts; a tube on the skin stands out of it
+  const LabelGrid& thick;  // what of the tissue lies near the core
+  const LabelGrid&
+      outside;            // air that a ball from outside reaches, which a nostril does not let in
+  const LabelGrid& hull;  // the head with its hollow parts; a tube on the skin stands out of it
 };
 
 struct HeadWithoutObjects {

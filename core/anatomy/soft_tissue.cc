@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "absl/strings/str_format.h"
 
@@ -220,7 +221,7 @@ absl::StatusOr<SoftTissue> ExtractSoftTissue(
   const LabelGrid face = WithoutBrain(soft, options.narrowest_neck_mm, joint_z_mm);
 
   TellStage(tell, "finding the outer skin", 0.45);
-  const LabelGrid outside_air = OutsideAir(head);
+  LabelGrid outside_air = OutsideAir(head);
   const LabelGrid shell = SkinShell(head, outside_air, landmarks, options.thinnest_mm);
 
   TellStage(tell, "cutting the region of interest", 0.6);
@@ -255,6 +256,7 @@ absl::StatusOr<SoftTissue> ExtractSoftTissue(
     if (all_soft.values[i] != 0 && mask.values[i] == 0) result.left_out_mm3 += voxel_mm3;
     if (all_soft.values[i] == 0 && mask.values[i] != 0) result.filled_mm3 += voxel_mm3;
   }
+  result.outside_air = std::move(outside_air);
   return result;
 }
 

@@ -59,6 +59,8 @@ struct SoftTissue {
   double left_out_mm3 = 0;  // soft voxels in the box that are not in it: brain, marrow, thin sheets
   double filled_mm3 = 0;    // voxels in it that are not soft: behind thin skin, small cavities
   RegionOfInterest region;
+
+  LabelGrid outside_air;  // OutsideAir(head), on the head's grid
 };
 
 // Soft tissue = head minus bone minus air minus brain inside the region.

@@ -258,11 +258,12 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
   TF_ASSIGN_OR_RETURN(Description description, Describe(mesh, soft_tissue, anatomy, bone.segments,
                                                         recipe, options.threads, &progress));
   progress.Begin("comparing with the CT's skin", 0.98, 1);
-  TF_ASSIGN_OR_RETURN(
-      SkinCoverage coverage,
-      MeasureSkinCoverage(anatomy.head, anatomy.landmarks,
-                          {mesh.surface, description.released.regions, soft_tissue.region},
-                          ct.spacing_mm.maxCoeff()));
+  TF_ASSIGN_OR_RETURN(SkinCoverage coverage,
+                      MeasureSkinCoverage(anatomy.head, anatomy.landmarks,
+                                          {mesh.surface, description.released.regions,
+                                           soft_tissue.region, &soft_tissue.outside_air},
+                                          ct.spacing_mm.maxCoeff(), options.threads));
+  soft_tissue.outside_air = {};  // as large as the CT's grid, and not asked for any more
   TellStage(options.tell, "done", 1);
   return PlanBuild{.recipe = recipe,
                    .ct = std::move(ct.provenance),

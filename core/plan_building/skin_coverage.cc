@@ -70,8 +70,8 @@ TriangleMesh KeepTriangles(const TriangleMesh& surface, const std::vector<bool>&
 }
 
 // The outer skin of the CT within the region of interest; teeth that an open mouth shows are none.
-absl::StatusOr<TriangleMesh> OuterSkin(const HeadSegmentation& head, const Landmarks& landmarks,
-                                       const RegionOfInterest& region) {
+absl::StatusOr<TriangleMesh> OuterSkin(const HeadSegmentation& head, const LabelGrid& outside_air,
+                                       const Landmarks& landmarks, const RegionOfInterest& region) {
   FloatGrid hu(head.hu.geometry);
   std::copy(head.hu.values.begin(), head.hu.values.end(), hu.values.begin());
   SurfaceExtractionOptions extraction;
@@ -79,7 +79,6 @@ absl::StatusOr<TriangleMesh> OuterSkin(const HeadSegmentation& head, const Landm
   extraction.clearance = kClearanceHu;
   extraction.min_cavity_volume_mm3 = std::numeric_limits<double>::infinity();
   TF_ASSIGN_OR_RETURN(const TriangleMesh surface, ExtractSurface(hu, extraction));
-  const LabelGrid outside_air = OutsideAir(head);
   const LabelGrid teeth = ExposedTeeth(head, outside_air, landmarks);
   std::vector<bool> is_outer;
   for (const auto& position : surface.positions().rowwise()) {
@@ -160,9 +159,10 @@ std::vector<SkinGap> PartsBeyond(double limit_mm, const MeasuredSkin& measured) 
 }
 
 // Of the mesh's boundary where the CT has its skin.
-void CountBone(const MeshedSkin& mesh, const TriangleMesh& skin, SkinCoverage* coverage) {
+void CountBone(const MeshedSkin& mesh, const TriangleMesh& skin, int threads,
+               SkinCoverage* coverage) {
   const TriangleSizes sizes = SizesOf(mesh.surface);
-  const Eigen::VectorXd to_skin = DistancesToSurface(sizes.middles, skin);
+  const Eigen::VectorXd to_skin = DistancesToSurface(sizes.middles, skin, threads);
   const std::vector<Plane> planes = mesh.region.planes();
   for (Eigen::Index f = 0; f < mesh.surface.num_triangles(); ++f) {
     const bool is_cut = LeastHeightMm(planes, sizes.middles.row(f)) < coverage->tolerance_mm;
@@ -181,11 +181,14 @@ void CountBone(const MeshedSkin& mesh, const TriangleMesh& skin, SkinCoverage* c
 
 absl::StatusOr<SkinCoverage> MeasureSkinCoverage(const HeadSegmentation& head,
                                                  const Landmarks& landmarks, const MeshedSkin& mesh,
-                                                 double ct_voxel_mm) {
-  TF_ASSIGN_OR_RETURN(const TriangleMesh skin, OuterSkin(head, landmarks, mesh.region));
+                                                 double ct_voxel_mm, int threads) {
+  TF_ASSIGN_OR_RETURN(
+      const TriangleMesh skin,
+      OuterSkin(head, mesh.outside_air != nullptr ? *mesh.outside_air : OutsideAir(head), landmarks,
+                mesh.region));
   TF_ASSIGN_OR_RETURN(const TriangleMesh mesh_skin, SkinOf(mesh));
   const TriangleSizes sizes = SizesOf(skin);
-  const Eigen::VectorXd distances = DistancesToSurface(sizes.middles, mesh_skin);
+  const Eigen::VectorXd distances = DistancesToSurface(sizes.middles, mesh_skin, threads);
   const std::vector<SkinRegion> names = NameSkinRegions(sizes.middles, landmarks);
 
   SkinCoverage coverage;
@@ -201,7 +204,7 @@ absl::StatusOr<SkinCoverage> MeasureSkinCoverage(const HeadSegmentation& head,
   const MeasuredSkin measured{skin, sizes, names, coverage.distance_mm};
   coverage.gaps = PartsBeyond(kGapMm, measured);
   coverage.holes = PartsBeyond(coverage.hole_mm, measured);
-  CountBone(mesh, skin, &coverage);
+  CountBone(mesh, skin, threads, &coverage);
   coverage.positions = skin.positions();
   coverage.triangles = skin.triangles();
   return coverage;

@@ -72,14 +72,15 @@ struct MeshedSkin {
   const TriangleMesh& surface;
   const PlanningRegions& regions;
   const RegionOfInterest& region;
+  const LabelGrid* outside_air = nullptr;  // OutsideAir(head); null: found anew
 };
 
 // Within a voxel of the planes of the region of interest nothing is counted. `ct_voxel_mm` is the
-// longest side of a voxel of the CT as it was read.
+// longest side of a voxel of the CT as it was read. The result does not depend on `threads`.
 //
 // Errors: those of ExtractSurface; InvalidArgument when no outer skin lies in the region.
 absl::StatusOr<SkinCoverage> MeasureSkinCoverage(const HeadSegmentation& head,
                                                  const Landmarks& landmarks, const MeshedSkin& mesh,
-                                                 double ct_voxel_mm);
+                                                 double ct_voxel_mm, int threads = 1);
 
 }  // namespace tissueform

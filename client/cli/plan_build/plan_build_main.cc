@@ -86,4 +86,7 @@ absl::StatusOr<PlanBuildAnswer> BuildRequestedPlan(const PlanBuildRequest& reque
 }  // namespace
 }  // namespace tissueform
 
-int main() { return tissueform::RunPlanBuildProgram(tissueform::BuildRequestedPlan); }
+int main(int /*argc*/, char** argv) {
+  tissueform::RestartWithFittingBlasKernels(argv);
+  return tissueform::RunPlanBuildProgram(tissueform::BuildRequestedPlan);
+}

@@ -96,8 +96,7 @@ TEST(AttachedObjectsTest, AFingerThatTouchesTheFaceIsKept) {
 TEST(AttachedObjectsTest, ATubeIsTakenAwayAndItsPlaceOnTheSkinIsTold) {
   for (const int16_t wall_hu : {int16_t{300}, int16_t{60}}) {  // dense, or it leaves the CT
     SCOPED_TRACE(wall_hu);
-    const HuGrid ct =
-        Painted([&](const Vector3d& p, int16_t hu) { return Tube(p, hu, wall_hu); });
+    const HuGrid ct = Painted([&](const Vector3d& p, int16_t hu) { return Tube(p, hu, wall_hu); });
     ASSERT_OK_AND_ASSIGN(const HeadSegmentation head, SegmentHead(ct));
     ASSERT_FALSE(head.objects.empty());
     for (const AttachedObject& tube : head.objects) {
@@ -113,8 +112,8 @@ TEST(AttachedObjectsTest, ATubeIsTakenAwayAndItsPlaceOnTheSkinIsTold) {
                           return FromTube(p) < 5.5 && p.z() < -20 && Interpolate(bare, p) < -500;
                         }),
               0.02);
-    EXPECT_GT(testing::DiceOverlap(head.head, testing::AtPlaceOf(head.head.geometry,
-                                                                 testing::HeadPhantomMask())),
+    EXPECT_GT(testing::DiceOverlap(
+                  head.head, testing::AtPlaceOf(head.head.geometry, testing::HeadPhantomMask())),
               0.997);
   }
 }
