@@ -3,34 +3,16 @@
 
 #include "client/benchmarks/benchmark_report.h"
 
-#include <fstream>
-#include <thread>
-
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "absl/strings/str_split.h"
 #include "nlohmann/json.hpp"
+
+#include "client/cli/shared/circumstances.h"
 
 namespace tissueform::benchmarks {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-std::string Processor() {
-  std::ifstream file("/proc/cpuinfo");
-  for (std::string line; std::getline(file, line);) {
-    const std::vector<std::string> parts = absl::StrSplit(line, absl::MaxSplits(": ", 1));
-    if (absl::StartsWith(line, "model name") && parts.size() == 2) {
-      return parts[1];
-    }
-  }
-  return "unknown processor";
-}
-
-std::string Machine() {
-  return absl::StrCat(Processor(), ", ", std::thread::hardware_concurrency(), " cores");
-}
 
 Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
 
@@ -72,11 +54,17 @@ std::optional<double> BenchmarkRow::Ratio() const {
 }
 
 std::string ReportJson(const BenchmarkReport& report) {
-  Json json = {{"machine", Machine()},        {"compiler", TISSUEFORM_COMPILER},
-               {"commit", TISSUEFORM_COMMIT}, {"threads", report.threads},
-               {"blas_threads", 1},           {"repetitions", report.repetitions},
-               {"rows", Json::array()},       {"memory", Json::array()},
-               {"growth", Json::object()},    {"targets", Json::array()}};
+  const Circumstances circumstances = MeasuringCircumstances();
+  Json json = {{"machine", circumstances.machine},
+               {"compiler", circumstances.compiler},
+               {"commit", circumstances.commit},
+               {"threads", report.threads},
+               {"blas_threads", 1},
+               {"repetitions", report.repetitions},
+               {"rows", Json::array()},
+               {"memory", Json::array()},
+               {"growth", Json::object()},
+               {"targets", Json::array()}};
   for (const BenchmarkRow& row : report.rows) {
     json["rows"].push_back(RowJson(row));
   }
@@ -135,8 +123,10 @@ std::string ClosingText(const BenchmarkReport& report) {
 }
 
 std::string CircumstancesText(const BenchmarkReport& report) {
-  return absl::StrCat(Machine(), "; ", TISSUEFORM_COMPILER, "; commit ", TISSUEFORM_COMMIT, "; ",
-                      report.threads, " threads, 1 BLAS thread; medians of ", report.repetitions,
+  const Circumstances circumstances = MeasuringCircumstances();
+  return absl::StrCat(circumstances.machine, "; ", circumstances.compiler, "; commit ",
+                      circumstances.commit, "; ", report.threads,
+                      " threads, 1 BLAS thread; medians of ", report.repetitions,
                       " interleaved repetitions");
 }
 

@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
     tissueform::AddCompareCommand(app, work);
     tissueform::AddCompanionCommand(app, tissueform::kExperimentsCommand, words, work);
     tissueform::AddBenchCommand(app, work);
+    tissueform::AddCompanionCommand(app, tissueform::kLoadCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kDemoCommand, words, work);
   });
 }

@@ -16,19 +16,27 @@ constexpr char kStiffnessArray[] = "youngs_modulus_pa";
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<PlanSession>> PlanSession::Create(TissueformClient* client,
-                                                                 const PlanProblem& problem) {
-  TF_ASSIGN_OR_RETURN(const v1::Mesh mesh,
-                      client->UploadMesh(*problem.mesh, {{kStiffnessArray, problem.stiffness}}));
+absl::StatusOr<v1::Mesh> UploadMeshOf(TissueformClient* client, const PlanProblem& problem) {
+  return client->UploadMesh(*problem.mesh, {{kStiffnessArray, problem.stiffness}});
+}
+
+SessionRequest SessionRequestOf(const PlanProblem& problem, const std::string& mesh) {
   SessionRequest request;
-  request.mesh = mesh.name();
+  request.mesh = mesh;
   request.stiffness = kStiffnessArray;
   request.fixed = problem.constraints.fixed();
   request.handles = problem.constraints.handles();
   request.model = problem.deformer.model;
   request.poisson_ratio = problem.deformer.preparation.poisson_ratio;
   request.gradient_field = problem.deformer.gradient_field;
-  TF_ASSIGN_OR_RETURN(v1::Session description, client->CreateSession(request));
+  return request;
+}
+
+absl::StatusOr<std::unique_ptr<PlanSession>> PlanSession::Create(TissueformClient* client,
+                                                                 const PlanProblem& problem) {
+  TF_ASSIGN_OR_RETURN(const v1::Mesh mesh, UploadMeshOf(client, problem));
+  TF_ASSIGN_OR_RETURN(v1::Session description,
+                      client->CreateSession(SessionRequestOf(problem, mesh.name())));
   return std::unique_ptr<PlanSession>(new PlanSession(client, std::move(description)));
 }
 

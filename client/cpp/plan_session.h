@@ -40,6 +40,10 @@ class PlanSession {
   const v1::Session description_;
 };
 
+// What PlanSession::Create does, step by step: for those who want more than one session of a plan.
+absl::StatusOr<v1::Mesh> UploadMeshOf(TissueformClient* client, const PlanProblem& problem);
+SessionRequest SessionRequestOf(const PlanProblem& problem, const std::string& mesh);
+
 // The poses of the plan with the names of their handles.
 std::vector<NamedPose> NamedPoses(const PlanProblem& problem);
 

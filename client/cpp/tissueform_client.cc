@@ -24,11 +24,12 @@ constexpr size_t kChunkBytes = 512 << 10;
 // lost its power says nothing: this finds out within a minute.
 constexpr int kKeepaliveMilliseconds = 30'000;
 
-std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address) {
+std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address, bool own_connection) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMilliseconds);
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  if (own_connection) arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
 }
 
@@ -62,7 +63,7 @@ absl::StatusOr<std::unique_ptr<TissueformClient>> TissueformClient::Connect(
     return absl::InvalidArgumentError(
         absl::StrCat("\"", address, "\" has no port; give the server as HOST:PORT"));
   }
-  const std::shared_ptr<grpc::Channel> channel = MakeChannel(address);
+  const std::shared_ptr<grpc::Channel> channel = MakeChannel(address, options.own_connection);
   if (!channel->WaitForConnected(std::chrono::system_clock::now() + options.connect_deadline)) {
     return absl::UnavailableError(absl::StrCat(
         "no tissueform-server answers at ", address, " within ",

@@ -35,6 +35,9 @@ class TissueformClient {
   struct Options {
     std::chrono::milliseconds connect_deadline{5'000};
     std::chrono::milliseconds call_deadline{600'000};
+    // A TCP connection of its own. Otherwise clients of one process and address share one, over
+    // which their frames follow each other.
+    bool own_connection = false;
   };
 
   // `address` is HOST:PORT. Connects directly: proxies of the environment are not used.

@@ -10,7 +10,6 @@
 #include <thread>
 #include <utility>
 
-#include "core/base/mutex.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/constraints/handle_pose.h"
@@ -24,32 +23,13 @@ double Milliseconds(Clock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
 }
 
-// When each pose was sent: written by the sender, read by the receiver.
-class SendTimes {
- public:
-  explicit SendTimes(int64_t count) : times_(count) {}
-
-  void Set(uint64_t sequence, Clock::time_point time) {
-    MutexLock lock(mutex_);
-    times_[sequence] = time;
-  }
-  Clock::time_point Get(uint64_t sequence) const {
-    MutexLock lock(mutex_);
-    return times_[sequence];
-  }
-
- private:
-  mutable Mutex mutex_;
-  std::vector<Clock::time_point> times_ ABSL_GUARDED_BY(mutex_);
-};
-
 void Receive(DeformStream* stream, Clock::time_point start, const SendTimes& send_times,
              DragResult* result) {
   while (std::optional<v1::DeformFrame> frame = stream->Receive()) {
     const Clock::time_point now = Clock::now();
     stream->Ack(*frame).IgnoreError();  // not needed once the sender has closed
     result->frames.push_back({.sequence = frame->sequence(),
-                              .sent_ms = Milliseconds(send_times.Get(frame->sequence()) - start),
+                              .sent_ms = send_times.Get(frame->sequence()),
                               .received_ms = Milliseconds(now - start),
                               .solve_ms = frame->summary().solve_seconds() * 1e3,
                               .coalesced_count = frame->coalesced_count(),
@@ -83,7 +63,7 @@ absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& 
   const auto count =
       std::max<int64_t>(1, static_cast<int64_t>(options.seconds * options.poses_per_second));
   const std::chrono::duration<double> interval(1 / options.poses_per_second);
-  SendTimes send_times(count);
+  SendTimes send_times;
   const Clock::time_point start = Clock::now();
   std::thread receiver([&] { Receive(stream.get(), start, send_times, &result); });
   absl::Status sent;
@@ -94,7 +74,7 @@ absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& 
     // From rest to the end and at rest at both: as a hand moves, not at one speed.
     const double amount =
         (1 - std::cos(M_PI * static_cast<double>(i + 1) / static_cast<double>(count))) / 2;
-    send_times.Set(i, Clock::now());
+    send_times.Append(Milliseconds(Clock::now() - start));
     sent = stream->SendPoses(i, PartOfPoses(poses, amount));
     ++result.poses_sent;
   }

@@ -12,6 +12,7 @@
 #include "absl/types/span.h"
 
 #include "client/cpp/tissueform_client.h"
+#include "core/base/mutex.h"
 
 namespace tissueform {
 
@@ -45,6 +46,28 @@ struct DragResult {
   int64_t coalesced = 0;
   std::vector<DragFrame> frames;  // in the order of arrival
   std::string last_positions;     // of the last frame, as they came
+};
+
+// When each pose of a drag was sent, by its sequence (0, 1, ...): written by the sender, read by
+// the receiver. Thread-safe.
+class SendTimes {
+ public:
+  void Append(double time_ms) {
+    MutexLock lock(mutex_);
+    times_ms_.push_back(time_ms);
+  }
+  double Get(uint64_t sequence) const {
+    MutexLock lock(mutex_);
+    return times_ms_[sequence];
+  }
+  int64_t size() const {
+    MutexLock lock(mutex_);
+    return static_cast<int64_t>(times_ms_.size());
+  }
+
+ private:
+  mutable Mutex mutex_;
+  std::vector<double> times_ms_ ABSL_GUARDED_BY(mutex_);
 };
 
 // Streams the drag on `session`, at least one pose of it. Stops early with Cancelled when

@@ -23,6 +23,9 @@ inline constexpr CompanionCommand kRunCommand = {"run", "predict through a tissu
 inline constexpr CompanionCommand kDemoCommand = {
     "demo", "drag the lower jaw of the bundled real head through a server, end to end",
     "tissueform-online"};
+inline constexpr CompanionCommand kLoadCommand = {
+    "load", "drag on a server many times at once, and tell how old the pictures were",
+    "tissueform-online"};
 inline constexpr CompanionCommand kExperimentsCommand = {
     "experiments", "compute the paper's figures and table again, and the models' accuracy",
     "tissueform-experiments"};

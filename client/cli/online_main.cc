@@ -3,6 +3,7 @@
 //
 // The companion of `tissueform` that speaks with servers.
 
+#include "client/cli/load/load_command.h"
 #include "client/cli/online/demo_command.h"
 #include "client/cli/online/run_command.h"
 #include "client/cli/shared/command_line.h"
@@ -10,6 +11,7 @@
 int main(int argc, char** argv) {
   return tissueform::RunCommandLine(argc, argv, [](CLI::App& app, tissueform::CommandWork* work) {
     tissueform::AddRunCommand(app, work);
+    tissueform::AddLoadCommand(app, work);
     tissueform::AddDemoCommand(app, work);
   });
 }

@@ -1,0 +1,133 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/load/load_command.h"
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+#include "client/cli/load/load_report.h"
+#include "client/cli/load/load_run.h"
+#include "client/cli/online/server_process.h"
+#include "client/cli/shared/companion.h"
+#include "client/cli/shared/demo_paths.h"
+#include "core/base/atomic_file.h"
+#include "core/base/status_macros.h"
+#include "core/planning/plan_io.h"
+#include "core/process/child_process.h"
+
+namespace tissueform {
+namespace {
+
+constexpr std::chrono::seconds kServerStartDeadline{30};
+
+struct LoadCommandOptions {
+  LoadOptions load;
+  std::string server;
+  std::string plan;
+  std::string model = "linear_elastic";
+  std::string json;
+};
+
+// Plans of the bundled head say gradient_field; what a drag is mostly asked for is elasticity.
+DeformationModel ModelOf(const std::string& name) {
+  return name == "gradient_field" ? DeformationModel::kGradientField
+                                  : DeformationModel::kLinearElastic;
+}
+
+absl::Status Run(const LoadCommandOptions& options) {
+  if (!options.json.empty()) TF_RETURN_IF_ERROR(CheckWritable(options.json));
+  TF_ASSIGN_OR_RETURN(const std::string path, FindDemoPlan(options.plan));
+  TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(path));
+  TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan));
+  problem.deformer.model = ModelOf(options.model);
+  std::unique_ptr<ServerProcess> server;
+  std::string address = options.server;
+  if (address.empty()) {
+    TF_ASSIGN_OR_RETURN(const std::string program, FindProgram("tissueform-server"));
+    TF_ASSIGN_OR_RETURN(server, ServerProcess::Start(program,
+                                                     {"--host", "127.0.0.1", "--port", "0",
+                                                      "--max-sessions", "4096", "--max-streams",
+                                                      "4096", "--log-level", "warn"},
+                                                     kServerStartDeadline));
+    address = server->address();
+  }
+  absl::FPrintF(stderr, "plan %s: %d vertices, %d tets, %s; preparing %d drags on %s ...\n", path,
+                problem.mesh->num_vertices(), problem.mesh->num_tets(), options.model,
+                options.load.sessions + options.load.slow_readers + options.load.refining, address);
+  TF_ASSIGN_OR_RETURN(const LoadResult result, RunLoad(address, problem, options.load));
+  absl::PrintF("prepared in %.1f s, then %g s\n%s", result.preparing_seconds, options.load.seconds,
+               LoadText(options.load, result));
+  if (!options.json.empty()) {
+    TF_RETURN_IF_ERROR(
+        WriteFileAtomically(options.json, LoadJson(options.load, result).dump(2) + "\n"));
+  }
+  if (!result.errors.empty()) {
+    return absl::InternalError(absl::StrCat(result.errors.size(), " calls failed; the first: ",
+                                            result.errors.front().message()));
+  }
+  return absl::OkStatus();
+}
+
+void AddOptions(CLI::App* command, LoadCommandOptions* options) {
+  LoadOptions& load = options->load;
+  command->add_option("--server", options->server, "a server that runs; else one is started")
+      ->type_name("HOST:PORT");
+  command->add_option("--plan", options->plan, "another plan than the bundled head");
+  command->add_option("--model", options->model, "what answers the drags")
+      ->check(CLI::IsMember({"gradient_field", "linear_elastic"}))
+      ->capture_default_str();
+  command->add_option("--sessions", load.sessions, "drags from prepared answers")
+      ->check(CLI::Range(0, 4096))
+      ->capture_default_str();
+  command->add_option("--rate", load.poses_per_second, "poses a second of each")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->capture_default_str();
+  command->add_option("--seconds", load.seconds, "how long")
+      ->check(CLI::Range(0.1, 86400.0))
+      ->capture_default_str();
+  command
+      ->add_option("--churn", load.churn,
+                   "clients that make and delete sessions all the while, none like another")
+      ->check(CLI::Range(0, 256))
+      ->capture_default_str();
+  command
+      ->add_option("--slow-readers", load.slow_readers,
+                   "further drags whose client takes --slow-ms for each frame")
+      ->check(CLI::Range(0, 4096))
+      ->capture_default_str();
+  command->add_option("--slow-ms", load.slow_ms, "what a slow reader takes")
+      ->check(CLI::Range(0.0, 10000.0))
+      ->capture_default_str();
+  command->add_option("--refining", load.refining, "further drags answered by neo_hookean")
+      ->check(CLI::Range(0, 256))
+      ->capture_default_str();
+  command->add_flag("--in-phase", load.in_phase,
+                    "all drags send at the same moments; else they are spread out");
+  command->add_option("--json", options->json, "also write the figures to this JSON file");
+}
+
+}  // namespace
+
+void AddLoadCommand(CLI::App& app, CommandWork* work) {
+  auto options = std::make_shared<LoadCommandOptions>();
+  CLI::App* command = app.add_subcommand(kLoadCommand.name, kLoadCommand.description);
+  AddOptions(command, options.get());
+  command->footer(
+      "Every drag has a session and a connection of its own and asks for the skin. The picture's\n"
+      "age is sampled every 10 ms: now minus the time when the newest shown pose was sent, so that\n"
+      "poses that were dropped count; the interval of the poses is part of it. The clients run\n"
+      "on this machine, too, and take their share of it. Exit code 1 when a call fails.\n"
+      "Examples:\n"
+      "  tissueform load --sessions 32 --rate 30 --churn 2 --seconds 60 --json load.json\n"
+      "  tissueform load --server localhost:50051 --sessions 1 --churn 0 --seconds 10\n"
+      "docs/performance.md tells what was measured so.");
+  command->callback([options, work] { *work = [options] { return Run(*options); }; });
+}
+
+}  // namespace tissueform

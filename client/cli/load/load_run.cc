@@ -1,0 +1,262 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/load/load_run.h"
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <thread>
+#include <utility>
+
+#include "client/cli/load/picture_age.h"
+#include "client/cli/online/drag.h"
+#include "client/cpp/plan_session.h"
+#include "client/cpp/tissueform_client.h"
+#include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
+
+namespace tissueform {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// From rest to the plan's pose and back.
+constexpr double kPeriodSeconds = 4;
+// Until every drag's thread waits for its first pose.
+constexpr std::chrono::milliseconds kLeadTime{200};
+// The smallest of the stiffnesses of churn; each session takes one that was not there before.
+constexpr double kChurnStiffnessPa = 1e4;
+
+double Milliseconds(Clock::duration duration) {
+  return std::chrono::duration<double, std::milli>(duration).count();
+}
+
+Clock::duration Seconds(double seconds) {
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
+// One drag with its session and stream, until it is run.
+class LoadDrag {
+ public:
+  struct Kind {
+    bool neo_hookean = false;
+    double slow_ms = 0;  // that the client takes for each frame
+  };
+
+  static absl::StatusOr<std::unique_ptr<LoadDrag>> Open(const std::string& address,
+                                                        const PlanProblem& problem,
+                                                        const Kind& kind) {
+    auto drag = std::unique_ptr<LoadDrag>(new LoadDrag(kind, NamedPoses(problem)));
+    TF_ASSIGN_OR_RETURN(drag->client_,
+                        TissueformClient::Connect(address, {.own_connection = true}));
+    TF_ASSIGN_OR_RETURN(drag->session_, PlanSession::Create(drag->client_.get(), problem));
+    DeformStream::Options stream;
+    stream.vertices.kind = AnswerVertices::Kind::kSkin;
+    if (kind.neo_hookean) {
+      stream.model = v1::DEFORMATION_MODEL_NEO_HOOKEAN;
+    } else if (HasPreparedAnswers(problem.deformer)) {
+      stream.prepared.emplace();
+    }
+    TF_ASSIGN_OR_RETURN(drag->stream_, drag->client_->OpenStream(drag->session_->name(), stream));
+    return drag;
+  }
+
+  // Sends poses from `start` on, every `interval` until `end`, and takes the frames.
+  void Run(Clock::time_point origin, Clock::time_point start, Clock::time_point end,
+           Clock::duration interval) {
+    std::thread receiver([&] { Receive(origin); });
+    for (int64_t i = 0;; ++i) {
+      const Clock::time_point due = start + interval * i;
+      if (due >= end) break;
+      std::this_thread::sleep_until(due);
+      const double seconds = std::chrono::duration<double>(due - start).count();
+      const double amount = (1 - std::cos(2 * M_PI * seconds / kPeriodSeconds)) / 2;
+      send_times_.Append(Milliseconds(Clock::now() - origin));
+      if (!stream_->SendPoses(i, PartOfPoses(poses_, amount)).ok()) break;  // Finish says why
+    }
+    end_ms_ = Milliseconds(Clock::now() - origin);
+    stream_->CloseSending();
+    receiver.join();
+    status_ = stream_->Finish();
+  }
+
+  const absl::Status& status() const { return status_; }
+
+  void AddTo(DragLoad* load) const {
+    ++load->drags;
+    load->poses_sent += send_times_.size();
+    load->frames += static_cast<int64_t>(frames_.size());
+    load->bytes += bytes_;
+    for (const ShownFrame& frame : frames_) {
+      load->latencies_ms.push_back(frame.shown_ms - frame.sent_ms);
+    }
+    load->solves_ms.insert(load->solves_ms.end(), solves_ms_.begin(), solves_ms_.end());
+    if (send_times_.size() == 0) return;
+    const std::vector<double> ages = PictureAges(send_times_.Get(0), end_ms_, frames_);
+    load->picture_ages_ms.insert(load->picture_ages_ms.end(), ages.begin(), ages.end());
+  }
+
+ private:
+  LoadDrag(const Kind& kind, std::vector<NamedPose> poses)
+      : kind_(kind), poses_(std::move(poses)) {}
+
+  void Receive(Clock::time_point origin) {
+    while (std::optional<v1::DeformFrame> frame = stream_->Receive()) {
+      frames_.push_back(
+          {send_times_.Get(frame->sequence()), Milliseconds(Clock::now() - origin)});
+      solves_ms_.push_back(frame->summary().solve_seconds() * 1e3);
+      bytes_ += static_cast<int64_t>(frame->positions().size());
+      if (kind_.slow_ms > 0) std::this_thread::sleep_for(Seconds(kind_.slow_ms / 1e3));
+      stream_->Ack(*frame).IgnoreError();  // not needed once the sender has closed
+    }
+  }
+
+  const Kind kind_;
+  const std::vector<NamedPose> poses_;
+  std::unique_ptr<TissueformClient> client_;
+  std::unique_ptr<PlanSession> session_;
+  std::unique_ptr<DeformStream> stream_;
+
+  // Self-synchronised.
+  SendTimes send_times_;
+
+  // Written while it runs, by one thread each.
+  std::vector<ShownFrame> frames_;
+  std::vector<double> solves_ms_;
+  int64_t bytes_ = 0;
+  double end_ms_ = 0;
+  absl::Status status_;
+};
+
+// A client that makes and deletes sessions until it is told to stop.
+class Churn {
+ public:
+  // `number` of `count`, so that no two sessions have the same stiffness.
+  Churn(std::unique_ptr<TissueformClient> client, SessionRequest request, int number, int count)
+      : number_(number),
+        count_(count),
+        client_(std::move(client)),
+        request_(std::move(request)) {}
+
+  void Run(const std::atomic<bool>& stop) {
+    for (int round = 0; !stop; ++round) {
+      request_.stiffness = kChurnStiffnessPa + round * count_ + number_;
+      const Stopwatch stopwatch;
+      const absl::StatusOr<v1::Session> session = client_->CreateSession(request_);
+      if (session.ok()) seconds_.push_back(stopwatch.Seconds());
+      const absl::Status status =
+          session.ok() ? client_->DeleteSession(session->name()) : session.status();
+      if (!status.ok()) {
+        errors_.push_back(status);
+        std::this_thread::sleep_for(Seconds(0.1));  // refusals at once would be another load
+      }
+    }
+  }
+
+  const std::vector<double>& seconds() const { return seconds_; }
+  const std::vector<absl::Status>& errors() const { return errors_; }
+
+ private:
+  const int number_;
+  const int count_;
+  const std::unique_ptr<TissueformClient> client_;
+  SessionRequest request_;
+  std::vector<double> seconds_;
+  std::vector<absl::Status> errors_;
+};
+
+struct DragGroup {
+  std::string name;
+  LoadDrag::Kind kind;
+  int count = 0;
+  std::vector<std::unique_ptr<LoadDrag>> drags;
+};
+
+std::vector<DragGroup> GroupsOf(const LoadOptions& options) {
+  std::vector<DragGroup> groups;
+  groups.push_back({"prepared", {}, options.sessions, {}});
+  groups.push_back({"slow reader", {.slow_ms = options.slow_ms}, options.slow_readers, {}});
+  groups.push_back({"neo_hookean", {.neo_hookean = true}, options.refining, {}});
+  return groups;
+}
+
+absl::Status Open(const std::string& address, const PlanProblem& problem, DragGroup* group) {
+  for (int i = 0; i < group->count; ++i) {
+    TF_ASSIGN_OR_RETURN(std::unique_ptr<LoadDrag> drag,
+                        LoadDrag::Open(address, problem, group->kind));
+    group->drags.push_back(std::move(drag));
+  }
+  return absl::OkStatus();
+}
+
+void RunAll(const LoadOptions& options, const std::vector<DragGroup>& groups,
+            const std::vector<std::unique_ptr<Churn>>& churn) {
+  std::atomic<bool> stop = false;
+  std::vector<std::thread> churning;
+  churning.reserve(churn.size());
+  for (const auto& client : churn) {
+    churning.emplace_back([&client, &stop] { client->Run(stop); });
+  }
+  const Clock::time_point origin = Clock::now();
+  const Clock::time_point first = origin + kLeadTime;
+  const Clock::time_point end = first + Seconds(options.seconds);
+  const Clock::duration interval = Seconds(1 / options.poses_per_second);
+  const int count = options.sessions + options.slow_readers + options.refining;
+  std::vector<std::thread> dragging;
+  dragging.reserve(count);
+  for (const DragGroup& group : groups) {
+    for (const auto& drag : group.drags) {
+      const auto number = static_cast<int64_t>(dragging.size());
+      const Clock::time_point start = options.in_phase ? first : first + interval * number / count;
+      dragging.emplace_back([=, &drag] { drag->Run(origin, start, end, interval); });
+    }
+  }
+  for (std::thread& thread : dragging) thread.join();
+  stop = true;
+  for (std::thread& thread : churning) thread.join();
+}
+
+}  // namespace
+
+absl::StatusOr<LoadResult> RunLoad(const std::string& address, const PlanProblem& problem,
+                                   const LoadOptions& options) {
+  LoadResult result;
+  const Stopwatch preparing;
+  std::vector<DragGroup> groups = GroupsOf(options);
+  for (DragGroup& group : groups) TF_RETURN_IF_ERROR(Open(address, problem, &group));
+  // Whatever drags there are, the mesh is on the server while churn makes sessions of it.
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client,
+                      TissueformClient::Connect(address, {}));
+  TF_ASSIGN_OR_RETURN(const v1::Mesh mesh, UploadMeshOf(client.get(), problem));
+  std::vector<std::unique_ptr<Churn>> churn;
+  for (int i = 0; i < options.churn; ++i) {
+    TF_ASSIGN_OR_RETURN(std::unique_ptr<TissueformClient> own,
+                        TissueformClient::Connect(address, {.own_connection = true}));
+    churn.push_back(std::make_unique<Churn>(
+        std::move(own), SessionRequestOf(problem, mesh.name()), i, options.churn));
+  }
+  result.preparing_seconds = preparing.Seconds();
+  RunAll(options, groups, churn);
+  for (const DragGroup& group : groups) {
+    if (group.drags.empty()) continue;
+    DragLoad load;
+    load.kind = group.name;
+    for (const auto& drag : group.drags) {
+      drag->AddTo(&load);
+      if (!drag->status().ok()) result.errors.push_back(drag->status());
+    }
+    result.drags.push_back(std::move(load));
+  }
+  for (const auto& client_of_churn : churn) {
+    result.session_seconds.insert(result.session_seconds.end(),
+                                  client_of_churn->seconds().begin(),
+                                  client_of_churn->seconds().end());
+    result.errors.insert(result.errors.end(), client_of_churn->errors().begin(),
+                         client_of_churn->errors().end());
+  }
+  return result;
+}
+
+}  // namespace tissueform
