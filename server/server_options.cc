@@ -84,7 +84,7 @@ void AddServerOptions(CLI::App& app, ServerOptions* options) {
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
   app.add_option("--workers", options->workers,
-                 "threads that compute (default: one a core); sessions share them")
+                 "threads that compute, in each lane (default: one a core); sessions share them")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   AddLimits(app, options);

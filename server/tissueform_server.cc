@@ -75,9 +75,9 @@ TissueformServer::TissueformServer(const ServerOptions& options)
       pool_(std::make_unique<WorkerPool>(options.workers)),
       registry_(options.limits, &budget_, pool_.get(), &store_),
       streams_(options.limits.max_streams),
-      mesh_service_(&gate_, &catalog_, pool_.get()),
+      mesh_service_(&gate_, options.limits, &catalog_, pool_.get(), &timer_),
       session_service_(&gate_, options.limits, &catalog_, &registry_),
-      deform_service_(&gate_, options.limits, &registry_, &streams_) {
+      deform_service_(&gate_, options.limits, &registry_, &streams_, &timer_) {
   SetBlasThreads(1);  // the pool's workers share the cores already
   budget_.set_reclaimer([this] { Reclaim(); });
 }

@@ -15,6 +15,7 @@
 #include "server/rpc/mesh_service.h"
 #include "server/rpc/session_service.h"
 #include "server/server_options.h"
+#include "server/session/deadline_timer.h"
 #include "server/session/memory_budget.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session_registry.h"
@@ -66,6 +67,7 @@ class TissueformServer {
   InMemorySessionStore store_;
   SessionRegistry registry_;
   DeformStreams streams_;
+  DeadlineTimer timer_;
   MeshService mesh_service_;
   SessionService session_service_;
   DeformService deform_service_;

@@ -57,7 +57,7 @@ std::vector<NamedPose> NamedPoses(const PlanProblem& problem) {
 }
 
 // The server refuses a stream that asks for what its model does not have
-// (SessionModels::CreateResponse has the same rule): who asks first, as here, can do without.
+// (SharedPreparation::CreateResponse has the same rule): who asks first, as here, can do without.
 bool HasPreparedAnswers(const DeformerOptions& options) {
   if (options.model == DeformationModel::kLinearElastic) return true;
   return options.model == DeformationModel::kGradientField &&

@@ -151,8 +151,20 @@ Eigen::VectorXd ElasticSystem::Coefficients(absl::Span<const HandlePose> poses) 
   return coefficients;
 }
 
+absl::StatusOr<const SinglePrecisionSolver*> ElasticSystem::Rounded(
+    const FactorAdmission& admission) {
+  if (rounded_ == nullptr) {
+    if (admission) {
+      TF_RETURN_IF_ERROR(admission(system_->single_precision_bytes()));
+    }
+    TF_ASSIGN_OR_RETURN(rounded_, system_->FreeInSinglePrecision());
+  }
+  return rounded_.get();
+}
+
 int64_t ElasticSystem::bytes_held() const {
-  return system_->bytes_held() + response_columns_.size() * static_cast<int64_t>(sizeof(double));
+  return system_->bytes_held() + (rounded_ != nullptr ? system_->single_precision_bytes() : 0) +
+         response_columns_.size() * static_cast<int64_t>(sizeof(double));
 }
 
 }  // namespace tissueform

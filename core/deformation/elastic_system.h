@@ -26,7 +26,8 @@ struct ElasticSystemOptions {
 
 // The stiffness matrix of linear elasticity with the constrained vertices eliminated and
 // factorised, and the responses of the free vertices to 12 affine motions of every handle: what the
-// linear model answers with, and what preconditions the non-linear one. One thread at a time.
+// linear model answers with, and what preconditions the non-linear one. What is const may be used
+// by several threads at once.
 //
 // Unknowns are interleaved: 3 v + axis.
 class ElasticSystem {
@@ -57,12 +58,15 @@ class ElasticSystem {
   // K d = f with prescribed displacements, by back-substitution: `forces` 3 #V (or no rows) and
   // `values` 3 #constrained, both interleaved. Returns 3 #V.
   absl::StatusOr<Eigen::MatrixXd> Solve(const Eigen::MatrixXd& forces,
-                                        const Eigen::MatrixXd& values) {
+                                        const Eigen::MatrixXd& values) const {
     return system_->Solve(forces, values);
   }
 
-  // For iterations on the free unknowns; its factor stays as it is.
-  DirichletSystem& system() { return *system_; }
+  // The factor in single precision, made when it is first asked for: as
+  // DirichletSystem::FreeInSinglePrecision, with its errors. `admission`, which may be empty, is
+  // asked for its bytes. The pointer lives as long as this object.
+  absl::StatusOr<const SinglePrecisionSolver*> Rounded(const FactorAdmission& admission);
+
   const DirichletSystem& system() const { return *system_; }
   // The larger of the free block's (DirichletSystem::EstimateCondition) and the ratio of bulk to
   // shear modulus.
@@ -83,6 +87,7 @@ class ElasticSystem {
   double assemble_seconds_ = 0;
   double response_seconds_ = 0;
   std::unique_ptr<DirichletSystem> system_;
+  std::unique_ptr<SinglePrecisionSolver> rounded_;  // null until asked for
 };
 
 }  // namespace tissueform

@@ -25,12 +25,12 @@ constexpr double kLargestShortening = 0.5;
 
 }  // namespace
 
-EquilibriumSearch::EquilibriumSearch(NeoHookeanEnergy* energy, DirichletSystem* system,
-                                     std::unique_ptr<SinglePrecisionSolver> rounded,
-                                     double force_unit, int history)
+EquilibriumSearch::EquilibriumSearch(NeoHookeanEnergy* energy, const DirichletSystem* system,
+                                     const SinglePrecisionSolver* rounded, double force_unit,
+                                     int history)
     : energy_(*energy),
       system_(*system),
-      rounded_(std::move(rounded)),
+      rounded_(rounded),
       force_unit_(force_unit),
       history_(history) {}
 

@@ -23,8 +23,8 @@ class EquilibriumSearch {
   // Refers to energy and system. `system` is the linear stiffness with unknowns 3 v + axis, three
   // for every free vertex; `rounded` stands in for its factor, or is null. `force_unit` is the
   // size, in Pa mm^2, of the forces below which rounding is all that is left; see residual().
-  EquilibriumSearch(NeoHookeanEnergy* energy, DirichletSystem* system,
-                    std::unique_ptr<SinglePrecisionSolver> rounded, double force_unit, int history);
+  EquilibriumSearch(NeoHookeanEnergy* energy, const DirichletSystem* system,
+                    const SinglePrecisionSolver* rounded, double force_unit, int history);
 
   // Goes on from these displacements (#V by 3, mm), forgetting the steps so far. False, and nothing
   // is changed, when they invert a tet.
@@ -60,8 +60,8 @@ class EquilibriumSearch {
   absl::StatusOr<Eigen::VectorXd> Precondition(const Eigen::VectorXd& rhs);
 
   NeoHookeanEnergy& energy_;
-  DirichletSystem& system_;
-  const std::unique_ptr<SinglePrecisionSolver> rounded_;  // may be null
+  const DirichletSystem& system_;
+  const SinglePrecisionSolver* const rounded_;  // may be null
   const double force_unit_;
 
   // The state.

@@ -85,37 +85,33 @@ bool UsesRoundedFactor(const ElasticSystem& elastic) {
 }
 
 // What a deformer holds beside the preparation.
-int64_t BytesNeeded(const MeshPreparation& preparation, const ElasticSystem& elastic,
-                    const NeoHookeanOptions& options) {
+int64_t BytesNeeded(const MeshPreparation& preparation, const NeoHookeanOptions& options) {
   const Eigen::Index num_vertices = preparation.mesh().num_vertices();
   const auto handles = static_cast<int64_t>(preparation.constraints().handles().size());
   return NeoHookeanEnergy::BytesNeeded(preparation.mesh().num_tets()) +
          EquilibriumSearch::BytesNeeded(num_vertices, options.history) +
-         num_vertices * handles * static_cast<int64_t>(sizeof(double)) +
-         (UsesRoundedFactor(elastic) ? elastic.system().single_precision_bytes() : 0);
+         num_vertices * handles * static_cast<int64_t>(sizeof(double));
 }
 
 class NeoHookeanDeformer : public Deformer {
  public:
   // `rounded` may be null.
-  NeoHookeanDeformer(std::shared_ptr<MeshPreparation> preparation, ElasticSystem* elastic,
-                     std::unique_ptr<SinglePrecisionSolver> rounded,
-                     const NeoHookeanOptions& options)
+  NeoHookeanDeformer(std::shared_ptr<MeshPreparation> preparation, const ElasticSystem& elastic,
+                     const SinglePrecisionSolver* rounded, const NeoHookeanOptions& options)
       : preparation_(std::move(preparation)),
-        elastic_(*elastic),
+        elastic_(elastic),
         options_(options),
-        shares_(HandleShares(*elastic, rest().rows())),
+        shares_(HandleShares(elastic, rest().rows())),
         energy_(preparation_->elements(), preparation_->vertex_cells(), preparation_->stiffness(),
                 preparation_->options().poisson_ratio, preparation_->options().threads),
-        search_(&energy_, &elastic->system(), std::move(rounded), ForceUnit(*preparation_),
-                options.history) {
+        search_(&energy_, &elastic.system(), rounded, ForceUnit(*preparation_), options.history) {
     const FactorizationSummary& factorization = elastic_.system().factorization();
     summary_.assemble_seconds = elastic_.assemble_seconds();
     summary_.analyse_seconds = factorization.analyse_seconds;
     summary_.factorise_seconds = factorization.factorise_seconds;
     summary_.prepare_seconds = elastic_.response_seconds();
     summary_.factor_bytes = factorization.factor_bytes;
-    summary_.own_bytes = BytesNeeded(*preparation_, elastic_, options_);
+    summary_.own_bytes = BytesNeeded(*preparation_, options_);
     summary_.bytes_held = preparation_->bytes_held() + summary_.own_bytes;
   }
 
@@ -264,7 +260,7 @@ class NeoHookeanDeformer : public Deformer {
 
   // Constant after the constructor.
   const std::shared_ptr<MeshPreparation> preparation_;  // owns elastic_
-  ElasticSystem& elastic_;
+  const ElasticSystem& elastic_;
   const NeoHookeanOptions options_;
   const Eigen::MatrixXd shares_;  // #V by #handles
   PreparationSummary summary_;
@@ -284,14 +280,13 @@ absl::StatusOr<std::unique_ptr<Deformer>> CreateNeoHookeanDeformer(
   TF_ASSIGN_OR_RETURN(ElasticSystem * elastic, preparation->Elastic(cancellation));
   TF_RETURN_IF_ERROR(cancellation.Check());
   if (const FactorAdmission& admission = preparation->options().admission) {
-    TF_RETURN_IF_ERROR(admission(BytesNeeded(*preparation, *elastic, options)));
+    TF_RETURN_IF_ERROR(admission(BytesNeeded(*preparation, options)));
   }
-  std::unique_ptr<SinglePrecisionSolver> rounded;
+  const SinglePrecisionSolver* rounded = nullptr;
   if (UsesRoundedFactor(*elastic)) {
-    TF_ASSIGN_OR_RETURN(rounded, elastic->system().FreeInSinglePrecision());
+    TF_ASSIGN_OR_RETURN(rounded, elastic->Rounded(preparation->options().admission));
   }
-  return std::make_unique<NeoHookeanDeformer>(std::move(preparation), elastic, std::move(rounded),
-                                              options);
+  return std::make_unique<NeoHookeanDeformer>(std::move(preparation), *elastic, rounded, options);
 }
 
 }  // namespace tissueform

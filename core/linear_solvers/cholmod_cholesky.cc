@@ -15,6 +15,7 @@
 
 #include "cholmod.h"
 #include "core/base/status_macros.h"
+#include "core/base/workspace_pool.h"
 #include "core/linear_solvers/supernodal_factor.h"
 
 // Declared here because clang has no omp.h without a package of its own.
@@ -115,6 +116,27 @@ absl::Status CheckPivots(const SupernodalFactor& factor) {
   return absl::OkStatus();
 }
 
+// What solving writes to beside the solution; the factor is only read. Kept between solves:
+// cholmod_solve2 allocates it once.
+struct SolveWorkspace {
+  SolveWorkspace() {
+    cholmod_start(&common);
+    common.print = 0;
+    common.error_handler = nullptr;
+  }
+  ~SolveWorkspace() {
+    cholmod_free_dense(&y, &common);
+    cholmod_free_dense(&e, &common);
+    cholmod_finish(&common);
+  }
+  SolveWorkspace(const SolveWorkspace&) = delete;
+  SolveWorkspace& operator=(const SolveWorkspace&) = delete;
+
+  cholmod_common common{};
+  cholmod_dense* y = nullptr;
+  cholmod_dense* e = nullptr;
+};
+
 class CholmodCholesky : public SparseCholesky {
  public:
   explicit CholmodCholesky(int unknowns_per_node) : unknowns_per_node_(unknowns_per_node) {
@@ -132,8 +154,6 @@ class CholmodCholesky : public SparseCholesky {
   }
 
   ~CholmodCholesky() override {
-    cholmod_free_dense(&workspace_y_, &common_);
-    cholmod_free_dense(&workspace_e_, &common_);
     cholmod_free_factor(&factor_, &common_);
     cholmod_finish(&common_);
   }
@@ -168,15 +188,16 @@ class CholmodCholesky : public SparseCholesky {
     return ToStatus(common_.status, "factorising the linear system");
   }
 
-  absl::Status Solve(const Eigen::MatrixXd& rhs, Eigen::MatrixXd* solution) override {
+  absl::Status Solve(const Eigen::MatrixXd& rhs, Eigen::MatrixXd* solution) const override {
+    const WorkspacePool<SolveWorkspace>::Lease workspace = workspaces_.Borrow();
     solution->resize(rhs.rows(), rhs.cols());
     cholmod_dense view = ViewDense(rhs);
     // Of the right size already, so CHOLMOD writes into it instead of allocating one of its own.
     cholmod_dense result = ViewDense(*solution);
     cholmod_dense* result_handle = &result;
-    cholmod_solve2(CHOLMOD_A, factor_, &view, nullptr, &result_handle, nullptr, &workspace_y_,
-                   &workspace_e_, &common_);
-    return ToStatus(common_.status, "solving the linear system");
+    cholmod_solve2(CHOLMOD_A, factor_, &view, nullptr, &result_handle, nullptr, &workspace->y,
+                   &workspace->e, &workspace->common);
+    return ToStatus(workspace->common.status, "solving the linear system");
   }
 
   absl::StatusOr<std::unique_ptr<SinglePrecisionSolver>> ToSinglePrecision() const override {
@@ -241,9 +262,7 @@ class CholmodCholesky : public SparseCholesky {
   const int unknowns_per_node_;
   cholmod_common common_{};
   cholmod_factor* factor_ = nullptr;
-  // Kept between solves: cholmod_solve2 allocates them once.
-  cholmod_dense* workspace_y_ = nullptr;
-  cholmod_dense* workspace_e_ = nullptr;
+  mutable WorkspacePool<SolveWorkspace> workspaces_;
 };
 
 }  // namespace

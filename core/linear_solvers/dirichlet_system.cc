@@ -123,23 +123,25 @@ absl::StatusOr<std::unique_ptr<DirichletSystem>> DirichletSystem::Create(
 }
 
 absl::StatusOr<Eigen::MatrixXd> DirichletSystem::Solve(const Eigen::MatrixXd& rhs,
-                                                       const Eigen::MatrixXd& values) {
+                                                       const Eigen::MatrixXd& values) const {
   Eigen::MatrixXd solution = Eigen::MatrixXd::Zero(size_, values.cols());
   if (!free_.empty()) {
     // Two steps: Eigen would make a temporary of the size of the product for its negative.
-    reduced_rhs_.noalias() = free_prescribed_ * values;
-    reduced_rhs_ = -reduced_rhs_;
+    Eigen::MatrixXd reduced_rhs;
+    reduced_rhs.noalias() = free_prescribed_ * values;
+    reduced_rhs = -reduced_rhs;
     if (rhs.rows() > 0) {
-      reduced_rhs_ += rhs(free_, Eigen::all);
+      reduced_rhs += rhs(free_, Eigen::all);
     }
-    TF_RETURN_IF_ERROR(cholesky_->Solve(reduced_rhs_, &reduced_solution_));
-    solution(free_, Eigen::all) = reduced_solution_;
+    Eigen::MatrixXd reduced_solution;
+    TF_RETURN_IF_ERROR(cholesky_->Solve(reduced_rhs, &reduced_solution));
+    solution(free_, Eigen::all) = reduced_solution;
   }
   solution(prescribed_, Eigen::all) = values;
   return solution;
 }
 
-absl::StatusOr<double> DirichletSystem::EstimateCondition(int iterations) {
+absl::StatusOr<double> DirichletSystem::EstimateCondition(int iterations) const {
   if (free_.empty()) {
     return 1.0;
   }
@@ -181,10 +183,8 @@ double DirichletSystem::RelativeResidual(const Eigen::MatrixXd& rhs,
 
 int64_t DirichletSystem::bytes_held() const {
   const auto indices = static_cast<int64_t>(free_.size() + prescribed_.size());
-  const auto workspace = static_cast<int64_t>(reduced_rhs_.size() + reduced_solution_.size());
   return factorization_.factor_bytes + BytesOf(free_free_) + BytesOf(free_prescribed_) +
-         indices * static_cast<int64_t>(sizeof(int32_t)) +
-         workspace * static_cast<int64_t>(sizeof(double));
+         indices * static_cast<int64_t>(sizeof(int32_t));
 }
 
 }  // namespace tissueform

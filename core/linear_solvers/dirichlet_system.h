@@ -32,7 +32,7 @@ using FactorAdmission = std::function<absl::Status(int64_t factor_bytes)>;
 // K x = b with prescribed values at some unknowns (Liao et al. 2009, Eq. 7): rows and columns of
 // prescribed unknowns are eliminated, the free block is factorised once.
 //
-// One thread at a time.
+// Thread-safe once it is made.
 class DirichletSystem {
  public:
   struct Options {
@@ -55,11 +55,12 @@ class DirichletSystem {
   // Solves for k right-hand sides in one pass. `rhs` is n by k (rows of prescribed unknowns are not
   // read) or has no rows, which stands for zero; `values` is #prescribed by k, in the order of
   // `prescribed`. Returns n by k.
-  absl::StatusOr<Eigen::MatrixXd> Solve(const Eigen::MatrixXd& rhs, const Eigen::MatrixXd& values);
+  absl::StatusOr<Eigen::MatrixXd> Solve(const Eigen::MatrixXd& rhs,
+                                        const Eigen::MatrixXd& values) const;
 
   // A x = b on the free block alone, for `rhs` #free by k in the order of free(); `solution` is
   // resized. For iterations that keep to the free unknowns. REQUIRES: num_free() > 0.
-  absl::Status SolveFree(const Eigen::MatrixXd& rhs, Eigen::MatrixXd* solution) {
+  absl::Status SolveFree(const Eigen::MatrixXd& rhs, Eigen::MatrixXd* solution) const {
     return cholesky_->Solve(rhs, solution);
   }
 
@@ -74,7 +75,7 @@ class DirichletSystem {
   // each by `iterations` steps of power iteration with A and with its inverse: an estimate from
   // below, within a small factor after some ten steps. The same at every call; 1 without free
   // unknowns.
-  absl::StatusOr<double> EstimateCondition(int iterations);
+  absl::StatusOr<double> EstimateCondition(int iterations) const;
 
   // Relative residual ||A x - b|| / ||b|| of the free rows, over all columns; 0 when b is zero and
   // x solves it.
@@ -95,11 +96,7 @@ class DirichletSystem {
   SparseMatrix free_free_;           // #free by #free: the lower triangle of A
   SparseMatrix free_prescribed_;     // #free by #prescribed
   FactorizationSummary factorization_;
-
-  // Workspaces, reused between solves.
   std::unique_ptr<SparseCholesky> cholesky_;
-  Eigen::MatrixXd reduced_rhs_;
-  Eigen::MatrixXd reduced_solution_;
 };
 
 }  // namespace tissueform

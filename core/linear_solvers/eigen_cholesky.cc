@@ -27,7 +27,7 @@ class SimplicialSolver : public SinglePrecisionSolver {
   SimplicialSolver(const Factor& factor, const Permutation& permutation)
       : factor_(factor), permutation_(permutation) {}
 
-  void Solve(const Eigen::VectorXf& rhs, Eigen::VectorXf* solution) override {
+  void Solve(const Eigen::VectorXf& rhs, Eigen::VectorXf* solution) const override {
     Eigen::VectorXf x = permutation_ * rhs;
     factor_.triangularView<Eigen::Lower>().solveInPlace(x);
     factor_.transpose().triangularView<Eigen::Upper>().solveInPlace(x);
@@ -69,7 +69,7 @@ class EigenCholesky : public SparseCholesky {
     return absl::OkStatus();
   }
 
-  absl::Status Solve(const Eigen::MatrixXd& rhs, Eigen::MatrixXd* solution) override {
+  absl::Status Solve(const Eigen::MatrixXd& rhs, Eigen::MatrixXd* solution) const override {
     *solution = factor_.solve(rhs);
     return absl::OkStatus();
   }

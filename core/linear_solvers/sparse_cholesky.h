@@ -21,19 +21,19 @@ enum class CholeskyBackend {
 // Solves A x = b nearly, with a Cholesky factor rounded to single precision: a back-substitution is
 // bound by reading the factor, and this one reads half as much. The rounded factor is that of a
 // matrix that is positive definite, too, and differs from A by some 1e-7 of A's size: what a
-// preconditioner needs. One thread at a time.
+// preconditioner needs. Thread-safe.
 class SinglePrecisionSolver {
  public:
   virtual ~SinglePrecisionSolver() = default;
 
   // `rhs` has one entry a row of A; `solution` is resized.
-  virtual void Solve(const Eigen::VectorXf& rhs, Eigen::VectorXf* solution) = 0;
+  virtual void Solve(const Eigen::VectorXf& rhs, Eigen::VectorXf* solution) const = 0;
 };
 
 // Direct solver for A x = b with A sparse, symmetric and positive definite.
 //
 // The calls come in the order Analyze, Factorize, Solve; a later Factorize with the same sparsity
-// pattern reuses the analysis. One thread at a time (solving reuses a workspace).
+// pattern reuses the analysis. One thread at a time; once factorised, several may solve at once.
 class SparseCholesky {
  public:
   virtual ~SparseCholesky() = default;
@@ -53,7 +53,7 @@ class SparseCholesky {
 
   // Solves for all columns of `rhs` (#rows by k) in one pass over the factor and writes `solution`
   // (#rows by k, resized). REQUIRES: Factorize succeeded.
-  virtual absl::Status Solve(const Eigen::MatrixXd& rhs, Eigen::MatrixXd* solution) = 0;
+  virtual absl::Status Solve(const Eigen::MatrixXd& rhs, Eigen::MatrixXd* solution) const = 0;
 
   // A solver of its own with the factor in single precision, and the bytes that it holds.
   // REQUIRES: Factorize succeeded. Errors: FailedPrecondition (a pivot is outside the range of

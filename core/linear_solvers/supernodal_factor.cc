@@ -34,56 +34,60 @@ Eigen::Index LargestRowCount(const SupernodalFactor& factor) {
 }  // namespace
 
 SupernodalSolver::SupernodalSolver(SupernodalFactor factor)
-    : factor_(std::move(factor)),
-      x_(static_cast<Eigen::Index>(factor_.permutation.size())),
-      below_(LargestRowCount(factor_)) {}
+    : factor_(std::move(factor)), largest_row_count_(LargestRowCount(factor_)) {}
 
-SupernodalSolver::Block SupernodalSolver::BlockOf(size_t supernode) {
+SupernodalSolver::Block SupernodalSolver::BlockOf(size_t supernode, Workspace* workspace) const {
   const int32_t first_column = factor_.first_columns[supernode];
   const int32_t first_row = factor_.first_rows[supernode];
   const int columns = factor_.first_columns[supernode + 1] - first_column;
   return {.columns = columns,
           .rows_below = factor_.first_rows[supernode + 1] - first_row - columns,
           .values = factor_.values.data() + factor_.first_values[supernode],
-          .x = x_.data() + first_column,
+          .x = workspace->x.data() + first_column,
           .below = factor_.rows.data() + first_row + columns};
 }
 
-void SupernodalSolver::Solve(const Eigen::VectorXf& rhs, Eigen::VectorXf* solution) {
-  x_ = rhs(factor_.permutation);
-  SolveDown();
-  SolveUp();
-  solution->resize(x_.size());
-  (*solution)(factor_.permutation) = x_;
+void SupernodalSolver::Solve(const Eigen::VectorXf& rhs, Eigen::VectorXf* solution) const {
+  const WorkspacePool<Workspace>::Lease workspace = workspaces_.Borrow();
+  workspace->below.resize(largest_row_count_);
+  workspace->x = rhs(factor_.permutation);
+  SolveDown(&*workspace);
+  SolveUp(&*workspace);
+  solution->resize(workspace->x.size());
+  (*solution)(factor_.permutation) = workspace->x;
 }
 
-void SupernodalSolver::SolveDown() {
+void SupernodalSolver::SolveDown(Workspace* workspace) const {
+  Eigen::VectorXf& x = workspace->x;
+  Eigen::VectorXf& below = workspace->below;
   // CHOLMOD 3 solves in double precision only. Its supernodes are dense blocks, so the level 2 BLAS
   // reads each once, at the speed of memory: half the bytes are half the time.
   for (size_t s = 0; s + 1 < factor_.first_columns.size(); ++s) {
-    const Block block = BlockOf(s);
+    const Block block = BlockOf(s, workspace);
     const int leading = block.columns + block.rows_below;
     strsv_("L", "N", "N", &block.columns, block.values, &leading, block.x, &kOne);
     if (block.rows_below == 0) continue;
     sgemv_("N", &block.rows_below, &block.columns, &kPlus, block.values + block.columns, &leading,
-           block.x, &kOne, &kZero, below_.data(), &kOne);
+           block.x, &kOne, &kZero, below.data(), &kOne);
     for (int i = 0; i < block.rows_below; ++i) {
-      x_[block.below[i]] -= below_[i];
+      x[block.below[i]] -= below[i];
     }
   }
 }
 
-void SupernodalSolver::SolveUp() {
+void SupernodalSolver::SolveUp(Workspace* workspace) const {
+  const Eigen::VectorXf& x = workspace->x;
+  Eigen::VectorXf& below = workspace->below;
   for (size_t s = factor_.first_columns.size() - 1; s-- > 0;) {
-    const Block block = BlockOf(s);
+    const Block block = BlockOf(s, workspace);
     const int leading = block.columns + block.rows_below;
     // Gathered first, so that the product runs over neighbouring numbers.
     for (int i = 0; i < block.rows_below; ++i) {
-      below_[i] = x_[block.below[i]];
+      below[i] = x[block.below[i]];
     }
     if (block.rows_below > 0) {
       sgemv_("T", &block.rows_below, &block.columns, &kMinus, block.values + block.columns,
-             &leading, below_.data(), &kOne, &kPlus, block.x, &kOne);
+             &leading, below.data(), &kOne, &kPlus, block.x, &kOne);
     }
     strsv_("L", "T", "N", &block.columns, block.values, &leading, block.x, &kOne);
   }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/workspace_pool.h"
 #include "core/linear_solvers/sparse_cholesky.h"
 
 namespace tissueform {
@@ -26,7 +27,7 @@ class SupernodalSolver : public SinglePrecisionSolver {
  public:
   explicit SupernodalSolver(SupernodalFactor factor);
 
-  void Solve(const Eigen::VectorXf& rhs, Eigen::VectorXf* solution) override;
+  void Solve(const Eigen::VectorXf& rhs, Eigen::VectorXf* solution) const override;
 
  private:
   // The dense block of a supernode and where its rows lie.
@@ -38,16 +39,21 @@ class SupernodalSolver : public SinglePrecisionSolver {
     const int32_t* below;
   };
 
-  Block BlockOf(size_t supernode);
-  void SolveDown();
-  void SolveUp();
+  struct Workspace {
+    Eigen::VectorXf x;      // in the order of the factor
+    Eigen::VectorXf below;  // of the rows below a supernode
+  };
+
+  Block BlockOf(size_t supernode, Workspace* workspace) const;
+  void SolveDown(Workspace* workspace) const;
+  void SolveUp(Workspace* workspace) const;
 
   // Constant after the constructor.
   const SupernodalFactor factor_;
+  const Eigen::Index largest_row_count_;
 
-  // Workspaces.
-  Eigen::VectorXf x_;      // in the order of the factor
-  Eigen::VectorXf below_;  // of the rows below a supernode
+  // Self-synchronised.
+  mutable WorkspacePool<Workspace> workspaces_;
 };
 
 }  // namespace tissueform

@@ -36,17 +36,26 @@ class LinearElasticResponse : public VertexResponse {
     }
   }
 
-  double ErrorBoundMm(absl::Span<const HandlePose> poses) override {
+  double ErrorBoundMm(absl::Span<const HandlePose> poses) const override {
     // Nothing is truncated: 12 columns make every affine motion of a handle.
     return panel_.RoundingBoundMm(elastic_.Coefficients(poses));
   }
 
-  bool Covers(absl::Span<const HandlePose> poses) override {
+  bool Covers(absl::Span<const HandlePose> poses) const override {
     return ErrorBoundMm(poses) <= tolerance_mm_;
   }
 
-  void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) override {
+  void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) const override {
     panel_.Evaluate(elastic_.Coefficients(poses), positions);
+  }
+
+  std::optional<double> Answer(absl::Span<const HandlePose> poses,
+                               FloatPositions* positions) const override {
+    const Eigen::VectorXd coefficients = elastic_.Coefficients(poses);
+    const double bound_mm = panel_.RoundingBoundMm(coefficients);
+    if (!(bound_mm <= tolerance_mm_)) return std::nullopt;
+    panel_.Evaluate(coefficients, positions);
+    return bound_mm;
   }
 
   Eigen::Index num_vertices() const override { return panel_.num_vertices(); }

@@ -71,14 +71,6 @@ ResponseBasisPlan PlanOfDegree(int degree, size_t num_handles, Eigen::Index num_
   return plan;
 }
 
-bool SamePoses(absl::Span<const HandlePose> a, absl::Span<const HandlePose> b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](const HandlePose& p, const HandlePose& q) {
-                      return p.rotation_vector == q.rotation_vector && p.pivot_mm == q.pivot_mm &&
-                             p.translation_mm == q.translation_mm && p.scale == q.scale;
-                    });
-}
-
 class ResponseBasis : public VertexResponse {
  public:
   ResponseBasis(const ResponseBasisPlan& plan, const ResponseBasisOptions& options,
@@ -97,25 +89,26 @@ class ResponseBasis : public VertexResponse {
     return PreparePolynomials(vertices, preparation, cancellation);
   }
 
-  double ErrorBoundMm(absl::Span<const HandlePose> poses) override {
-    Expand(poses);
-    return TruncationBoundMm(poses) + panel_.RoundingBoundMm(factors_);
+  double ErrorBoundMm(absl::Span<const HandlePose> poses) const override {
+    return ErrorBoundMm(poses, Expand(poses));
   }
 
-  bool Covers(absl::Span<const HandlePose> poses) override {
-    constexpr double kSlack = 1 + 1e-9;  // the edge of the range belongs to it
-    return std::all_of(poses.begin(), poses.end(),
-                       [this](const HandlePose& pose) {
-                         return pose.rotation_vector.norm() <= options_.max_rotation_rad * kSlack &&
-                                std::abs(pose.scale - 1) <=
-                                    options_.max_scale_change + (kSlack - 1);
-                       }) &&
-           ErrorBoundMm(poses) <= options_.tolerance_mm;
+  bool Covers(absl::Span<const HandlePose> poses) const override {
+    return InRange(poses) && ErrorBoundMm(poses) <= options_.tolerance_mm;
   }
 
-  void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) override {
-    Expand(poses);
-    panel_.Evaluate(factors_, positions);
+  void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) const override {
+    panel_.Evaluate(Expand(poses).factors, positions);
+  }
+
+  std::optional<double> Answer(absl::Span<const HandlePose> poses,
+                               FloatPositions* positions) const override {
+    if (!InRange(poses)) return std::nullopt;
+    const Expansion expansion = Expand(poses);
+    const double bound_mm = ErrorBoundMm(poses, expansion);
+    if (!(bound_mm <= options_.tolerance_mm)) return std::nullopt;
+    panel_.Evaluate(expansion.factors, positions);
+    return bound_mm;
   }
 
   Eigen::Index num_vertices() const override { return panel_.num_vertices(); }
@@ -127,6 +120,12 @@ class ResponseBasis : public VertexResponse {
   }
 
  private:
+  // Of poses: what the columns are multiplied with.
+  struct Expansion {
+    ExpansionCoefficients coefficients;
+    Eigen::MatrixXd factors;  // #columns by 3
+  };
+
   // Small ones first: high degrees before low ones, handles last.
   Eigen::Index ColumnOfPolynomial(Eigen::Index n) const { return 3 * (num_polynomials_ - 1 - n); }
   Eigen::Index ColumnOfHandle(size_t h) const {
@@ -178,36 +177,47 @@ class ResponseBasis : public VertexResponse {
     return absl::OkStatus();
   }
 
-  // Brings coefficients_ and factors_ to `poses`. Asking whether poses are covered and then for
-  // their answer expands once.
-  void Expand(absl::Span<const HandlePose> poses) {
-    if (!poses_.empty() && SamePoses(poses, poses_)) {
-      return;
-    }
-    poses_.assign(poses.begin(), poses.end());
-    coefficients_ = expansion_.Expand(poses);
-    factors_.resize(panel_.num_columns(), 3);
+  bool InRange(absl::Span<const HandlePose> poses) const {
+    constexpr double kSlack = 1 + 1e-9;  // the edge of the range belongs to it
+    return std::all_of(poses.begin(), poses.end(), [this](const HandlePose& pose) {
+      return pose.rotation_vector.norm() <= options_.max_rotation_rad * kSlack &&
+             std::abs(pose.scale - 1) <= options_.max_scale_change + (kSlack - 1);
+    });
+  }
+
+  Expansion Expand(absl::Span<const HandlePose> poses) const {
+    Expansion expansion;
+    expansion.coefficients = expansion_.Expand(poses);
+    Eigen::MatrixXd& factors = expansion.factors;
+    factors.resize(panel_.num_columns(), 3);
     for (Eigen::Index n = 0; n < num_polynomials_; ++n) {
       // Row-major C seen column-major is its transpose.
-      factors_.middleRows<3>(ColumnOfPolynomial(n)) =
-          Eigen::Map<const Eigen::Matrix3d>(coefficients_.row(n).data());
+      factors.middleRows<3>(ColumnOfPolynomial(n)) =
+          Eigen::Map<const Eigen::Matrix3d>(expansion.coefficients.row(n).data());
     }
     for (size_t h = 0; h < poses.size(); ++h) {
       const HandlePose& pose = poses[h];
       const Eigen::Matrix3d turn =
           pose.scale * RotationMatrix(pose.rotation_vector) - Eigen::Matrix3d::Identity();
-      factors_.middleRows<3>(ColumnOfHandle(h)) = turn.transpose();
-      factors_.row(ColumnOfHandle(h) + 3) =
+      factors.middleRows<3>(ColumnOfHandle(h)) = turn.transpose();
+      factors.row(ColumnOfHandle(h) + 3) =
           turn * (origins_[h] - pose.pivot_mm) + pose.translation_mm;
     }
+    return expansion;
   }
 
-  double TruncationBoundMm(absl::Span<const HandlePose> poses) const {
+  double ErrorBoundMm(absl::Span<const HandlePose> poses, const Expansion& expansion) const {
+    return TruncationBoundMm(poses, expansion.coefficients) +
+           panel_.RoundingBoundMm(expansion.factors);
+  }
+
+  double TruncationBoundMm(absl::Span<const HandlePose> poses,
+                           const ExpansionCoefficients& coefficients) const {
     const Eigen::Index guards = guard_gains_.size();
     if (guards == 0) {
       return 0;
     }
-    const Eigen::VectorXd sizes = coefficients_.rowwise().norm();
+    const Eigen::VectorXd sizes = coefficients.rowwise().norm();
     const Eigen::Index unmeasured = sizes.size() - num_polynomials_ - guards;
     return sizes.segment(num_polynomials_, guards).dot(guard_gains_) +
            kGainAllowance * guard_gains_.maxCoeff() * sizes.tail(unmeasured).sum() +
@@ -226,11 +236,6 @@ class ResponseBasis : public VertexResponse {
   // that any one does, mm.
   Eigen::VectorXd guard_gains_;
   double largest_gain_ = 0;
-
-  // Of the last poses.
-  std::vector<HandlePose> poses_;
-  ExpansionCoefficients coefficients_;
-  Eigen::MatrixXd factors_;
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "absl/types/span.h"
 
@@ -15,7 +16,8 @@ namespace tissueform {
 // Answers of a linear-in-its-columns model at chosen vertices without a back-substitution: a small
 // dense product of prepared columns with coefficients that depend on the poses only (the response
 // basis of the gradient field, the 12 columns a handle of linear elasticity). Single precision.
-// One thread at a time.
+//
+// Constant: any number of threads may ask at once.
 class VertexResponse {
  public:
   virtual ~VertexResponse() = default;
@@ -25,14 +27,19 @@ class VertexResponse {
   // vertices.
   //
   // REQUIRES: one legal pose per handle.
-  virtual double ErrorBoundMm(absl::Span<const HandlePose> poses) = 0;
+  virtual double ErrorBoundMm(absl::Span<const HandlePose> poses) const = 0;
 
   // Whether the bound is within the tolerance that was asked for, and the poses within the prepared
   // range. Otherwise use the direct solve.
-  virtual bool Covers(absl::Span<const HandlePose> poses) = 0;
+  virtual bool Covers(absl::Span<const HandlePose> poses) const = 0;
 
   // Writes the positions of the chosen vertices in their order, resized.
-  virtual void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) = 0;
+  virtual void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) const = 0;
+
+  // The three in one, which is what a frame costs: the bound, with `positions` written, or nothing
+  // when the poses are not covered.
+  virtual std::optional<double> Answer(absl::Span<const HandlePose> poses,
+                                       FloatPositions* positions) const = 0;
 
   virtual Eigen::Index num_vertices() const = 0;
   virtual int num_terms() const = 0;  // columns of the product, all handles together

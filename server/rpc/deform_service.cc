@@ -48,7 +48,6 @@ absl::Status ClientHasCancelled() {
 absl::Status Run(const DeformOnceJob& job, const Cancellation& cancellation,
                  v1::DeformOnceResponse* response) {
   if (cancellation.requested()) return ClientHasCancelled();
-  TF_RETURN_IF_ERROR(job.session->PrepareModel(job.model, cancellation));
   DeformControl control;
   control.on_progress = [&cancellation](const Deformation& /*so_far*/) {
     return !cancellation.requested();
@@ -78,11 +77,27 @@ grpc::ServerUnaryReactor* DeformService::DeformOnce(grpc::CallbackServerContext*
     reactor->Finish(scope->End(job.status()));
     return reactor;
   }
-  Strand& strand = job->session->strand();
-  strand.Post([reactor, response, scope, context, job = *std::move(job)] {
-    reactor->Finish(
-        scope->End(Run(job, Cancellation([context] { return context->IsCancelled(); }), response)));
-  });
+  const Cancellation cancellation([context] { return context->IsCancelled(); });
+  const auto shared = std::make_shared<const DeformOnceJob>(*std::move(job));
+  const auto solve = [reactor, response, scope, cancellation, shared] {
+    shared->session->strand().Post(
+        shared->session->LaneOf(shared->model), [reactor, response, scope, cancellation, shared] {
+          reactor->Finish(scope->End(Run(*shared, cancellation, response)));
+        });
+  };
+  if (shared->session->HasModel(shared->model)) {
+    solve();
+    return reactor;
+  }
+  shared->session->making_strand().Post(
+      Lane::kBatch, [reactor, scope, cancellation, shared, solve] {
+        const absl::Status made = shared->session->PrepareModel(shared->model, cancellation);
+        if (made.ok()) {
+          solve();
+        } else {
+          reactor->Finish(scope->End(made));
+        }
+      });
   return reactor;
 }
 
@@ -90,7 +105,7 @@ grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* DeformService::D
     grpc::CallbackServerContext* context) {
   return new DeformStreamReactor(
       CallScope(context, "DeformService.Deform", CallKind::kNewWork, gate_), limits_, registry_,
-      streams_);
+      streams_, timer_);
 }
 
 }  // namespace tissueform

@@ -5,6 +5,7 @@
 
 #include "server/rpc/call_scope.h"
 #include "server/rpc/deform_streams.h"
+#include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
 #include "server/session/session_registry.h"
 #include "tissueform/v1/deform_service.grpc.pb.h"
@@ -16,8 +17,8 @@ namespace tissueform {
 class DeformService final : public v1::DeformService::CallbackService {
  public:
   DeformService(ServiceGate* gate, const ServiceLimits& limits, SessionRegistry* registry,
-                DeformStreams* streams)
-      : gate_(gate), limits_(limits), registry_(registry), streams_(streams) {}
+                DeformStreams* streams, DeadlineTimer* timer)
+      : gate_(gate), limits_(limits), registry_(registry), streams_(streams), timer_(timer) {}
 
   grpc::ServerUnaryReactor* DeformOnce(grpc::CallbackServerContext* context,
                                        const v1::DeformOnceRequest* request,
@@ -30,6 +31,7 @@ class DeformService final : public v1::DeformService::CallbackService {
   const ServiceLimits limits_;
   SessionRegistry* const registry_;
   DeformStreams* const streams_;
+  DeadlineTimer* const timer_;
 };
 
 }  // namespace tissueform

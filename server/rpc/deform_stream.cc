@@ -6,14 +6,21 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
+
 #include "core/base/status_macros.h"
 #include "proto/conversion/geometry_conversion.h"
 
 namespace tissueform {
 
 DeformStreamReactor::DeformStreamReactor(CallScope scope, const ServiceLimits& limits,
-                                         SessionRegistry* registry, DeformStreams* streams)
-    : scope_(std::move(scope)), limits_(limits), registry_(registry), streams_(streams) {
+                                         SessionRegistry* registry, DeformStreams* streams,
+                                         DeadlineTimer* timer)
+    : scope_(std::move(scope)),
+      limits_(limits),
+      registry_(registry),
+      streams_(streams),
+      timer_(timer) {
   absl::Status admission = scope_.admission();
   if (admission.ok()) {
     admission = streams_->Add(this);
@@ -21,6 +28,8 @@ DeformStreamReactor::DeformStreamReactor(CallScope scope, const ServiceLimits& l
   }
   MutexLock lock(mutex_);
   if (admission.ok()) {
+    deadline_ = timer_->Start(std::chrono::steady_clock::now() + limits_.configuration_deadline,
+                              [this] { EndUnlessConfigured(); });
     StartRead(&request_);
   } else {
     End(admission);
@@ -61,9 +70,20 @@ void DeformStreamReactor::OnCancel() {
   Advance();
 }
 
+void DeformStreamReactor::EndUnlessConfigured() {
+  MutexLock lock(mutex_);
+  if (configuration_ != nullptr) return;
+  // A silent stream holds one of the places that others wait for.
+  End(absl::DeadlineExceededError(
+      absl::StrCat("no configuration came within ", limits_.configuration_deadline.count(),
+                   " ms of the opening of the stream; send it as the first message")));
+  Advance();
+}
+
 void DeformStreamReactor::OnDone() {
   if (registered_) {
     streams_->Remove(this);
+    timer_->Cancel(deadline_);
   }
   {
     MutexLock lock(mutex_);  // whoever called Finish may still hold it
@@ -107,10 +127,10 @@ absl::Status DeformStreamReactor::TakeConfiguration() {
   flow_.emplace(configuration_->max_unacked);
   if (configuration_->NeedsPreparation()) {
     flow_->StartPreparation();
-    configuration_->session->strand().Post(
-        [this, configuration = configuration_] { Prepare(*configuration); });
+    configuration_->session->making_strand().Post(
+        Lane::kBatch, [this, configuration = configuration_] { Prepare(*configuration); });
   } else {
-    started_ = StartedWithoutPreparation(*configuration_);
+    started_ = BeginWithoutPreparation(*configuration_).started;
   }
   return absl::OkStatus();
 }
@@ -135,8 +155,7 @@ void DeformStreamReactor::Advance() {
   if (!outcome_.has_value() && flow_.has_value()) {
     WriteNext();
     if (flow_->StartSolve()) {
-      configuration_->session->strand().Post(
-          [this, configuration = configuration_] { SolveNewest(*configuration); });
+      StartAnswer();
     } else if (flow_->Done() && !write_in_flight_) {
       End(absl::OkStatus());
     }
@@ -177,40 +196,68 @@ std::optional<v1::DeformResponse> DeformStreamReactor::NextMessage() {
 }
 
 void DeformStreamReactor::Prepare(const StreamConfiguration& configuration) {
-  absl::StatusOr<v1::DeformResponse> started =
+  absl::StatusOr<StreamBegin> begin =
       PrepareAnswers(configuration, Cancellation([this] { return Ended(); }));
   MutexLock lock(mutex_);
   flow_->FinishPreparation();
-  if (started.ok()) {
-    started_ = *std::move(started);
+  if (begin.ok()) {
+    started_ = std::move(begin->started);
+    claim_ = std::move(begin->claim);
   } else {
-    End(started.status());
+    End(begin.status());
   }
   Advance();
 }
 
-void DeformStreamReactor::SolveNewest(const StreamConfiguration& configuration) {
-  std::optional<WaitingPose> pose;
-  {
-    MutexLock lock(mutex_);
-    if (!outcome_.has_value()) {
-      pose = flow_->TakePose();
-    }
+void DeformStreamReactor::StartAnswer() {
+  Session& session = *configuration_->session;
+  if (claim_ != nullptr) {
+    session.pool().Post(Lane::kFrames, [this, configuration = configuration_, claim = claim_] {
+      AnswerNewest(configuration, claim);
+    });
+    return;
   }
-  std::optional<AnswerFrame> frame;
-  absl::Status status;
-  if (pose.has_value()) {
-    absl::StatusOr<AnswerFrame> answer =
-        AnswerPose(configuration, *pose,
-                   [this](const MakeFrame& make_frame) { return ShowEarly(make_frame); });
-    status = answer.status();
-    if (answer.ok()) frame = *std::move(answer);
-  }
+  session.strand().Post(
+      session.LaneOf(configuration_->model),
+      [this, configuration = configuration_] { SolveNewest(*configuration, std::nullopt); });
+}
+
+std::optional<WaitingPose> DeformStreamReactor::TakePose() {
   MutexLock lock(mutex_);
-  flow_->FinishSolve(std::move(frame));
-  if (!status.ok()) {
-    End(status);
+  return outcome_.has_value() ? std::nullopt : flow_->TakePose();
+}
+
+void DeformStreamReactor::AnswerNewest(const Configuration& configuration,
+                                       const std::shared_ptr<ResponseClaim>& claim) {
+  std::optional<WaitingPose> pose = TakePose();
+  absl::StatusOr<std::optional<AnswerFrame>> answer = std::optional<AnswerFrame>();
+  if (pose.has_value()) answer = AnswerFromPrepared(*configuration, *claim, *pose);
+  if (!pose.has_value() || !answer.ok() || answer->has_value()) {
+    FinishAnswer(std::move(answer));
+    return;
   }
+  // Not covered. The pose goes along: what is under way is this pose's answer.
+  Session& session = *configuration->session;
+  session.strand().Post(
+      session.LaneOf(configuration->model),
+      [this, configuration, pose = std::move(pose)] { SolveNewest(*configuration, pose); });
+}
+
+void DeformStreamReactor::SolveNewest(const StreamConfiguration& configuration,
+                                      std::optional<WaitingPose> pose) {
+  if (!pose.has_value()) pose = TakePose();
+  absl::StatusOr<std::optional<AnswerFrame>> answer = std::optional<AnswerFrame>();
+  if (pose.has_value()) {
+    answer = SolvePose(configuration, *pose,
+                       [this](const MakeFrame& make_frame) { return ShowEarly(make_frame); });
+  }
+  FinishAnswer(std::move(answer));
+}
+
+void DeformStreamReactor::FinishAnswer(absl::StatusOr<std::optional<AnswerFrame>> answer) {
+  MutexLock lock(mutex_);
+  if (!answer.ok()) End(answer.status());
+  flow_->FinishSolve(answer.ok() ? *std::move(answer) : std::nullopt);
   Advance();
 }
 

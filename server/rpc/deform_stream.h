@@ -13,6 +13,7 @@
 #include "server/rpc/call_scope.h"
 #include "server/rpc/deform_streams.h"
 #include "server/rpc/stream_answers.h"
+#include "server/session/deadline_timer.h"
 #include "server/session/frame_flow.h"
 #include "server/session/limits.h"
 #include "server/session/session_registry.h"
@@ -21,8 +22,9 @@
 namespace tissueform {
 
 // One Deform call: hands poses and acknowledgements to a FrameFlow and does what that says, with
-// one read, one write and one job on the session's strand at a time. Deletes itself when gRPC is
-// done with it.
+// one read, one write and one job at a time: on the session's making strand before the stream
+// begins, then in the lane of frames while prepared answers cover the poses, else on its strand.
+// Deletes itself when gRPC is done with it.
 //
 // Reactions come on gRPC's threads and compute nothing. Finish is called once, when neither a job
 // nor a write is under way: whatever runs may use this object. Jobs hold the configuration
@@ -31,7 +33,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
  public:
   // All pointers must outlive the stream.
   DeformStreamReactor(CallScope scope, const ServiceLimits& limits, SessionRegistry* registry,
-                      DeformStreams* streams);
+                      DeformStreams* streams, DeadlineTimer* timer);
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -43,6 +45,9 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
 
  private:
   using Configuration = std::shared_ptr<const StreamConfiguration>;
+
+  // The client has had its time for the configuration.
+  void EndUnlessConfigured() ABSL_LOCKS_EXCLUDED(mutex_);
 
   // Takes the message in request_.
   absl::Status Take() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -56,9 +61,19 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   void WriteNext() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   std::optional<v1::DeformResponse> NextMessage() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
-  // On the session's strand.
+  // Posts the job that answers the newest pose.
+  void StartAnswer() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  // On the session's making strand.
   void Prepare(const StreamConfiguration& configuration) ABSL_LOCKS_EXCLUDED(mutex_);
-  void SolveNewest(const StreamConfiguration& configuration) ABSL_LOCKS_EXCLUDED(mutex_);
+  // On any worker.
+  void AnswerNewest(const Configuration& configuration, const std::shared_ptr<ResponseClaim>& claim)
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  // On the session's strand. `pose` is the newest one when there is none.
+  void SolveNewest(const StreamConfiguration& configuration, std::optional<WaitingPose> pose)
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  std::optional<WaitingPose> TakePose() ABSL_LOCKS_EXCLUDED(mutex_);
+  void FinishAnswer(absl::StatusOr<std::optional<AnswerFrame>> answer) ABSL_LOCKS_EXCLUDED(mutex_);
   // From within a solve: false when it is to stop.
   bool ShowEarly(const MakeFrame& make_frame) ABSL_LOCKS_EXCLUDED(mutex_);
   bool Ended() ABSL_LOCKS_EXCLUDED(mutex_);
@@ -69,15 +84,18 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   const ServiceLimits limits_;
   SessionRegistry* const registry_;
   DeformStreams* const streams_;
+  DeadlineTimer* const timer_;
   bool registered_ = false;
+  DeadlineTimer::Id deadline_;  // of the configuration
 
   // gRPC's while an operation is under way.
   v1::DeformRequest request_;
   v1::DeformResponse writing_;
 
   Mutex mutex_;
-  Configuration configuration_ ABSL_GUARDED_BY(mutex_);    // null before the first message
-  std::optional<FrameFlow> flow_ ABSL_GUARDED_BY(mutex_);  // likewise
+  Configuration configuration_ ABSL_GUARDED_BY(mutex_);           // null before the first message
+  std::optional<FrameFlow> flow_ ABSL_GUARDED_BY(mutex_);         // likewise
+  std::shared_ptr<ResponseClaim> claim_ ABSL_GUARDED_BY(mutex_);  // null: none are prepared
   std::optional<v1::DeformResponse> started_ ABSL_GUARDED_BY(mutex_);  // waits for its write
   bool has_started_ ABSL_GUARDED_BY(mutex_) = false;                   // it was written
   bool tell_draining_ ABSL_GUARDED_BY(mutex_) = false;

@@ -20,8 +20,8 @@ absl::Status NoSuchMesh() {
 grpc::ServerReadReactor<v1::UploadMeshRequest>* MeshService::UploadMesh(
     grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) {
   return new MeshUploadStream(
-      CallScope(context, "MeshService.UploadMesh", CallKind::kNewWork, gate_), catalog_, pool_,
-      response);
+      CallScope(context, "MeshService.UploadMesh", CallKind::kNewWork, gate_), limits_, catalog_,
+      pool_, timer_, response);
 }
 
 grpc::ServerUnaryReactor* MeshService::GetMesh(grpc::CallbackServerContext* context,

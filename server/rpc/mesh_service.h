@@ -4,6 +4,8 @@
 #pragma once
 
 #include "server/rpc/call_scope.h"
+#include "server/session/deadline_timer.h"
+#include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/worker_pool.h"
 #include "tissueform/v1/mesh_service.grpc.pb.h"
@@ -13,8 +15,9 @@ namespace tissueform {
 // tissueform.v1.MeshService over a catalog. Stateless; all arguments must outlive it.
 class MeshService final : public v1::MeshService::CallbackService {
  public:
-  MeshService(ServiceGate* gate, MeshCatalog* catalog, WorkerPool* pool)
-      : gate_(gate), catalog_(catalog), pool_(pool) {}
+  MeshService(ServiceGate* gate, const ServiceLimits& limits, MeshCatalog* catalog,
+              WorkerPool* pool, DeadlineTimer* timer)
+      : gate_(gate), limits_(limits), catalog_(catalog), pool_(pool), timer_(timer) {}
 
   grpc::ServerReadReactor<v1::UploadMeshRequest>* UploadMesh(
       grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) override;
@@ -29,8 +32,10 @@ class MeshService final : public v1::MeshService::CallbackService {
   absl::Status RemoveMesh(const v1::DeleteMeshRequest& request);
 
   ServiceGate* const gate_;
+  const ServiceLimits limits_;
   MeshCatalog* const catalog_;
   WorkerPool* const pool_;
+  DeadlineTimer* const timer_;
 };
 
 }  // namespace tissueform

@@ -12,10 +12,19 @@
 
 namespace tissueform {
 
-MeshUploadStream::MeshUploadStream(CallScope scope, MeshCatalog* catalog, WorkerPool* pool,
+MeshUploadStream::MeshUploadStream(CallScope scope, const ServiceLimits& limits,
+                                   MeshCatalog* catalog, WorkerPool* pool, DeadlineTimer* timer,
                                    v1::UploadMeshResponse* response)
-    : scope_(std::move(scope)), catalog_(catalog), pool_(pool), response_(response) {
+    : scope_(std::move(scope)),
+      limits_(limits),
+      catalog_(catalog),
+      pool_(pool),
+      timer_(timer),
+      response_(response) {
+  MutexLock lock(mutex_);
   if (scope_.admission().ok()) {
+    last_heard_ = std::chrono::steady_clock::now();
+    WaitForMore(last_heard_ + limits_.upload_silence);
     StartRead(&request_);
   } else {
     End(scope_.admission());
@@ -23,6 +32,9 @@ MeshUploadStream::MeshUploadStream(CallScope scope, MeshCatalog* catalog, Worker
 }
 
 void MeshUploadStream::OnReadDone(bool ok) {
+  MutexLock lock(mutex_);
+  if (ended_) return;  // the client was silent for too long
+  last_heard_ = std::chrono::steady_clock::now();
   if (!ok) {
     End(absl::InvalidArgumentError(
         absl::StrCat("the upload ended after ", upload_ == nullptr ? 0 : upload_->committed_bytes(),
@@ -39,6 +51,34 @@ void MeshUploadStream::OnReadDone(bool ok) {
   } else {
     StartRead(&request_);
   }
+}
+
+void MeshUploadStream::OnDone() {
+  DeadlineTimer::Id deadline;
+  {
+    MutexLock lock(mutex_);  // whoever called Finish may still hold it
+    deadline = deadline_;
+  }
+  timer_->Cancel(deadline);
+  delete this;
+}
+
+void MeshUploadStream::WaitForMore(DeadlineTimer::TimePoint until) {
+  deadline_ = timer_->Start(until, [this] { EndIfSilent(); });
+}
+
+void MeshUploadStream::EndIfSilent() {
+  MutexLock lock(mutex_);
+  if (ended_ || checking_) return;
+  const DeadlineTimer::TimePoint until = last_heard_ + limits_.upload_silence;
+  if (std::chrono::steady_clock::now() < until) {
+    WaitForMore(until);
+    return;
+  }
+  // It holds memory that others are refused.
+  End(absl::DeadlineExceededError(
+      absl::StrCat("no chunk came for ", limits_.upload_silence.count(),
+                   " ms, and the upload was given up; send the mesh again")));
 }
 
 absl::Status MeshUploadStream::Take() {
@@ -68,9 +108,16 @@ absl::Status MeshUploadStream::TakeHeader() {
 }
 
 void MeshUploadStream::CheckOnWorker() {
-  pool_->Post([this] {
-    const int64_t committed_bytes = upload_->committed_bytes();
-    auto stored = catalog_->Finish(std::move(upload_));
+  checking_ = true;
+  pool_->Post(Lane::kBatch, [this] {
+    std::unique_ptr<MeshUpload> upload;
+    {
+      MutexLock lock(mutex_);
+      upload = std::move(upload_);
+    }
+    const int64_t committed_bytes = upload->committed_bytes();
+    auto stored = catalog_->Finish(std::move(upload));
+    MutexLock lock(mutex_);
     const absl::Status outcome = stored.status();
     if (stored.ok()) {
       *response_->mutable_mesh() = ToProto(**stored);
@@ -83,6 +130,7 @@ void MeshUploadStream::CheckOnWorker() {
 }
 
 void MeshUploadStream::End(const absl::Status& outcome) {
+  ended_ = true;
   upload_.reset();
   Finish(scope_.End(outcome));
 }

@@ -74,6 +74,7 @@ v1::Session ToProto(const Session& session) {
   }
   SetPreparation(session.preparation(), &proto);
   proto.set_bytes_held(session.bytes_held());
+  proto.set_shared_bytes(session.shared_bytes());
   return proto;
 }
 

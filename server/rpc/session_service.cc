@@ -35,7 +35,10 @@ class CreateSessionCall : public grpc::ServerUnaryReactor {
 
   void End(const absl::Status& outcome) { Finish(scope_.End(outcome)); }
 
-  void OnCancel() override { *cancelled_ = true; }
+  void OnCancel() override {
+    *cancelled_ = true;
+    registry_->CancelCreate(cancelled_);
+  }
 
   // A client that has cancelled never learns the name of its session: nobody would ever delete it.
   void OnDone() override {

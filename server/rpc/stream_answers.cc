@@ -75,43 +75,46 @@ absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ReadConfiguration(
   return configuration;
 }
 
-v1::DeformResponse StartedWithoutPreparation(const StreamConfiguration& configuration) {
+StreamBegin BeginWithoutPreparation(const StreamConfiguration& configuration) {
   const VertexChoice& choice = configuration.choice;
-  v1::DeformResponse response;
-  v1::DeformStarted* started = response.mutable_started();
+  StreamBegin begin;
+  v1::DeformStarted* started = begin.started.mutable_started();
   started->set_max_unacked(configuration.max_unacked);
   started->set_vertex_count(choice.all ? configuration.session->mesh().mesh.num_vertices()
                                        : static_cast<int64_t>(choice.vertices.size()));
   started->mutable_vertices()->Add(choice.vertices.begin(), choice.vertices.end());
-  return response;
+  return begin;
 }
 
-absl::StatusOr<v1::DeformResponse> PrepareAnswers(const StreamConfiguration& configuration,
-                                                  const Cancellation& cancellation) {
+absl::StatusOr<StreamBegin> PrepareAnswers(const StreamConfiguration& configuration,
+                                           const Cancellation& cancellation) {
   Session& session = *configuration.session;
   TF_RETURN_IF_ERROR(session.PrepareModel(configuration.model, cancellation));
-  v1::DeformResponse started = StartedWithoutPreparation(configuration);
+  StreamBegin begin = BeginWithoutPreparation(configuration);
   if (configuration.response.has_value()) {
-    TF_ASSIGN_OR_RETURN(const VertexResponse* response,
+    TF_ASSIGN_OR_RETURN(begin.claim,
                         session.PrepareResponse(*configuration.response, cancellation));
-    started.mutable_started()->set_prepared_terms(response->num_terms());
-    started.mutable_started()->set_prepared_bytes(response->bytes_held());
-  }
-  return started;
-}
-
-absl::StatusOr<AnswerFrame> AnswerPose(const StreamConfiguration& configuration,
-                                       const WaitingPose& pose, const OnEarlyAnswer& on_early) {
-  if (configuration.response.has_value()) {
-    TF_ASSIGN_OR_RETURN(const std::optional<PreparedAnswer> answer,
-                        configuration.session->Respond(*configuration.response, pose.poses));
-    if (answer.has_value()) {
-      return AnswerFrame{.sequence = pose.sequence,
-                         .coalesced_count = pose.coalesced_count,
-                         .summary = answer->summary,
-                         .positions = EncodePositions(answer->positions)};
+    if (const auto shared = begin.claim->Get(); shared != nullptr) {
+      begin.started.mutable_started()->set_prepared_terms(shared->response->num_terms());
+      begin.started.mutable_started()->set_prepared_bytes(shared->response->bytes_held());
     }
   }
+  return begin;
+}
+
+absl::StatusOr<std::optional<AnswerFrame>> AnswerFromPrepared(
+    const StreamConfiguration& configuration, const ResponseClaim& claim, const WaitingPose& pose) {
+  TF_ASSIGN_OR_RETURN(const std::optional<PreparedAnswer> answer,
+                      configuration.session->Respond(claim, pose.poses));
+  if (!answer.has_value()) return std::optional<AnswerFrame>();
+  return std::optional<AnswerFrame>(AnswerFrame{.sequence = pose.sequence,
+                                                .coalesced_count = pose.coalesced_count,
+                                                .summary = answer->summary,
+                                                .positions = EncodePositions(answer->positions)});
+}
+
+absl::StatusOr<AnswerFrame> SolvePose(const StreamConfiguration& configuration,
+                                      const WaitingPose& pose, const OnEarlyAnswer& on_early) {
   DeformControl control;
   control.warm_start = true;
   control.on_progress = [&](const Deformation& so_far) {

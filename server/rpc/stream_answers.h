@@ -30,26 +30,35 @@ struct StreamConfiguration {
   int max_unacked = 2;
 
   // Something is to be made before the stream begins.
-  bool NeedsPreparation() const { return response.has_value() || model != session->model(); }
+  bool NeedsPreparation() const { return response.has_value() || !session->HasModel(model); }
 };
 
 // Errors: InvalidArgument (a field that is unknown or out of range), NotFound (the session).
 absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ReadConfiguration(
     const v1::DeformConfiguration& proto, const ServiceLimits& limits, SessionRegistry* registry);
 
-// The first message of the server. With preparation it must run on the session's strand; errors:
-// those of Session::PrepareModel and PrepareResponse.
-v1::DeformResponse StartedWithoutPreparation(const StreamConfiguration& configuration);
-absl::StatusOr<v1::DeformResponse> PrepareAnswers(const StreamConfiguration& configuration,
-                                                  const Cancellation& cancellation);
+// What was made for a stream before it began.
+struct StreamBegin {
+  v1::DeformResponse started;            // the first message of the server
+  std::shared_ptr<ResponseClaim> claim;  // null: every frame is solved directly
+};
 
-// On the session's strand: the answer to a pose, from prepared answers where they cover it. A solve
-// that iterates shows what it has by `on_early`, which makes the frame when it wants it and returns
-// false when the solve is to stop.
+StreamBegin BeginWithoutPreparation(const StreamConfiguration& configuration);
+// On the session's making strand. Errors: those of Session::PrepareModel and PrepareResponse.
+absl::StatusOr<StreamBegin> PrepareAnswers(const StreamConfiguration& configuration,
+                                           const Cancellation& cancellation);
+
+// The answer to a pose from prepared answers, where they cover it. Any worker. Errors: those of
+// Session::Respond.
+absl::StatusOr<std::optional<AnswerFrame>> AnswerFromPrepared(
+    const StreamConfiguration& configuration, const ResponseClaim& claim, const WaitingPose& pose);
+
+// On the session's strand: the answer to a pose by a solve. One that iterates shows what it has by
+// `on_early`, which makes the frame when it wants it and returns false when the solve is to stop.
 using MakeFrame = std::function<AnswerFrame()>;
 using OnEarlyAnswer = std::function<bool(const MakeFrame& make_frame)>;
-absl::StatusOr<AnswerFrame> AnswerPose(const StreamConfiguration& configuration,
-                                       const WaitingPose& pose, const OnEarlyAnswer& on_early);
+absl::StatusOr<AnswerFrame> SolvePose(const StreamConfiguration& configuration,
+                                      const WaitingPose& pose, const OnEarlyAnswer& on_early);
 
 v1::DeformResponse ToProto(AnswerFrame frame);
 

@@ -17,6 +17,9 @@ struct ServiceLimits {
   int max_sessions = 64;
   int max_streams = 64;
   std::chrono::seconds session_idle_ttl{1800};
+  // A client that says nothing for so long is given up.
+  std::chrono::milliseconds configuration_deadline{10'000};  // of a stream, from its opening on
+  std::chrono::milliseconds upload_silence{30'000};          // between two chunks
 
   int max_handles = 256;
   int max_cell_arrays = 16;

@@ -27,100 +27,190 @@ absl::StatusOr<Eigen::VectorXd> ResolveStiffness(const SessionRecord& record,
   return array->values;
 }
 
+// Gives every answer's residual; a small part of a solve.
+DeformerOptions OptionsOf(const SessionRecord& record) {
+  DeformerOptions options;
+  options.model = record.model;
+  options.preparation.poisson_ratio = record.poisson_ratio;
+  options.preparation.mesh_is_usable = true;  // MeshCatalog
+  options.gradient_field = record.gradient_field;
+  options.gradient_field.compute_residual = true;
+  return options;
+}
+
+// An answer and the messages that carry it: float64 once, float32 in up to three frames.
+constexpr int64_t kAnswerBytesPerVertex = 3 * (8 + 3 * 4);
+
 }  // namespace
 
 Session::Session(const SessionRecord& record, std::shared_ptr<const StoredMesh> mesh,
-                 ConstraintSet constraints, WorkerPool* pool, const Clock* clock)
+                 ConstraintSet constraints, const Strand& making_strand, MemoryBudget* budget,
+                 WorkerPool* pool, const Clock* clock)
     : clock_(clock),
+      budget_(budget),
+      pool_(pool),
       id_(record.id),
       mesh_(std::move(mesh)),
       constraints_(std::move(constraints)),
-      model_(record.model),
-      poisson_ratio_(record.poisson_ratio),
-      gradient_field_(record.gradient_field),
+      options_(OptionsOf(record)),
       strand_(pool),
+      making_strand_(making_strand),
       last_used_(clock->Now()) {}
 
-absl::StatusOr<std::shared_ptr<Session>> Session::Create(SessionRecord record,
-                                                         std::shared_ptr<const StoredMesh> mesh,
-                                                         MemoryBudget* budget, WorkerPool* pool,
-                                                         const Clock* clock,
-                                                         const Cancellation& cancellation) {
+absl::StatusOr<std::shared_ptr<Session>> Session::Create(
+    SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
+    std::shared_ptr<SharedPreparation> preparation, MemoryBudget* budget, WorkerPool* pool,
+    const Clock* clock, const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(cancellation.Check());
   TF_ASSIGN_OR_RETURN(
       ConstraintSet constraints,
       ConstraintSet::Create(mesh->mesh, std::move(record.fixed), std::move(record.handles)));
   TF_ASSIGN_OR_RETURN(const Eigen::VectorXd stiffness, ResolveStiffness(record, *mesh));
-  std::shared_ptr<Session> session(
-      new Session(record, std::move(mesh), std::move(constraints), pool, clock));
-  TF_RETURN_IF_ERROR(session->Prepare(stiffness, budget, cancellation));
+  std::shared_ptr<Session> session(new Session(record, std::move(mesh), std::move(constraints),
+                                               preparation->strand(), budget, pool, clock));
+  TF_RETURN_IF_ERROR(session->Prepare(stiffness, std::move(preparation), cancellation));
   return session;
 }
 
-absl::Status Session::Prepare(const Eigen::VectorXd& stiffness, MemoryBudget* budget,
+absl::Status Session::Prepare(const Eigen::VectorXd& stiffness,
+                              std::shared_ptr<SharedPreparation> preparation,
                               const Cancellation& cancellation) {
-  DeformerOptions options;
-  options.model = model_;
-  options.preparation.poisson_ratio = poisson_ratio_;
-  options.preparation.mesh_is_usable = true;  // MeshCatalog
-  options.gradient_field = gradient_field_;
-  // Told in every answer; a small part of a solve.
-  options.gradient_field.compute_residual = true;
-  models_ = std::make_unique<SessionModels>(std::move(options), budget);
-  TF_RETURN_IF_ERROR(models_->Begin(mesh_->mesh, stiffness, constraints_));
-  TF_ASSIGN_OR_RETURN(const Deformer* deformer, models_->Prepare(model_, cancellation));
-  preparation_ = deformer->preparation();
-  bytes_held_ = models_->bytes_held();
+  TF_RETURN_IF_ERROR(
+      preparation->Begin(mesh_->mesh, stiffness, constraints_, options_.preparation));
+  Models models;
+  models.preparation = std::move(preparation);
+  TF_ASSIGN_OR_RETURN(
+      models.reservation,
+      budget_->Reserve(kAnswerBytesPerVertex * mesh_->mesh.num_vertices(), "session"));
+  own_bytes_ = models.reservation.bytes();
+  {
+    MutexLock lock(mutex_);
+    models_ = std::move(models);
+  }
+  TF_RETURN_IF_ERROR(PrepareModel(options_.model, cancellation));
   Touch();
   return absl::OkStatus();
 }
 
-absl::Status Session::CheckOpen() const {
-  if (models_ != nullptr) return absl::OkStatus();
+absl::Status Session::Closed() const {
   return absl::NotFoundError(absl::StrCat("sessions/", id_, " has been deleted; create it again"));
 }
 
+absl::StatusOr<std::shared_ptr<SharedPreparation>> Session::OpenPreparation() const {
+  MutexLock lock(mutex_);
+  if (!models_.has_value()) return Closed();
+  return models_->preparation;
+}
+
+int64_t Session::shared_bytes() const {
+  MutexLock lock(mutex_);
+  return models_.has_value() ? models_->preparation->bytes_held() : 0;
+}
+
+bool Session::HasModel(DeformationModel model) const {
+  MutexLock lock(mutex_);
+  return models_.has_value() && models_->models.contains(model);
+}
+
+Lane Session::LaneOf(DeformationModel model) const {
+  const bool one_solve = model == DeformationModel::kLinearElastic ||
+                         (model == DeformationModel::kGradientField &&
+                          options_.gradient_field.rotation != RotationMode::kEstimated);
+  return one_solve ? Lane::kSolves : Lane::kIterations;
+}
+
 absl::Status Session::PrepareModel(DeformationModel model, const Cancellation& cancellation) {
-  TF_RETURN_IF_ERROR(CheckOpen());
-  const absl::Status status = models_->Prepare(model, cancellation).status();
-  bytes_held_ = models_->bytes_held();
+  making_ = true;
+  const absl::Status status = MakeModel(model, cancellation);
+  making_ = false;
   return status;
 }
 
-absl::StatusOr<VertexResponse*> Session::PrepareResponse(const ResponseRequest& request,
-                                                         const Cancellation& cancellation) {
-  TF_RETURN_IF_ERROR(CheckOpen());
-  absl::StatusOr<VertexResponse*> response = models_->PrepareResponse(request, cancellation);
-  bytes_held_ = models_->bytes_held();
-  return response;
+absl::Status Session::MakeModel(DeformationModel model, const Cancellation& cancellation) {
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<SharedPreparation> preparation, OpenPreparation());
+  if (HasModel(model)) return absl::OkStatus();
+  DeformerOptions options = options_;
+  options.model = model;
+  Model made;
+  TF_ASSIGN_OR_RETURN(made.deformer, preparation->MakeModel(options, cancellation));
+  TF_ASSIGN_OR_RETURN(made.reservation,
+                      budget_->Reserve(made.deformer->preparation().own_bytes, "session"));
+  if (model == options_.model) summary_ = made.deformer->preparation();
+  return Keep(model, std::move(made));
+}
+
+absl::Status Session::Keep(DeformationModel model, Model made) {
+  MutexLock lock(mutex_);
+  if (!models_.has_value()) return Closed();
+  own_bytes_ += made.reservation.bytes();
+  models_->models[model] = std::move(made);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::shared_ptr<ResponseClaim>> Session::PrepareResponse(
+    const ResponseRequest& request, const Cancellation& cancellation) {
+  TF_RETURN_IF_ERROR(PrepareModel(request.model, cancellation));
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<SharedPreparation> preparation, OpenPreparation());
+  making_ = true;
+  absl::StatusOr<std::shared_ptr<const SharedResponse>> response =
+      preparation->PrepareResponse(request, options_.gradient_field, cancellation);
+  making_ = false;
+  TF_RETURN_IF_ERROR(response.status());
+  auto claim = std::make_shared<ResponseClaim>(*std::move(response));
+  MutexLock lock(mutex_);
+  if (!models_.has_value()) {
+    claim->Drop();
+    return claim;
+  }
+  std::erase_if(models_->claims, [](const auto& known) { return known.expired(); });
+  models_->claims.push_back(claim);
+  return claim;
 }
 
 absl::StatusOr<Deformation> Session::Deform(DeformationModel model,
                                             absl::Span<const HandlePose> poses,
                                             const DeformControl& control) {
   Touch();
-  TF_RETURN_IF_ERROR(CheckOpen());
-  const absl::StatusOr<Deformer*> deformer = models_->Prepare(model, {});
-  bytes_held_ = models_->bytes_held();
-  TF_RETURN_IF_ERROR(deformer.status());
-  return (*deformer)->Deform(poses, control);
+  std::shared_ptr<Deformer> deformer;
+  {
+    MutexLock lock(mutex_);
+    if (!models_.has_value()) return Closed();
+    const auto found = models_->models.find(model);
+    if (found == models_->models.end()) {
+      return absl::FailedPreconditionError("the model of this answer was not prepared");
+    }
+    deformer = found->second.deformer;
+  }
+  return deformer->Deform(poses, control);
 }
 
-absl::StatusOr<std::optional<PreparedAnswer>> Session::Respond(const ResponseRequest& request,
+absl::StatusOr<std::optional<PreparedAnswer>> Session::Respond(const ResponseClaim& claim,
                                                                absl::Span<const HandlePose> poses) {
   Touch();
   const Stopwatch stopwatch;
-  TF_ASSIGN_OR_RETURN(VertexResponse* const response, PrepareResponse(request, {}));
-  if (!response->Covers(poses)) return std::optional<PreparedAnswer>();
+  const std::shared_ptr<const SharedResponse> shared = claim.Get();
+  if (shared == nullptr) return Closed();
   PreparedAnswer answer;
-  response->Evaluate(poses, &answer.positions);
+  const std::optional<double> bound_mm = shared->response->Answer(poses, &answer.positions);
+  if (!bound_mm.has_value()) return std::optional<PreparedAnswer>();
   answer.summary.iterations = 0;
   answer.summary.prepared = true;
-  answer.summary.error_bound_mm = response->ErrorBoundMm(poses);
+  answer.summary.error_bound_mm = *bound_mm;
   answer.summary.solve_seconds = stopwatch.Seconds();
   return std::optional<PreparedAnswer>(std::move(answer));
 }
 
-void Session::Close() { models_.reset(); }
+void Session::Close() {
+  std::optional<Models> closed;  // ends without the lock
+  {
+    MutexLock lock(mutex_);
+    std::swap(closed, models_);
+    own_bytes_ = 0;
+  }
+  if (!closed.has_value()) return;
+  for (const std::weak_ptr<ResponseClaim>& known : closed->claims) {
+    if (const std::shared_ptr<ResponseClaim> claim = known.lock()) claim->Drop();
+  }
+}
 
 }  // namespace tissueform

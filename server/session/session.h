@@ -5,9 +5,11 @@
 
 #include <atomic>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -15,6 +17,7 @@
 #include "absl/types/span.h"
 
 #include "core/base/cancellation.h"
+#include "core/base/mutex.h"
 #include "core/constraints/constraint_set.h"
 #include "core/constraints/handle_pose.h"
 #include "core/deformation/create_deformer.h"
@@ -22,7 +25,7 @@
 #include "server/session/clock.h"
 #include "server/session/memory_budget.h"
 #include "server/session/mesh_catalog.h"
-#include "server/session/session_models.h"
+#include "server/session/shared_preparation.h"
 #include "server/session/worker_pool.h"
 #include "server/store/session_record.h"
 
@@ -34,85 +37,144 @@ struct PreparedAnswer {
   SolveSummary summary;
 };
 
-// A mesh prepared for poses. Lives on its strand: what is marked so runs there and nowhere else;
-// everything else is constant and may be read from any thread.
+// A stream's claim on prepared answers; empty once its session is closed, so that no stream keeps
+// their memory. Thread-safe.
+class ResponseClaim {
+ public:
+  explicit ResponseClaim(std::shared_ptr<const SharedResponse> response)
+      : response_(std::move(response)) {}
+
+  // Null when dropped.
+  std::shared_ptr<const SharedResponse> Get() const {
+    MutexLock lock(mutex_);
+    return response_;
+  }
+  void Drop() {
+    MutexLock lock(mutex_);
+    response_.reset();
+  }
+
+ private:
+  mutable Mutex mutex_;
+  std::shared_ptr<const SharedResponse> response_ ABSL_GUARDED_BY(mutex_);
+};
+
+// A mesh prepared for poses: models of its own on a preparation that it may share.
+//
+// Two strands: what makes something runs on that of the preparation, in Lane::kBatch; solves run on
+// the session's own, so that they do not wait for what is made; answers from prepared columns need
+// neither. The rest is constant or may be called from any thread.
 class Session {
  public:
-  // Factorises: call it on a worker. `mesh` is the one that the record names. `budget`, `pool` and
-  // `clock` must outlive the session.
+  // Factorises unless the preparation has it: call it on preparation->strand(). `mesh` is the one
+  // that the record names. `budget`, `pool` and `clock` must outlive the session.
   //
   // Errors: InvalidArgument (regions, stiffness), FailedPrecondition (not positive definite),
   // ResourceExhausted (no room), Cancelled.
-  static absl::StatusOr<std::shared_ptr<Session>> Create(SessionRecord record,
-                                                         std::shared_ptr<const StoredMesh> mesh,
-                                                         MemoryBudget* budget, WorkerPool* pool,
-                                                         const Clock* clock,
-                                                         const Cancellation& cancellation);
+  static absl::StatusOr<std::shared_ptr<Session>> Create(
+      SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
+      std::shared_ptr<SharedPreparation> preparation, MemoryBudget* budget, WorkerPool* pool,
+      const Clock* clock, const Cancellation& cancellation);
 
   const std::string& id() const { return id_; }
   const StoredMesh& mesh() const { return *mesh_; }
   const ConstraintSet& constraints() const { return constraints_; }
-  DeformationModel model() const { return model_; }
-  double poisson_ratio() const { return poisson_ratio_; }
-  const GradientFieldOptions& gradient_field() const { return gradient_field_; }
-  const PreparationSummary& preparation() const { return preparation_; }  // of its own model
-  // Grows when another model or prepared answers are first asked for.
-  int64_t bytes_held() const { return bytes_held_; }
+  DeformationModel model() const { return options_.model; }
+  double poisson_ratio() const { return options_.preparation.poisson_ratio; }
+  const GradientFieldOptions& gradient_field() const { return options_.gradient_field; }
+  const PreparationSummary& preparation() const { return summary_; }  // of its own model
+  // Grow when another model or prepared answers are first asked for. The second is what other
+  // sessions may use as well, and is part of the first.
+  int64_t bytes_held() const { return own_bytes_ + shared_bytes(); }
+  int64_t shared_bytes() const;
 
+  // Where solves run, in LaneOf(model).
   Strand& strand() { return strand_; }
+  // Where things are made, in Lane::kBatch.
+  Strand& making_strand() { return making_strand_; }
+  WorkerPool& pool() { return *pool_; }
 
-  // On the strand only. Makes another model than the session's own ready. What exists is shared and
-  // not factorised again.
+  // Any thread. A model that is not there yet needs PrepareModel.
+  bool HasModel(DeformationModel model) const;
+  Lane LaneOf(DeformationModel model) const;
+
+  // On the making strand. Makes another model than the session's own ready. What exists is shared
+  // and not factorised again.
   //
-  // Errors: those of SessionModels::Prepare, NotFound (the session was closed).
+  // Errors: those of SharedPreparation::MakeModel and PrepareResponse, NotFound (the session was
+  // closed).
   absl::Status PrepareModel(DeformationModel model, const Cancellation& cancellation);
-  absl::StatusOr<VertexResponse*> PrepareResponse(const ResponseRequest& request,
-                                                  const Cancellation& cancellation);
+  absl::StatusOr<std::shared_ptr<ResponseClaim>> PrepareResponse(const ResponseRequest& request,
+                                                                 const Cancellation& cancellation);
 
-  // On the strand only. `poses` has one entry per handle, in the order of the constraints.
+  // On the strand. `poses` has one entry per handle, in the order of the constraints.
   //
-  // Errors: InvalidArgument (a pose that is not legal), NotFound (the session was closed), those of
-  // PrepareModel.
+  // Errors: InvalidArgument (a pose that is not legal), NotFound (the session was closed),
+  // FailedPrecondition (a model that was not prepared).
   absl::StatusOr<Deformation> Deform(DeformationModel model, absl::Span<const HandlePose> poses,
                                      const DeformControl& control);
 
-  // On the strand only. The same from prepared answers; empty when they do not cover the poses: use
-  // Deform then.
-  absl::StatusOr<std::optional<PreparedAnswer>> Respond(const ResponseRequest& request,
+  // Any thread. The same from prepared answers; empty when they do not cover the poses: use Deform
+  // then. Errors: NotFound (the session was closed).
+  absl::StatusOr<std::optional<PreparedAnswer>> Respond(const ResponseClaim& claim,
                                                         absl::Span<const HandlePose> poses);
 
-  // On the strand only. Gives the memory back; later calls of Deform fail.
+  // On the strand. Gives the memory back; later calls of Deform fail. What is being made for the
+  // session at this moment (see making()) is given back when that ends.
   void Close();
+  // Any thread. Whether a call of PrepareModel or PrepareResponse is under way.
+  bool making() const { return making_; }
 
   // Any thread. When somebody last did something with the session.
   void Touch() { last_used_ = clock_->Now(); }
   Clock::TimePoint last_used() const { return last_used_; }
 
  private:
-  Session(const SessionRecord& record, std::shared_ptr<const StoredMesh> mesh,
-          ConstraintSet constraints, WorkerPool* pool, const Clock* clock);
+  // What ends with Close.
+  struct Model {
+    MemoryReservation reservation;  // of its workspaces; given back after them
+    std::shared_ptr<Deformer> deformer;
+  };
+  struct Models {
+    std::shared_ptr<SharedPreparation> preparation;
+    MemoryReservation reservation;  // of answers
+    std::map<DeformationModel, Model> models;
+    std::vector<std::weak_ptr<ResponseClaim>> claims;
+  };
 
-  absl::Status Prepare(const Eigen::VectorXd& stiffness, MemoryBudget* budget,
+  Session(const SessionRecord& record, std::shared_ptr<const StoredMesh> mesh,
+          ConstraintSet constraints, const Strand& making_strand, MemoryBudget* budget,
+          WorkerPool* pool, const Clock* clock);
+
+  absl::Status Prepare(const Eigen::VectorXd& stiffness,
+                       std::shared_ptr<SharedPreparation> preparation,
                        const Cancellation& cancellation);
-  absl::Status CheckOpen() const;
+  // Errors: NotFound once closed.
+  absl::StatusOr<std::shared_ptr<SharedPreparation>> OpenPreparation() const;
+  // Errors: NotFound once closed.
+  absl::Status Keep(DeformationModel model, Model made);
+  absl::Status MakeModel(DeformationModel model, const Cancellation& cancellation);
+  absl::Status Closed() const;
 
   // Constant after Create.
   const Clock* const clock_;
+  MemoryBudget* const budget_;
+  WorkerPool* const pool_;
   const std::string id_;
   const std::shared_ptr<const StoredMesh> mesh_;
   const ConstraintSet constraints_;
-  const DeformationModel model_;
-  const double poisson_ratio_;
-  const GradientFieldOptions gradient_field_;
-  PreparationSummary preparation_;
+  DeformerOptions options_;
+  PreparationSummary summary_;
 
   // Self-synchronised.
   Strand strand_;
-  std::atomic<int64_t> bytes_held_ = 0;
+  Strand making_strand_;  // the preparation's
+  std::atomic<int64_t> own_bytes_ = 0;
+  std::atomic<bool> making_ = false;
   std::atomic<Clock::TimePoint> last_used_;
 
-  // The strand's.
-  std::unique_ptr<SessionModels> models_;  // null once closed
+  mutable Mutex mutex_;
+  std::optional<Models> models_ ABSL_GUARDED_BY(mutex_);  // empty once closed
 };
 
 }  // namespace tissueform

@@ -4,6 +4,7 @@
 #include "server/session/session_registry.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -36,6 +37,11 @@ absl::Status EndingId(const std::string& id) {
                                              "choose another session_id"));
 }
 
+// Where nobody waits for the end of a session.
+void WarnIfLeftBehind(const absl::Status& status) {
+  if (!status.ok()) spdlog::warn("a session's record stays behind: {}", status.ToString());
+}
+
 // This process is the only one that writes to its store; a store that outlives its server gives
 // each start an epoch of its own.
 constexpr int64_t kEpoch = 1;
@@ -44,7 +50,12 @@ constexpr int64_t kEpoch = 1;
 
 SessionRegistry::SessionRegistry(const ServiceLimits& limits, MemoryBudget* budget,
                                  WorkerPool* pool, SessionStore* store, const Clock* clock)
-    : limits_(limits), budget_(budget), pool_(pool), store_(store), clock_(clock) {}
+    : limits_(limits),
+      budget_(budget),
+      pool_(pool),
+      store_(store),
+      clock_(clock),
+      preparations_(budget, pool) {}
 
 void SessionRegistry::Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
                              CancelFlag cancelled, const CreateCallback& done) {
@@ -63,16 +74,21 @@ void SessionRegistry::Create(SessionRecord record, std::shared_ptr<const StoredM
   if (admission.started == nullptr) {
     return;
   }
-  pool_->Post(
-      [this, creation = std::move(admission.started), record = std::move(record),
-       mesh = std::move(mesh)]() mutable { Make(creation, std::move(record), std::move(mesh)); });
+  std::shared_ptr<SharedPreparation> preparation = preparations_.Find(record);
+  Strand& strand = preparation->strand();
+  strand.Post(Lane::kBatch,
+              [this, creation = std::move(admission.started), record = std::move(record),
+               mesh = std::move(mesh), preparation = std::move(preparation)]() mutable {
+                Make(creation, std::move(record), std::move(mesh), std::move(preparation));
+              });
 }
 
 void SessionRegistry::Make(const std::shared_ptr<Creation>& creation, SessionRecord record,
-                           std::shared_ptr<const StoredMesh> mesh) {
+                           std::shared_ptr<const StoredMesh> mesh,
+                           std::shared_ptr<SharedPreparation> preparation) {
   const Cancellation cancellation([this, &creation] { return AllCancelled(*creation); });
-  absl::StatusOr<std::shared_ptr<Session>> session =
-      Session::Create(record, std::move(mesh), budget_, pool_, clock_, cancellation);
+  absl::StatusOr<std::shared_ptr<Session>> session = Session::Create(
+      record, std::move(mesh), std::move(preparation), budget_, pool_, clock_, cancellation);
   if (!session.ok()) {
     FinishCreation(creation, session.status());
     return;
@@ -157,6 +173,9 @@ bool SessionRegistry::JoinEarlierRequest(const RequestKey& key, const Waiter& wa
   }
   if ((*creation)->key.fingerprint != key.fingerprint) {
     admission->refusal = OtherRequest(key.request_id);
+  } else if ((*creation)->waiters.empty()) {
+    // It is being given up, perhaps past the last moment at which somebody could join.
+    admission->refusal = EndingId((*creation)->id);
   } else {
     (*creation)->waiters.push_back(waiter);
   }
@@ -176,11 +195,15 @@ bool SessionRegistry::AllCancelled(const Creation& creation) const {
 void SessionRegistry::FinishCreation(const std::shared_ptr<Creation>& creation,
                                      absl::StatusOr<std::shared_ptr<Session>> result) {
   std::vector<Waiter> waiters;
+  bool nobody_waits = false;
   {
     MutexLock lock(mutex_);
     creations_.erase(std::find(creations_.begin(), creations_.end(), creation));
     waiters = std::move(creation->waiters);
-    if (result.ok()) {
+    nobody_waits = waiters.empty();  // all have cancelled
+    if (result.ok() && nobody_waits) {
+      ending_.insert((*result)->id());
+    } else if (result.ok()) {
       const std::string& id = (*result)->id();
       sessions_[id] = Entry{*result, creation->key, static_cast<int>(waiters.size())};
       if (!creation->key.request_id.empty()) {
@@ -188,8 +211,29 @@ void SessionRegistry::FinishCreation(const std::shared_ptr<Creation>& creation,
       }
     }
   }
+  if (result.ok() && nobody_waits) {
+    End(*result, WarnIfLeftBehind);
+  }
   for (const Waiter& waiter : waiters) {
     waiter.done(result);
+  }
+}
+
+void SessionRegistry::CancelCreate(const CancelFlag& cancelled) {
+  std::vector<Waiter> gone;
+  {
+    MutexLock lock(mutex_);
+    for (const std::shared_ptr<Creation>& creation : creations_) {
+      std::vector<Waiter>& waiters = creation->waiters;
+      const auto first_gone = std::partition(
+          waiters.begin(), waiters.end(),
+          [&cancelled](const Waiter& waiter) { return waiter.cancelled != cancelled; });
+      std::move(first_gone, waiters.end(), std::back_inserter(gone));
+      waiters.erase(first_gone, waiters.end());
+    }
+  }
+  for (const Waiter& waiter : gone) {
+    waiter.done(absl::CancelledError("the client has cancelled the call"));
   }
 }
 
@@ -204,9 +248,20 @@ void SessionRegistry::Abandon(const std::shared_ptr<Session>& session) {
     }
     Take(session->id());
   }
-  session->strand().Post([this, session] {
+  End(session, WarnIfLeftBehind);
+}
+
+void SessionRegistry::End(const std::shared_ptr<Session>& session,
+                          const std::function<void(absl::Status)>& done) {
+  session->strand().Post(Lane::kSolves, [this, session, done] {
     session->Close();
-    Forget(session->id());
+    // What is being made for it holds memory until that ends.
+    const auto forget = [this, id = session->id(), done] { Forget(id, done); };
+    if (session->making()) {
+      session->making_strand().Post(Lane::kBatch, forget);
+    } else {
+      forget();
+    }
   });
 }
 
@@ -217,12 +272,6 @@ void SessionRegistry::Forget(const std::string& id, std::function<void(absl::Sta
       ending_.erase(id);
     }
     done(status);
-  });
-}
-
-void SessionRegistry::Forget(const std::string& id) {
-  Forget(id, [](const absl::Status& status) {
-    if (!status.ok()) spdlog::warn("a session's record stays behind: {}", status.ToString());
   });
 }
 
@@ -246,10 +295,7 @@ void SessionRegistry::Delete(const std::string& id, std::function<void(absl::Sta
     done(NoSuchSession(id));
     return;
   }
-  session->strand().Post([this, session, done = std::move(done)] {
-    session->Close();
-    Forget(session->id(), done);
-  });
+  End(session, done);
 }
 
 int SessionRegistry::RemoveIdle() {
@@ -273,12 +319,12 @@ int SessionRegistry::RemoveIdle() {
                  limits_.session_idle_ttl.count());
   }
   for (std::shared_ptr<Session>& session : removed) {
-    Forget(session->id());
+    Forget(session->id(), WarnIfLeftBehind);
     // Usually the last reference, which frees the memory here and now. A silent stream may hold
     // another one: then the strand does it.
     if (session.use_count() > 1) {
       Strand& strand = session->strand();
-      strand.Post([held = std::move(session)] { held->Close(); });
+      strand.Post(Lane::kSolves, [held = std::move(session)] { held->Close(); });
     }
     session.reset();
   }

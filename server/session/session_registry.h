@@ -19,6 +19,7 @@
 #include "server/session/limits.h"
 #include "server/session/memory_budget.h"
 #include "server/session/session.h"
+#include "server/session/shared_preparation.h"
 #include "server/session/worker_pool.h"
 #include "server/store/session_store.h"
 
@@ -48,6 +49,10 @@ class SessionRegistry {
   // request); Cancelled.
   void Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh, CancelFlag cancelled,
               const CreateCallback& done);
+
+  // Answers those callers of Create at once with Cancelled who came with this flag and still wait;
+  // what is made for nobody else stops at its next stage.
+  void CancelCreate(const CancelFlag& cancelled);
 
   // Takes back one claim of a caller who never saw the answer. The session ends with its last
   // claim.
@@ -99,16 +104,19 @@ class SessionRegistry {
   bool JoinEarlierRequest(const RequestKey& key, const Waiter& waiter, Admission* admission)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool Full() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // On a worker.
+  // On the preparation's strand.
   void Make(const std::shared_ptr<Creation>& creation, SessionRecord record,
-            std::shared_ptr<const StoredMesh> mesh) ABSL_LOCKS_EXCLUDED(mutex_);
+            std::shared_ptr<const StoredMesh> mesh, std::shared_ptr<SharedPreparation> preparation)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   bool AllCancelled(const Creation& creation) const ABSL_LOCKS_EXCLUDED(mutex_);
   void FinishCreation(const std::shared_ptr<Creation>& creation,
                       absl::StatusOr<std::shared_ptr<Session>> result) ABSL_LOCKS_EXCLUDED(mutex_);
+  // Ends a session that was taken out, and its record.
+  void End(const std::shared_ptr<Session>& session, const std::function<void(absl::Status)>& done)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   // Takes the record of a session that has ended out of the store; then its id is free again.
   void Forget(const std::string& id, std::function<void(absl::Status)> done)
       ABSL_LOCKS_EXCLUDED(mutex_);
-  void Forget(const std::string& id) ABSL_LOCKS_EXCLUDED(mutex_);
   // Whoever takes a session forgets it in the end.
   std::shared_ptr<Session> Take(const std::string& id) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
@@ -118,6 +126,9 @@ class SessionRegistry {
   WorkerPool* const pool_;
   SessionStore* const store_;
   const Clock* const clock_;
+
+  // Self-synchronised.
+  SharedPreparations preparations_;
 
   mutable Mutex mutex_;
   std::map<std::string, Entry> sessions_ ABSL_GUARDED_BY(mutex_);

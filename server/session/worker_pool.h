@@ -3,6 +3,8 @@
 
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -13,52 +15,72 @@
 
 namespace tissueform {
 
-// The threads that do all numerical work. Jobs start in the order of posting.
+// What a job may hold up. Every lane has threads of its own, so that none waits behind another
+// lane's job; where processors are short the operating system gives them to the earlier lane.
+enum class Lane {
+  kFrames,      // products of prepared answers: below a millisecond, somebody looks at it
+  kSolves,      // one back-substitution, and what ends sessions
+  kIterations,  // answers of many solves
+  kBatch,       // factorisations, checks of meshes: seconds
+};
+inline constexpr size_t kLanes = 4;
+
+// The threads that do all numerical work. Jobs of a lane start in the order of posting.
 //
 // Thread-safe.
 class WorkerPool {
  public:
   using Job = std::function<void()>;
 
-  // REQUIRES: num_threads > 0.
+  // REQUIRES: num_threads > 0, for each lane.
   explicit WorkerPool(int num_threads);
   // Runs what is queued, then ends.
   ~WorkerPool();
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
-  void Post(Job job);
+  void Post(Lane lane, Job job);
 
  private:
-  void Work();
+  struct Queue {
+    std::deque<Job> jobs;
+    ConditionVariable job_or_stop;
+  };
+
+  void Work(Lane lane);
 
   Mutex mutex_;
-  ConditionVariable job_or_stop_;
-  std::deque<Job> jobs_ ABSL_GUARDED_BY(mutex_);
+  std::array<Queue, kLanes> queues_ ABSL_GUARDED_BY(mutex_);
+  // Queued or running, in all lanes: a job may post to another lane while the pool ends.
+  int unfinished_ ABSL_GUARDED_BY(mutex_) = 0;
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
 
   // Constant after construction; joined by the destructor.
   std::vector<std::thread> threads_;
 };
 
-// Runs its jobs on a pool, one at a time and in the order of posting: what only jobs of one strand
-// touch needs no lock. Jobs of different strands take turns, so that a busy one does not starve the
-// others.
+// Runs its jobs on a pool, one at a time and in the order of posting, each in its lane: what only
+// jobs of one strand touch needs no lock. Jobs of different strands take turns, so that a busy one
+// does not starve the others.
 //
 // Thread-safe. May be destroyed while jobs are queued: they still run. The pool must outlive them.
 class Strand {
  public:
   explicit Strand(WorkerPool* pool);
 
-  void Post(WorkerPool::Job job);
+  void Post(Lane lane, WorkerPool::Job job);
 
  private:
+  struct LaneJob {
+    Lane lane = Lane::kBatch;
+    WorkerPool::Job job;
+  };
   struct Queue {
     explicit Queue(WorkerPool* worker_pool) : pool(worker_pool) {}
 
     WorkerPool* const pool;
     Mutex mutex;
-    std::deque<WorkerPool::Job> jobs ABSL_GUARDED_BY(mutex);
+    std::deque<LaneJob> jobs ABSL_GUARDED_BY(mutex);
     bool running ABSL_GUARDED_BY(mutex) = false;
   };
 

@@ -50,11 +50,11 @@ absl::Status Run(const LoadCommandOptions& options) {
   std::string address = options.server;
   if (address.empty()) {
     TF_ASSIGN_OR_RETURN(const std::string program, FindProgram("tissueform-server"));
-    TF_ASSIGN_OR_RETURN(server, ServerProcess::Start(program,
-                                                     {"--host", "127.0.0.1", "--port", "0",
-                                                      "--max-sessions", "4096", "--max-streams",
-                                                      "4096", "--log-level", "warn"},
-                                                     kServerStartDeadline));
+    TF_ASSIGN_OR_RETURN(
+        server, ServerProcess::Start(program,
+                                     {"--host", "127.0.0.1", "--port", "0", "--max-sessions",
+                                      "4096", "--max-streams", "4096", "--log-level", "warn"},
+                                     kServerStartDeadline));
     address = server->address();
   }
   absl::FPrintF(stderr, "plan %s: %d vertices, %d tets, %s; preparing %d drags on %s ...\n", path,
@@ -68,8 +68,8 @@ absl::Status Run(const LoadCommandOptions& options) {
         WriteFileAtomically(options.json, LoadJson(options.load, result).dump(2) + "\n"));
   }
   if (!result.errors.empty()) {
-    return absl::InternalError(absl::StrCat(result.errors.size(), " calls failed; the first: ",
-                                            result.errors.front().message()));
+    return absl::InternalError(absl::StrCat(
+        result.errors.size(), " calls failed; the first: ", result.errors.front().message()));
   }
   return absl::OkStatus();
 }
@@ -120,7 +120,8 @@ void AddLoadCommand(CLI::App& app, CommandWork* work) {
   AddOptions(command, options.get());
   command->footer(
       "Every drag has a session and a connection of its own and asks for the skin. The picture's\n"
-      "age is sampled every 10 ms: now minus the time when the newest shown pose was sent, so that\n"
+      "age is sampled every 10 ms: now minus the time when the newest shown pose was sent, so "
+      "that\n"
       "poses that were dropped count; the interval of the poses is part of it. The clients run\n"
       "on this machine, too, and take their share of it. Exit code 1 when a call fails.\n"
       "Examples:\n"

@@ -65,10 +65,10 @@ std::string DragText(const DragLoad& load, double seconds) {
 }  // namespace
 
 std::string LoadText(const LoadOptions& options, const LoadResult& result) {
-  std::string text = absl::StrFormat(
-      "%-12s %5s  %31s  %31s  %12s  %7s  %6s  %6s\n", "drags", "count",
-      "picture age ms 50/90/99/most", "latency ms 50/90/99/most", "solve 50/99", "answers",
-      "frames/s", "MiB/s");
+  std::string text =
+      absl::StrFormat("%-12s %5s  %31s  %31s  %12s  %7s  %6s  %6s\n", "drags", "count",
+                      "picture age ms 50/90/99/most", "latency ms 50/90/99/most", "solve 50/99",
+                      "answers", "frames/s", "MiB/s");
   for (const DragLoad& load : result.drags) absl::StrAppend(&text, DragText(load, options.seconds));
   if (options.churn > 0) {
     absl::StrAppendFormat(&text, "churn: %d sessions made, s 50/90/99/most: %s\n",

@@ -104,8 +104,7 @@ class LoadDrag {
 
   void Receive(Clock::time_point origin) {
     while (std::optional<v1::DeformFrame> frame = stream_->Receive()) {
-      frames_.push_back(
-          {send_times_.Get(frame->sequence()), Milliseconds(Clock::now() - origin)});
+      frames_.push_back({send_times_.Get(frame->sequence()), Milliseconds(Clock::now() - origin)});
       solves_ms_.push_back(frame->summary().solve_seconds() * 1e3);
       bytes_ += static_cast<int64_t>(frame->positions().size());
       if (kind_.slow_ms > 0) std::this_thread::sleep_for(Seconds(kind_.slow_ms / 1e3));
@@ -135,10 +134,7 @@ class Churn {
  public:
   // `number` of `count`, so that no two sessions have the same stiffness.
   Churn(std::unique_ptr<TissueformClient> client, SessionRequest request, int number, int count)
-      : number_(number),
-        count_(count),
-        client_(std::move(client)),
-        request_(std::move(request)) {}
+      : number_(number), count_(count), client_(std::move(client)), request_(std::move(request)) {}
 
   void Run(const std::atomic<bool>& stop) {
     for (int round = 0; !stop; ++round) {
@@ -234,8 +230,8 @@ absl::StatusOr<LoadResult> RunLoad(const std::string& address, const PlanProblem
   for (int i = 0; i < options.churn; ++i) {
     TF_ASSIGN_OR_RETURN(std::unique_ptr<TissueformClient> own,
                         TissueformClient::Connect(address, {.own_connection = true}));
-    churn.push_back(std::make_unique<Churn>(
-        std::move(own), SessionRequestOf(problem, mesh.name()), i, options.churn));
+    churn.push_back(std::make_unique<Churn>(std::move(own), SessionRequestOf(problem, mesh.name()),
+                                            i, options.churn));
   }
   result.preparing_seconds = preparing.Seconds();
   RunAll(options, groups, churn);
@@ -250,8 +246,7 @@ absl::StatusOr<LoadResult> RunLoad(const std::string& address, const PlanProblem
     result.drags.push_back(std::move(load));
   }
   for (const auto& client_of_churn : churn) {
-    result.session_seconds.insert(result.session_seconds.end(),
-                                  client_of_churn->seconds().begin(),
+    result.session_seconds.insert(result.session_seconds.end(), client_of_churn->seconds().begin(),
                                   client_of_churn->seconds().end());
     result.errors.insert(result.errors.end(), client_of_churn->errors().begin(),
                          client_of_churn->errors().end());

@@ -16,14 +16,14 @@ namespace tissueform {
 
 // What a server is asked to bear. Every drag has a session and a connection of its own.
 struct LoadOptions {
-  int sessions = 32;           // drags of skin, from prepared answers where the model has them
+  int sessions = 32;  // drags of skin, from prepared answers where the model has them
   double poses_per_second = 30;
   double seconds = 60;
-  int churn = 2;               // clients that make and delete sessions, one after the other
-  int slow_readers = 0;        // further drags, whose client takes slow_ms for each frame
+  int churn = 2;         // clients that make and delete sessions, one after the other
+  int slow_readers = 0;  // further drags, whose client takes slow_ms for each frame
   double slow_ms = 50;
-  int refining = 0;            // further drags, answered by neo_hookean: solves that iterate
-  bool in_phase = false;       // all drags send at the same moments, instead of spread out
+  int refining = 0;       // further drags, answered by neo_hookean: solves that iterate
+  bool in_phase = false;  // all drags send at the same moments, instead of spread out
 };
 
 // The drags of one kind together.
@@ -32,15 +32,15 @@ struct DragLoad {
   int drags = 0;
   int64_t poses_sent = 0;
   int64_t frames = 0;
-  int64_t bytes = 0;  // of positions
+  int64_t bytes = 0;                    // of positions
   std::vector<double> picture_ages_ms;  // of all drags; see PictureAges
   std::vector<double> latencies_ms;     // of the frames that came, until they were taken
   std::vector<double> solves_ms;        // as the server tells them
 };
 
 struct LoadResult {
-  double preparing_seconds = 0;  // until all drags were ready to begin
-  std::vector<DragLoad> drags;   // of the kinds that there were
+  double preparing_seconds = 0;         // until all drags were ready to begin
+  std::vector<DragLoad> drags;          // of the kinds that there were
   std::vector<double> session_seconds;  // of every session that churn made
   std::vector<absl::Status> errors;     // of drags and churn; what was not asked for is one
 };

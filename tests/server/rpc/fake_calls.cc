@@ -11,7 +11,7 @@ void FakeCallState::Bind(grpc::internal::ServerReactor* reactor) {
     reactor_ = reactor;
     if (cancelled_) {
       ++reactions_under_way_;
-      pool_->Post([this, reactor] {
+      pool_->Post(Lane::kBatch, [this, reactor] {
         reactor->OnCancel();
         Ended();
       });
@@ -25,7 +25,7 @@ void FakeCallState::React(WorkerPool::Job reaction) {
     MutexLock lock(mutex_);
     ++reactions_under_way_;
   }
-  pool_->Post([this, reaction = std::move(reaction)] {
+  pool_->Post(Lane::kBatch, [this, reaction = std::move(reaction)] {
     reaction();
     Ended();
   });
@@ -41,7 +41,7 @@ void FakeCallState::Finish(grpc::Status status) {
                          : std::move(status);
   }
   // Not from here: the caller may hold locks of the reactor.
-  pool_->Post([this] { Ended(); });
+  pool_->Post(Lane::kBatch, [this] { Ended(); });
 }
 
 void FakeCallState::Cancel() {
@@ -51,7 +51,7 @@ void FakeCallState::Cancel() {
     return;
   }
   ++reactions_under_way_;
-  pool_->Post([this, reactor = reactor_] {
+  pool_->Post(Lane::kBatch, [this, reactor = reactor_] {
     reactor->OnCancel();
     Ended();
   });

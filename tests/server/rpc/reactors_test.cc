@@ -51,6 +51,16 @@ v1::DeformRequest Ack(uint64_t sequence) {
   return request;
 }
 
+v1::UploadMeshRequest HeaderOf(const MeshAnnouncement& announcement) {
+  v1::UploadMeshRequest request;
+  request.mutable_header()->set_vertex_count(announcement.shape.num_vertices);
+  request.mutable_header()->set_tet_count(announcement.shape.num_tets);
+  request.mutable_header()->add_cell_arrays("youngs_modulus_pa");
+  request.mutable_header()->set_total_bytes(announcement.total_bytes);
+  request.mutable_header()->set_sha256(announcement.sha256);
+  return request;
+}
+
 constexpr int kWorkers = 2;
 
 class ReactorsTest : public ::testing::Test {
@@ -76,7 +86,7 @@ class ReactorsTest : public ::testing::Test {
     std::promise<void> bound;
     const std::shared_future<void> is_bound = bound.get_future().share();
     for (int worker = 0; worker < kWorkers; ++worker) {
-      workers_->Post([is_bound] { is_bound.wait(); });
+      workers_->Post(Lane::kBatch, [is_bound] { is_bound.wait(); });
     }
     call->Bind(session_service_.CreateSession(nullptr, &request, session));
     bound.set_value();
@@ -114,9 +124,10 @@ class ReactorsTest : public ::testing::Test {
   InMemorySessionStore store_;
   SessionRegistry registry_{limits_, &budget_, workers_.get(), &store_};
   DeformStreams streams_{limits_.max_streams};
-  MeshService mesh_service_{&gate_, &catalog_, workers_.get()};
+  DeadlineTimer timer_;
+  MeshService mesh_service_{&gate_, limits_, &catalog_, workers_.get(), &timer_};
   SessionService session_service_{&gate_, limits_, &catalog_, &registry_};
-  DeformService deform_service_{&gate_, limits_, &registry_, &streams_};
+  DeformService deform_service_{&gate_, limits_, &registry_, &streams_, &timer_};
   std::unique_ptr<WorkerPool> reactions_ = std::make_unique<WorkerPool>(4);
 };
 
@@ -217,13 +228,8 @@ TEST_F(ReactorsTest, UploadsSurviveCancellationAtAnyChunk) {
     v1::UploadMeshResponse response;
     FakeReaderCall<v1::UploadMeshRequest> call(reactions_.get());
     call.Bind(mesh_service_.UploadMesh(nullptr, &response));
+    call.Send(HeaderOf(announcement));
     v1::UploadMeshRequest request;
-    request.mutable_header()->set_vertex_count(announcement.shape.num_vertices);
-    request.mutable_header()->set_tet_count(announcement.shape.num_tets);
-    request.mutable_header()->add_cell_arrays("youngs_modulus_pa");
-    request.mutable_header()->set_total_bytes(announcement.total_bytes);
-    request.mutable_header()->set_sha256(announcement.sha256);
-    call.Send(request);
     for (int64_t i = 0; i < chunks && i < cancel_at; ++i) {
       request.mutable_chunk()->set_write_offset(i * kChunk);
       request.mutable_chunk()->set_data(payload.substr(i * kChunk, kChunk));
@@ -238,6 +244,55 @@ TEST_F(ReactorsTest, UploadsSurviveCancellationAtAnyChunk) {
       EXPECT_TRUE(call.WaitUntilDone()->ok());
       EXPECT_EQ(response.committed_bytes(), announcement.total_bytes);
     }
+  }
+}
+
+TEST_F(ReactorsTest, AStreamWithoutConfigurationIsGivenUpAndLeavesItsPlace) {
+  ServiceLimits impatient = limits_;
+  impatient.configuration_deadline = std::chrono::milliseconds(20);
+  DeformService service(&gate_, impatient, &registry_, &streams_, &timer_);
+  FakeStream silent(reactions_.get());
+  silent.Bind(service.Deform(nullptr));
+  const auto status = silent.WaitUntilDone();
+  ASSERT_TRUE(status.has_value()) << "it waits for ever";
+  EXPECT_EQ(status->error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  EXPECT_NE(status->error_message().find("configuration"), std::string::npos);
+  EXPECT_EQ(streams_.size(), 0);
+}
+
+TEST_F(ReactorsTest, AConfiguredStreamMayRest) {
+  ServiceLimits impatient = limits_;
+  impatient.configuration_deadline = std::chrono::milliseconds(200);
+  DeformService service(&gate_, impatient, &registry_, &streams_, &timer_);
+  FakeStream stream(reactions_.get());
+  stream.Bind(service.Deform(nullptr));
+  stream.Send(Configuration(MakeSession()));
+  ASSERT_TRUE(stream.Receive()->has_started());
+  // Deadlines pass in their order: once this one has, the stream's has.
+  std::promise<void> passed;
+  timer_.Start(std::chrono::steady_clock::now() + impatient.configuration_deadline,
+               [&passed] { passed.set_value(); });
+  passed.get_future().wait();
+  stream.Send(Pose(1));
+  EXPECT_TRUE(stream.Receive()->has_frame());
+  stream.CloseSending();
+  EXPECT_TRUE(stream.WaitUntilDone()->ok());
+}
+
+TEST_F(ReactorsTest, ASilentUploadIsGivenUpAndItsMemoryIsFree) {
+  ServiceLimits impatient = limits_;
+  impatient.upload_silence = std::chrono::milliseconds(20);
+  MeshService service(&gate_, impatient, &catalog_, workers_.get(), &timer_);
+  const MeshAnnouncement announcement = sample_.Announcement();
+  for (const bool with_header : {false, true}) {
+    v1::UploadMeshResponse response;
+    FakeReaderCall<v1::UploadMeshRequest> call(reactions_.get());
+    call.Bind(service.UploadMesh(nullptr, &response));
+    if (with_header) call.Send(HeaderOf(announcement));
+    const auto status = call.WaitUntilDone();
+    ASSERT_TRUE(status.has_value()) << "it waits for ever";
+    EXPECT_EQ(status->error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+    EXPECT_EQ(budget_.reserved_bytes(), 0);
   }
 }
 

@@ -4,9 +4,11 @@
 #include "server/session/session_registry.h"
 
 #include <atomic>
+#include <functional>
 #include <future>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/match.h"
@@ -42,6 +44,31 @@ struct Key {
 };
 
 using CreateResult = absl::StatusOr<std::shared_ptr<Session>>;
+
+// Lets a test do something when a session has been made and its record is about to be kept.
+class WatchedStore : public SessionStore {
+ public:
+  void Create(SessionRecord record, int64_t epoch, RecordCallback done) override {
+    if (before_create) before_create();
+    store_.Create(std::move(record), epoch, std::move(done));
+  }
+  void Get(const std::string& id, RecordCallback done) override { store_.Get(id, std::move(done)); }
+  void Update(SessionRecord record, int64_t epoch, RecordCallback done) override {
+    store_.Update(std::move(record), epoch, std::move(done));
+  }
+  void Delete(const std::string& id, const std::string& etag, int64_t epoch,
+              StatusCallback done) override {
+    store_.Delete(id, etag, epoch, std::move(done));
+  }
+  void List(const ListRequest& request, PageCallback done) override {
+    store_.List(request, std::move(done));
+  }
+
+  std::function<void()> before_create;
+
+ private:
+  InMemorySessionStore store_;
+};
 
 // A server's inside without its network. One worker, so that a blocked worker holds everything.
 class SessionRegistryTest : public ::testing::Test {
@@ -84,9 +111,11 @@ class SessionRegistryTest : public ::testing::Test {
 
   // Runs what is queued at the moment.
   void Drain() {
-    std::promise<void> reached;
-    pool_->Post([&reached] { reached.set_value(); });
-    reached.get_future().wait();
+    for (const Lane lane : {Lane::kBatch, Lane::kSolves}) {
+      std::promise<void> reached;
+      pool_->Post(lane, [&reached] { reached.set_value(); });
+      reached.get_future().wait();
+    }
   }
 
   // The ids in the store, in order.
@@ -100,7 +129,7 @@ class SessionRegistryTest : public ::testing::Test {
   }
 
   FakeClock clock_;
-  InMemorySessionStore store_;
+  WatchedStore store_;
   std::unique_ptr<MemoryBudget> budget_;
   std::unique_ptr<MeshCatalog> catalog_;
   std::unique_ptr<WorkerPool> pool_;
@@ -129,7 +158,7 @@ TEST_F(SessionRegistryTest, ADeletedSessionAnswersNoMorePoses) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create().get());
   ASSERT_THAT(Delete(session->id()), IsOk());
   std::promise<absl::Status> status;
-  session->strand().Post([&] {
+  session->strand().Post(Lane::kSolves, [&] {
     status.set_value(session->Deform(session->model(), {HandlePose{}}, DeformControl{}).status());
   });
   EXPECT_THAT(status.get_future().get(),
@@ -178,7 +207,7 @@ TEST_F(SessionRegistryTest, RequestsWithoutIdGetSessionsOfTheirOwn) {
 
 TEST_F(SessionRegistryTest, ConcurrentCallsWithOneRequestIdShareTheWork) {
   std::promise<void> go;
-  pool_->Post([&go] { go.get_future().wait(); });
+  pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
   std::future<CreateResult> first = Create({"id", "print", ""});
   std::future<CreateResult> second = Create({"id", "print", ""});
   std::future<CreateResult> other = Create({"id", "other", ""});
@@ -192,7 +221,7 @@ TEST_F(SessionRegistryTest, ConcurrentCallsWithOneRequestIdShareTheWork) {
 
 TEST_F(SessionRegistryTest, ACancelledCreationLeavesNothingBehind) {
   std::promise<void> go;
-  pool_->Post([&go] { go.get_future().wait(); });
+  pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
   const auto cancelled = std::make_shared<std::atomic<bool>>(false);
   std::future<CreateResult> result = Create({}, cancelled);
   *cancelled = true;
@@ -203,9 +232,41 @@ TEST_F(SessionRegistryTest, ACancelledCreationLeavesNothingBehind) {
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
 }
 
+TEST_F(SessionRegistryTest, ACancelledCallerIsAnsweredAtOnceAndWhatWasMadeForItEnds) {
+  std::promise<void> go;
+  pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
+  const auto cancelled = std::make_shared<std::atomic<bool>>(false);
+  std::future<CreateResult> result = Create({"id", "print", "chosen"}, cancelled);
+  *cancelled = true;
+  registry_->CancelCreate(cancelled);
+  // The worker has not begun.
+  EXPECT_THAT(result.get(), StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
+  EXPECT_THAT(Create({"id", "print", "chosen"}).get(),
+              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("try again")))
+      << "what is given up is not joined";
+  go.set_value();
+  Drain();
+  EXPECT_EQ(registry_->size(), 0);
+  EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
+  EXPECT_THAT(Stored(), ::testing::IsEmpty());
+  EXPECT_THAT(Create({"id", "print", "chosen"}).get(), IsOk());
+}
+
+TEST_F(SessionRegistryTest, ASessionThatNobodyWaitsForAnyMoreEndsThoughItIsMade) {
+  const auto cancelled = std::make_shared<std::atomic<bool>>(false);
+  // After its last stage: too late to stop early.
+  store_.before_create = [&] { registry_->CancelCreate(cancelled); };
+  EXPECT_THAT(Create({}, cancelled).get(),
+              StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
+  Drain();
+  EXPECT_EQ(registry_->size(), 0);
+  EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
+  EXPECT_THAT(Stored(), ::testing::IsEmpty());
+}
+
 TEST_F(SessionRegistryTest, OneCancelledCallerDoesNotSpoilItForTheOther) {
   std::promise<void> go;
-  pool_->Post([&go] { go.get_future().wait(); });
+  pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
   const auto cancelled = std::make_shared<std::atomic<bool>>(true);
   std::future<CreateResult> gone = Create({"id", "print", ""}, cancelled);
   std::future<CreateResult> stays = Create({"id", "print", ""});
@@ -308,7 +369,7 @@ TEST_F(SessionRegistryTest, AClientMayChooseTheId) {
 
 TEST_F(SessionRegistryTest, AChosenIdIsTakenFromTheFirstCallOn) {
   std::promise<void> go;
-  pool_->Post([&go] { go.get_future().wait(); });
+  pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
   std::future<CreateResult> first = Create({"", "", "chosen"});
   std::future<CreateResult> second = Create({"", "", "chosen"});
   EXPECT_THAT(second.get(), StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("chosen")));
@@ -319,7 +380,7 @@ TEST_F(SessionRegistryTest, AChosenIdIsTakenFromTheFirstCallOn) {
 TEST_F(SessionRegistryTest, AnIdUnderDeletionIsNeitherThereNorFreeAndTheMessageSaysSo) {
   ASSERT_THAT(Create({"", "", "chosen"}).get(), IsOk());
   std::promise<void> go;
-  pool_->Post([&go] { go.get_future().wait(); });
+  pool_->Post(Lane::kSolves, [&go] { go.get_future().wait(); });
   std::promise<absl::Status> deleted;
   registry_->Delete("chosen", [&](absl::Status status) { deleted.set_value(std::move(status)); });
   EXPECT_THAT(Create({"", "", "chosen"}).get(),

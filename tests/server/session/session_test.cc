@@ -12,6 +12,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/base/status_macros.h"
 #include "tests/testing/fake_clock.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/session_samples.h"
@@ -44,13 +45,25 @@ class SessionTest : public ::testing::Test {
   absl::StatusOr<std::shared_ptr<Session>> Create(SessionRecord record,
                                                   const Cancellation& cancellation = {}) {
     record.id = "id";
-    return Session::Create(std::move(record), bar_, &budget_, &pool_, &clock_, cancellation);
+    std::shared_ptr<SharedPreparation> preparation = preparations_.Find(record);
+    return Session::Create(std::move(record), bar_, std::move(preparation), &budget_, &pool_,
+                           &clock_, cancellation);
+  }
+
+  // As a stream does at its beginning, and then for a pose.
+  static absl::StatusOr<std::optional<PreparedAnswer>> Respond(Session* session,
+                                                               const ResponseRequest& request,
+                                                               const HandlePose& pose) {
+    TF_ASSIGN_OR_RETURN(const std::shared_ptr<ResponseClaim> claim,
+                        session->PrepareResponse(request, {}));
+    return session->Respond(*claim, {pose});
   }
 
   FakeClock clock_;
   MemoryBudget budget_{256 << 20};
   MeshCatalog catalog_{{}, &budget_};
   WorkerPool pool_{1};
+  SharedPreparations preparations_{&budget_, &pool_};
   const std::shared_ptr<const StoredMesh> bar_ = Store(SampleMesh(Bar({3, 3, 6})), &catalog_);
   const int64_t mesh_bytes_ = budget_.reserved_bytes();
 };
@@ -152,7 +165,7 @@ TEST_F(SessionTest, PreparedAnswersAreNearTheDirectOnesOrNone) {
   request.tolerance_mm = 1e-3;
   request.max_rotation_rad = 0.4;
   ASSERT_OK_AND_ASSIGN(const std::optional<PreparedAnswer> answer,
-                       session->Respond(request, {{Turn(10)}}));
+                       Respond(session.get(), request, Turn(10)));
   ASSERT_TRUE(answer.has_value());
   EXPECT_TRUE(answer->summary.prepared);
   EXPECT_LE(answer->summary.error_bound_mm, 1e-3);
@@ -161,7 +174,7 @@ TEST_F(SessionTest, PreparedAnswersAreNearTheDirectOnesOrNone) {
   const Positions expected = direct.positions(bar_->skin, Eigen::all);
   EXPECT_LE((answer->positions.cast<double>() - expected).rowwise().norm().maxCoeff(), 1e-3);
   ASSERT_OK_AND_ASSIGN(const std::optional<PreparedAnswer> too_far,
-                       session->Respond(request, {{Turn(90)}}));
+                       Respond(session.get(), request, Turn(90)));
   EXPECT_FALSE(too_far.has_value()) << "not covered";
 }
 
@@ -180,8 +193,44 @@ TEST_F(SessionTest, AClosedSessionHoldsNothingAndAnswersNothing) {
   const auto closed = StatusIs(absl::StatusCode::kNotFound, HasSubstr("sessions/id"));
   EXPECT_THAT(session->Deform(session->model(), {Turn(1)}, {}), closed);
   EXPECT_THAT(session->PrepareModel(DeformationModel::kArap, {}), closed);
-  EXPECT_THAT(session->Respond({.vertices = {0}}, {{Turn(1)}}), closed);
+  EXPECT_THAT(Respond(session.get(), {.vertices = {0}}, Turn(1)), closed);
   session->Close();  // does no harm
+}
+
+TEST_F(SessionTest, ASecondSessionOfTheSameTakesATenthAndAnswersAlike) {
+  SessionRecord record = BarRecord(*bar_);
+  record.model = DeformationModel::kLinearElastic;
+  ASSERT_OK_AND_ASSIGN(const auto first, Create(record));
+  const int64_t reserved = budget_.reserved_bytes() - mesh_bytes_;
+  ASSERT_OK_AND_ASSIGN(const auto second, Create(record));
+  const int64_t more = budget_.reserved_bytes() - mesh_bytes_ - reserved;
+  EXPECT_EQ(more, second->bytes_held() - second->shared_bytes());
+  EXPECT_LE(10 * more, reserved);
+  ASSERT_OK_AND_ASSIGN(const Deformation a, first->Deform(record.model, {Turn(10)}, {}));
+  first->Close();
+  ASSERT_OK_AND_ASSIGN(const Deformation b, second->Deform(record.model, {Turn(10)}, {}));
+  EXPECT_EQ(a.positions, b.positions);
+  second->Close();
+  EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
+}
+
+TEST_F(SessionTest, AClosedSessionTakesThePreparedAnswersFromItsStreams) {
+  ASSERT_OK_AND_ASSIGN(const auto session, Create(BarRecord(*bar_)));
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<ResponseClaim> claim,
+                       session->PrepareResponse({.vertices = {0}}, {}));
+  session->Close();
+  EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
+  EXPECT_THAT(session->Respond(*claim, {Turn(1)}),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("sessions/id")));
+}
+
+TEST_F(SessionTest, AModelThatWasNotPreparedIsNotMadeOnTheWay) {
+  ASSERT_OK_AND_ASSIGN(const auto session, Create(BarRecord(*bar_)));
+  EXPECT_FALSE(session->HasModel(DeformationModel::kArap));
+  EXPECT_THAT(session->Deform(DeformationModel::kArap, {Turn(1)}, {}),
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("prepared")));
+  EXPECT_THAT(session->PrepareModel(DeformationModel::kArap, {}), IsOk());
+  EXPECT_TRUE(session->HasModel(DeformationModel::kArap));
 }
 
 TEST_F(SessionTest, EveryUseIsRemembered) {
@@ -192,7 +241,7 @@ TEST_F(SessionTest, EveryUseIsRemembered) {
   EXPECT_THAT(session->Deform(session->model(), {Turn(1)}, {}), IsOk());
   EXPECT_EQ(session->last_used(), clock_.Now());
   clock_.Advance(std::chrono::seconds(5));
-  EXPECT_THAT(session->Respond({.vertices = {0}}, {{Turn(1)}}), IsOk());
+  EXPECT_THAT(Respond(session.get(), {.vertices = {0}}, Turn(1)), IsOk());
   EXPECT_EQ(session->last_used(), clock_.Now());
 }
 

@@ -3,12 +3,16 @@
 
 #include "server/session/worker_pool.h"
 
+#include <algorithm>
 #include <atomic>
 #include <future>
+#include <map>
 #include <memory>
+#include <unistd.h>
 #include <vector>
 
 #include "gtest/gtest.h"
+#include <sys/resource.h>
 
 namespace tissueform {
 namespace {
@@ -18,7 +22,7 @@ TEST(WorkerPoolTest, RunsAllJobsBeforeItEnds) {
   {
     WorkerPool pool(3);
     for (int i = 0; i < 100; ++i) {
-      pool.Post([&count] { ++count; });
+      pool.Post(Lane::kBatch, [&count] { ++count; });
     }
   }
   EXPECT_EQ(count, 100);
@@ -28,9 +32,55 @@ TEST(WorkerPoolTest, JobsMayPostJobsWhileThePoolEnds) {
   std::atomic<int> count = 0;
   {
     WorkerPool pool(1);
-    pool.Post([&] { pool.Post([&] { pool.Post([&count] { ++count; }); }); });
+    pool.Post(Lane::kBatch, [&] {
+      pool.Post(Lane::kBatch, [&] { pool.Post(Lane::kBatch, [&count] { ++count; }); });
+    });
   }
   EXPECT_EQ(count, 1);
+}
+
+TEST(WorkerPoolTest, NoLaneWaitsForAnother) {
+  for (const Lane busy : {Lane::kFrames, Lane::kSolves, Lane::kIterations, Lane::kBatch}) {
+    WorkerPool pool(2);
+    std::promise<void> end;
+    const std::shared_future<void> ended = end.get_future().share();
+    // More than the lane has threads for: some wait.
+    for (int i = 0; i < 5; ++i) pool.Post(busy, [ended] { ended.wait(); });
+    for (const Lane lane : {Lane::kFrames, Lane::kSolves, Lane::kIterations, Lane::kBatch}) {
+      if (lane == busy) continue;
+      std::promise<void> ran;
+      pool.Post(lane, [&ran] { ran.set_value(); });
+      ran.get_future().wait();
+    }
+    end.set_value();
+  }
+}
+
+TEST(WorkerPoolTest, LaterLanesLeaveTheProcessorsToEarlierOnes) {
+  std::map<Lane, int> niceness;
+  for (const Lane lane : {Lane::kFrames, Lane::kSolves, Lane::kIterations, Lane::kBatch}) {
+    WorkerPool pool(1);
+    pool.Post(lane, [&niceness, lane] {
+      niceness[lane] = getpriority(PRIO_PROCESS, static_cast<id_t>(gettid()));
+    });
+  }
+  EXPECT_EQ(niceness[Lane::kFrames], getpriority(PRIO_PROCESS, 0));
+  EXPECT_LT(niceness[Lane::kFrames], niceness[Lane::kSolves]);
+  EXPECT_LT(niceness[Lane::kSolves], niceness[Lane::kIterations]);
+  EXPECT_LT(niceness[Lane::kIterations], niceness[Lane::kBatch]);
+}
+
+TEST(StrandTest, JobsOfDifferentLanesStillRunOneAtATimeInOrder) {
+  std::vector<int> order;  // without a lock: the strand is the lock
+  {
+    WorkerPool pool(2);
+    Strand strand(&pool);
+    for (int i = 0; i < 200; ++i) {
+      strand.Post(static_cast<Lane>(i % kLanes), [&order, i] { order.push_back(i); });
+    }
+  }
+  ASSERT_EQ(order.size(), 200);
+  EXPECT_TRUE(std::is_sorted(order.begin(), order.end()));
 }
 
 TEST(StrandTest, JobsRunOneAtATimeInOrder) {
@@ -42,7 +92,7 @@ TEST(StrandTest, JobsRunOneAtATimeInOrder) {
     WorkerPool pool(4);
     Strand strand(&pool);
     for (int i = 0; i < kJobs; ++i) {
-      strand.Post([&, i] {
+      strand.Post(Lane::kBatch, [&, i] {
         if (++running > 1) {
           overlapped = true;
         }
@@ -65,11 +115,11 @@ TEST(StrandTest, ABusyStrandLetsOthersTakeTurns) {
     Strand busy(&pool);
     Strand other(&pool);
     std::promise<void> all_posted;
-    pool.Post([future = all_posted.get_future().share()] { future.wait(); });
+    pool.Post(Lane::kBatch, [future = all_posted.get_future().share()] { future.wait(); });
     for (int i = 0; i < 3; ++i) {
-      busy.Post([&order] { order.push_back('b'); });
+      busy.Post(Lane::kBatch, [&order] { order.push_back('b'); });
     }
-    other.Post([&order] { order.push_back('o'); });
+    other.Post(Lane::kBatch, [&order] { order.push_back('o'); });
     all_posted.set_value();
   }
   EXPECT_EQ(order, (std::vector<char>{'b', 'o', 'b', 'b'}));
@@ -81,7 +131,7 @@ TEST(StrandTest, AJobMayHoldTheLastReferenceToItsStrand) {
     WorkerPool pool(2);
     auto strand = std::make_shared<Strand>(&pool);
     Strand& posted_on = *strand;
-    posted_on.Post([&ran, owner = std::move(strand)] { ran = true; });
+    posted_on.Post(Lane::kBatch, [&ran, owner = std::move(strand)] { ran = true; });
   }
   EXPECT_TRUE(ran);
 }
