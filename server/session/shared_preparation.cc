@@ -59,9 +59,9 @@ absl::Status SharedPreparation::Begin(const TetMesh& mesh, const Eigen::VectorXd
   if (preparation_ != nullptr) return absl::OkStatus();
   TF_ASSIGN_OR_RETURN(
       MemoryReservation reservation,
-      budget_->Reserve(LaplacianBytesBesideFactor(mesh.num_vertices(), mesh.num_tets(),
-                                                  NumHandles(constraints)),
-                       "session"));
+      budget_->Reserve(
+          LaplacianBytesBesideFactor(mesh.num_vertices(), mesh.num_tets(), NumHandles(constraints)),
+          "session"));
   options.admission = [this](int64_t bytes) { return Admit(bytes); };
   TF_ASSIGN_OR_RETURN(preparation_,
                       MeshPreparation::Create(mesh, stiffness, constraints, std::move(options)));
@@ -79,9 +79,9 @@ int64_t SharedPreparation::BytesBesideFactor(const DeformerOptions& options) con
     return preparation_->has_elastic() ? ModelBytes(vertices, tets)
                                        : laplacian + ElasticBytesBesideFactor(vertices);
   }
-  const bool makes_factor = !preparation_->has_laplacian() ||
-                            (options.model == DeformationModel::kGradientField &&
-                             options.gradient_field.guidance == Guidance::kUniform);
+  const bool makes_factor =
+      !preparation_->has_laplacian() || (options.model == DeformationModel::kGradientField &&
+                                         options.gradient_field.guidance == Guidance::kUniform);
   return makes_factor ? laplacian : ModelBytes(vertices, tets);
 }
 

@@ -103,7 +103,7 @@ class SharedPreparation {
 
   // The strand's.
   MemoryReservation reservation_;
-  std::shared_ptr<MeshPreparation> preparation_;  // null before Begin
+  std::shared_ptr<MeshPreparation> preparation_;                // null before Begin
   std::list<std::shared_ptr<const SharedResponse>> responses_;  // the last used first
 };
 
