@@ -173,6 +173,27 @@ TEST(RealHeadsTest, TheEarsAreKept) {
   EXPECT_GT(kept, tissue * 99 / 100);
 }
 
+// Thin skin is thickened into bone; a segment lies deeper, and what its handle holds is its
+// surface. Teeth that the open mouth shows are blurred at their edges, and are no skin all the
+// same.
+TEST(RealHeadsTest, ThickeningLeavesTheSegmentsBone) {
+  ASSERT_OK_AND_ASSIGN(const HuGrid ct, LivingHead(2));
+  ASSERT_OK_AND_ASSIGN(const Anatomy a, AnatomyOf(ct));
+  std::vector<int64_t> voxels(kFirstSegment + 3);
+  std::vector<int64_t> eaten(voxels.size());
+  ForEachVoxel(LabelGrid(a.soft.labels.geometry, 1), [&](size_t index, const Eigen::Vector3d& p) {
+    const Eigen::Vector3i at = a.bone.geometry.ToVoxels(p).array().round().matrix().cast<int>();
+    const uint8_t label = a.bone.At(at.x(), at.y(), at.z());
+    ++voxels[label];
+    if (a.soft.labels.values[index] == kSoftTissue) ++eaten[label];
+  });
+  for (size_t label = kFirstSegment; label < voxels.size(); ++label) {
+    SCOPED_TRACE(label);
+    EXPECT_GT(voxels[label], 500);
+    EXPECT_LT(static_cast<double>(eaten[label]) / static_cast<double>(voxels[label]), 0.004);
+  }
+}
+
 TEST(RealHeadsTest, AHeadCutOffOverTheJawIsRefused) {
   ASSERT_OK_AND_ASSIGN(const HuGrid ct, LivingHead(2.5));
   VoxelBox upper;

@@ -119,6 +119,29 @@ TEST(SkinShellTest, ANostrilIsNotPlugged) {
   EXPECT_GE(DepthsOf(shell, [](const Vector3d& d) { return d.z() > 0; }).least, 2.4);
 }
 
+// The layer before the teeth is half air: tissue by its HU.
+TEST(SkinShellTest, BlurredEdgesOfExposedTeethGetNone) {
+  const auto in_mouth = [](const Vector3d& p) {
+    return std::abs(p.z()) < 9 && std::abs(p.x()) < 16 && p.y() < -20;
+  };
+  // Bare in the middle, blurred all round.
+  const auto in_teeth = [](const Vector3d& p) {
+    return std::abs(p.z()) < 9 && std::abs(p.x()) < 16 && p.y() >= -20 && p.y() < -14;
+  };
+  const auto blurred = [](const Vector3d& p) { return p.y() < -19.5 && std::abs(p.x()) > 5; };
+  const HeadSegmentation head = Ball([&](const Vector3d& p) {
+    return in_mouth(p) ? -1000 : !in_teeth(p) ? 40 : blurred(p) ? 100 : 2500;
+  });
+  const LabelGrid shell = Shell(head);
+  int bone = 0;
+  ForEachVoxel(head.bone, [&](size_t index, const Vector3d& place) {
+    if (!in_teeth(place) || std::abs(place.z()) > 5 || std::abs(place.x()) > 11) return;
+    ASSERT_EQ(shell.values[index], 0) << place.transpose();
+    ++bone;
+  });
+  EXPECT_GT(bone, 1000);
+}
+
 // Teeth in a mouth that is wide open, 10 mm behind the lips: no skin is made over them.
 TEST(SkinShellTest, ExposedTeethGetNone) {
   const auto in_mouth = [](const Vector3d& p) {
