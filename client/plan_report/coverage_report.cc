@@ -20,6 +20,8 @@ using Json = nlohmann::ordered_json;
 // the CT shows: a sound head has next to none.
 constexpr double kMuchBoneInSkin = 0.01;
 constexpr size_t kMostGapsTold = 5;
+// Fat has -130 to -70 HU.
+constexpr double kLooserThanSkinHu = -180;
 
 const Colour kCoveredColour = kTissueColour;
 const Colour kMissingColour{0.85, 0.10, 0.10};
@@ -72,10 +74,18 @@ QualityCheck CheckParts(const std::string& name, const std::string& required,
 }
 
 std::string GapText(const SkinGap& gap, double limit_mm) {
-  return absl::StrFormat(
+  std::string text = absl::StrFormat(
       "Skin of the CT is missing in the mesh: %.1f cm2 of %s are farther than %.1f mm from it, up "
       "to %.1f mm at %s.",
       gap.area_mm2 / 100, Words(gap.region), limit_mm, gap.largest_mm, PlaceText(gap.farthest));
+  if (gap.hu_behind < kLooserThanSkinHu) {
+    absl::StrAppendFormat(
+        &text,
+        " What the CT shows behind it has %.0f HU on average, less than fat: hair "
+        "or cloth rather than skin.",
+        gap.hu_behind);
+  }
+  return text;
 }
 
 Json PartJson(const CoveredPart& part) {
@@ -91,7 +101,8 @@ Json GapsJson(const std::vector<SkinGap>& gaps) {
     list.push_back({{"region", KeyOf(gap.region)},
                     {"area_mm2", gap.area_mm2},
                     {"largest_distance_mm", gap.largest_mm},
-                    {"at_mm", ToJson(gap.farthest)}});
+                    {"at_mm", ToJson(gap.farthest)},
+                    {"hu_behind", gap.hu_behind}});
   }
   return list;
 }

@@ -26,6 +26,9 @@ namespace {
 // As for the mesh: keeps the surface off the centres of voxels. HU.
 constexpr float kClearanceHu = 20;
 
+// So deep behind the surface the blur of a voxel or two is over.
+constexpr double kBehindMm = 2;
+
 // Barycentres and areas of all triangles.
 struct TriangleSizes {
   Positions middles;
@@ -127,11 +130,22 @@ void Count(double area_mm2, double distance_mm, double tolerance_mm, const Eigen
 
 // What is measured of each triangle of the CT's skin.
 struct MeasuredSkin {
+  const HuGrid& hu;
   const TriangleMesh& skin;
   const TriangleSizes& sizes;
   const std::vector<SkinRegion>& names;
   const std::vector<double>& distance_mm;
 };
+
+// HU behind the middle of a triangle of the skin; its surface faces outwards.
+double HuBehind(const MeasuredSkin& measured, size_t f) {
+  const auto row = static_cast<Eigen::Index>(f);
+  const auto corner = [&](int k) -> Eigen::Vector3d {
+    return measured.skin.positions().row(measured.skin.triangles()(row, k));
+  };
+  const Eigen::Vector3d out = (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
+  return Interpolate(measured.hu, measured.sizes.middles.row(row).transpose() - kBehindMm * out);
+}
 
 // The connected parts that are farther than the limit, by falling area.
 std::vector<SkinGap> PartsBeyond(double limit_mm, const MeasuredSkin& measured) {
@@ -148,11 +162,13 @@ std::vector<SkinGap> PartsBeyond(double limit_mm, const MeasuredSkin& measured) 
     const size_t f = triangles[k];
     SkinGap& gap = gaps[static_cast<size_t>(parts.part_of_triangle[k])];
     gap.area_mm2 += measured.sizes.areas_mm2[f];
+    gap.hu_behind += measured.sizes.areas_mm2[f] * HuBehind(measured, f);
     if (measured.distance_mm[f] <= gap.largest_mm) continue;
     gap.largest_mm = measured.distance_mm[f];
     gap.region = measured.names[f];
     gap.farthest = measured.sizes.middles.row(static_cast<Eigen::Index>(f));
   }
+  for (SkinGap& gap : gaps) gap.hu_behind /= gap.area_mm2;
   std::stable_sort(gaps.begin(), gaps.end(),
                    [](const SkinGap& a, const SkinGap& b) { return a.area_mm2 > b.area_mm2; });
   return gaps;
@@ -201,7 +217,7 @@ absl::StatusOr<SkinCoverage> MeasureSkinCoverage(const HeadSegmentation& head,
     }
   }
   coverage.distance_mm.assign(distances.begin(), distances.end());
-  const MeasuredSkin measured{skin, sizes, names, coverage.distance_mm};
+  const MeasuredSkin measured{head.hu, skin, sizes, names, coverage.distance_mm};
   coverage.gaps = PartsBeyond(kGapMm, measured);
   coverage.holes = PartsBeyond(coverage.hole_mm, measured);
   CountBone(mesh, skin, threads, &coverage);

@@ -51,12 +51,13 @@ TEST(CoverageReportTest, ARegionCannotHideInTheWhole) {
 
 TEST(CoverageReportTest, GapsAndHolesAreToldWithTheirPlace) {
   SkinCoverage coverage = WithNose(2000);
-  coverage.holes = {{SkinRegion::kLeftCheek, 72, 6.5, {1, 2, 3}},
+  coverage.holes = {{SkinRegion::kLeftCheek, 72, 6.5, {1, 2, 3}, -320},
                     {SkinRegion::kChin, 9, 2.6, {4, 5, 6}}};
   EXPECT_THAT(Passed(coverage), ElementsAre(true, true, true, false));
   EXPECT_THAT(CoverageCautions(coverage),
               ElementsAre(AllOf(HasSubstr("0.7 cm2 of the left cheek"),
-                                HasSubstr("up to 6.5 mm at (1, 2, 3) mm"))));
+                                HasSubstr("up to 6.5 mm at (1, 2, 3) mm"),
+                                HasSubstr("-320 HU on average, less than fat"))));
   coverage.gaps = {{SkinRegion::kLeftCheek, 51, 6.5, {1, 2, 3}}};
   EXPECT_THAT(Passed(coverage), ElementsAre(true, true, false, false));
   coverage.gaps[0].area_mm2 = 49;

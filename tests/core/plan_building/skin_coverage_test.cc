@@ -139,6 +139,7 @@ TEST(SkinCoverageTest, AGapIsMeasuredToItsRim) {
   EXPECT_NEAR(coverage.gaps[0].area_mm2, cap_mm2(kAngle - edge - angle_of_chord(kGapMm)), 40);
   EXPECT_NEAR(coverage.holes[0].area_mm2, cap_mm2(kAngle - edge - angle_of_chord(kHoleMm)), 50);
   EXPECT_NEAR((coverage.gaps[0].farthest - Eigen::Vector3d(0, 0, kBallMm)).norm(), 0, 3);
+  EXPECT_NEAR(coverage.gaps[0].hu_behind, 0, 60);  // of the ball: 0, and its blur
   EXPECT_EQ(coverage.whole.largest_mm, coverage.gaps[0].largest_mm);
 }
 
