@@ -61,14 +61,15 @@ Depths DepthsOf(const LabelGrid& shell, const std::function<bool(const Vector3d&
       const Vector3d direction(std::cos(latitude) * std::cos(longitude),
                                std::cos(latitude) * std::sin(longitude), std::sin(latitude));
       if (!asked(direction)) continue;
-      double depth = 0;
+      int tenths = 0;
       // From half a voxel behind the skin, where its first voxel is.
-      for (; depth < 20; depth += 0.1) {
-        const Vector3d at = shell.geometry.ToVoxels((kBallMm - kVoxelMm - depth) * direction);
+      for (; tenths < 200; ++tenths) {
+        const double at_depth = 0.1 * tenths;
+        const Vector3d at = shell.geometry.ToVoxels((kBallMm - kVoxelMm - at_depth) * direction);
         const Eigen::Vector3i voxel = at.array().round().cast<int>();
         if (shell.At(voxel.x(), voxel.y(), voxel.z()) == 0) break;
       }
-      depth += kVoxelMm;
+      const double depth = 0.1 * tenths + kVoxelMm;
       depths.least = std::min(depths.least, depth);
       depths.largest = std::max(depths.largest, depth);
     }
