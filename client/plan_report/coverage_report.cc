@@ -79,11 +79,10 @@ std::string GapText(const SkinGap& gap, double limit_mm) {
       "to %.1f mm at %s.",
       gap.area_mm2 / 100, Words(gap.region), limit_mm, gap.largest_mm, PlaceText(gap.farthest));
   if (gap.hu_behind < kLooserThanSkinHu) {
-    absl::StrAppendFormat(
-        &text,
-        " What the CT shows behind it has %.0f HU on average, less than fat: hair "
-        "or cloth rather than skin.",
-        gap.hu_behind);
+    absl::StrAppendFormat(&text,
+                          " The densest that the CT shows up to 3 mm behind it has %.0f HU on "
+                          "average, less than fat: hair or cloth rather than skin.",
+                          gap.hu_behind);
   }
   return text;
 }

@@ -26,8 +26,9 @@ namespace {
 // As for the mesh: keeps the surface off the centres of voxels. HU.
 constexpr float kClearanceHu = 20;
 
-// So deep behind the surface the blur of a voxel or two is over.
-constexpr double kBehindMm = 2;
+// Skin is so thick at least, and what is looser is hair.
+constexpr double kBehindMm = 3;
+constexpr int kBehindSteps = 6;
 
 // Barycentres and areas of all triangles.
 struct TriangleSizes {
@@ -137,14 +138,21 @@ struct MeasuredSkin {
   const std::vector<double>& distance_mm;
 };
 
-// HU behind the middle of a triangle of the skin; its surface faces outwards.
+// The densest HU up to kBehindMm behind the middle of a triangle of the skin, whose surface faces
+// outwards.
 double HuBehind(const MeasuredSkin& measured, size_t f) {
   const auto row = static_cast<Eigen::Index>(f);
   const auto corner = [&](int k) -> Eigen::Vector3d {
     return measured.skin.positions().row(measured.skin.triangles()(row, k));
   };
   const Eigen::Vector3d out = (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
-  return Interpolate(measured.hu, measured.sizes.middles.row(row).transpose() - kBehindMm * out);
+  const Eigen::Vector3d middle = measured.sizes.middles.row(row);
+  double densest = Interpolate(measured.hu, middle);
+  for (int step = 1; step <= kBehindSteps; ++step) {
+    const double deep_mm = kBehindMm * step / kBehindSteps;
+    densest = std::max(densest, Interpolate(measured.hu, middle - deep_mm * out));
+  }
+  return densest;
 }
 
 // The connected parts that are farther than the limit, by falling area.

@@ -45,8 +45,8 @@ struct SkinGap {
   double area_mm2 = 0;
   double largest_mm = 0;
   Eigen::Vector3d farthest = Eigen::Vector3d::Zero();
-  // What the CT shows 2 mm behind it, on average: fat has -100 HU, muscle 50. Hair and cloth that
-  // the threshold takes for skin have less.
+  // The densest that the CT shows up to 3 mm behind it, on average: fat has -100 HU, muscle 50, and
+  // so has the thin wall of a nose. Hair and cloth that the threshold takes for skin have less.
   double hu_behind = 0;
 };
 

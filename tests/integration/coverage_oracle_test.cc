@@ -34,10 +34,10 @@ class CoverageOracleTest : public CliTest {
  protected:
   // With a ball ("X Y Z RADIUS") as if the mesh had nothing there. Null without the modules.
   nlohmann::json Measure(const std::string& ball = "") const {
-    const std::string command = absl::StrCat(
-        TISSUEFORM_PYTHON, " ", SourcePath("tests/integration/measure_coverage.py"), " ",
-        TestDataPath("ct/headsq/headsq_quarter.nhdr"), " ", Path("head"), " ", ball, " > ",
-        Path("others.json"));
+    const std::string command =
+        absl::StrCat(TISSUEFORM_PYTHON, " ", SourcePath("tests/integration/measure_coverage.py"),
+                     " ", TestDataPath("ct/headsq/headsq_quarter.nhdr"), " ", Path("head"), " ",
+                     ball, " > ", Path("others.json"));
     const int exit_code = WEXITSTATUS(std::system(command.c_str()));
     if (exit_code == kModulesMissing) return nullptr;
     EXPECT_EQ(exit_code, 0);
@@ -47,15 +47,13 @@ class CoverageOracleTest : public CliTest {
 
 TEST_F(CoverageOracleTest, AnotherProgramFindsAsMuchOfTheSkinCovered) {
   Write("recipe.json", kRecipe);
-  const ProcessResult built = Run({"plan", "build", "--ct",
-                                   TestDataPath("ct/headsq/headsq_quarter.nhdr"), "--recipe",
-                                   "recipe.json", "--out", "head", "--no-pictures",
-                                   "--accept-defects"});
+  const ProcessResult built =
+      Run({"plan", "build", "--ct", TestDataPath("ct/headsq/headsq_quarter.nhdr"), "--recipe",
+           "recipe.json", "--out", "head", "--no-pictures", "--accept-defects"});
   ASSERT_THAT(built, Succeeds());
   const nlohmann::json other = Measure();
   if (other.is_null()) GTEST_SKIP() << "numpy or python3-vtk9 is missing";
-  const nlohmann::json ours =
-      nlohmann::json::parse(Read("head/report.json"))["coverage"]["whole"];
+  const nlohmann::json ours = nlohmann::json::parse(Read("head/report.json"))["coverage"]["whole"];
   const double share = ours["covered_share"];
   EXPECT_LT(share, 0.9999);
   EXPECT_NEAR(other["share"], share, kShareTolerance);
