@@ -46,7 +46,8 @@ struct Face {
   absl::StatusOr<SkinCoverage> Coverage(const TriangleMesh& surface,
                                         const PlanningRegions& of_surface,
                                         double ct_voxel_mm) const {
-    return MeasureSkinCoverage(head, landmarks, {surface, of_surface, tissue.region}, ct_voxel_mm);
+    return MeasureSkinCoverage(
+        head, landmarks, {surface, of_surface, tissue.region, &tissue.outside_air}, ct_voxel_mm);
   }
 };
 
