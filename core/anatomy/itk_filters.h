@@ -13,7 +13,7 @@ namespace tissueform {
 using FloatGrid = VoxelGrid<float>;
 
 // Plain functions over ITK's filters, and distances, which are ours (distance_transform) because
-// they are asked for twenty times a plan and ITK's take ten times as long: a mask is a LabelGrid
+// they are asked for twenty times a plan and ITK's take three times as long: a mask is a LabelGrid
 // whose voxels are inside where not 0. Results do not depend on the number of threads. What lies
 // beyond the grid counts as outside.
 //

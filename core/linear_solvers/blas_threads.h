@@ -13,7 +13,7 @@ namespace tissueform {
 void SetBlasThreads(int threads);
 
 // OpenBLAS chooses its kernels when it is loaded, by the model of the processor. One that is newer
-// than itself it takes for one of 2004 (Prescott), with kernels that need four times as long. Where
+// than itself it takes for one of 2004 (Prescott), with kernels that need twice as long. Where
 // that is so, and the processor has AVX2 and FMA, this starts the program anew with the kernels for
 // those (Haswell), unless the environment chooses (OPENBLAS_CORETYPE); else it returns. The first
 // call in main, with its argv.
