@@ -12,6 +12,9 @@
 #include "absl/strings/str_format.h"
 #include <Eigen/Geometry>
 
+#include "core/anatomy/itk_filters.h"
+#include "core/anatomy/outer_skin.h"
+#include "core/anatomy/skin_shell.h"
 #include "core/base/percentiles.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/skin_region.h"
@@ -116,11 +119,17 @@ BoneDepths DepthsOfBone(const PlanBuild& build, const TriangleMesh& outer_skin) 
   return bone;
 }
 
+// Teeth that the open mouth shows have no skin over them; the rim of a lip lies beside them.
+FloatGrid FromExposedTeeth(const PlanBuild& build) {
+  return DistanceMm(ExposedTeeth(build.head, OutsideAir(build.head), build.landmarks));
+}
+
 void CompareBoneNearSkin(const BoneDepths& plan, const BoneDepths& truth,
-                         PlanDifference* difference) {
+                         const FloatGrid& from_teeth, PlanDifference* difference) {
   difference->nearest_bone.mm = std::numeric_limits<double>::infinity();
   for (Eigen::Index v = 0; v < plan.mm.size(); ++v) {
     if (plan.mm[v] >= kNearSkinMm) continue;
+    if (Interpolate(from_teeth, plan.places.row(v).transpose()) < kNearSkinMm) continue;
     const auto round =
         (truth.places.rowwise() - plan.places.row(v)).rowwise().squaredNorm().array() <
         kRoundMm * kRoundMm;
@@ -265,7 +274,8 @@ absl::StatusOr<PlanDifference> ComparePlans(const PlanBuild& plan, const PlanBui
   difference.landmark = WorstLandmark(plan.landmarks, truth.landmarks);
   TF_ASSIGN_OR_RETURN(const TriangleMesh outer_skin,
                       TriangleMesh::Create(truth.coverage.positions, truth.coverage.triangles));
-  CompareBoneNearSkin(DepthsOfBone(plan, outer_skin), DepthsOfBone(truth, outer_skin), &difference);
+  CompareBoneNearSkin(DepthsOfBone(plan, outer_skin), DepthsOfBone(truth, outer_skin),
+                      FromExposedTeeth(truth), &difference);
   TF_RETURN_IF_ERROR(CompareSkin(plan, truth, &difference));
   TF_RETURN_IF_ERROR(CompareMovements(plan, truth, model, outer_skin, &difference));
   return difference;
