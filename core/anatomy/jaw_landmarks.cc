@@ -8,12 +8,14 @@
 #include <iterator>
 #include <limits>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include <Eigen/Geometry>
 
+#include "core/anatomy/farthest_bone.h"
 #include "core/anatomy/grid_operations.h"
 #include "core/anatomy/itk_filters.h"
 #include "core/base/status_macros.h"
@@ -21,12 +23,10 @@
 namespace tissueform {
 namespace {
 
-using Places = std::vector<Eigen::Vector3d>;
-
 const Eigen::Vector3d kFront(0, -1, 0);
 const Eigen::Vector3d kUp(0, 0, 1);
 const Eigen::Vector3d kDown(0, 0, -1);
-
+constexpr EndShape kFrontTeeth = {.volume_mm3 = 100, .near_mm = 4};  // of half a tooth's width
 constexpr double kMidlineMm = 8;  // half the width of what counts as the midline
 
 Places PlacesOf(const LabelGrid& parts, uint8_t part) {
@@ -54,27 +54,6 @@ Places Where(const Places& places, Predicate keep) {
   return kept;
 }
 
-// The mean of the places that lie within a millimetre of the farthest along `direction`, so that
-// one voxel more or less does not move it.
-absl::Status Farthest(const Places& places, const Eigen::Vector3d& direction,
-                      absl::string_view name, Eigen::Vector3d* found) {
-  if (places.empty()) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        name, " is not in view, or the bone there is below the threshold; check the CT's extent"));
-  }
-  double farthest = -std::numeric_limits<double>::max();
-  for (const Eigen::Vector3d& place : places) farthest = std::max(farthest, direction.dot(place));
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double count = 0;
-  for (const Eigen::Vector3d& place : places) {
-    if (direction.dot(place) < farthest - 1) continue;
-    sum += place;
-    ++count;
-  }
-  *found = sum / count;
-  return absl::OkStatus();
-}
-
 // From the rearmost on to the front, as far as no gap of 4 mm lies between: what is before that is
 // no ramus, but a streak beside a molar.
 Places WithoutIslandsBefore(Places places) {
@@ -92,7 +71,8 @@ Places WithoutIslandsBefore(Places places) {
 class JawLandmarkFinder {
  public:
   JawLandmarkFinder(const LabelGrid& parts, const LabelGrid& metal, Landmarks* landmarks)
-      : mandible_(PlacesOf(parts, kMandible)),
+      : voxel_mm_(parts.geometry.spacing_mm),
+        mandible_(PlacesOf(parts, kMandible)),
         has_metal_(CountVoxels(metal) > 0),
         mandible_off_metal_(PlacesOf(OffMetal(parts, metal), kMandible)),
         cranium_(PlacesOf(parts, kCranium)),
@@ -111,18 +91,23 @@ class JawLandmarkFinder {
 
  private:
   double Lateral(const Eigen::Vector3d& p) const { return landmarks_.midsagittal.HeightMm(p); }
+  Eigen::Vector3d Mirrored(const Eigen::Vector3d& p) const {
+    return p - 2 * Lateral(p) * landmarks_.midsagittal.normal;
+  }
+  Candidates Of(Places places) const { return {std::move(places), voxel_mm_}; }
   bool InMidline(const Eigen::Vector3d& p) const { return std::abs(Lateral(p)) < kMidlineMm; }
 
   // First along the patient's axes.
   absl::Status FindLowerIncisor() {
     const Places midline = Where(mandible_, [&](const auto& p) { return InMidline(p); });
     Landmarks& l = landmarks_;
-    TF_RETURN_IF_ERROR(Farthest(midline, kDown, "the chin", &l.menton));
-    TF_RETURN_IF_ERROR(Farthest(midline, kFront, "the chin's front", &l.pogonion));
+    TF_RETURN_IF_ERROR(Farthest(Of(midline), kDown, "the chin", &l.menton));
+    TF_RETURN_IF_ERROR(Farthest(Of(midline), kFront, "the chin's front", &l.pogonion));
     // Streaks of metal fillings reach from the molars to the midline, but not to its front.
     const double foremost_mm = l.pogonion.y();
-    const Places front = Where(midline, [&](const auto& p) { return p.y() < foremost_mm + 18; });
-    return Farthest(front, kUp, "the lower front teeth", &l.lower_incisor);
+    const auto in_front = [&](const auto& p) { return InMidline(p) && p.y() < foremost_mm + 18; };
+    return Farthest(Of(Where(mandible_, in_front)), kUp, "the lower front teeth", &l.lower_incisor,
+                    kFrontTeeth);
   }
 
   // Then along those of the lower teeth: heads lie tilted, and mouths are open.
@@ -131,11 +116,11 @@ class JawLandmarkFinder {
     const Eigen::Vector3d up = l.lower_teeth.normal;
     const Eigen::Vector3d front = l.ForwardOf(l.lower_teeth);
     const Places midline = Where(mandible_, [&](const auto& p) { return InMidline(p); });
-    TF_RETURN_IF_ERROR(Farthest(midline, -up, "the chin", &l.menton));
+    TF_RETURN_IF_ERROR(Farthest(Of(midline), -up, "the chin", &l.menton));
     const double middle_mm = 0.45 * up.dot(l.lower_incisor - l.menton);
     const Places chin =
         Where(midline, [&](const auto& p) { return up.dot(p - l.menton) < middle_mm; });
-    return Farthest(chin, front, "the chin's front", &l.pogonion);
+    return Farthest(Of(chin), front, "the chin's front", &l.pogonion);
   }
 
   // Upper front teeth lie over and not far from the lower ones; molars behind on either side,
@@ -143,11 +128,12 @@ class JawLandmarkFinder {
   absl::Status FindTeeth() {
     Landmarks& l = landmarks_;
     const Eigen::Vector3d front = l.lower_incisor;
-    const Places upper_front = Where(cranium_, [&](const auto& p) {
+    const auto in_front = [&](const auto& p) {
       return InMidline(p) && std::abs(p.y() - front.y()) < 18 && p.z() > front.z() - 8 &&
              p.z() < front.z() + 45;
-    });
-    TF_RETURN_IF_ERROR(Farthest(upper_front, kDown, "the upper front teeth", &l.upper_incisor));
+    };
+    TF_RETURN_IF_ERROR(Farthest(Of(Where(cranium_, in_front)), kDown, "the upper front teeth",
+                                &l.upper_incisor, kFrontTeeth));
     for (const double side : {1.0, -1.0}) {
       const auto in_molars = [&](const Eigen::Vector3d& incisor) {
         return [=, this](const Eigen::Vector3d& p) {
@@ -158,9 +144,9 @@ class JawLandmarkFinder {
         };
       };
       const auto member = side > 0 ? &LeftAndRight::left : &LeftAndRight::right;
-      TF_RETURN_IF_ERROR(Farthest(Where(mandible_, in_molars(l.lower_incisor)), kUp,
+      TF_RETURN_IF_ERROR(Farthest(Of(Where(mandible_, in_molars(l.lower_incisor))), kUp,
                                   "a lower molar", &(l.lower_molar.*member)));
-      TF_RETURN_IF_ERROR(Farthest(Where(cranium_, in_molars(l.upper_incisor)), kDown,
+      TF_RETURN_IF_ERROR(Farthest(Of(Where(cranium_, in_molars(l.upper_incisor))), kDown,
                                   "an upper molar", &(l.upper_molar.*member)));
     }
     return absl::OkStatus();
@@ -187,34 +173,46 @@ class JawLandmarkFinder {
   absl::Status FindLastUpperTooth() {
     Landmarks& l = landmarks_;
     const Eigen::Vector3d back = -l.ForwardOf(l.upper_teeth);
-    const Places crowns = Where(cranium_, [&](const auto& p) {
-      const double lateral = std::abs(Lateral(p));
-      const double height = l.upper_teeth.HeightMm(p);
-      const double behind = back.dot(p - l.upper_incisor);
-      return lateral > 12 && lateral < 36 && height > -3 && height < 5 && behind < 62;
-    });
-    return Farthest(crowns, back, "the last upper tooth", &l.last_upper_tooth);
+    const auto crowns = [&](double side) {
+      return Where(cranium_, [&, side](const Eigen::Vector3d& p) {
+        const double lateral = side * Lateral(p);
+        const double height = l.upper_teeth.HeightMm(p);
+        const double behind = back.dot(p - l.upper_incisor);
+        return lateral > 12 && lateral < 36 && height > -3 && height < 5 && behind < 62;
+      });
+    };
+    // Each side for itself: the middle of what reaches farthest back on both would lie on either
+    // side or between the two, by a voxel more or less. A side without teeth takes the other's.
+    const Places left = crowns(1);
+    const Places right = crowns(-1);
+    TF_RETURN_IF_ERROR(Farthest(Of(left.empty() ? right : left), back, "the last upper tooth",
+                                &l.last_upper_tooth.left));
+    TF_RETURN_IF_ERROR(Farthest(Of(right.empty() ? left : right), back, "the last upper tooth",
+                                &l.last_upper_tooth.right));
+    if (left.empty()) l.last_upper_tooth.left = Mirrored(l.last_upper_tooth.left);
+    if (right.empty()) l.last_upper_tooth.right = Mirrored(l.last_upper_tooth.right);
+    return absl::OkStatus();
   }
 
   absl::Status FindSide(double side, Eigen::Vector3d LeftAndRight::*member) {
     Landmarks& l = landmarks_;
     const Places half = Where(mandible_, [&](const auto& p) { return side * Lateral(p) > 20; });
     const Eigen::Vector3d back_and_down = -(l.lower_teeth.normal + l.ForwardOf(l.lower_teeth));
-    TF_RETURN_IF_ERROR(
-        Farthest(half, back_and_down.normalized(), "the angle of the jaw", &(l.gonion.*member)));
+    TF_RETURN_IF_ERROR(Farthest(Of(half), back_and_down.normalized(), "the angle of the jaw",
+                                &(l.gonion.*member)));
     // A filling, or what its blur has left beside it, stands before the ramus and as high.
     const Places ramus = Where(mandible_off_metal_, [&](const auto& p) {
       const double height = l.lower_teeth.HeightMm(p);
       // Beside the molars, whose crowns and metal streaks reach over the plane too.
       return height > 3 && height < 5 && side * Lateral(p) > 32 && p.y() > l.lower_incisor.y() + 25;
     });
-    TF_RETURN_IF_ERROR(Farthest(has_metal_ ? WithoutIslandsBefore(ramus) : ramus, kFront,
+    TF_RETURN_IF_ERROR(Farthest(Of(has_metal_ ? WithoutIslandsBefore(ramus) : ramus), kFront,
                                 "the front of the ramus", &(l.ramus_front.*member)));
     return FindCondyle(half, &(l.condyle.*member));
   }
 
   // Of the ramus's two tips the rear one; the front one is the coronoid process.
-  static absl::Status FindCondyle(const Places& half, Eigen::Vector3d* found) {
+  absl::Status FindCondyle(const Places& half, Eigen::Vector3d* found) const {
     double low = std::numeric_limits<double>::max();
     double high = -low;
     for (const Eigen::Vector3d& p : half) {
@@ -230,7 +228,7 @@ class JawLandmarkFinder {
       back = std::max(back, p.y());
     }
     const Places rear = Where(upper, [=](const auto& p) { return p.y() > (front + back) / 2; });
-    return Farthest(rear, kUp, "a jaw joint", found);
+    return Farthest(Of(rear), kUp, "a jaw joint", found);
   }
 
   // Over each place of the palate the top of the first bone; the middle one of those heights, as
@@ -256,7 +254,7 @@ class JawLandmarkFinder {
       while (top + 1 < palate.size() && (palate[top + 1] - palate[top]).norm() < kThinGapMm) ++top;
       tops.push_back(palate[top]);
     }
-    if (tops.empty()) return Farthest(tops, kUp, "the hard palate", &l.nasal_floor);
+    if (tops.empty()) return Farthest(Of(tops), kUp, "the hard palate", &l.nasal_floor);
     const auto middle = tops.begin() + static_cast<int64_t>(tops.size() / 2);
     std::nth_element(tops.begin(), middle, tops.end(),
                      [](const auto& a, const auto& b) { return a.z() < b.z(); });
@@ -270,6 +268,7 @@ class JawLandmarkFinder {
 
   static constexpr double kThinGapMm = 3;
 
+  double voxel_mm_;
   Places mandible_;
   bool has_metal_;
   Places mandible_off_metal_;

@@ -23,18 +23,17 @@ struct LeftAndRight {
 struct Landmarks {
   Plane midsagittal;  // normal to the left
 
-  // Bone and teeth, centres of voxels.
+  // Bone and teeth: ends of what the labels hold (core/anatomy/farthest_bone.h).
   Eigen::Vector3d menton = Eigen::Vector3d::Zero();         // lowest of the chin in the midline
   Eigen::Vector3d pogonion = Eigen::Vector3d::Zero();       // foremost of the chin in the midline
   Eigen::Vector3d lower_incisor = Eigen::Vector3d::Zero();  // highest of the lower front teeth
   Eigen::Vector3d upper_incisor = Eigen::Vector3d::Zero();  // lowest of the upper front teeth
-  LeftAndRight lower_molar;  // highest of the lower jaw 25 to 36 mm behind the incisor
-  LeftAndRight upper_molar;  // lowest of the upper jaw there
-  // Rearmost of the upper crowns, on the side where they reach farther back.
-  Eigen::Vector3d last_upper_tooth = Eigen::Vector3d::Zero();
-  LeftAndRight ramus_front;  // front border of the ramus, 4 mm over the lower teeth
-  LeftAndRight gonion;       // farthest back and down
-  LeftAndRight condyle;      // top
+  LeftAndRight lower_molar;       // highest of the lower jaw 25 to 36 mm behind the incisor
+  LeftAndRight upper_molar;       // lowest of the upper jaw there
+  LeftAndRight last_upper_tooth;  // rearmost of the upper crowns
+  LeftAndRight ramus_front;       // front border of the ramus, 4 mm over the lower teeth
+  LeftAndRight gonion;            // farthest back and down
+  LeftAndRight condyle;           // top
   Eigen::Vector3d nasal_floor =
       Eigen::Vector3d::Zero();  // top of the hard palate, 15 to 30 mm behind the incisor
 

@@ -58,8 +58,10 @@ std::vector<Plane> LeFort1Planes(const Landmarks& l) {
   const Eigen::Vector3d up = l.upper_teeth.normal;
   const Eigen::Vector3d front = l.ForwardOf(l.upper_teeth);
   const Eigen::Vector3d& left = l.midsagittal.normal;
+  const auto& [on_left, on_right] = l.last_upper_tooth;
+  const Eigen::Vector3d& last_tooth = front.dot(on_left - on_right) < 0 ? on_left : on_right;
   return {{l.nasal_floor + kOverNasalFloorMm * up, -up},
-          {l.last_upper_tooth - kBehindUpperTeethMm * front, front},
+          {last_tooth - kBehindUpperTeethMm * front, front},
           {l.upper_molar.left + kBesideUpperMolarMm * left, -left},
           {l.upper_molar.right - kBesideUpperMolarMm * left, left}};
 }

@@ -3,6 +3,8 @@
 
 #include "core/anatomy/landmarks.h"
 
+#include <random>
+
 #include "core/ct/ct_volume_reader.h"
 #include "core/ct/isotropic_resample.h"
 #include "tests/core/anatomy/head_phantom.h"
@@ -50,6 +52,51 @@ TEST(LandmarksTest, ThoseOfThePhantomAreWhereItsSolidsSay) {
   EXPECT_NEAR(l.nose_tip.z(), testing::kPhantomNoseHeightMm, 3 * kVoxelMm);
   EXPECT_GT(l.upper_lip.z(), -44);
   EXPECT_LT(l.lower_lip.z(), -47);
+}
+
+// Of voxels at the surface of jaw and cranium every twentieth is taken away, and every twentieth
+// beside them added.
+void RoughenSurface(uint32_t seed, LabelGrid* labels) {
+  const LabelGrid smooth = *labels;
+  std::mt19937 random(seed);
+  const auto [size_x, size_y, size_z] = smooth.geometry.size;
+  for (int z = 1; z + 1 < size_z; ++z) {
+    for (int y = 1; y + 1 < size_y; ++y) {
+      for (int x = 1; x + 1 < size_x; ++x) {
+        const uint8_t here = smooth.At(x, y, z);
+        for (const uint8_t beside :
+             {smooth.At(x - 1, y, z), smooth.At(x + 1, y, z), smooth.At(x, y - 1, z),
+              smooth.At(x, y + 1, z), smooth.At(x, y, z - 1), smooth.At(x, y, z + 1)}) {
+          if ((here == 0) == (beside == 0) || random() % 20 != 0) continue;
+          labels->At(x, y, z) = here == 0 ? beside : 0;
+          break;
+        }
+      }
+    }
+  }
+}
+
+// The place of a tooth once jumped by 10 mm, because a crown on the other side ended a voxel later.
+TEST(LandmarksTest, WhereACrownsVoxelsEndDoesNotMoveIt) {
+  ASSERT_OK_AND_ASSIGN(const HeadSegmentation head, SegmentHead(HeadPhantom()));
+  ASSERT_OK_AND_ASSIGN(const BoneParts parts, SeparateBoneParts(head));
+  ASSERT_OK_AND_ASSIGN(const Landmarks smooth, FindLandmarks(head, parts));
+  EXPECT_GT(smooth.last_upper_tooth.left.x(), 20);
+  EXPECT_LT(smooth.last_upper_tooth.right.x(), -20);
+  for (uint32_t seed = 0; seed < 5; ++seed) {
+    BoneParts rough = parts;
+    RoughenSurface(seed, &rough.labels);
+    ASSERT_OK_AND_ASSIGN(const Landmarks l, FindLandmarks(head, rough));
+    constexpr double kMostMm = 3;  // one and a half voxels
+    ExpectNear(l.lower_incisor, smooth.lower_incisor, kMostMm, "lower incisor");
+    ExpectNear(l.upper_incisor, smooth.upper_incisor, kMostMm, "upper incisor");
+    for (const auto member : {&LeftAndRight::left, &LeftAndRight::right}) {
+      ExpectNear(l.lower_molar.*member, smooth.lower_molar.*member, kMostMm, "lower molar");
+      ExpectNear(l.upper_molar.*member, smooth.upper_molar.*member, kMostMm, "upper molar");
+      ExpectNear(l.last_upper_tooth.*member, smooth.last_upper_tooth.*member, kMostMm,
+                 "last upper tooth");
+    }
+  }
 }
 
 TEST(LandmarksTest, FrontIsSquareToUpAndToTheMidline) {
