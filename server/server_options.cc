@@ -62,6 +62,13 @@ void AddLimits(CLI::App& app, ServerOptions* options) {
   AddNumber(app, "--max-calls-per-connection", options->max_calls_per_connection, 1, kMaxCount,
             "calls open at the same time on one connection; more wait at the client",
             Into(&options->max_calls_per_connection));
+  AddNumber(app, "--max-connections", options->max_connections, 1, kMaxCount,
+            "connections open at the same time, and no more than the descriptors that the process "
+            "may open; others are closed at once",
+            Into(&options->max_connections));
+  AddNumber(app, "--max-connections-per-address", options->max_connections_per_address, 1,
+            kMaxCount, "of these from one address (IPv6: one network of 64 bits)",
+            Into(&options->max_connections_per_address));
 }
 
 }  // namespace

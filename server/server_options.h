@@ -21,6 +21,8 @@ struct ServerOptions {
   int workers = 1;
   ServiceLimits limits;
   int max_calls_per_connection = 128;
+  int max_connections = 1024;
+  int max_connections_per_address = 512;
   std::chrono::seconds drain_deadline{20};
   std::string log_level = "info";
 

@@ -3,10 +3,9 @@
 
 #include "server/tissueform_server.h"
 
+#include <algorithm>
 #include <mutex>
 
-#include "absl/strings/match.h"
-#include "absl/strings/str_cat.h"
 #include "grpcpp/ext/proto_server_reflection_plugin.h"
 #include "grpcpp/health_check_service_interface.h"
 #include "grpcpp/resource_quota.h"
@@ -28,6 +27,7 @@ constexpr int kMaxReceiveBytes = 4 << 20;
 constexpr int kKeepaliveMilliseconds = 25'000;
 constexpr int kKeepaliveTimeoutMilliseconds = 10'000;
 constexpr int kMinClientPingMilliseconds = 10'000;
+constexpr int kHandshakeMilliseconds = 10'000;
 // For what was finished just now to leave the buffers.
 constexpr std::chrono::milliseconds kLastMessagesGrace{500};
 
@@ -50,13 +50,19 @@ void SetTransportLimits(const ServerOptions& options, grpc::ServerBuilder* build
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMilliseconds);
   builder->AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
                               kMinClientPingMilliseconds);
-  // Two servers on one port would take turns at answering; the second one shall fail instead.
-  builder->AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  // Who connects and says nothing does not hold a place for long.
+  builder->AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMilliseconds);
 }
 
-std::string Address(const ServerOptions& options) {
-  const bool is_ipv6 = absl::StrContains(options.host, ":");
-  return absl::StrCat(is_ipv6 ? "[" : "", options.host, is_ipv6 ? "]:" : ":", options.port);
+// What the process needs beside connections: libraries, logs, helper processes, gRPC's own.
+constexpr int kOtherDescriptors = 100;
+
+ConnectionListener::Options ListenerOptions(const ServerOptions& options) {
+  const int descriptors = std::max(RaiseDescriptorLimit() - kOtherDescriptors, 1);
+  return {.host = options.host,
+          .port = options.port,
+          .most = std::min(options.max_connections, descriptors),
+          .most_of_address = options.max_connections_per_address};
 }
 
 }  // namespace
@@ -84,6 +90,7 @@ TissueformServer::TissueformServer(const ServerOptions& options)
 
 TissueformServer::~TissueformServer() {
   if (server_ != nullptr) {
+    listener_->Stop();
     server_->Shutdown(std::chrono::system_clock::now());
     server_->Wait();
     server_.reset();
@@ -93,19 +100,23 @@ TissueformServer::~TissueformServer() {
 
 absl::Status TissueformServer::Listen() {
   PrepareProcessOnce();
+  TF_ASSIGN_OR_RETURN(listener_, ConnectionListener::Listen(ListenerOptions(options_)));
   grpc::ServerBuilder builder;
   SetTransportLimits(options_, &builder);
-  builder.AddListeningPort(Address(options_), grpc::InsecureServerCredentials(), &port_);
+  acceptor_ = builder.experimental().AddExternalConnectionAcceptor(
+      grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+      grpc::InsecureServerCredentials());
   builder.RegisterService(&mesh_service_);
   builder.RegisterService(&session_service_);
   builder.RegisterService(&deform_service_);
   server_ = builder.BuildAndStart();
-  if (server_ == nullptr || port_ == 0) {
-    return absl::UnavailableError(
-        absl::StrCat("cannot listen on ", Address(options_),
-                     ": the port is taken or the address is not this machine's; choose another "
-                     "--port or --host"));
-  }
+  if (server_ == nullptr) return absl::InternalError("gRPC does not start");
+  listener_->Start([this](int fd, int listener_fd) {
+    grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+    connection.fd = fd;
+    connection.listener_fd = listener_fd;
+    acceptor_->HandleNewConnection(&connection);
+  });
   return absl::OkStatus();
 }
 
@@ -128,6 +139,7 @@ void TissueformServer::Drain() {
   if (!gate_.WaitUntilIdle(deadline)) {
     spdlog::warn("draining: cancelling the calls that are still open");
   }
+  listener_->Stop();
   // Only now: a server that shuts down answers CANCELLED instead of UNAVAILABLE, and waits for idle
   // connections to be closed by their clients.
   server_->Shutdown(std::chrono::system_clock::now() + kLastMessagesGrace);

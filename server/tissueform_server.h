@@ -8,6 +8,7 @@
 
 #include "absl/status/statusor.h"
 #include "grpcpp/server.h"
+#include "grpcpp/server_builder.h"
 
 #include "server/rpc/call_scope.h"
 #include "server/rpc/deform_service.h"
@@ -21,6 +22,7 @@
 #include "server/session/session_registry.h"
 #include "server/session/worker_pool.h"
 #include "server/store/in_memory_session_store.h"
+#include "server/transport/connection_listener.h"
 
 namespace tissueform {
 
@@ -36,7 +38,7 @@ class TissueformServer {
   ~TissueformServer();
 
   // The port that is listened on, also when the options said 0.
-  int port() const { return port_; }
+  int port() const { return listener_->port(); }
 
   // Ends in good order: health turns to NOT_SERVING, streams are told, new work is refused with
   // UNAVAILABLE; open calls may go on until the drain deadline and are then cancelled; the listener
@@ -56,7 +58,6 @@ class TissueformServer {
 
   // Constant.
   const ServerOptions options_;
-  int port_ = 0;
 
   // Self-synchronised; each may use those before it. Destroyed from the last to the first: calls
   // end, then jobs, then what they used.
@@ -71,6 +72,10 @@ class TissueformServer {
   MeshService mesh_service_;
   SessionService session_service_;
   DeformService deform_service_;
+  // gRPC gets its connections from the listener, through the acceptor. The server comes last: what
+  // it is given goes to the acceptor of a server that lives.
+  std::unique_ptr<ConnectionListener> listener_;
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
   std::unique_ptr<grpc::Server> server_;
 };
 

@@ -217,5 +217,41 @@ TEST(ServerProgramStartTest, WrongUseEndsWithTwo) {
   EXPECT_EQ(WEXITSTATUS(status), 2);
 }
 
+// gRPC 1.51 by itself is deaf for ever after this (CVE-2023-4785).
+TEST(ServerFloodTest, AFloodOfConnectionsLeavesAServerThatAnswersAndADragThatGoesOn) {
+  auto process = ServerProcess::Start(
+      "/usr/bin/prlimit",
+      {"--nofile=256:256", ProgramPath("tissueform-server"), "--port", "0", "--log-level", "error"},
+      kPatience);
+  ASSERT_THAT(process, IsOk());
+  const std::string& address = (*process)->address();
+  ASSERT_OK_AND_ASSIGN(const auto client, TissueformClient::Connect(address, {}));
+  const BarProblem problem(1);
+  ASSERT_OK_AND_ASSIGN(const v1::Mesh mesh, client->UploadMesh(problem.mesh, problem.CellArrays()));
+  ASSERT_OK_AND_ASSIGN(const v1::Session session,
+                       client->CreateSession(problem.Request(mesh.name())));
+  ASSERT_OK_AND_ASSIGN(const auto stream, client->OpenStream(session.name(), {}));
+  uint64_t sequence = 0;
+  const auto goes_on = [&] {
+    EXPECT_THAT(stream->SendPoses(++sequence, TopPose(SomePose(1))), IsOk());
+    const auto frame = stream->Receive();
+    ASSERT_TRUE(frame.has_value());
+    EXPECT_THAT(stream->Ack(*frame), IsOk());
+  };
+  for (int round = 0; round < 3; ++round) {
+    std::vector<int> held;
+    for (int i = 0; i < 400; ++i) {
+      const int fd = ConnectTo(address);
+      if (fd >= 0) held.push_back(fd);
+    }
+    goes_on();
+    for (const int fd : held) close(fd);
+    ASSERT_OK_AND_ASSIGN(const auto another,
+                         TissueformClient::Connect(address, {.own_connection = true}));
+    EXPECT_THAT(another->GetSession(session.name()), IsOk());
+  }
+  goes_on();
+}
+
 }  // namespace
 }  // namespace tissueform::testing
