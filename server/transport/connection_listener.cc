@@ -3,12 +3,11 @@
 
 #include "server/transport/connection_listener.h"
 
-#include <arpa/inet.h>
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
 #include <netdb.h>
-#include <netinet/in.h>
 #include <poll.h>
 #include <unistd.h>
 #include <utility>
@@ -16,6 +15,8 @@
 #include "absl/memory/memory.h"
 #include "absl/strings/str_cat.h"
 #include "spdlog/spdlog.h"
+#include <arpa/inet.h>
+#include <netinet/in.h>
 #include <sys/eventfd.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -36,9 +37,8 @@ std::string Join(const std::string& host, int port) {
 }
 
 absl::Status CannotListen(const ConnectionListener::Options& options, const std::string& why) {
-  return absl::UnavailableError(
-      absl::StrCat("cannot listen on ", Join(options.host, options.port), ": ", why,
-                   "; choose another --port or --host"));
+  return absl::UnavailableError(absl::StrCat("cannot listen on ", Join(options.host, options.port),
+                                             ": ", why, "; choose another --port or --host"));
 }
 
 // The port that the socket has; 0 when there is none.
@@ -209,8 +209,9 @@ void ConnectionListener::TurnOneAway(int listener_fd) {
 
 void ConnectionListener::TellOfRefusals() {
   if (refused_ == 0) return;
-  spdlog::warn("turned {} connections away; {} are open, as many as may be, or as many of one address",
-               refused_, table_.size());
+  spdlog::warn(
+      "turned {} connections away; {} are open, as many as may be, or as many of one address",
+      refused_, table_.size());
   refused_ = 0;
 }
 

@@ -4,6 +4,7 @@
 #include "server/transport/connection_table.h"
 
 #include <optional>
+
 #include <sys/stat.h>
 
 namespace tissueform {
@@ -22,7 +23,7 @@ ConnectionTable::Verdict ConnectionTable::Take(int fd, const std::string& addres
   const std::optional<uint64_t> inode = InodeOf(fd);
   if (!inode.has_value()) return Verdict::kTooMany;  // closed already
   const auto full = [&] {
-    return size() >= most_ ? Verdict::kTooMany
+    return size() >= most_                        ? Verdict::kTooMany
            : CountOf(address) >= most_of_address_ ? Verdict::kTooManyOfAddress
                                                   : Verdict::kTaken;
   };

@@ -14,8 +14,7 @@ namespace tissueform {
 class ConnectionTable {
  public:
   // Connections at the same time, and of one address.
-  ConnectionTable(int most, int most_of_address)
-      : most_(most), most_of_address_(most_of_address) {}
+  ConnectionTable(int most, int most_of_address) : most_(most), most_of_address_(most_of_address) {}
 
   enum class Verdict { kTaken, kTooMany, kTooManyOfAddress };
 

@@ -3,16 +3,16 @@
 
 #include "server/transport/connection_listener.h"
 
-#include <arpa/inet.h>
 #include <chrono>
 #include <memory>
-#include <netinet/in.h>
 #include <unistd.h>
 #include <utility>
 #include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include <arpa/inet.h>
+#include <netinet/in.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 
@@ -55,8 +55,8 @@ class ConnectionListenerTest : public ::testing::Test {
   }
 
   void Start(int most, int most_of_address) {
-    auto listener =
-        ConnectionListener::Listen({.host = "127.0.0.1", .most = most, .most_of_address = most_of_address});
+    auto listener = ConnectionListener::Listen(
+        {.host = "127.0.0.1", .most = most, .most_of_address = most_of_address});
     ASSERT_THAT(listener, testing::IsOk());
     listener_ = *std::move(listener);
     listener_->Start([this](int fd, int /*listener_fd*/) {
