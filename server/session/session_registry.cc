@@ -285,7 +285,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string
   return found->second.session;
 }
 
-void SessionRegistry::Delete(const std::string& id, std::function<void(absl::Status)> done) {
+void SessionRegistry::Delete(const std::string& id, const std::function<void(absl::Status)>& done) {
   std::shared_ptr<Session> session;
   {
     MutexLock lock(mutex_);

@@ -63,7 +63,7 @@ class SessionRegistry {
 
   // Calls `done` when the memory of the session is free and its record is gone. Errors: NotFound,
   // those of SessionStore::Delete.
-  void Delete(const std::string& id, std::function<void(absl::Status)> done);
+  void Delete(const std::string& id, const std::function<void(absl::Status)>& done);
 
   // Ends the sessions that were idle for longer than the TTL. Returns how many.
   int RemoveIdle();

@@ -20,7 +20,7 @@
 namespace tissueform {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using SteadyClock = std::chrono::steady_clock;
 
 // From rest to the plan's pose and back.
 constexpr double kPeriodSeconds = 4;
@@ -29,12 +29,12 @@ constexpr std::chrono::milliseconds kLeadTime{200};
 // The smallest of the stiffnesses of churn; each session takes one that was not there before.
 constexpr double kChurnStiffnessPa = 1e4;
 
-double Milliseconds(Clock::duration duration) {
+double Milliseconds(SteadyClock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
 }
 
-Clock::duration Seconds(double seconds) {
-  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+SteadyClock::duration Seconds(double seconds) {
+  return std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(seconds));
 }
 
 // One drag with its session and stream, until it is run.
@@ -64,19 +64,19 @@ class LoadDrag {
   }
 
   // Sends poses from `start` on, every `interval` until `end`, and takes the frames.
-  void Run(Clock::time_point origin, Clock::time_point start, Clock::time_point end,
-           Clock::duration interval) {
+  void Run(SteadyClock::time_point origin, SteadyClock::time_point start,
+           SteadyClock::time_point end, SteadyClock::duration interval) {
     std::thread receiver([&] { Receive(origin); });
     for (int64_t i = 0;; ++i) {
-      const Clock::time_point due = start + interval * i;
+      const SteadyClock::time_point due = start + interval * i;
       if (due >= end) break;
       std::this_thread::sleep_until(due);
       const double seconds = std::chrono::duration<double>(due - start).count();
       const double amount = (1 - std::cos(2 * M_PI * seconds / kPeriodSeconds)) / 2;
-      send_times_.Append(Milliseconds(Clock::now() - origin));
+      send_times_.Append(Milliseconds(SteadyClock::now() - origin));
       if (!stream_->SendPoses(i, PartOfPoses(poses_, amount)).ok()) break;  // Finish says why
     }
-    end_ms_ = Milliseconds(Clock::now() - origin);
+    end_ms_ = Milliseconds(SteadyClock::now() - origin);
     stream_->CloseSending();
     receiver.join();
     status_ = stream_->Finish();
@@ -102,9 +102,10 @@ class LoadDrag {
   LoadDrag(const Kind& kind, std::vector<NamedPose> poses)
       : kind_(kind), poses_(std::move(poses)) {}
 
-  void Receive(Clock::time_point origin) {
+  void Receive(SteadyClock::time_point origin) {
     while (std::optional<v1::DeformFrame> frame = stream_->Receive()) {
-      frames_.push_back({send_times_.Get(frame->sequence()), Milliseconds(Clock::now() - origin)});
+      frames_.push_back(
+          {send_times_.Get(frame->sequence()), Milliseconds(SteadyClock::now() - origin)});
       solves_ms_.push_back(frame->summary().solve_seconds() * 1e3);
       bytes_ += static_cast<int64_t>(frame->positions().size());
       if (kind_.slow_ms > 0) std::this_thread::sleep_for(Seconds(kind_.slow_ms / 1e3));
@@ -195,17 +196,18 @@ void RunAll(const LoadOptions& options, const std::vector<DragGroup>& groups,
   for (const auto& client : churn) {
     churning.emplace_back([&client, &stop] { client->Run(stop); });
   }
-  const Clock::time_point origin = Clock::now();
-  const Clock::time_point first = origin + kLeadTime;
-  const Clock::time_point end = first + Seconds(options.seconds);
-  const Clock::duration interval = Seconds(1 / options.poses_per_second);
+  const SteadyClock::time_point origin = SteadyClock::now();
+  const SteadyClock::time_point first = origin + kLeadTime;
+  const SteadyClock::time_point end = first + Seconds(options.seconds);
+  const SteadyClock::duration interval = Seconds(1 / options.poses_per_second);
   const int count = options.sessions + options.slow_readers + options.refining;
   std::vector<std::thread> dragging;
   dragging.reserve(count);
   for (const DragGroup& group : groups) {
     for (const auto& drag : group.drags) {
       const auto number = static_cast<int64_t>(dragging.size());
-      const Clock::time_point start = options.in_phase ? first : first + interval * number / count;
+      const SteadyClock::time_point start =
+          options.in_phase ? first : first + interval * number / count;
       dragging.emplace_back([=, &drag] { drag->Run(origin, start, end, interval); });
     }
   }

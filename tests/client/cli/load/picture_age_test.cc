@@ -32,6 +32,7 @@ TEST(PictureAges, AreNotMadeYoungerByAnOldPoseThatIsShownLate) {
 TEST(PictureAges, TellDroppedPosesThatLatencyHides) {
   // One pose in ten is answered, each 5 ms after it was sent: every latency is 5 ms.
   std::vector<ShownFrame> frames;
+  frames.reserve(10);
   for (int i = 0; i < 10; ++i) frames.push_back({i * 330.0, i * 330.0 + 5});
   const std::vector<double> ages = PictureAges(0, 3000, frames);
   EXPECT_GT(*std::max_element(ages.begin(), ages.end()), 320);
