@@ -75,7 +75,8 @@ TriangleMesh KeepTriangles(const TriangleMesh& surface, const std::vector<bool>&
 
 // The outer skin of the CT within the region of interest; teeth that an open mouth shows are none.
 absl::StatusOr<TriangleMesh> OuterSkin(const HeadSegmentation& head, const LabelGrid& outside_air,
-                                       const Landmarks& landmarks, const RegionOfInterest& region) {
+                                       const Landmarks& landmarks, const RegionOfInterest& region,
+                                       double tolerance_mm) {
   FloatGrid hu(head.hu.geometry);
   std::copy(head.hu.values.begin(), head.hu.values.end(), hu.values.begin());
   SurfaceExtractionOptions extraction;
@@ -90,7 +91,9 @@ absl::StatusOr<TriangleMesh> OuterSkin(const HeadSegmentation& head, const Label
                        !Touches(teeth, position.transpose()));
   }
   const std::vector<Plane> planes = region.planes();
-  const double margin_mm = head.hu.geometry.spacing_mm;
+  // Where the region's planes cut, the mesh ends up to the tolerance beside them; a thin ear that a
+  // plane shaves shows it most.
+  const double margin_mm = std::max(head.hu.geometry.spacing_mm, tolerance_mm);
   const TriangleSizes sizes = SizesOf(surface);
   std::vector<bool> kept;
   bool any = false;
@@ -206,17 +209,18 @@ void CountBone(const MeshedSkin& mesh, const TriangleMesh& skin, int threads,
 absl::StatusOr<SkinCoverage> MeasureSkinCoverage(const HeadSegmentation& head,
                                                  const Landmarks& landmarks, const MeshedSkin& mesh,
                                                  double ct_voxel_mm, int threads) {
+  const double tolerance_mm = std::max(kLeastToleranceMm, ct_voxel_mm);
   TF_ASSIGN_OR_RETURN(
       const TriangleMesh skin,
       OuterSkin(head, mesh.outside_air != nullptr ? *mesh.outside_air : OutsideAir(head), landmarks,
-                mesh.region));
+                mesh.region, tolerance_mm));
   TF_ASSIGN_OR_RETURN(const TriangleMesh mesh_skin, SkinOf(mesh));
   const TriangleSizes sizes = SizesOf(skin);
   const Eigen::VectorXd distances = DistancesToSurface(sizes.middles, mesh_skin, threads);
   const std::vector<SkinRegion> names = NameSkinRegions(sizes.middles, landmarks);
 
   SkinCoverage coverage;
-  coverage.tolerance_mm = std::max(kLeastToleranceMm, ct_voxel_mm);
+  coverage.tolerance_mm = tolerance_mm;
   for (size_t f = 0; f < names.size(); ++f) {
     const auto row = static_cast<Eigen::Index>(f);
     for (CoveredPart* part : {&coverage.whole, &coverage.regions[static_cast<size_t>(names[f])]}) {
