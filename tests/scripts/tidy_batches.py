@@ -19,22 +19,10 @@ import re
 import shlex
 import sys
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "cmake"))
+from source_names import LONERS, declared_names, imported_names  # noqa: E402
+
 MOST_FILES = 24
-
-# Names that a line at the left margin declares: tests, types, aliases, functions and constants.
-DECLARATIONS = [
-    re.compile(r"^(?:TYPED_)?TEST(?:_F|_P)?\((\w+),\s*(\w+)\)"),
-    re.compile(r"^INSTANTIATE_\w+\((\w+),\s*(\w+)"),
-    re.compile(r"^(?:struct|class|enum class|enum|union)\s+(\w+)"),
-    re.compile(r"^using\s+(\w+)\s*="),
-    re.compile(r"^#define\s+(\w+)"),
-    re.compile(r"^(?!#|//|\s|TEST|TYPED_TEST|INSTANTIATE|using|namespace|template)[\w:<>,&*\s\[\]]*?\b(\w+)\s*(?:\(|=|\{|\[|;)"),
-]
-
-
-# `using testing::HasSubstr;`: may be said twice, but not beside a declaration of that name.
-IMPORT = re.compile(r"^using\s+[\w:]*::(\w+);")
-
 
 KNOWS_GCC_ONLY = re.compile(r"^#include <itk", re.MULTILINE)
 
@@ -56,28 +44,17 @@ def compile_command(entry):
     return kept
 
 
-def declared_names(path):
-    # Declarations that clang-format broke over lines count with their first word line only: hence "as far as".
-    names = set()
-    for line in path.read_text(encoding="utf-8").splitlines():
-        for pattern in DECLARATIONS:
-            if match := pattern.match(line):
-                names.add("_".join(match.groups()))
-                break
-    return names
-
-
-# Headers whose macros are everyday words (Status, None, Bool).
-LONERS = re.compile(r"^#include <X11/", re.MULTILINE)
+def sources_of(entry):
+    """The file, or those that a unity build has put together in it."""
+    path = pathlib.Path(entry["file"]).resolve()
+    if not path.name.startswith("unity_"):
+        return [path]
+    included = re.findall(r'^#include "(.+)"', path.read_text(encoding="utf-8"), re.MULTILINE)
+    return [pathlib.Path(name).resolve() for name in included]
 
 
 def macros(command):
     return dict(argument[2:].partition("=")[::2] for argument in command if argument.startswith("-D"))
-
-
-def imported_names(path):
-    matches = map(IMPORT.match, path.read_text(encoding="utf-8").splitlines())
-    return {match.group(1) for match in matches if match}
 
 
 class Batch:
@@ -129,7 +106,7 @@ def main():
     build = pathlib.Path(sys.argv[1]).resolve()
     chosen = {pathlib.Path(name).resolve() for name in sys.argv[2:]}
     entries = json.loads((build / "compile_commands.json").read_text(encoding="utf-8"))
-    commands = {pathlib.Path(entry["file"]).resolve(): compile_command(entry) for entry in entries}
+    commands = {path: compile_command(entry) for entry in entries for path in sources_of(entry)}
     for path in [path for path in commands if path in chosen and KNOWS_GCC_ONLY.search(path.read_text(encoding="utf-8"))]:
         print(f"tidy_batches.py: {path.name} is left out: Debian's ITK refuses every compiler but GCC", file=sys.stderr)
         chosen.discard(path)
