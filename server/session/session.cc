@@ -27,13 +27,13 @@ absl::StatusOr<Eigen::VectorXd> ResolveStiffness(const SessionRecord& record,
   return array->values;
 }
 
-// Gives every answer's residual; a small part of a solve.
 DeformerOptions OptionsOf(const SessionRecord& record) {
   DeformerOptions options;
   options.model = record.model;
   options.preparation.poisson_ratio = record.poisson_ratio;
   options.preparation.mesh_is_usable = true;  // MeshCatalog
   options.gradient_field = record.gradient_field;
+  // Told in every answer; a small part of a solve.
   options.gradient_field.compute_residual = true;
   return options;
 }
