@@ -134,8 +134,9 @@ std::vector<double> Gaps(const std::vector<double>& heights) {
   return gaps;
 }
 
-// The usual gap: one or two missing slices do not move a median, as they would a mean.
-double UsualGap(std::vector<double> values) {
+// The usual one of some values: one or two missing slices do not move a median, as they would a
+// mean.
+double UpperMedian(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
@@ -163,7 +164,7 @@ absl::Status CheckGaps(const std::vector<DicomHeader>& slices, const std::vector
 // the line from the first to the last, too.
 bool IsEven(const std::vector<DicomHeader>& slices, const std::vector<double>& gaps,
             const Eigen::Vector3d& step) {
-  const double usual = UsualGap(gaps);
+  const double usual = UpperMedian(gaps);
   for (size_t i = 0; i < slices.size(); ++i) {
     const Eigen::Vector3d expected = *slices.front().position_mm + static_cast<double>(i) * step;
     if ((*slices[i].position_mm - expected).norm() > kPositionToleranceMm) return false;
@@ -174,7 +175,7 @@ bool IsEven(const std::vector<DicomHeader>& slices, const std::vector<double>& g
 
 // "; 2 slices are missing between ... and ..." for the first gap that is a multiple of the usual.
 std::string MissingSlices(const std::vector<DicomHeader>& slices, const std::vector<double>& gaps) {
-  const double usual = UsualGap(gaps);
+  const double usual = UpperMedian(gaps);
   for (size_t i = 0; i < gaps.size(); ++i) {
     const double missing = std::round(gaps[i] / usual) - 1;
     if (missing < 1 || std::abs(gaps[i] - (missing + 1) * usual) > kPositionToleranceMm) continue;
@@ -191,7 +192,7 @@ std::string UnevenNote(const std::vector<DicomHeader>& slices, const std::vector
   return absl::StrFormat(
       "the slices lie unevenly, %.2f to %.2f mm apart, usually %.2f mm: values between them are "
       "interpolated%s",
-      *least, *most, UsualGap(gaps), MissingSlices(slices, gaps));
+      *least, *most, UpperMedian(gaps), MissingSlices(slices, gaps));
 }
 
 // From one slice to the next, for one mm along the normal: the median, as some may lie beside the
@@ -205,7 +206,7 @@ Eigen::Vector3d UsualSlope(const std::vector<DicomHeader>& slices, const std::ve
     along_row.push_back(step.dot(row) / gaps[i]);
     along_column.push_back(step.dot(column) / gaps[i]);
   }
-  return row.cross(column) + UsualGap(along_row) * row + UsualGap(along_column) * column;
+  return row.cross(column) + UpperMedian(along_row) * row + UpperMedian(along_column) * column;
 }
 
 // A tilted gantry stacks slices along a step that is not their normal: the turn about the row.
@@ -250,7 +251,7 @@ absl::Status ArrangeStack(bool has_offset, DicomStack* stack) {
                          static_cast<double>(slices.size() - 1);
   TF_RETURN_IF_ERROR(CheckGaps(slices, gaps));
   if (!IsEven(slices, gaps, step)) {
-    step = UsualGap(gaps) * UsualSlope(slices, gaps, row, column);
+    step = UpperMedian(gaps) * UsualSlope(slices, gaps, row, column);
     for (const DicomHeader& slice : slices) stack->slice_origins_mm.push_back(*slice.position_mm);
     stack->notes.push_back(UnevenNote(slices, gaps));
   }
