@@ -39,8 +39,8 @@ function(_tissueform_use_precompiled target name)
 endfunction()
 
 # Unity builds (CMAKE_UNITY_BUILD, which the sanitizers' presets set) put some files together, so that what they include is
-# read once: from nothing they take a third less. Which files may be together, source_names.py says. The release build
-# does without: there a missing include shall be seen.
+# read once. Which files may be together, source_names.py says. The release build does without: there a missing include
+# shall be seen.
 set(_tissueform_most_together 8)
 if(CMAKE_UNITY_BUILD)
   find_package(Python3 3.11 REQUIRED COMPONENTS Interpreter)

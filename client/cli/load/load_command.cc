@@ -41,6 +41,11 @@ DeformationModel ModelOf(const std::string& name) {
 }
 
 absl::Status Run(const LoadCommandOptions& options) {
+  const LoadOptions& load = options.load;
+  if (load.sessions + load.slow_readers + load.refining + load.churn == 0) {
+    return absl::InvalidArgumentError(
+        "nothing is asked for; give --sessions, --slow-readers, --refining or --churn a number");
+  }
   if (!options.json.empty()) TF_RETURN_IF_ERROR(CheckWritable(options.json));
   TF_ASSIGN_OR_RETURN(const std::string path, FindDemoPlan(options.plan));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(path));

@@ -211,6 +211,7 @@ void RunAll(const LoadOptions& options, const std::vector<DragGroup>& groups,
       dragging.emplace_back([=, &drag] { drag->Run(origin, start, end, interval); });
     }
   }
+  std::this_thread::sleep_until(end);  // churn may be all that is asked for
   for (std::thread& thread : dragging) thread.join();
   stop = true;
   for (std::thread& thread : churning) thread.join();
