@@ -189,6 +189,21 @@ MetalReport LessenStreaks(const MetalFindings& findings, int threads, CtVolume* 
   return report;
 }
 
+absl::StatusOr<LabelGrid> ResampleMetal(const MetalFindings& findings, CtVolume volume,
+                                        double spacing_mm, int threads) {
+  // The mean over a voxel of the grid is the share of it that is metal.
+  for (size_t i = 0; i < volume.hu.size(); ++i) {
+    volume.hu[i] = findings.mask[i] != 0 ? kWholly : int16_t{0};
+  }
+  TF_ASSIGN_OR_RETURN(const HuGrid share,
+                      ResampleIsotropic(volume, spacing_mm, {.threads = threads}));
+  LabelGrid metal(share.geometry);
+  for (size_t i = 0; i < share.values.size(); ++i) {
+    metal.values[i] = share.values[i] >= kWholly / 4 ? 1 : 0;
+  }
+  return metal;
+}
+
 absl::StatusOr<CtWithMetal> ResampleWithoutStreaks(CtVolume volume, double spacing_mm,
                                                    const MetalOptions& options, int threads) {
   CtWithMetal ct;
@@ -203,15 +218,7 @@ absl::StatusOr<CtWithMetal> ResampleWithoutStreaks(CtVolume volume, double spaci
   }
   TF_ASSIGN_OR_RETURN(ct.hu, ResampleIsotropic(volume, spacing_mm, resample));
   if (findings.any()) {
-    // The mean over a voxel of the grid is the share of it that is metal.
-    for (size_t i = 0; i < volume.hu.size(); ++i) {
-      volume.hu[i] = findings.mask[i] != 0 ? kWholly : int16_t{0};
-    }
-    TF_ASSIGN_OR_RETURN(const HuGrid share, ResampleIsotropic(volume, spacing_mm, resample));
-    ct.metal = LabelGrid(share.geometry);
-    for (size_t i = 0; i < share.values.size(); ++i) {
-      ct.metal.values[i] = share.values[i] >= kWholly / 4 ? 1 : 0;
-    }
+    TF_ASSIGN_OR_RETURN(ct.metal, ResampleMetal(findings, std::move(volume), spacing_mm, threads));
   }
   return ct;
 }

@@ -50,6 +50,12 @@ struct CtWithMetal {
   MetalReport report;
 };
 
+// 1 where a quarter of the voxel or more is metal, on the grid that ResampleIsotropic makes of
+// `volume`, in which the metal was found. Its values are overwritten. Errors: those of
+// ResampleIsotropic.
+absl::StatusOr<LabelGrid> ResampleMetal(const MetalFindings& findings, CtVolume volume,
+                                        double spacing_mm, int threads);
+
 // ResampleIsotropic of the volume without streaks; of the volume itself where options.correct is
 // false or no metal is found. Errors: those of ResampleIsotropic.
 absl::StatusOr<CtWithMetal> ResampleWithoutStreaks(CtVolume volume, double spacing_mm,

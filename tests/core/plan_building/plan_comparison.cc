@@ -60,17 +60,6 @@ std::vector<std::pair<std::string, Eigen::Vector3d>> Named(const Landmarks& l) {
           {"mouth_corner.right", l.mouth_corner.right}};
 }
 
-WorstAt WorstLandmark(const Landmarks& plan, const Landmarks& truth) {
-  const auto found = Named(plan);
-  const auto known = Named(truth);
-  WorstAt worst;
-  for (size_t i = 0; i < found.size(); ++i) {
-    const double mm = (found[i].second - known[i].second).norm();
-    if (mm > worst.mm) worst = {mm, known[i].second, known[i].first};
-  }
-  return worst;
-}
-
 void CompareSegments(const TriangleMesh& plan, const TriangleMesh& truth,
                      PlanDifference* difference) {
   std::vector<double> all;
@@ -266,6 +255,17 @@ Recipe MetalRecipe(bool correct) {
   mandible.pose.translation_mm.y() = -6;
   recipe.segments = {mandible};
   return recipe;
+}
+
+WorstAt WorstLandmark(const Landmarks& plan, const Landmarks& truth) {
+  const auto found = Named(plan);
+  const auto known = Named(truth);
+  WorstAt worst;
+  for (size_t i = 0; i < found.size(); ++i) {
+    const double mm = (found[i].second - known[i].second).norm();
+    if (mm > worst.mm) worst = {mm, known[i].second, known[i].first};
+  }
+  return worst;
 }
 
 absl::StatusOr<PlanDifference> ComparePlans(const PlanBuild& plan, const PlanBuild& truth,

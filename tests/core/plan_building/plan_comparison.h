@@ -48,6 +48,9 @@ struct PlanDifference {
 
 inline constexpr double kNearSkinMm = 2.5;
 
+// The landmark that lies farthest from where `truth` has it.
+WorstAt WorstLandmark(const Landmarks& plan, const Landmarks& truth);
+
 // What `plan` has otherwise than `truth`; movements by the given model.
 //
 // Errors: those of ToPlanProblem and of deformers.
