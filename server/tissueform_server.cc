@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "grpc/health/v1/health.pb.h"
 #include "grpcpp/ext/proto_server_reflection_plugin.h"
 #include "grpcpp/health_check_service_interface.h"
 #include "grpcpp/resource_quota.h"
@@ -36,6 +37,9 @@ void PrepareProcessOnce() {
   std::call_once(once, [] {
     RouteLibraryLogs();
     grpc::EnableDefaultHealthCheckService(true);
+    // gRPC's health service has no descriptor of its own; without one, clients that ask reflection
+    // for every service's schema end at it (buf curl --list-methods).
+    google::protobuf::LinkMessageReflection<grpc::health::v1::HealthCheckRequest>();
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   });
 }

@@ -4,13 +4,27 @@
 #include "client/cpp/client_call.h"
 
 #include "absl/status/statusor.h"
+#include "google/rpc/error_details.pb.h"
+#include "google/rpc/status.pb.h"
 
+#include "core/base/error_reason.h"
 #include "proto/conversion/session_conversion.h"
 
 namespace tissueform {
 
 absl::Status FromGrpcStatus(const grpc::Status& status) {
-  return {static_cast<absl::StatusCode>(status.error_code()), status.error_message()};
+  const absl::Status plain(static_cast<absl::StatusCode>(status.error_code()),
+                           status.error_message());
+  google::rpc::Status details;
+  if (!details.ParseFromString(status.error_details())) return plain;
+  for (const google::protobuf::Any& detail : details.details()) {
+    google::rpc::ErrorInfo info;
+    if (detail.UnpackTo(&info)) {
+      return WithErrorInfo(
+          plain, {info.reason(), ErrorMetadata(info.metadata().begin(), info.metadata().end())});
+    }
+  }
+  return plain;
 }
 
 void AddSessionHeader(const std::string& session, grpc::ClientContext* context) {

@@ -11,7 +11,8 @@
 
 namespace tissueform {
 
-// The same code and message.
+// The same code and message, and the reason that the server gave (ErrorInfoOf in
+// core/base/error_reason.h).
 absl::Status FromGrpcStatus(const grpc::Status& status);
 
 // Lets a proxy send the call to the server of `session` ("sessions/{id}"); see kSessionHeader.

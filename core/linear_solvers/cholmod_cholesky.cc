@@ -14,6 +14,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "cholmod.h"
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "core/base/workspace_pool.h"
 #include "core/linear_solvers/supernodal_factor.h"
@@ -42,7 +43,8 @@ absl::Status ToStatus(int status, const std::string& doing) {
     case CHOLMOD_OK:
       return absl::OkStatus();
     case CHOLMOD_NOT_POSDEF:
-      return absl::FailedPreconditionError("linear system is not positive definite");
+      return WithReason(absl::FailedPreconditionError("linear system is not positive definite"),
+                        ErrorReason::kNotPositiveDefinite);
     case CHOLMOD_OUT_OF_MEMORY:
       return absl::ResourceExhaustedError(absl::StrCat("out of memory while ", doing));
     case CHOLMOD_TOO_LARGE:

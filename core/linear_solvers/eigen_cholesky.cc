@@ -8,6 +8,8 @@
 
 #include <Eigen/SparseCholesky>
 
+#include "core/base/error_reason.h"
+
 namespace tissueform {
 namespace {
 
@@ -64,7 +66,8 @@ class EigenCholesky : public SparseCholesky {
       return absl::ResourceExhaustedError("out of memory while factorising the linear system");
     }
     if (factor_.info() != Eigen::Success) {
-      return absl::FailedPreconditionError("linear system is not positive definite");
+      return WithReason(absl::FailedPreconditionError("linear system is not positive definite"),
+                        ErrorReason::kNotPositiveDefinite);
     }
     return absl::OkStatus();
   }

@@ -10,6 +10,7 @@
 #include "absl/memory/memory.h"
 #include "absl/strings/str_cat.h"
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -88,8 +89,9 @@ absl::Status ReleasableSystem::GrowSchurComplement(size_t first_new) {
   }
   schur_factor_.compute(schur_complement_);
   if (schur_factor_.info() != Eigen::Success) {
-    return absl::FailedPreconditionError(
-        "linear system is not positive definite once these unknowns are released");
+    return WithReason(absl::FailedPreconditionError("linear system is not positive definite once "
+                                                    "these unknowns are released"),
+                      ErrorReason::kNotPositiveDefinite);
   }
   return absl::OkStatus();
 }

@@ -10,6 +10,7 @@
 #include "grpcpp/server_context.h"
 #include "spdlog/spdlog.h"
 
+#include "core/base/error_reason.h"
 #include "server/auth/identity.h"
 #include "server/rpc/status_conversion.h"
 
@@ -65,8 +66,10 @@ CallScope::CallScope(const grpc::CallbackServerContext* context, std::string_vie
       request_id_(RequestIdOr(RequestIdHeader(context))) {
   gate_->Enter();
   if (kind == CallKind::kNewWork && gate_->draining()) {
-    admission_ = absl::UnavailableError(
-        "the server is draining and takes no new work; try another one, or again in a minute");
+    admission_ = WithReason(
+        absl::UnavailableError(
+            "the server is draining and takes no new work; try another one, or again in a minute"),
+        ErrorReason::kServerDraining);
   }
 }
 

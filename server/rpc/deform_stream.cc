@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/geometry_conversion.h"
 
@@ -74,9 +75,10 @@ void DeformStreamReactor::EndUnlessConfigured() {
   MutexLock lock(mutex_);
   if (configuration_ != nullptr) return;
   // A silent stream holds one of the places that others wait for.
-  End(absl::DeadlineExceededError(
-      absl::StrCat("no configuration came within ", limits_.configuration_deadline.count(),
-                   " ms of the opening of the stream; send it as the first message")));
+  End(WithReason(absl::DeadlineExceededError(absl::StrCat(
+                     "no configuration came within ", limits_.configuration_deadline.count(),
+                     " ms of the opening of the stream; send it as the first message")),
+                 ErrorReason::kNoConfigurationInTime));
   Advance();
 }
 

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/error_reason.h"
 #include "server/rpc/deform_stream.h"
 
 namespace tissueform {
@@ -12,9 +13,10 @@ namespace tissueform {
 absl::Status DeformStreams::Add(DeformStreamReactor* stream) {
   MutexLock lock(mutex_);
   if (streams_.size() >= static_cast<size_t>(max_streams_)) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat("the server has ", max_streams_,
-                     " open streams, as many as it may; close one or raise --max-streams"));
+    return WithReason(absl::ResourceExhaustedError(absl::StrCat(
+                          "the server has ", max_streams_,
+                          " open streams, as many as it may; close one or raise --max-streams")),
+                      ErrorReason::kTooManyStreams, {{"limit", absl::StrCat(max_streams_)}});
   }
   streams_.insert(stream);
   return absl::OkStatus();

@@ -3,6 +3,7 @@
 
 #include "server/rpc/mesh_service.h"
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "server/rpc/mesh_upload_stream.h"
@@ -12,7 +13,8 @@ namespace tissueform {
 namespace {
 
 absl::Status NoSuchMesh() {
-  return absl::NotFoundError("the server does not have this mesh; upload it");
+  return WithReason(absl::NotFoundError("the server does not have this mesh; upload it"),
+                    ErrorReason::kMeshNotFound);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "server/rpc/resource_conversion.h"
 
@@ -76,9 +77,10 @@ void MeshUploadStream::EndIfSilent() {
     return;
   }
   // It holds memory that others are refused.
-  End(absl::DeadlineExceededError(
-      absl::StrCat("no chunk came for ", limits_.upload_silence.count(),
-                   " ms, and the upload was given up; send the mesh again")));
+  End(WithReason(absl::DeadlineExceededError(
+                     absl::StrCat("no chunk came for ", limits_.upload_silence.count(),
+                                  " ms, and the upload was given up; send the mesh again")),
+                 ErrorReason::kUploadSilent));
 }
 
 absl::Status MeshUploadStream::Take() {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "proto/conversion/session_conversion.h"
@@ -108,7 +109,9 @@ absl::StatusOr<SessionService::Creation> SessionService::ReadRequest(
   Creation creation;
   creation.mesh = catalog_->Find(sha256);
   if (creation.mesh == nullptr) {
-    return absl::NotFoundError("the server does not have the mesh of this request; upload it");
+    return WithReason(
+        absl::NotFoundError("the server does not have the mesh of this request; upload it"),
+        ErrorReason::kMeshNotFound);
   }
   TF_ASSIGN_OR_RETURN(creation.record,
                       ToSessionRecord(request, *creation.mesh, scope.principal(), limits_));

@@ -3,14 +3,41 @@
 
 #include "server/rpc/status_conversion.h"
 
+#include <algorithm>
 #include <string>
+
+#include "absl/strings/string_view.h"
+#include "google/rpc/error_details.pb.h"
+#include "google/rpc/status.pb.h"
+
+#include "core/base/error_reason.h"
 
 namespace tissueform {
 namespace {
 
-// gRPC's limit for all trailing metadata together is 8 KiB, and percent-encoding may triple a
-// message.
+// gRPC's limit for all trailing metadata together is 8 KiB. The message goes twice:
+// percent-encoding may triple it, and base64 makes the details a third longer.
 constexpr size_t kMaxMessageBytes = 1024;
+
+// Not through the middle of a letter: details are UTF-8, or other languages cannot read them.
+std::string Cut(absl::string_view message) {
+  size_t size = std::min(message.size(), kMaxMessageBytes);
+  while (size < message.size() && size > 0 && (message[size] & 0xC0) == 0x80) --size;
+  return std::string(message.substr(0, size));
+}
+
+std::string Details(const absl::Status& status, const std::string& message) {
+  const ErrorInfo info = ErrorInfoOf(status);
+  google::rpc::ErrorInfo proto;
+  proto.set_reason(info.reason);
+  proto.set_domain("tissueform");
+  proto.mutable_metadata()->insert(info.metadata.begin(), info.metadata.end());
+  google::rpc::Status details;
+  details.set_code(static_cast<int>(status.code()));
+  details.set_message(message);
+  details.add_details()->PackFrom(proto);
+  return details.SerializeAsString();
+}
 
 }  // namespace
 
@@ -18,8 +45,8 @@ grpc::Status ToGrpcStatus(const absl::Status& status) {
   if (status.ok()) {
     return grpc::Status::OK;
   }
-  return {static_cast<grpc::StatusCode>(status.code()),
-          std::string(status.message().substr(0, kMaxMessageBytes))};
+  const std::string message = Cut(status.message());
+  return {static_cast<grpc::StatusCode>(status.code()), message, Details(status, message)};
 }
 
 }  // namespace tissueform

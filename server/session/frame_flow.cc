@@ -7,14 +7,17 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
 
 absl::Status FrameFlow::CheckSequence(uint64_t sequence) const {
   if (!last_sequence_.has_value() || sequence > *last_sequence_) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("sequence ", sequence, " after ", *last_sequence_,
-                                                 "; sequences must rise from pose to pose"));
+  return WithReason(
+      absl::InvalidArgumentError(absl::StrCat("sequence ", sequence, " after ", *last_sequence_,
+                                              "; sequences must rise from pose to pose")),
+      ErrorReason::kPoseSequenceNotRising);
 }
 
 absl::Status FrameFlow::Put(uint64_t sequence, std::vector<HandlePose> poses) {

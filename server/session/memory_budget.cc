@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -73,10 +74,13 @@ absl::Status MemoryBudget::Take(int64_t bytes, absl::string_view what) {
       return absl::OkStatus();
     }
   }
-  return absl::ResourceExhaustedError(absl::StrCat(
-      "no room for the ", what, ": it needs ", Mebibytes(bytes), ", and ",
-      Mebibytes(reserved_bytes()), " of ", Mebibytes(limit_bytes_),
-      " are taken; delete sessions or meshes, or raise --memory-budget-mib of the server"));
+  return WithReason(
+      absl::ResourceExhaustedError(absl::StrCat(
+          "no room for the ", what, ": it needs ", Mebibytes(bytes), ", and ",
+          Mebibytes(reserved_bytes()), " of ", Mebibytes(limit_bytes_),
+          " are taken; delete sessions or meshes, or raise --memory-budget-mib of the server")),
+      ErrorReason::kMemoryBudgetFull,
+      {{"needed_bytes", absl::StrCat(bytes)}, {"limit_bytes", absl::StrCat(limit_bytes_)}});
 }
 
 bool MemoryBudget::TryTake(int64_t bytes) {

@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/tet_topology.h"
 #include "core/mesh/validation.h"
@@ -30,8 +31,10 @@ absl::Status CheckCount(int64_t count, int64_t max, absl::string_view field,
     return absl::InvalidArgumentError(absl::StrCat(field, " is ", count, "; it must be positive"));
   }
   if (count > max) {
-    return absl::ResourceExhaustedError(absl::StrCat(
-        field, " is ", count, ", and the server takes ", max, " at most; raise its ", option));
+    return WithReason(
+        absl::ResourceExhaustedError(absl::StrCat(field, " is ", count, ", and the server takes ",
+                                                  max, " at most; raise its ", option)),
+        ErrorReason::kMeshTooLarge, {{"field", std::string(field)}, {"limit", absl::StrCat(max)}});
   }
   return absl::OkStatus();
 }
@@ -116,9 +119,11 @@ absl::Status MeshUpload::Write(int64_t offset, absl::string_view data, bool fini
                                                    " bytes; send ", max_chunk_bytes_, " at most"));
   }
   if (offset != committed_bytes_) {
-    return absl::InvalidArgumentError(absl::StrCat("chunk begins at ", offset, ", but ",
-                                                   committed_bytes_,
-                                                   " bytes have come; send chunks without gaps"));
+    return WithReason(absl::InvalidArgumentError(
+                          absl::StrCat("chunk begins at ", offset, ", but ", committed_bytes_,
+                                       " bytes have come; send chunks without gaps")),
+                      ErrorReason::kChunkOutOfPlace,
+                      {{"committed_bytes", absl::StrCat(committed_bytes_)}});
   }
   if (size > announcement_.total_bytes - committed_bytes_) {
     return absl::InvalidArgumentError(absl::StrCat("chunk at ", offset, " with ", size,
@@ -154,10 +159,11 @@ absl::StatusOr<std::shared_ptr<const StoredMesh>> MeshCatalog::Finish(
     std::unique_ptr<MeshUpload> upload) {
   const std::string& sha256 = upload->announcement_.sha256;
   if (upload->payload_.View().Sha256() != sha256) {
-    return absl::DataLossError(
-        "the payload does not have the declared SHA-256: it was damaged on its way, or the digest "
-        "was "
-        "computed over something else (see MeshHeader.sha256); send it again");
+    return WithReason(
+        absl::DataLossError(
+            "the payload does not have the declared SHA-256: it was damaged on its way, or the "
+            "digest was computed over something else (see MeshHeader.sha256); send it again"),
+        ErrorReason::kMeshDamagedOnItsWay);
   }
   TF_RETURN_IF_ERROR(CheckCellArraysFinite(upload->payload_.cell_arrays()));
   TF_ASSIGN_OR_RETURN(TetMesh mesh, TetMesh::Create(std::move(upload->payload_.positions()),

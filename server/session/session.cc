@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 
@@ -93,7 +94,9 @@ absl::Status Session::Prepare(const Eigen::VectorXd& stiffness,
 }
 
 absl::Status Session::Closed() const {
-  return absl::NotFoundError(absl::StrCat("sessions/", id_, " has been deleted; create it again"));
+  return WithReason(
+      absl::NotFoundError(absl::StrCat("sessions/", id_, " has been deleted; create it again")),
+      ErrorReason::kSessionNotFound);
 }
 
 absl::StatusOr<std::shared_ptr<SharedPreparation>> Session::OpenPreparation() const {

@@ -10,31 +10,39 @@
 #include "absl/strings/str_cat.h"
 #include "spdlog/spdlog.h"
 
+#include "core/base/error_reason.h"
 #include "server/auth/identity.h"
 
 namespace tissueform {
 namespace {
 
 absl::Status NoSuchSession(const std::string& id) {
-  return absl::NotFoundError(
-      absl::StrCat("no session \"sessions/", id,
-                   "\": it was deleted, or removed after being idle; create it again"));
+  return WithReason(absl::NotFoundError(absl::StrCat(
+                        "no session \"sessions/", id,
+                        "\": it was deleted, or removed after being idle; create it again")),
+                    ErrorReason::kSessionNotFound);
 }
 
 absl::Status OtherRequest(const std::string& request_id) {
-  return absl::InvalidArgumentError(absl::StrCat(
-      "request_id \"", request_id, "\" was used for another request; choose a new one"));
+  return WithReason(
+      absl::InvalidArgumentError(absl::StrCat("request_id \"", request_id,
+                                              "\" was used for another request; choose a new one")),
+      ErrorReason::kRequestIdReused);
 }
 
 absl::Status TakenId(const std::string& id) {
-  return absl::AlreadyExistsError(
-      absl::StrCat("a session \"sessions/", id, "\" exists already; choose another session_id"));
+  return WithReason(
+      absl::AlreadyExistsError(absl::StrCat("a session \"sessions/", id,
+                                            "\" exists already; choose another session_id")),
+      ErrorReason::kSessionIdTaken);
 }
 
 absl::Status EndingId(const std::string& id) {
-  return absl::UnavailableError(absl::StrCat("the session \"sessions/", id,
-                                             "\" is being deleted; try again in a moment, or "
-                                             "choose another session_id"));
+  return WithReason(
+      absl::UnavailableError(
+          absl::StrCat("the session \"sessions/", id,
+                       "\" is being deleted; try again in a moment, or choose another session_id")),
+      ErrorReason::kSessionBeingDeleted);
 }
 
 // Where nobody waits for the end of a session.
@@ -135,9 +143,11 @@ SessionRegistry::Admission SessionRegistry::Admit(const SessionRecord& record,
     return admission;
   }
   if (Full()) {
-    admission.refusal = absl::ResourceExhaustedError(
-        absl::StrCat("the server holds ", limits_.max_sessions,
-                     " sessions, as many as it may; delete one or raise --max-sessions"));
+    admission.refusal =
+        WithReason(absl::ResourceExhaustedError(absl::StrCat(
+                       "the server holds ", limits_.max_sessions,
+                       " sessions, as many as it may; delete one or raise --max-sessions")),
+                   ErrorReason::kTooManySessions, {{"limit", absl::StrCat(limits_.max_sessions)}});
     return admission;
   }
   admission.started = std::make_shared<Creation>(Creation{record.id, key, {waiter}});

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "core/mesh_payload/sha256.h"
 #include "core/prepared_answers/linear_elastic_response.h"
@@ -144,9 +145,10 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> SharedPreparation::CreateRespons
                                 .admission = admission},
                                cancellation);
   }
-  return absl::InvalidArgumentError(
-      "only gradient_field with propagated rotations and cotangent guidance, and linear_elastic, "
-      "have prepared answers; leave `prepared` out");
+  return WithReason(absl::InvalidArgumentError(
+                        "only gradient_field with propagated rotations and cotangent guidance, and "
+                        "linear_elastic, have prepared answers; leave `prepared` out"),
+                    ErrorReason::kNoPreparedAnswers);
 }
 
 absl::Status SharedPreparation::Admit(int64_t more_bytes) {

@@ -7,6 +7,8 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/error_reason.h"
+
 namespace tissueform {
 
 void InMemorySessionStore::Create(SessionRecord record, int64_t epoch, RecordCallback done) {
@@ -93,8 +95,10 @@ absl::Status InMemorySessionStore::CheckWrite(const std::string& id, const std::
                                                       " now: another server has taken it"));
   }
   if (!etag.empty() && etag != found->second.etag) {
-    return absl::AbortedError(
-        absl::StrCat("session \"", id, "\" has changed in the meantime; get it and try again"));
+    return WithReason(
+        absl::AbortedError(
+            absl::StrCat("session \"", id, "\" has changed in the meantime; get it and try again")),
+        ErrorReason::kStaleEtag);
   }
   return absl::OkStatus();
 }

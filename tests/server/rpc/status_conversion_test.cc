@@ -5,7 +5,12 @@
 
 #include <string>
 
+#include "google/rpc/error_details.pb.h"
+#include "google/rpc/status.pb.h"
 #include "gtest/gtest.h"
+
+#include "client/cpp/client_call.h"
+#include "core/base/error_reason.h"
 
 namespace tissueform {
 namespace {
@@ -24,6 +29,46 @@ TEST(StatusConversionTest, CodeAndMessageAreKept) {
 TEST(StatusConversionTest, LongMessagesAreCut) {
   const grpc::Status status = ToGrpcStatus(absl::InvalidArgumentError(std::string(100'000, 'x')));
   EXPECT_EQ(status.error_message(), std::string(1024, 'x'));
+}
+
+google::rpc::Status DetailsOf(const grpc::Status& status) {
+  google::rpc::Status details;
+  EXPECT_TRUE(details.ParseFromString(status.error_details()));
+  return details;
+}
+
+TEST(StatusConversionTest, ErrorsCarryTheirReasonAsGoogleRpcSaysIt) {
+  const google::rpc::Status details = DetailsOf(ToGrpcStatus(WithReason(
+      absl::ResourceExhaustedError("full"), ErrorReason::kTooManyStreams, {{"limit", "64"}})));
+  EXPECT_EQ(details.code(), 8);
+  EXPECT_EQ(details.message(), "full");
+  ASSERT_EQ(details.details_size(), 1);
+  google::rpc::ErrorInfo info;
+  ASSERT_TRUE(details.details(0).UnpackTo(&info));
+  EXPECT_EQ(info.domain(), "tissueform");
+  EXPECT_EQ(info.reason(), "TOO_MANY_STREAMS");
+  EXPECT_EQ(info.metadata().at("limit"), "64");
+}
+
+TEST(StatusConversionTest, TheClientGetsBackWhatTheServerHad) {
+  const absl::Status status =
+      WithReason(absl::NotFoundError("no such mesh"), ErrorReason::kMeshNotFound, {{"a", "b=c"}});
+  EXPECT_EQ(FromGrpcStatus(ToGrpcStatus(status)), status);  // payloads too
+}
+
+TEST(StatusConversionTest, DetailsThatNobodyUnderstandsLeaveTheCodeAndTheMessage) {
+  for (const char* details : {"", "\xff\xff", "\x1a\x02\x12\x00"}) {
+    const absl::Status status =
+        FromGrpcStatus({grpc::StatusCode::NOT_FOUND, "no such mesh", details});
+    EXPECT_EQ(status, absl::NotFoundError("no such mesh"));
+  }
+}
+
+TEST(StatusConversionTest, ALongMessageIsNotCutThroughALetter) {
+  std::string message(1023, 'x');
+  message += "\u00e4\u00e4";
+  const google::rpc::Status details = DetailsOf(ToGrpcStatus(absl::InternalError(message)));
+  EXPECT_EQ(details.message(), std::string(1023, 'x'));
 }
 
 }  // namespace

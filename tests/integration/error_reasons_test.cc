@@ -1,0 +1,110 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <string>
+#include <thread>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "core/base/error_reason.h"
+#include "tests/integration/service_test.h"
+#include "tests/testing/status_matchers.h"
+
+// What a client decides by arrives at the client: over the network, from where each error is made.
+namespace tissueform::testing {
+namespace {
+
+MATCHER_P(Because, reason, std::string(ReasonName(reason))) {
+  *result_listener << GetStatus(arg).ToString();
+  return HasReason(GetStatus(arg), reason);
+}
+
+class ErrorReasonsTest : public ServiceTest {
+ protected:
+  const BarProblem problem_{5};
+};
+
+TEST_F(ErrorReasonsTest, WhatIsNotThere) {
+  const auto client = Connect();
+  EXPECT_THAT(client->GetSession("sessions/none"), Because(ErrorReason::kSessionNotFound));
+  EXPECT_THAT(client->DeleteSession("sessions/none"), Because(ErrorReason::kSessionNotFound));
+  EXPECT_THAT(client->OpenStream("sessions/none", {}), Because(ErrorReason::kSessionNotFound));
+  const std::string mesh = "meshes/" + std::string(64, '0');
+  EXPECT_THAT(client->DeleteMesh(mesh), Because(ErrorReason::kMeshNotFound));
+  EXPECT_THAT(client->CreateSession(problem_.Request(mesh)), Because(ErrorReason::kMeshNotFound));
+}
+
+TEST_F(ErrorReasonsTest, IdsThatAreInUse) {
+  const auto client = Connect();
+  ASSERT_OK_AND_ASSIGN(const v1::Mesh mesh,
+                       client->UploadMesh(problem_.mesh, problem_.CellArrays()));
+  SessionRequest request = problem_.Request(mesh.name());
+  request.request_id = "one";
+  request.session_id = "0123456789abcdef";
+  ASSERT_THAT(client->CreateSession(request), IsOk());
+  request.request_id = "another";
+  EXPECT_THAT(client->CreateSession(request), Because(ErrorReason::kSessionIdTaken));
+  request.request_id = "one";
+  request.poisson_ratio = 0.3;
+  EXPECT_THAT(client->CreateSession(request), Because(ErrorReason::kRequestIdReused));
+}
+
+TEST_F(ErrorReasonsTest, WhatTheServerHasNoRoomFor) {
+  ServerOptions options = TestOptions();
+  options.limits.max_sessions = 1;
+  options.limits.max_streams = 1;
+  options.limits.max_vertices = 300;
+  StartServer(options);
+  const auto client = Connect();
+  const v1::Session session = MakeSession(client.get(), problem_);
+  const absl::Status full = client->CreateSession(problem_.Request(session.mesh())).status();
+  EXPECT_THAT(full, Because(ErrorReason::kTooManySessions));
+  EXPECT_EQ(ErrorInfoOf(full).metadata.at("limit"), "1");
+  ASSERT_OK_AND_ASSIGN(const auto stream, client->OpenStream(session.name(), {}));
+  EXPECT_THAT(client->OpenStream(session.name(), {}), Because(ErrorReason::kTooManyStreams));
+  const BarProblem large(1, {6, 6, 8});
+  EXPECT_THAT(client->UploadMesh(large.mesh, {}), Because(ErrorReason::kMeshTooLarge));
+}
+
+TEST_F(ErrorReasonsTest, NoMemory) {
+  ServerOptions options = TestOptions();
+  options.memory_budget_bytes = 1000;
+  StartServer(options);
+  const absl::Status full = Connect()->UploadMesh(problem_.mesh, {}).status();
+  EXPECT_THAT(full, Because(ErrorReason::kMemoryBudgetFull));
+  EXPECT_EQ(ErrorInfoOf(full).metadata.at("limit_bytes"), "1000");
+}
+
+TEST_F(ErrorReasonsTest, ADragThatGoesWrong) {
+  const auto client = Connect();
+  const v1::Session session = MakeSession(client.get(), problem_);
+  DeformStream::Options prepared;
+  prepared.model = v1::DEFORMATION_MODEL_ARAP;
+  prepared.prepared.emplace();
+  EXPECT_THAT(client->OpenStream(session.name(), prepared),
+              Because(ErrorReason::kNoPreparedAnswers));
+  ASSERT_OK_AND_ASSIGN(const auto stream, client->OpenStream(session.name(), {}));
+  ASSERT_THAT(stream->SendPoses(2, TopPose(SomePose(1))), IsOk());
+  stream->SendPoses(2, TopPose(SomePose(2))).IgnoreError();
+  stream->CloseSending();
+  EXPECT_THAT(stream->Finish(), Because(ErrorReason::kPoseSequenceNotRising));
+}
+
+TEST_F(ErrorReasonsTest, ADrainingServer) {
+  const auto client = Connect();
+  const v1::Session session = MakeSession(client.get(), problem_);
+  ASSERT_OK_AND_ASSIGN(const auto stream, client->OpenStream(session.name(), {}));
+  std::thread drain([this] { server().Drain(); });
+  absl::Status refusal;
+  EXPECT_TRUE(Eventually([&] {
+    refusal = client->CreateSession(problem_.Request(session.mesh())).status();
+    return !refusal.ok();
+  }));
+  EXPECT_THAT(refusal, Because(ErrorReason::kServerDraining));
+  stream->Cancel();
+  drain.join();
+}
+
+}  // namespace
+}  // namespace tissueform::testing
