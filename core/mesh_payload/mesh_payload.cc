@@ -30,12 +30,17 @@ int64_t MeshPayloadShape::TotalBytes() const {
          num_tets * int64_t{sizeof(double)} * static_cast<int64_t>(cell_arrays.size());
 }
 
-std::string MeshPayloadView::Sha256() const {
-  std::string text = absl::StrCat("tissueform-mesh 1\nvertices ", shape.num_vertices, "\ntets ",
-                                  shape.num_tets, "\n");
-  for (const std::string& name : shape.cell_arrays) {
+std::string MeshPayloadShape::Text() const {
+  std::string text =
+      absl::StrCat("tissueform-mesh 1\nvertices ", num_vertices, "\ntets ", num_tets, "\n");
+  for (const std::string& name : cell_arrays) {
     absl::StrAppend(&text, "cell_array ", name.size(), " ", name, "\n");
   }
+  return text;
+}
+
+std::string MeshPayloadView::Sha256() const {
+  const std::string text = shape.Text();
   std::vector<absl::string_view> parts = {text};
   parts.insert(parts.end(), segments.begin(), segments.end());
   return Sha256Hex(parts);

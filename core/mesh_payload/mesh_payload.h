@@ -26,6 +26,8 @@ struct MeshPayloadShape {
 
   // Size of the payload. REQUIRES: counts so small that it fits (see the limits of the server).
   int64_t TotalBytes() const;
+  // The shape in words; what a mesh is named by begins with it.
+  std::string Text() const;
 };
 
 // A named array with one number per tet.

@@ -17,22 +17,40 @@ namespace {
 
 constexpr size_t kHexDigits = 64;
 
+// Fails only without memory, or without any OpenSSL provider.
+void Require(bool ok) {
+  if (!ok) std::abort();
+}
+
 }  // namespace
 
-std::string Sha256Hex(const std::vector<absl::string_view>& parts) {
-  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(),
-                                                                        &EVP_MD_CTX_free);
-  bool ok = context != nullptr && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1;
-  for (const absl::string_view part : parts) {
-    ok = ok && EVP_DigestUpdate(context.get(), part.data(), part.size()) == 1;
-  }
+struct Sha256::Context {
+  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> evp{EVP_MD_CTX_new(),
+                                                                    &EVP_MD_CTX_free};
+};
+
+Sha256::Sha256() : context_(std::make_unique<Context>()) {
+  Require(context_->evp != nullptr &&
+          EVP_DigestInit_ex(context_->evp.get(), EVP_sha256(), nullptr) == 1);
+}
+
+Sha256::~Sha256() = default;
+
+void Sha256::Add(absl::string_view bytes) {
+  Require(EVP_DigestUpdate(context_->evp.get(), bytes.data(), bytes.size()) == 1);
+}
+
+std::string Sha256::Hex() {
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
   unsigned int size = 0;
-  ok = ok && EVP_DigestFinal_ex(context.get(), digest.data(), &size) == 1;
-  if (!ok) {
-    std::abort();  // only without memory, or without any OpenSSL provider
-  }
+  Require(EVP_DigestFinal_ex(context_->evp.get(), digest.data(), &size) == 1);
   return absl::BytesToHexString({reinterpret_cast<const char*>(digest.data()), size});
+}
+
+std::string Sha256Hex(const std::vector<absl::string_view>& parts) {
+  Sha256 digest;
+  for (const absl::string_view part : parts) digest.Add(part);
+  return digest.Hex();
 }
 
 bool IsSha256Hex(absl::string_view text) {

@@ -3,12 +3,30 @@
 
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "absl/strings/string_view.h"
 
 namespace tissueform {
+
+// SHA-256 of bytes that come piece by piece.
+class Sha256 {
+ public:
+  Sha256();
+  ~Sha256();
+  Sha256(const Sha256&) = delete;
+  Sha256& operator=(const Sha256&) = delete;
+
+  void Add(absl::string_view bytes);
+  // In 64 lower-case hexadecimal digits; once.
+  std::string Hex();
+
+ private:
+  struct Context;
+  const std::unique_ptr<Context> context_;
+};
 
 // SHA-256 of the parts one after the other, in 64 lower-case hexadecimal digits.
 std::string Sha256Hex(const std::vector<absl::string_view>& parts);

@@ -3,11 +3,12 @@
 
 #include "server/store/in_memory_session_store.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 
-#include "core/base/error_reason.h"
+#include "server/store/store_errors.h"
 
 namespace tissueform {
 
@@ -16,18 +17,18 @@ void InMemorySessionStore::Create(SessionRecord record, int64_t epoch, RecordCal
   if (!record.id.empty()) {
     MutexLock lock(mutex_);
     if (records_.find(record.id) == records_.end()) {
+      record.created_s = clock_();
+      record.last_used_s = 0;
       result = Keep(std::move(record), epoch);
     } else {
-      result = absl::AlreadyExistsError(
-          absl::StrCat("a session \"", record.id, "\" exists already; choose another id"));
+      result = SessionExists(record.id);
     }
   }
   done(std::move(result));
 }
 
 void InMemorySessionStore::Get(const std::string& id, RecordCallback done) {
-  absl::StatusOr<SessionRecord> result =
-      absl::NotFoundError(absl::StrCat("no record of session \"", id, "\""));
+  absl::StatusOr<SessionRecord> result = NoSession(id);
   {
     MutexLock lock(mutex_);
     if (const auto found = records_.find(id); found != records_.end()) {
@@ -44,9 +45,33 @@ void InMemorySessionStore::Update(SessionRecord record, int64_t epoch, RecordCal
     // A record without an etag was not read from here.
     const std::string etag = record.etag.empty() ? "none" : record.etag;
     const absl::Status status = CheckWrite(record.id, etag, epoch);
-    result = status.ok() ? Keep(std::move(record), epoch) : absl::StatusOr<SessionRecord>(status);
+    if (status.ok()) {
+      const SessionRecord& before = records_[record.id];
+      record.created_s = before.created_s;
+      record.last_used_s = before.last_used_s;
+      result = Keep(std::move(record), epoch);
+    } else {
+      result = status;
+    }
   }
   done(std::move(result));
+}
+
+void InMemorySessionStore::CommitPoses(const std::string& id, std::vector<HandlePose> poses,
+                                       int64_t epoch, StatusCallback done) {
+  absl::Status status;
+  {
+    MutexLock lock(mutex_);
+    status = CheckWrite(id, "", epoch);
+    if (status.ok()) status = CheckPoseCount(id, poses.size(), records_[id].handles.size());
+    if (status.ok()) {
+      SessionRecord& record = records_[id];
+      record.last_poses = std::move(poses);
+      record.epoch = epoch;
+      record.last_used_s = std::max(record.last_used_s, clock_());
+    }
+  }
+  done(std::move(status));
 }
 
 void InMemorySessionStore::Delete(const std::string& id, const std::string& etag, int64_t epoch,
@@ -64,15 +89,14 @@ void InMemorySessionStore::Delete(const std::string& id, const std::string& etag
 
 void InMemorySessionStore::List(const ListRequest& request, PageCallback done) {
   if (request.limit < 1) {
-    done(absl::InvalidArgumentError(
-        absl::StrCat("limit is ", request.limit, "; it must be at least 1")));
+    done(BadLimit(request.limit));
     return;
   }
   Page page;
   {
     MutexLock lock(mutex_);
     for (auto next = records_.upper_bound(request.after); next != records_.end(); ++next) {
-      if (next->second.owner != request.owner) continue;
+      if (request.owner.has_value() && next->second.owner != *request.owner) continue;
       if (page.records.size() == static_cast<size_t>(request.limit)) {
         page.next = page.records.back().id;
         break;
@@ -83,29 +107,48 @@ void InMemorySessionStore::List(const ListRequest& request, PageCallback done) {
   done(std::move(page));
 }
 
+void InMemorySessionStore::Touch(std::vector<std::string> ids, int64_t now_s, StatusCallback done) {
+  {
+    MutexLock lock(mutex_);
+    for (const std::string& id : ids) {
+      if (const auto found = records_.find(id); found != records_.end()) {
+        found->second.last_used_s = std::max(found->second.last_used_s, now_s);
+      }
+    }
+  }
+  done(absl::OkStatus());
+}
+
+void InMemorySessionStore::ListUnused(int64_t before_s, int limit, PageCallback done) {
+  if (limit < 1) {
+    done(BadLimit(limit));
+    return;
+  }
+  Page page;
+  {
+    MutexLock lock(mutex_);
+    for (const auto& [id, record] : records_) {
+      if (record.last_used_s < before_s) page.records.push_back(record);
+    }
+  }
+  std::stable_sort(
+      page.records.begin(), page.records.end(),
+      [](const SessionRecord& a, const SessionRecord& b) { return a.last_used_s < b.last_used_s; });
+  if (page.records.size() > static_cast<size_t>(limit)) page.records.resize(limit);
+  done(std::move(page));
+}
+
 absl::Status InMemorySessionStore::CheckWrite(const std::string& id, const std::string& etag,
                                               int64_t epoch) const {
   const auto found = records_.find(id);
-  if (found == records_.end()) {
-    return absl::NotFoundError(absl::StrCat("no record of session \"", id, "\""));
-  }
-  if (epoch < found->second.epoch) {
-    return absl::FailedPreconditionError(absl::StrCat("epoch ", epoch, " of session \"", id,
-                                                      "\" is over, it is ", found->second.epoch,
-                                                      " now: another server has taken it"));
-  }
-  if (!etag.empty() && etag != found->second.etag) {
-    return WithReason(
-        absl::AbortedError(
-            absl::StrCat("session \"", id, "\" has changed in the meantime; get it and try again")),
-        ErrorReason::kStaleEtag);
-  }
-  return absl::OkStatus();
+  if (found == records_.end()) return NoSession(id);
+  return CheckSessionWrite(id, etag, epoch, found->second.etag, found->second.epoch);
 }
 
 SessionRecord InMemorySessionStore::Keep(SessionRecord record, int64_t epoch) {
   record.etag = absl::StrCat(++last_version_);
   record.epoch = epoch;
+  record.last_used_s = std::max(record.last_used_s, clock_());
   return records_[record.id] = std::move(record);
 }
 

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 
@@ -17,12 +19,18 @@ namespace tissueform {
 // Nothing outlives the process. Every call is answered before it returns.
 class InMemorySessionStore final : public SessionStore {
  public:
+  explicit InMemorySessionStore(UnixClock clock = SystemUnixSeconds) : clock_(std::move(clock)) {}
+
   void Create(SessionRecord record, int64_t epoch, RecordCallback done) override;
   void Get(const std::string& id, RecordCallback done) override;
   void Update(SessionRecord record, int64_t epoch, RecordCallback done) override;
+  void CommitPoses(const std::string& id, std::vector<HandlePose> poses, int64_t epoch,
+                   StatusCallback done) override;
   void Delete(const std::string& id, const std::string& etag, int64_t epoch,
               StatusCallback done) override;
   void List(const ListRequest& request, PageCallback done) override;
+  void Touch(std::vector<std::string> ids, int64_t now_s, StatusCallback done) override;
+  void ListUnused(int64_t before_s, int limit, PageCallback done) override;
 
  private:
   // Whether a write to `id` made from version `etag` is allowed.
@@ -30,6 +38,8 @@ class InMemorySessionStore final : public SessionStore {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Keeps the record as its next version.
   SessionRecord Keep(SessionRecord record, int64_t epoch) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  const UnixClock clock_;
 
   Mutex mutex_;
   std::map<std::string, SessionRecord> records_ ABSL_GUARDED_BY(mutex_);

@@ -37,6 +37,16 @@ absl::Status ReadStiffness(const v1::Stiffness& stiffness, SessionRecord* record
   return Damaged("it has no stiffness");
 }
 
+// Marks the vertices one by one: what comes twice or lies outside is found at once.
+bool IsPermutation(const std::vector<int32_t>& order) {
+  std::vector<bool> seen(order.size());
+  for (const int32_t vertex : order) {
+    if (vertex < 0 || static_cast<size_t>(vertex) >= order.size() || seen[vertex]) return false;
+    seen[vertex] = true;
+  }
+  return true;
+}
+
 absl::Status ReadPoses(const store::v1::SessionRecord& proto, SessionRecord* record) {
   if (!proto.last_poses().empty() && proto.last_poses_size() != proto.handles_size()) {
     return Damaged(absl::StrCat("it has ", proto.last_poses_size(), " poses for ",
@@ -50,6 +60,22 @@ absl::Status ReadPoses(const store::v1::SessionRecord& proto, SessionRecord* rec
     record->last_poses.push_back(pose.pose);
   }
   return absl::OkStatus();
+}
+
+// Equal for equal messages.
+std::string Bytes(const google::protobuf::MessageLite& message) {
+  std::string bytes;
+  google::protobuf::io::StringOutputStream stream(&bytes);
+  google::protobuf::io::CodedOutputStream output(&stream);
+  output.SetSerializationDeterministic(true);
+  message.SerializeToCodedStream(&output);
+  output.Trim();
+  return bytes;
+}
+
+bool Parse(absl::string_view bytes, google::protobuf::MessageLite* message) {
+  return bytes.size() <= std::numeric_limits<int>::max() &&
+         message->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
 }
 
 }  // namespace
@@ -79,22 +105,13 @@ std::string SerializeRecord(const SessionRecord& record) {
   }
   proto.set_request_id(record.request_id);
   proto.set_request_fingerprint(record.request_fingerprint);
-  std::string bytes;
-  {
-    google::protobuf::io::StringOutputStream stream(&bytes);
-    google::protobuf::io::CodedOutputStream output(&stream);
-    output.SetSerializationDeterministic(true);
-    proto.SerializeToCodedStream(&output);
-  }
-  return bytes;
+  proto.mutable_node_order()->Add(record.node_order.begin(), record.node_order.end());
+  return Bytes(proto);
 }
 
 absl::StatusOr<SessionRecord> ParseRecord(absl::string_view bytes) {
   store::v1::SessionRecord proto;
-  if (bytes.size() > std::numeric_limits<int>::max() ||
-      !proto.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
-    return Damaged("its bytes are not a record");
-  }
+  if (!Parse(bytes, &proto)) return Damaged("its bytes are not a record");
   if (proto.id().empty()) return Damaged("it has no id");
   if (!IsSha256Hex(proto.mesh_sha256())) return Damaged("its mesh has no name");
   SessionRecord record;
@@ -119,7 +136,29 @@ absl::StatusOr<SessionRecord> ParseRecord(absl::string_view bytes) {
   TF_RETURN_IF_ERROR(ReadPoses(proto, &record));
   record.request_id = proto.request_id();
   record.request_fingerprint = proto.request_fingerprint();
+  record.node_order = {proto.node_order().begin(), proto.node_order().end()};
+  if (!IsPermutation(record.node_order)) return Damaged("its order of vertices is no permutation");
   return record;
+}
+
+std::string SerializePoses(const std::vector<HandlePose>& poses) {
+  store::v1::Poses proto;
+  for (const HandlePose& pose : poses) *proto.add_poses() = ToProto(NamedPose{"", pose});
+  return Bytes(proto);
+}
+
+absl::StatusOr<std::vector<HandlePose>> ParsePoses(absl::string_view bytes) {
+  store::v1::Poses proto;
+  if (!Parse(bytes, &proto)) return Damaged("its poses are none");
+  std::vector<HandlePose> poses;
+  poses.reserve(proto.poses_size());
+  for (const v1::HandlePose& pose : proto.poses()) {
+    poses.push_back(ToNamedPose(pose).pose);
+    if (!CheckPose(poses.back()).ok()) {
+      return Damaged(absl::StrCat("pose ", poses.size() - 1, " is none"));
+    }
+  }
+  return poses;
 }
 
 }  // namespace tissueform

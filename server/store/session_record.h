@@ -32,21 +32,33 @@ struct SessionRecord {
   GradientFieldOptions gradient_field;  // what a client can ask for; the server fills in the rest
   std::vector<HandlePose> last_poses;   // one a handle, in their order; empty: at rest
 
+  // A fill-reducing order of the vertices (before postordering), so that a restart need not look
+  // for one: a permutation of 0..n-1, whose n the reader compares with the mesh. Empty: none.
+  std::vector<int32_t> node_order;
+
   // What makes the creation idempotent: the same id again with the same fingerprint is the same
   // request.
   std::string request_id;  // empty: every call makes a session of its own
   std::string request_fingerprint;
 
   // The store's; changed by it alone.
-  std::string etag;   // of this version of the record
-  int64_t epoch = 0;  // under which it was written
+  std::string etag;         // of this version of the record
+  int64_t epoch = 0;        // under which it was written
+  int64_t created_s = 0;    // unix seconds
+  int64_t last_used_s = 0;  // written, its poses committed, or touched
 };
 
-// The record as bytes (tissueform.store.v1.SessionRecord), without the store's own two. Equal for
-// equal records.
+// The record as bytes (tissueform.store.v1.SessionRecord), without what is the store's own. Equal
+// for equal records.
 std::string SerializeRecord(const SessionRecord& record);
 
 // Errors: DataLoss for bytes that are no such record, or that do not agree with themselves.
 absl::StatusOr<SessionRecord> ParseRecord(absl::string_view bytes);
+
+// The poses of a session alone (tissueform.store.v1.Poses): they change more often than the rest.
+std::string SerializePoses(const std::vector<HandlePose>& poses);
+
+// Errors: DataLoss for bytes that are no poses, or poses that CheckPose refuses.
+absl::StatusOr<std::vector<HandlePose>> ParsePoses(absl::string_view bytes);
 
 }  // namespace tissueform

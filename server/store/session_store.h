@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,9 +41,9 @@ class SessionStore {
   using PageCallback = std::function<void(absl::StatusOr<Page>)>;
 
   struct ListRequest {
-    std::string owner;  // of this one only, the anonymous one when empty
-    std::string after;  // ids greater than this
-    int limit = 100;    // at least 1
+    std::optional<std::string> owner = {};  // of this one only; unset: of all
+    std::string after = {};                 // ids greater than this
+    int limit = 100;                        // at least 1
   };
 
   virtual ~SessionStore() = default;
@@ -59,12 +60,31 @@ class SessionStore {
   // get the record and try again). Tried in this order.
   virtual void Update(SessionRecord record, int64_t epoch, RecordCallback done) = 0;
 
+  // Replaces last_poses of this record and nothing else: the etag stays, so that a drag does not
+  // make the copies of others stale. Cheap enough for every end of a drag (one small row).
+  // Errors: NotFound, FailedPrecondition (the epoch is older), InvalidArgument (neither none nor
+  // one pose a handle). Tried in this order.
+  virtual void CommitPoses(const std::string& id, std::vector<HandlePose> poses, int64_t epoch,
+                           StatusCallback done) = 0;
+
   // Whatever its etag when `etag` is empty. Errors: those of Update.
   virtual void Delete(const std::string& id, const std::string& etag, int64_t epoch,
                       StatusCallback done) = 0;
 
   // Errors: InvalidArgument (limit).
   virtual void List(const ListRequest& request, PageCallback done) = 0;
+
+  // Says that these are in use, all in one write; ids that are not there do not count. A record's
+  // last_used_s never goes back, whatever the clock does.
+  virtual void Touch(std::vector<std::string> ids, int64_t now_s, StatusCallback done) = 0;
+
+  // Records of all owners that were last used before that time, longest unused first, up to `limit`
+  // of them; `next` stays empty. Errors: InvalidArgument (limit).
+  virtual void ListUnused(int64_t before_s, int limit, PageCallback done) = 0;
 };
+
+// Where a store takes the time from: unix seconds. Any thread may call it.
+using UnixClock = std::function<int64_t()>;
+int64_t SystemUnixSeconds();
 
 }  // namespace tissueform

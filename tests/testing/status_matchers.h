@@ -33,6 +33,9 @@ MATCHER_P2(StatusIs, code, message_matcher, "") {
                                        result_listener);
 }
 
+// Whatever the message.
+inline auto StatusIs(absl::StatusCode code) { return StatusIs(code, ::testing::_); }
+
 // ASSERT_OK_AND_ASSIGN(const TetMesh mesh, TetMesh::Create(...));
 #define ASSERT_OK_AND_ASSIGN(declaration, expression) \
   ASSERT_OK_AND_ASSIGN_IMPL(TF_TEST_CONCAT(status_or_, __LINE__), declaration, expression)

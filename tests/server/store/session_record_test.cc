@@ -4,6 +4,7 @@
 #include "server/store/session_record.h"
 
 #include <string>
+#include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -37,6 +38,7 @@ SessionRecord SomeRecord() {
                           .pivot_mm = {1, 2, 3},
                           .translation_mm = {4, 5, 6},
                           .scale = 1.5};
+  record.node_order = {2, 0, 1};
   record.request_id = "once";
   record.request_fingerprint = "print";
   return record;
@@ -67,6 +69,7 @@ TEST(SessionRecordTest, ARecordSurvivesItsBytes) {
   EXPECT_EQ(back.last_poses[1].pivot_mm, record.last_poses[1].pivot_mm);
   EXPECT_EQ(back.last_poses[1].translation_mm, record.last_poses[1].translation_mm);
   EXPECT_EQ(back.last_poses[1].scale, 1.5);
+  EXPECT_EQ(back.node_order, record.node_order);
   EXPECT_EQ(back.request_id, record.request_id);
   EXPECT_EQ(back.request_fingerprint, record.request_fingerprint);
   EXPECT_EQ(SerializeRecord(back), SerializeRecord(record)) << "nothing else is in the bytes";
@@ -107,6 +110,25 @@ TEST(SessionRecordTest, WhatDoesNotAgreeWithItselfIsDamaged) {
   damaged([](SessionRecord& record) { record.mesh_sha256 = "A"; }, "mesh");
   damaged([](SessionRecord& record) { record.last_poses.pop_back(); }, "1 poses for 2 handles");
   damaged([](SessionRecord& record) { record.last_poses[1].scale = -1; }, "pose 1");
+  damaged([](SessionRecord& record) { record.node_order[0] = 1; }, "no permutation");
+  damaged([](SessionRecord& record) { record.node_order[0] = 3; }, "no permutation");
+  damaged([](SessionRecord& record) { record.node_order[0] = -1; }, "no permutation");
+}
+
+TEST(SessionRecordTest, PosesAloneSurviveTheirBytes) {
+  const std::vector<HandlePose> poses = SomeRecord().last_poses;
+  ASSERT_OK_AND_ASSIGN(const std::vector<HandlePose> back, ParsePoses(SerializePoses(poses)));
+  ASSERT_EQ(back.size(), 2);
+  EXPECT_EQ(back[1].rotation_vector, poses[1].rotation_vector);
+  EXPECT_EQ(back[1].pivot_mm, poses[1].pivot_mm);
+  EXPECT_EQ(back[1].translation_mm, poses[1].translation_mm);
+  EXPECT_EQ(back[1].scale, 1.5);
+  ASSERT_OK_AND_ASSIGN(const std::vector<HandlePose> none, ParsePoses(SerializePoses({})));
+  EXPECT_TRUE(none.empty());
+  std::vector<HandlePose> bad = poses;
+  bad[0].scale = 0;
+  EXPECT_THAT(ParsePoses(SerializePoses(bad)), StatusIs(absl::StatusCode::kDataLoss));
+  EXPECT_THAT(ParsePoses("no poses"), StatusIs(absl::StatusCode::kDataLoss));
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include <functional>
+#include <atomic>
 #include <future>
 #include <memory>
 #include <string>
@@ -12,11 +12,11 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "server/store/in_memory_session_store.h"
 #include "server/store/session_store.h"
+#include "tests/server/store/stores_case.h"
 #include "tests/testing/status_matchers.h"
 
-// What every session store must do. A new store adds itself at the end.
+// What every session store must do. A new store adds itself to AllStores.
 namespace tissueform {
 namespace {
 
@@ -26,17 +26,10 @@ using ::testing::IsEmpty;
 using ::tissueform::testing::IsOk;
 using ::tissueform::testing::StatusIs;
 
-struct StoreCase {
-  std::string name;
-  std::function<std::unique_ptr<SessionStore>()> make;  // an empty one
-};
-
-void PrintTo(const StoreCase& store_case, std::ostream* out) { *out << store_case.name; }
-
 using Result = absl::StatusOr<SessionRecord>;
 
 // Calls that wait for their answer.
-class SessionStoreContractTest : public ::testing::TestWithParam<StoreCase> {
+class SessionStoreContractTest : public ::testing::TestWithParam<StoresCase> {
  protected:
   static SessionRecord Record(const std::string& id, const std::string& owner = "") {
     SessionRecord record;
@@ -65,6 +58,22 @@ class SessionStoreContractTest : public ::testing::TestWithParam<StoreCase> {
     return Wait<absl::StatusOr<SessionStore::Page>>(
         [&](auto done) { store_->List(request, done); });
   }
+  absl::Status CommitPoses(const std::string& id, const std::vector<HandlePose>& poses,
+                           int64_t epoch = 1) {
+    return Wait<absl::Status>([&](auto done) { store_->CommitPoses(id, poses, epoch, done); });
+  }
+  absl::Status Touch(const std::vector<std::string>& ids, int64_t now_s) {
+    return Wait<absl::Status>([&](auto done) { store_->Touch(ids, now_s, done); });
+  }
+  absl::StatusOr<SessionStore::Page> ListUnused(int64_t before_s, int limit = 100) {
+    return Wait<absl::StatusOr<SessionStore::Page>>(
+        [&](auto done) { store_->ListUnused(before_s, limit, done); });
+  }
+  static HandlePose Moved(double x_mm) {
+    HandlePose pose;
+    pose.translation_mm.x() = x_mm;
+    return pose;
+  }
   static std::vector<std::string> Ids(const SessionStore::Page& page) {
     std::vector<std::string> ids;
     for (const SessionRecord& record : page.records) ids.push_back(record.id);
@@ -79,7 +88,10 @@ class SessionStoreContractTest : public ::testing::TestWithParam<StoreCase> {
     return future.get();
   }
 
-  const std::unique_ptr<SessionStore> store_ = GetParam().make();
+  // The store's clock.
+  std::atomic<int64_t> now_s_ = 1000;
+  const std::unique_ptr<Stores> stores_ = GetParam().make([this] { return now_s_.load(); });
+  SessionStore* const store_ = &stores_->sessions();
 };
 
 TEST_P(SessionStoreContractTest, WhatWasCreatedIsFoundAsItWas) {
@@ -199,10 +211,13 @@ TEST_P(SessionStoreContractTest, ListsByOwnerInOrderPageAfterPage) {
   ASSERT_OK_AND_ASSIGN(page, List(request));
   EXPECT_THAT(Ids(page), ElementsAre("d", "e"));
   EXPECT_EQ(page.next, "") << "that was all";
-  ASSERT_OK_AND_ASSIGN(page, List({}));
+  ASSERT_OK_AND_ASSIGN(page, List({.owner = ""}));
   EXPECT_THAT(Ids(page), ElementsAre("anonymous"));
   ASSERT_OK_AND_ASSIGN(page, List({.owner = "nobody", .after = ""}));
   EXPECT_THAT(Ids(page), IsEmpty());
+  ASSERT_OK_AND_ASSIGN(page, List({}));
+  EXPECT_THAT(Ids(page), ElementsAre("a", "a2", "anonymous", "b", "b2", "c2", "d", "d2", "e", "e2"))
+      << "no owner: of all";
   EXPECT_THAT(List({.owner = "", .after = "", .limit = 0}),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("limit")));
 }
@@ -277,9 +292,90 @@ TEST_P(SessionStoreContractTest, AnAnswerMayAskTheStoreAgain) {
   EXPECT_THAT(answer.get_future().get(), IsOk()) << "no lock is held over it";
 }
 
-INSTANTIATE_TEST_SUITE_P(Stores, SessionStoreContractTest,
-                         ::testing::Values(StoreCase{
-                             "InMemory", [] { return std::make_unique<InMemorySessionStore>(); }}),
+TEST_P(SessionStoreContractTest, ACommitReplacesThePosesAndLeavesTheEtag) {
+  SessionRecord record = Record("a");
+  record.handles.push_back({"maxilla", {4}});
+  record.node_order = {4, 0, 3, 1, 2};
+  ASSERT_OK_AND_ASSIGN(record, Create(record));
+  now_s_ = 1007;
+  ASSERT_THAT(CommitPoses("a", {Moved(1), Moved(2)}), IsOk());
+  ASSERT_OK_AND_ASSIGN(SessionRecord found, Get("a"));
+  ASSERT_EQ(found.last_poses.size(), 2);
+  EXPECT_EQ(found.last_poses[1].translation_mm.x(), 2);
+  EXPECT_EQ(found.etag, record.etag);
+  EXPECT_EQ(found.last_used_s, 1007) << "a drag is a use";
+  found.last_poses.clear();
+  EXPECT_EQ(SerializeRecord(found), SerializeRecord(record)) << "nothing else has changed";
+  ASSERT_THAT(CommitPoses("a", {}), IsOk());
+  ASSERT_OK_AND_ASSIGN(found, Get("a"));
+  EXPECT_THAT(found.last_poses, IsEmpty()) << "at rest again";
+  found.project = "study";
+  EXPECT_THAT(Update(found), IsOk()) << "the etag is still good";
+}
+
+TEST_P(SessionStoreContractTest, AnUpdateReplacesThePosesToo) {
+  ASSERT_OK_AND_ASSIGN(SessionRecord record, Create(Record("a")));
+  ASSERT_THAT(CommitPoses("a", {Moved(1)}), IsOk());
+  record.last_poses = {Moved(5)};
+  ASSERT_THAT(Update(record), IsOk());
+  ASSERT_OK_AND_ASSIGN(record, Get("a"));
+  ASSERT_EQ(record.last_poses.size(), 1);
+  EXPECT_EQ(record.last_poses[0].translation_mm.x(), 5);
+}
+
+TEST_P(SessionStoreContractTest, ACommitThatDoesNotFitIsRefused) {
+  ASSERT_THAT(Create(Record("a"), 5), IsOk());
+  ASSERT_THAT(CommitPoses("a", {Moved(1)}, 5), IsOk());
+  EXPECT_THAT(CommitPoses("b", {}, 5), StatusIs(absl::StatusCode::kNotFound, HasSubstr("b")));
+  EXPECT_THAT(CommitPoses("a", {Moved(2), Moved(3)}, 4),
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("5")));
+  EXPECT_THAT(CommitPoses("a", {Moved(2), Moved(3)}, 5),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("1 handles, not 2")));
+  ASSERT_OK_AND_ASSIGN(SessionRecord found, Get("a"));
+  ASSERT_EQ(found.last_poses.size(), 1);
+  EXPECT_EQ(found.last_poses[0].translation_mm.x(), 1) << "nothing of it was kept";
+  ASSERT_THAT(CommitPoses("a", {Moved(2)}, 6), IsOk());
+  EXPECT_THAT(Update(found, 5), StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("6")))
+      << "a commit is a write under its epoch";
+}
+
+TEST_P(SessionStoreContractTest, TimesAreTheStoresAndNeverGoBack) {
+  SessionRecord record = Record("a");
+  record.created_s = 1;
+  record.last_used_s = 5000;
+  ASSERT_OK_AND_ASSIGN(record, Create(record));
+  EXPECT_EQ(record.created_s, 1000);
+  EXPECT_EQ(record.last_used_s, 1000);
+  now_s_ = 900;  // the clock was set back
+  record.created_s = 7;
+  ASSERT_OK_AND_ASSIGN(record, Update(record));
+  EXPECT_EQ(record.created_s, 1000);
+  EXPECT_EQ(record.last_used_s, 1000);
+  ASSERT_THAT(Touch({"b", "a"}, 1200), IsOk());
+  ASSERT_THAT(Touch({"a"}, 1100), IsOk());
+  ASSERT_OK_AND_ASSIGN(record, Get("a"));
+  EXPECT_EQ(record.last_used_s, 1200);
+  EXPECT_EQ(record.created_s, 1000);
+}
+
+TEST_P(SessionStoreContractTest, WhatIsLongUnusedIsListedOldestFirst) {
+  for (const char* id : {"a", "b", "c", "d"}) {
+    ASSERT_THAT(Create(Record(id, id)), IsOk());
+  }
+  ASSERT_THAT(Touch({"a"}, 1300), IsOk());
+  ASSERT_THAT(Touch({"b"}, 1100), IsOk());
+  ASSERT_THAT(Touch({"c"}, 1200), IsOk());
+  ASSERT_OK_AND_ASSIGN(SessionStore::Page page, ListUnused(1300));
+  EXPECT_THAT(Ids(page), ElementsAre("d", "b", "c"));
+  ASSERT_OK_AND_ASSIGN(page, ListUnused(1300, 2));
+  EXPECT_THAT(Ids(page), ElementsAre("d", "b"));
+  ASSERT_OK_AND_ASSIGN(page, ListUnused(1000));
+  EXPECT_THAT(Ids(page), IsEmpty());
+  EXPECT_THAT(ListUnused(1000, 0),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("limit")));
+}
+
+INSTANTIATE_TEST_SUITE_P(Stores, SessionStoreContractTest, ::testing::ValuesIn(AllStores()),
                          [](const auto& of) { return of.param.name; });
 
 }  // namespace

@@ -1,0 +1,67 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+#include "server/store/data_folder.h"
+#include "server/store/stores.h"
+
+namespace tissueform {
+
+// What was found damaged when a store was opened.
+struct DamagedItem {
+  std::string what;       // "session \"a\"", "mesh 0123...", "the database"
+  std::string why;        // what is wrong with it
+  std::string set_aside;  // the file that holds what was there; empty: nothing was
+};
+
+struct DurableStoreOptions {
+  UnixClock clock = SystemUnixSeconds;
+  UploadLimits uploads;
+  // Blobs whose digest is checked at the start, in bytes, the newest first; of the others only the
+  // size. Those are checked whenever they are read.
+  int64_t max_checked_bytes = int64_t{4} << 30;
+};
+
+// What the server keeps for good: rows in one SQLite database, meshes and positions as files beside
+// it (docs/operations.md, "What the server keeps, and where").
+//
+// One thread writes and reads rows, in the order of the calls; what waits is committed together. A
+// call is answered after its commit, on that thread for SessionStore. From such an answer the
+// blocking stores must not be called: they would wait for themselves.
+class DurableStore final : public Stores {
+ public:
+  // Opens the store, or makes it. A store of the version before is brought to this one's. Checks
+  // all of it: what is damaged is moved to the folder `damaged` and stands in damaged(), the rest
+  // serves. Blobs that nothing claims are removed.
+  //
+  // Errors: FailedPrecondition (written by a newer server; no database at all), ResourceExhausted
+  // (the disk is full), or what the disk says.
+  static absl::StatusOr<std::unique_ptr<DurableStore>> Open(DataFolder folder,
+                                                            DurableStoreOptions options = {});
+
+  ~DurableStore() override;
+
+  SessionStore& sessions() override;
+  MeshStore& meshes() override;
+  UploadStore& uploads() override;
+  PredictionStore& predictions() override;
+
+  const std::vector<DamagedItem>& damaged() const;
+
+ private:
+  struct Parts;
+
+  explicit DurableStore(std::unique_ptr<Parts> parts);
+
+  const std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,33 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+
+namespace tissueform {
+
+// What the stores refuse, in the same words whatever they keep it in.
+
+absl::Status NoSession(absl::string_view id);      // NotFound
+absl::Status SessionExists(absl::string_view id);  // AlreadyExists
+// OK when a write made from version `etag` (empty: from any) under `epoch` may follow what is kept;
+// otherwise FailedPrecondition (the epoch is older), then Aborted (the etag is another).
+absl::Status CheckSessionWrite(absl::string_view id, absl::string_view etag, int64_t epoch,
+                               absl::string_view kept_etag, int64_t kept_epoch);
+// InvalidArgument when there is neither no pose nor one a handle.
+absl::Status CheckPoseCount(absl::string_view id, size_t poses, size_t handles);
+
+absl::Status NoMesh(absl::string_view sha256);                        // NotFound
+absl::Status NoPrediction(absl::string_view id);                      // NotFound
+absl::Status PredictionExists(absl::string_view id);                  // AlreadyExists
+absl::Status NoUpload(absl::string_view sha256);                      // NotFound
+absl::Status BadLimit(int limit);                                     // InvalidArgument
+absl::Status CheckMeshName(absl::string_view sha256);                 // InvalidArgument: no SHA-256
+absl::Status Damaged(absl::string_view what, absl::string_view why);  // DataLoss
+
+}  // namespace tissueform

@@ -1,0 +1,26 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "server/store/mesh_store.h"
+#include "server/store/prediction_store.h"
+#include "server/store/session_store.h"
+#include "server/store/upload_store.h"
+
+namespace tissueform {
+
+// All that a server keeps: OpenInMemoryStores (in_memory_stores.h) or DurableStore::Open.
+//
+// Its end waits for the calls that were made; none may be made any longer.
+class Stores {
+ public:
+  virtual ~Stores() = default;
+
+  virtual SessionStore& sessions() = 0;
+  virtual MeshStore& meshes() = 0;
+  virtual UploadStore& uploads() = 0;
+  virtual PredictionStore& predictions() = 0;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,31 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+
+#include "core/mesh_payload/mesh_payload.h"
+#include "server/store/mesh_store.h"
+#include "server/store/prediction_store.h"
+#include "server/store/session_record.h"
+#include "server/store/upload_store.h"
+
+namespace tissueform {
+
+// Numbers choose the content: equal for equal numbers, different for others.
+
+// Arrays of a mesh; no solid need be in them.
+MeshPayload SampleMesh(int number, int num_vertices = 50);
+MeshRecord RecordOf(const MeshPayload& payload);
+UploadAnnouncement AnnouncementOf(const MeshPayload& payload);
+// The payload as it is sent.
+std::string BytesOf(const MeshPayload& payload);
+
+SessionRecord SampleSession(const std::string& id, int number);
+
+PredictionRecord SamplePrediction(const std::string& id, const std::string& owner = "planner",
+                                  const std::string& session = "s", int64_t vertex_count = 40);
+std::string SamplePositions(int number, int64_t vertex_count = 40);
+
+}  // namespace tissueform
