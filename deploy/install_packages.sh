@@ -4,7 +4,7 @@
 #
 # Installs those packages of deploy/packages.txt that are missing; does nothing where none is.
 #
-#   deploy/install_packages.sh [build|run|lint]...     everything without an argument
+#   deploy/install_packages.sh [build|run|lint|protocol]...     build, run and lint without an argument
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -18,7 +18,7 @@ while read -r package purpose _; do
   fi
 done <"$list"
 if [[ ${#wanted[@]} -eq 0 ]]; then
-  echo "install_packages.sh: no package is for:$purposes(known: build run lint)" >&2
+  echo "install_packages.sh: no package is for:$purposes(known: build run lint protocol)" >&2
   exit 2
 fi
 

@@ -1,0 +1,25 @@
+#!/usr/bin/env bash
+# Copyright 2026 The Tissueform Authors.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+#
+# Installs buf as deploy/protocol_tools/node_modules/buf, which checks the protocol (tests/scripts/check_protocol.sh) and
+# calls the server in a test, from npm in the version of package-lock.json. Who builds, runs or shows Tissueform does
+# not need it.
+#
+# The programs themselves are asked for, not @bufbuild/buf, which would fetch one of them by the same names.
+set -euo pipefail
+cd "$(dirname "$0")/protocol_tools"
+
+wanted=$(sed -n 's/.*"@bufbuild\/buf-linux-x64": "\(.*\)".*/\1/p' package.json)
+if [[ $(node_modules/buf --version 2>/dev/null || true) == "$wanted" ]]; then
+  exit 0
+fi
+
+# Debian's npm where there is none: other sources of Node bring their own, and cannot stand beside it.
+command -v npm >/dev/null || ../install_packages.sh protocol
+npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
+(cd node_modules && ln -sf @bufbuild/buf-linux-*/bin/buf buf)
+if [[ $(node_modules/buf --version 2>/dev/null || true) != "$wanted" ]]; then
+  echo "install_protocol_tools.sh: npm has no buf $wanted for this machine" >&2
+  exit 1
+fi
