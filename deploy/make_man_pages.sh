@@ -17,7 +17,7 @@ commands=(
   "tissueform"
   "tissueform mesh check" "tissueform mesh generate"
   "tissueform plan build" "tissueform plan check"
-  "tissueform deform" "tissueform run" "tissueform demo" "tissueform load" "tissueform compare" "tissueform experiments" "tissueform bench"
+  "tissueform deform" "tissueform run" "tissueform demo" "tissueform load" "tissueform server-info" "tissueform compare" "tissueform experiments" "tissueform bench"
   "tissueform-server"
 )
 

@@ -69,6 +69,18 @@ ConnectionListener::Options ListenerOptions(const ServerOptions& options) {
           .most_of_address = options.max_connections_per_address};
 }
 
+NamedLimits LimitsOf(const ServerOptions& options) {
+  NamedLimits limits = ToNamedLimits(options.limits);
+  limits["max_message_bytes"] = kMaxReceiveBytes;
+  limits["memory_budget_bytes"] = options.memory_budget_bytes;
+  limits["workers"] = options.workers;
+  limits["max_calls_per_connection"] = options.max_calls_per_connection;
+  limits["max_connections"] = options.max_connections;
+  limits["max_connections_per_address"] = options.max_connections_per_address;
+  limits["drain_deadline_ms"] = std::chrono::milliseconds(options.drain_deadline).count();
+  return limits;
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
@@ -87,7 +99,8 @@ TissueformServer::TissueformServer(const ServerOptions& options)
       streams_(options.limits.max_streams),
       mesh_service_(&gate_, options.limits, &catalog_, pool_.get(), &timer_),
       session_service_(&gate_, options.limits, &catalog_, &registry_),
-      deform_service_(&gate_, options.limits, &registry_, &streams_, &timer_) {
+      deform_service_(&gate_, options.limits, &registry_, &streams_, &timer_),
+      server_info_service_(&gate_, LimitsOf(options)) {
   SetBlasThreads(1);  // the pool's workers share the cores already
   budget_.set_reclaimer([this] { Reclaim(); });
 }
@@ -113,6 +126,7 @@ absl::Status TissueformServer::Listen() {
   builder.RegisterService(&mesh_service_);
   builder.RegisterService(&session_service_);
   builder.RegisterService(&deform_service_);
+  builder.RegisterService(&server_info_service_);
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) return absl::InternalError("gRPC does not start");
   listener_->Start([this](int fd, int listener_fd) {

@@ -78,10 +78,19 @@ TissueformClient::TissueformClient(const std::shared_ptr<grpc::Channel>& channel
     : options_(options),
       meshes_(v1::MeshService::NewStub(channel)),
       sessions_(v1::SessionService::NewStub(channel)),
-      deform_(v1::DeformService::NewStub(channel)) {}
+      deform_(v1::DeformService::NewStub(channel)),
+      server_info_(v1::ServerInfoService::NewStub(channel)) {}
 
 void TissueformClient::SetDeadline(grpc::ClientContext* context) const {
   context->set_deadline(std::chrono::system_clock::now() + options_.call_deadline);
+}
+
+absl::StatusOr<v1::ServerInfo> TissueformClient::GetServerInfo() {
+  grpc::ClientContext context;
+  SetDeadline(&context);
+  v1::ServerInfo info;
+  TF_RETURN_IF_ERROR(FromGrpcStatus(server_info_->GetServerInfo(&context, {}, &info)));
+  return info;
 }
 
 absl::StatusOr<v1::Mesh> TissueformClient::UploadMesh(const TetMesh& mesh,

@@ -21,6 +21,7 @@
 #include "proto/conversion/session_conversion.h"
 #include "tissueform/v1/deform_service.grpc.pb.h"
 #include "tissueform/v1/mesh_service.grpc.pb.h"
+#include "tissueform/v1/server_info.grpc.pb.h"
 #include "tissueform/v1/session_service.grpc.pb.h"
 
 namespace tissueform {
@@ -45,6 +46,9 @@ class TissueformClient {
   // Errors: InvalidArgument (no port), Unavailable when nobody answers within the deadline.
   static absl::StatusOr<std::unique_ptr<TissueformClient>> Connect(const std::string& address,
                                                                    const Options& options);
+
+  // What the server is and takes.
+  absl::StatusOr<v1::ServerInfo> GetServerInfo();
 
   // Uploads the mesh with its arrays, unless the server has it.
   //
@@ -77,6 +81,7 @@ class TissueformClient {
   const std::unique_ptr<v1::MeshService::Stub> meshes_;
   const std::unique_ptr<v1::SessionService::Stub> sessions_;
   const std::unique_ptr<v1::DeformService::Stub> deform_;
+  const std::unique_ptr<v1::ServerInfoService::Stub> server_info_;
 };
 
 }  // namespace tissueform

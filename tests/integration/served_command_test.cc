@@ -120,6 +120,25 @@ TEST_F(ServedCommandTest, RunWithoutServerFailsAndWritesNothing) {
   EXPECT_FALSE(fs::exists(PathOf("run.vtu")));
 }
 
+TEST_F(ServedCommandTest, ServerInfoAsTableAndAsJson) {
+  ASSERT_OK_AND_ASSIGN(
+      const std::unique_ptr<ServerProcess> server,
+      ServerProcess::Start(ProgramPath("tissueform-server"),
+                           {"--port", "0", "--log-level", "warn", "--max-sessions", "17"},
+                           kPatience));
+  const std::string command =
+      ProgramPath("tissueform") + " server-info --server " + server->address();
+  ASSERT_EQ(ExitCodeOf(command + " > " + PathOf("table.txt")), 0);
+  EXPECT_THAT(Read("table.txt"),
+              AllOf(ContainsRegex("protocol +tissueform.v1"), ContainsRegex("max_sessions +17\n"),
+                    ContainsRegex("neo_hookean +yes +no\n")));
+  ASSERT_EQ(ExitCodeOf(command + " --json > " + PathOf("info.json")), 0);
+  const Json info = Json::parse(Read("info.json"));
+  EXPECT_EQ(info["limits"]["max_sessions"], 17);
+  EXPECT_EQ(info["draining"], false);
+  EXPECT_EQ(info["models"].size(), 4);
+}
+
 TEST_F(ServedCommandTest, DemoTellsHowTheFaceFollowsAndLeavesResultsAndPictures) {
   ASSERT_EQ(RunDemo("--plan " + kChinPlan + " --seconds 0.5"), 0);
   EXPECT_THAT(

@@ -11,6 +11,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 
+#include "core/base/software_version.h"
+
 namespace tissueform {
 namespace {
 
@@ -29,7 +31,7 @@ std::string Processor() {
 
 Circumstances MeasuringCircumstances() {
   return {absl::StrCat(Processor(), ", ", std::thread::hardware_concurrency(), " cores"),
-          TISSUEFORM_COMPILER, TISSUEFORM_COMMIT};
+          TISSUEFORM_COMPILER, SoftwareCommit()};
 }
 
 nlohmann::ordered_json CircumstancesJson() {

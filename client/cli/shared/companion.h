@@ -26,6 +26,8 @@ inline constexpr CompanionCommand kDemoCommand = {
 inline constexpr CompanionCommand kLoadCommand = {
     "load", "drag on a server many times at once, and tell how old the pictures were",
     "tissueform-online"};
+inline constexpr CompanionCommand kServerInfoCommand = {
+    "server-info", "tell what a server is: version, models, limits", "tissueform-online"};
 inline constexpr CompanionCommand kExperimentsCommand = {
     "experiments", "compute the paper's figures and table again, and the models' accuracy",
     "tissueform-experiments"};

@@ -1,0 +1,93 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/rpc/server_info_service.h"
+
+#include "absl/status/status.h"
+#include "absl/strings/ascii.h"
+#include "absl/strings/strip.h"
+
+#include "core/base/software_version.h"
+#include "proto/conversion/geometry_conversion.h"
+
+namespace tissueform {
+namespace {
+
+int64_t Milliseconds(std::chrono::milliseconds duration) { return duration.count(); }
+
+// DEFORMATION_MODEL_LINEAR_ELASTIC is the linear_elastic of plans.
+std::string PlanName(v1::DeformationModel model) {
+  return absl::AsciiStrToLower(
+      absl::StripPrefix(v1::DeformationModel_Name(model), "DEFORMATION_MODEL_"));
+}
+
+void AddModel(v1::DeformationModel model, bool iterates, bool has_prepared_answers,
+              v1::ServerInfo* info) {
+  v1::ModelInfo* proto = info->add_models();
+  proto->set_model(model);
+  proto->set_name(PlanName(model));
+  proto->set_iterates(iterates);
+  proto->set_has_prepared_answers(has_prepared_answers);
+}
+
+// Those that a request may name: conversion decides, not a second list.
+void AddEncodings(v1::ServerInfo* info) {
+  for (int value = v1::PositionEncoding_MIN; value <= v1::PositionEncoding_MAX; ++value) {
+    const auto encoding = static_cast<v1::PositionEncoding>(value);
+    if (value != v1::POSITION_ENCODING_UNSPECIFIED && v1::PositionEncoding_IsValid(value) &&
+        CheckEncoding(encoding).ok()) {
+      info->add_encodings(encoding);
+    }
+  }
+}
+
+}  // namespace
+
+NamedLimits ToNamedLimits(const ServiceLimits& limits) {
+  return {{"max_vertices", limits.max_vertices},
+          {"max_tets", limits.max_tets},
+          {"max_mesh_bytes", limits.max_mesh_bytes},
+          {"max_sessions", limits.max_sessions},
+          {"max_streams", limits.max_streams},
+          {"session_idle_ttl_ms", Milliseconds(limits.session_idle_ttl)},
+          {"configuration_deadline_ms", Milliseconds(limits.configuration_deadline)},
+          {"upload_silence_ms", Milliseconds(limits.upload_silence)},
+          {"max_handles", limits.max_handles},
+          {"max_cell_arrays", limits.max_cell_arrays},
+          {"max_name_bytes", limits.max_name_bytes},
+          {"max_request_id_bytes", limits.max_request_id_bytes},
+          {"max_chunk_bytes", limits.max_chunk_bytes},
+          {"max_unacked", limits.max_unacked},
+          {"max_iterations", limits.max_iterations}};
+}
+
+ServerInfoService::ServerInfoService(ServiceGate* gate, const NamedLimits& limits) : gate_(gate) {
+  info_.set_version(SoftwareVersion());
+  info_.set_commit(SoftwareCommit());
+  info_.set_api_version("tissueform.v1");
+  for (const auto& [name, value] : limits) {
+    v1::ServerLimit* limit = info_.add_limits();
+    limit->set_name(name);
+    limit->set_value(value);
+  }
+  AddModel(v1::DEFORMATION_MODEL_GRADIENT_FIELD, false, true, &info_);
+  AddModel(v1::DEFORMATION_MODEL_ARAP, true, false, &info_);
+  AddModel(v1::DEFORMATION_MODEL_LINEAR_ELASTIC, false, true, &info_);
+  AddModel(v1::DEFORMATION_MODEL_NEO_HOOKEAN, true, false, &info_);
+  AddEncodings(&info_);
+}
+
+grpc::ServerUnaryReactor* ServerInfoService::GetServerInfo(
+    grpc::CallbackServerContext* context, const v1::GetServerInfoRequest* /*request*/,
+    v1::ServerInfo* response) {
+  CallScope scope(context, "ServerInfoService.GetServerInfo", CallKind::kUpkeep, gate_);
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  if (scope.admission().ok()) {
+    *response = info_;
+    response->set_draining(gate_->draining());
+  }
+  reactor->Finish(scope.End(scope.admission()));
+  return reactor;
+}
+
+}  // namespace tissueform
