@@ -53,7 +53,9 @@ void AddLimits(CLI::App& app, ServerOptions* options) {
   AddNumber(app, "--max-mesh-mib", limits.max_mesh_bytes / kMebibyte, 1, kMaxMebibytes,
             "size of one mesh as it is sent", MebibytesInto(&limits.max_mesh_bytes));
   AddNumber(app, "--max-sessions", limits.max_sessions, 1, kMaxCount,
-            "sessions held at the same time", Into(&limits.max_sessions));
+            "sessions in memory at the same time", Into(&limits.max_sessions));
+  AddNumber(app, "--max-stored-sessions", limits.max_stored_sessions, 1, kMaxCount,
+            "sessions kept, in memory or not", Into(&limits.max_stored_sessions));
   AddNumber(app, "--max-streams", limits.max_streams, 1, kMaxCount,
             "drags (Deform streams) open at the same time", Into(&limits.max_streams));
   AddNumber(app, "--session-idle-ttl", limits.session_idle_ttl.count(), 0, kMaxSeconds,

@@ -32,6 +32,10 @@ constexpr int kHandshakeMilliseconds = 10'000;
 // For what was finished just now to leave the buffers.
 constexpr std::chrono::milliseconds kLastMessagesGrace{500};
 
+// Of the memory budget: how far sessions that are not in use are evicted once something does not
+// fit. The high watermark is the budget itself.
+constexpr double kLowWatermark = 0.8;
+
 void PrepareProcessOnce() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -95,14 +99,14 @@ TissueformServer::TissueformServer(const ServerOptions& options)
       budget_(options.memory_budget_bytes),
       catalog_(options.limits, &budget_),
       pool_(std::make_unique<WorkerPool>(options.workers)),
-      registry_(options.limits, &budget_, pool_.get(), &store_),
+      registry_(options.limits, &budget_, pool_.get(), &store_, &catalog_),
       streams_(options.limits.max_streams),
-      mesh_service_(&gate_, options.limits, &catalog_, pool_.get(), &timer_),
+      mesh_service_(&gate_, options.limits, &catalog_, &registry_, pool_.get(), &timer_),
       session_service_(&gate_, options.limits, &catalog_, &registry_),
       deform_service_(&gate_, options.limits, &registry_, &streams_, &timer_),
       server_info_service_(&gate_, LimitsOf(options)) {
   SetBlasThreads(1);  // the pool's workers share the cores already
-  budget_.set_reclaimer([this] { Reclaim(); });
+  budget_.set_reclaimer([this](int64_t bytes) { Reclaim(bytes); });
 }
 
 TissueformServer::~TissueformServer() {
@@ -138,13 +142,24 @@ absl::Status TissueformServer::Listen() {
   return absl::OkStatus();
 }
 
-void TissueformServer::Reclaim() {
-  registry_.RemoveIdle();
+void TissueformServer::Reclaim(int64_t bytes) {
+  // Down to the low watermark, so that the next who needs room finds some.
+  const auto low =
+      static_cast<int64_t>(kLowWatermark * static_cast<double>(options_.memory_budget_bytes));
+  const auto most = [this, bytes](int64_t watermark) {
+    return budget_.reserved_bytes() <= watermark - bytes;
+  };
+  const auto enough = [&] { return most(low); };
+  registry_.Evict(enough);
   // Afterwards: a mesh is idle only when no session holds it.
-  if (const int count = catalog_.RemoveIdle(); count > 0) {
-    spdlog::info("removed {} meshes that were idle for more than {} s", count,
-                 options_.limits.session_idle_ttl.count());
+  int meshes = 0;
+  if (catalog_.keeps_meshes()) {
+    if (!enough()) meshes = catalog_.RemoveIdle(SessionRegistry::kInUse);
+  } else if (!most(options_.memory_budget_bytes)) {
+    registry_.RemoveIdle();
+    meshes = catalog_.RemoveIdle(options_.limits.session_idle_ttl);
   }
+  if (meshes > 0) spdlog::info("{} meshes that nobody uses have left memory", meshes);
 }
 
 void TissueformServer::Drain() {

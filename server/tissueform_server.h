@@ -55,7 +55,7 @@ class TissueformServer {
   explicit TissueformServer(const ServerOptions& options);
 
   absl::Status Listen();
-  void Reclaim();
+  void Reclaim(int64_t bytes);
 
   // Constant.
   const ServerOptions options_;

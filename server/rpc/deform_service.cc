@@ -3,7 +3,9 @@
 
 #include "server/rpc/deform_service.h"
 
+#include <atomic>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -27,11 +29,10 @@ struct DeformOnceJob {
 };
 
 absl::StatusOr<DeformOnceJob> ReadRequest(const v1::DeformOnceRequest& request,
-                                          SessionRegistry* registry) {
+                                          std::shared_ptr<Session> session) {
   DeformOnceJob job;
-  TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(request.session()));
   TF_RETURN_IF_ERROR(CheckEncoding(request.encoding()));
-  TF_ASSIGN_OR_RETURN(job.session, registry->Find(id));
+  job.session = std::move(session);
   TF_ASSIGN_OR_RETURN(job.model, ToModel(request.model(), job.session->model()));
   TF_ASSIGN_OR_RETURN(job.poses, ToPoses(request.poses(), job.session->constraints()));
   TF_ASSIGN_OR_RETURN(job.choice,
@@ -62,43 +63,81 @@ absl::Status Run(const DeformOnceJob& job, const Cancellation& cancellation,
   return absl::OkStatus();
 }
 
+// One DeformOnce call. Deletes itself when gRPC is done with it.
+class DeformOnceCall : public grpc::ServerUnaryReactor {
+ public:
+  DeformOnceCall(CallScope scope, SessionRegistry* registry, const v1::DeformOnceRequest* request,
+                 v1::DeformOnceResponse* response)
+      : scope_(std::move(scope)), registry_(registry), request_(*request), response_(*response) {}
+
+  void Start() {
+    const absl::StatusOr<std::string> id = scope_.admission().ok()
+                                               ? ParseSessionName(request_.session())
+                                               : absl::StatusOr<std::string>(scope_.admission());
+    if (!id.ok()) {
+      End(id.status());
+      return;
+    }
+    registry_->Open(*id, cancelled_, [this](absl::StatusOr<std::shared_ptr<Session>> session) {
+      const absl::Status status =
+          session.ok() ? TakeSession(*std::move(session)) : session.status();
+      if (!status.ok()) End(status);
+    });
+  }
+
+  void OnCancel() override {
+    *cancelled_ = true;
+    registry_->CancelWait(cancelled_);
+  }
+
+  void OnDone() override { delete this; }
+
+ private:
+  absl::Status TakeSession(std::shared_ptr<Session> session) {
+    TF_ASSIGN_OR_RETURN(job_, ReadRequest(request_, std::move(session)));
+    if (job_.session->HasModel(job_.model)) {
+      Solve();
+    } else {
+      job_.session->making_strand().Post(Lane::kBatch, [this] { MakeModel(); });
+    }
+    return absl::OkStatus();
+  }
+
+  void MakeModel() {
+    const absl::Status made = job_.session->PrepareModel(job_.model, cancellation_);
+    if (made.ok()) {
+      Solve();
+    } else {
+      End(made);
+    }
+  }
+
+  void Solve() {
+    job_.session->strand().Post(job_.session->LaneOf(job_.model),
+                                [this] { End(Run(job_, cancellation_, &response_)); });
+  }
+
+  void End(const absl::Status& outcome) { Finish(scope_.End(outcome)); }
+
+  CallScope scope_;
+  SessionRegistry* const registry_;
+  const v1::DeformOnceRequest& request_;
+  v1::DeformOnceResponse& response_;
+  const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
+  const Cancellation cancellation_{[flag = cancelled_] { return flag->load(); }};
+  DeformOnceJob job_;
+};
+
 }  // namespace
 
 grpc::ServerUnaryReactor* DeformService::DeformOnce(grpc::CallbackServerContext* context,
                                                     const v1::DeformOnceRequest* request,
                                                     v1::DeformOnceResponse* response) {
-  auto scope =
-      std::make_shared<CallScope>(context, "DeformService.DeformOnce", CallKind::kNewWork, gate_);
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  absl::StatusOr<DeformOnceJob> job = scope->admission().ok()
-                                          ? ReadRequest(*request, registry_)
-                                          : absl::StatusOr<DeformOnceJob>(scope->admission());
-  if (!job.ok()) {
-    reactor->Finish(scope->End(job.status()));
-    return reactor;
-  }
-  const Cancellation cancellation([context] { return context->IsCancelled(); });
-  const auto shared = std::make_shared<const DeformOnceJob>(*std::move(job));
-  const auto solve = [reactor, response, scope, cancellation, shared] {
-    shared->session->strand().Post(
-        shared->session->LaneOf(shared->model), [reactor, response, scope, cancellation, shared] {
-          reactor->Finish(scope->End(Run(*shared, cancellation, response)));
-        });
-  };
-  if (shared->session->HasModel(shared->model)) {
-    solve();
-    return reactor;
-  }
-  shared->session->making_strand().Post(
-      Lane::kBatch, [reactor, scope, cancellation, shared, solve] {
-        const absl::Status made = shared->session->PrepareModel(shared->model, cancellation);
-        if (made.ok()) {
-          solve();
-        } else {
-          reactor->Finish(scope->End(made));
-        }
-      });
-  return reactor;
+  auto* call =
+      new DeformOnceCall(CallScope(context, "DeformService.DeformOnce", CallKind::kNewWork, gate_),
+                         registry_, request, response);
+  call->Start();
+  return call;
 }
 
 grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* DeformService::Deform(

@@ -47,10 +47,11 @@ void DeformStreamReactor::OnReadDone(bool ok) {
       End(absl::InvalidArgumentError("the stream ended before its configuration; send that first"));
     }
   } else if (!outcome_.has_value()) {
+    const bool configures = !flow_.has_value();
     if (const absl::Status status = Take(); !status.ok()) {
       End(status);
-    } else {
-      StartRead(&request_);
+    } else if (!configures) {
+      StartRead(&request_);  // after the configuration only when there is a session, see Configure
     }
   }
   Advance();
@@ -66,6 +67,8 @@ void DeformStreamReactor::OnWriteDone(bool ok) {
 }
 
 void DeformStreamReactor::OnCancel() {
+  *cancelled_ = true;
+  registry_->CancelWait(cancelled_);
   MutexLock lock(mutex_);
   End(absl::CancelledError("the client has cancelled the stream"));
   Advance();
@@ -73,7 +76,7 @@ void DeformStreamReactor::OnCancel() {
 
 void DeformStreamReactor::EndUnlessConfigured() {
   MutexLock lock(mutex_);
-  if (configuration_ != nullptr) return;
+  if (flow_.has_value()) return;
   // A silent stream holds one of the places that others wait for.
   End(WithReason(absl::DeadlineExceededError(absl::StrCat(
                      "no configuration came within ", limits_.configuration_deadline.count(),
@@ -95,12 +98,12 @@ void DeformStreamReactor::OnDone() {
 
 void DeformStreamReactor::NotifyDraining() {
   MutexLock lock(mutex_);
-  tell_draining_ = true;
+  notices_.emplace_back().mutable_draining();
   Advance();
 }
 
 absl::Status DeformStreamReactor::Take() {
-  if (configuration_ == nullptr) {
+  if (!flow_.has_value()) {
     return TakeConfiguration();
   }
   switch (request_.message_case()) {
@@ -124,24 +127,81 @@ absl::Status DeformStreamReactor::TakeConfiguration() {
   if (!request_.has_configuration()) {
     return absl::InvalidArgumentError("the first message must be the configuration");
   }
-  TF_ASSIGN_OR_RETURN(configuration_,
-                      ReadConfiguration(request_.configuration(), limits_, registry_));
-  flow_.emplace(configuration_->max_unacked);
-  if (configuration_->NeedsPreparation()) {
-    flow_->StartPreparation();
+  TF_ASSIGN_OR_RETURN(stream_request_, ReadStreamRequest(request_.configuration(), limits_));
+  flow_.emplace(stream_request_.max_unacked);
+  StartOpening();
+  return absl::OkStatus();
+}
+
+void DeformStreamReactor::StartOpening() {
+  flow_->StartPreparation();
+  registry_->pool().Post(Lane::kFrames, [this, id = stream_request_.session_id] {
+    registry_->Open(id, cancelled_, [this](absl::StatusOr<std::shared_ptr<Session>> session) {
+      TakeSession(std::move(session));
+    });
+  });
+}
+
+void DeformStreamReactor::TakeSession(absl::StatusOr<std::shared_ptr<Session>> session) {
+  MutexLock lock(mutex_);
+  const absl::Status status =
+      session.ok() && !outcome_.has_value() ? Configure(*std::move(session)) : session.status();
+  if (!status.ok()) End(status);
+  if (outcome_.has_value()) {
+    flow_->FinishPreparation();
+  } else if (configuration_->NeedsPreparation()) {
     configuration_->session->making_strand().Post(
         Lane::kBatch, [this, configuration = configuration_] { Prepare(*configuration); });
   } else {
-    started_ = BeginWithoutPreparation(*configuration_).started;
+    Begin(BeginWithoutPreparation(*configuration_));
   }
+  Advance();
+}
+
+absl::Status DeformStreamReactor::Configure(std::shared_ptr<Session> session) {
+  if (configuration_ != nullptr) {
+    TF_ASSIGN_OR_RETURN(configuration_, ConfigurationFor(*configuration_, std::move(session)));
+    return absl::OkStatus();
+  }
+  TF_ASSIGN_OR_RETURN(configuration_, ReadConfiguration(stream_request_, std::move(session)));
+  StartRead(&request_);
   return absl::OkStatus();
+}
+
+void DeformStreamReactor::Begin(StreamBegin begin) {
+  flow_->FinishPreparation();
+  claim_ = std::move(begin.claim);
+  if (!started_.has_value() && !has_started_) started_ = std::move(begin.started);
+  if (std::exchange(restoring_, false)) notices_.emplace_back().mutable_restored();
 }
 
 absl::Status DeformStreamReactor::TakePose(const v1::PoseUpdate& update) {
   TF_RETURN_IF_ERROR(flow_->CheckSequence(update.sequence()));
   TF_ASSIGN_OR_RETURN(std::vector<HandlePose> poses,
                       ToPoses(update.poses(), configuration_->session->constraints()));
+  if (update.commit()) to_commit_ = {.sequence = update.sequence(), .poses = poses};
   return flow_->Put(update.sequence(), std::move(poses));
+}
+
+void DeformStreamReactor::StartCommit() {
+  committing_ = true;
+  registry_->pool().Post(
+      Lane::kFrames, [this, id = stream_request_.session_id,
+                      pose = *std::exchange(to_commit_, std::nullopt)]() mutable {
+        registry_->CommitPoses(id, std::move(pose.poses),
+                               [this, sequence = pose.sequence](const absl::Status& outcome) {
+                                 FinishCommit(sequence, outcome);
+                               });
+      });
+}
+
+void DeformStreamReactor::FinishCommit(uint64_t sequence, const absl::Status& outcome) {
+  MutexLock lock(mutex_);
+  committing_ = false;
+  v1::CommittedNotice* notice = notices_.emplace_back().mutable_committed();
+  notice->set_sequence(sequence);
+  if (!outcome.ok()) notice->set_failure(std::string(outcome.message()));
+  Advance();
 }
 
 void DeformStreamReactor::End(const absl::Status& outcome) {
@@ -156,13 +216,14 @@ void DeformStreamReactor::Advance() {
   }
   if (!outcome_.has_value() && flow_.has_value()) {
     WriteNext();
+    if (to_commit_.has_value() && !committing_) StartCommit();
     if (flow_->StartSolve()) {
       StartAnswer();
-    } else if (flow_->Done() && !write_in_flight_) {
+    } else if (flow_->Done() && !write_in_flight_ && !committing_ && notices_.empty()) {
       End(absl::OkStatus());
     }
   }
-  const bool busy = write_in_flight_ || (flow_.has_value() && flow_->busy());
+  const bool busy = write_in_flight_ || committing_ || (flow_.has_value() && flow_->busy());
   if (outcome_.has_value() && !busy) {
     finished_ = true;
     Finish(scope_.End(*outcome_));
@@ -186,10 +247,11 @@ std::optional<v1::DeformResponse> DeformStreamReactor::NextMessage() {
     return std::exchange(started_, std::nullopt);
   }
   // A notice that comes earlier waits: `started` is the first message.
-  if (has_started_ && std::exchange(tell_draining_, false)) {
-    v1::DeformResponse notice;
-    notice.mutable_notice()->mutable_draining();
-    return notice;
+  if (has_started_ && !notices_.empty()) {
+    v1::DeformResponse response;
+    *response.mutable_notice() = std::move(notices_.front());
+    notices_.pop_front();
+    return response;
   }
   if (std::optional<AnswerFrame> frame = flow_->TakeFrame(); frame.has_value()) {
     return ToProto(*std::move(frame));
@@ -201,11 +263,12 @@ void DeformStreamReactor::Prepare(const StreamConfiguration& configuration) {
   absl::StatusOr<StreamBegin> begin =
       PrepareAnswers(configuration, Cancellation([this] { return Ended(); }));
   MutexLock lock(mutex_);
-  flow_->FinishPreparation();
   if (begin.ok()) {
-    started_ = std::move(begin->started);
-    claim_ = std::move(begin->claim);
+    Begin(*std::move(begin));
+  } else if (configuration.session->evicted() && !outcome_.has_value()) {
+    StartOpening();
   } else {
+    flow_->FinishPreparation();
     End(begin.status());
   }
   Advance();
@@ -235,7 +298,7 @@ void DeformStreamReactor::AnswerNewest(const Configuration& configuration,
   absl::StatusOr<std::optional<AnswerFrame>> answer = std::optional<AnswerFrame>();
   if (pose.has_value()) answer = AnswerFromPrepared(*configuration, *claim, *pose);
   if (!pose.has_value() || !answer.ok() || answer->has_value()) {
-    FinishAnswer(std::move(answer));
+    FinishAnswer(*configuration->session, std::move(pose), std::move(answer));
     return;
   }
   // Not covered. The pose goes along: what is under way is this pose's answer.
@@ -253,13 +316,21 @@ void DeformStreamReactor::SolveNewest(const StreamConfiguration& configuration,
     answer = SolvePose(configuration, *pose,
                        [this](const MakeFrame& make_frame) { return ShowEarly(make_frame); });
   }
-  FinishAnswer(std::move(answer));
+  FinishAnswer(*configuration.session, std::move(pose), std::move(answer));
 }
 
-void DeformStreamReactor::FinishAnswer(absl::StatusOr<std::optional<AnswerFrame>> answer) {
+void DeformStreamReactor::FinishAnswer(const Session& session, std::optional<WaitingPose> pose,
+                                       absl::StatusOr<std::optional<AnswerFrame>> answer) {
   MutexLock lock(mutex_);
-  if (!answer.ok()) End(answer.status());
+  const bool left_memory = !answer.ok() && session.evicted();
+  if (!answer.ok() && !left_memory) End(answer.status());
   flow_->FinishSolve(answer.ok() ? *std::move(answer) : std::nullopt);
+  if (left_memory && !outcome_.has_value()) {
+    if (pose.has_value()) flow_->PutBack(*std::move(pose));
+    restoring_ = true;
+    notices_.emplace_back().mutable_evicted();
+    StartOpening();
+  }
   Advance();
 }
 

@@ -3,6 +3,8 @@
 
 #pragma once
 
+#include <atomic>
+#include <deque>
 #include <memory>
 #include <optional>
 
@@ -24,11 +26,14 @@ namespace tissueform {
 // One Deform call: hands poses and acknowledgements to a FrameFlow and does what that says, with
 // one read, one write and one job at a time: on the session's making strand before the stream
 // begins, then in the lane of frames while prepared answers cover the poses, else on its strand.
-// Deletes itself when gRPC is done with it.
+// A session that has left memory is opened again, and the stream goes on with that. Beside all
+// this, one commit of a pose at a time is on its way to the store. Deletes itself when gRPC is done
+// with it.
 //
-// Reactions come on gRPC's threads and compute nothing. Finish is called once, when neither a job
-// nor a write is under way: whatever runs may use this object. Jobs hold the configuration
-// themselves; nothing that the mutex guards leaves it by pointer.
+// Reactions come on gRPC's threads and compute nothing. Finish is called once, when no job, write
+// or commit is under way: whatever runs may use this object. Jobs hold the configuration
+// themselves; nothing that the mutex guards leaves it by pointer. The registry is never called
+// under the mutex, since it may answer before it returns: jobs in the lane of frames call it.
 class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse> {
  public:
   // All pointers must outlive the stream.
@@ -64,8 +69,17 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   // Posts the job that answers the newest pose.
   void StartAnswer() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
+  // Asks for the session, at first and whenever it has left memory.
+  void StartOpening() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void TakeSession(absl::StatusOr<std::shared_ptr<Session>> session) ABSL_LOCKS_EXCLUDED(mutex_);
+  absl::Status Configure(std::shared_ptr<Session> session) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // The stream may begin, or go on.
+  void Begin(StreamBegin begin) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // On the session's making strand.
   void Prepare(const StreamConfiguration& configuration) ABSL_LOCKS_EXCLUDED(mutex_);
+
+  void StartCommit() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void FinishCommit(uint64_t sequence, const absl::Status& outcome) ABSL_LOCKS_EXCLUDED(mutex_);
   // On any worker.
   void AnswerNewest(const Configuration& configuration, const std::shared_ptr<ResponseClaim>& claim)
       ABSL_LOCKS_EXCLUDED(mutex_);
@@ -73,7 +87,9 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   void SolveNewest(const StreamConfiguration& configuration, std::optional<WaitingPose> pose)
       ABSL_LOCKS_EXCLUDED(mutex_);
   std::optional<WaitingPose> TakePose() ABSL_LOCKS_EXCLUDED(mutex_);
-  void FinishAnswer(absl::StatusOr<std::optional<AnswerFrame>> answer) ABSL_LOCKS_EXCLUDED(mutex_);
+  // `pose` is what `answer` answers.
+  void FinishAnswer(const Session& session, std::optional<WaitingPose> pose,
+                    absl::StatusOr<std::optional<AnswerFrame>> answer) ABSL_LOCKS_EXCLUDED(mutex_);
   // From within a solve: false when it is to stop.
   bool ShowEarly(const MakeFrame& make_frame) ABSL_LOCKS_EXCLUDED(mutex_);
   bool Ended() ABSL_LOCKS_EXCLUDED(mutex_);
@@ -87,18 +103,23 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   DeadlineTimer* const timer_;
   bool registered_ = false;
   DeadlineTimer::Id deadline_;  // of the configuration
+  const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
 
   // gRPC's while an operation is under way.
   v1::DeformRequest request_;
   v1::DeformResponse writing_;
 
   Mutex mutex_;
-  Configuration configuration_ ABSL_GUARDED_BY(mutex_);           // null before the first message
-  std::optional<FrameFlow> flow_ ABSL_GUARDED_BY(mutex_);         // likewise
+  StreamRequest stream_request_ ABSL_GUARDED_BY(mutex_);
+  std::optional<FrameFlow> flow_ ABSL_GUARDED_BY(mutex_);         // empty before the first message
+  Configuration configuration_ ABSL_GUARDED_BY(mutex_);           // null before there is a session
   std::shared_ptr<ResponseClaim> claim_ ABSL_GUARDED_BY(mutex_);  // null: none are prepared
   std::optional<v1::DeformResponse> started_ ABSL_GUARDED_BY(mutex_);  // waits for its write
   bool has_started_ ABSL_GUARDED_BY(mutex_) = false;                   // it was written
-  bool tell_draining_ ABSL_GUARDED_BY(mutex_) = false;
+  bool restoring_ ABSL_GUARDED_BY(mutex_) = false;  // the session is coming back to memory
+  std::deque<v1::DeformNotice> notices_ ABSL_GUARDED_BY(mutex_);  // wait for their write
+  std::optional<WaitingPose> to_commit_ ABSL_GUARDED_BY(mutex_);  // the newest that is to be kept
+  bool committing_ ABSL_GUARDED_BY(mutex_) = false;
   bool write_in_flight_ ABSL_GUARDED_BY(mutex_) = false;
   bool finished_ ABSL_GUARDED_BY(mutex_) = false;
   std::optional<absl::Status> outcome_ ABSL_GUARDED_BY(mutex_);  // set: nothing new is started

@@ -3,22 +3,17 @@
 
 #include "server/rpc/mesh_service.h"
 
-#include "core/base/error_reason.h"
+#include <memory>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
 #include "core/base/status_macros.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "server/rpc/mesh_upload_stream.h"
 #include "server/rpc/resource_conversion.h"
 
 namespace tissueform {
-namespace {
-
-absl::Status NoSuchMesh() {
-  return WithReason(absl::NotFoundError("the server does not have this mesh; upload it"),
-                    ErrorReason::kMeshNotFound);
-}
-
-}  // namespace
-
 grpc::ServerReadReactor<v1::UploadMeshRequest>* MeshService::UploadMesh(
     grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) {
   return new MeshUploadStream(
@@ -26,38 +21,64 @@ grpc::ServerReadReactor<v1::UploadMeshRequest>* MeshService::UploadMesh(
       pool_, timer_, response);
 }
 
+grpc::ServerUnaryReactor* MeshService::Run(grpc::CallbackServerContext* context,
+                                           std::string_view method,
+                                           std::function<absl::Status()> work) {
+  auto scope = std::make_shared<CallScope>(context, method, CallKind::kUpkeep, gate_);
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  if (!scope->admission().ok()) {
+    reactor->Finish(scope->End(scope->admission()));
+    return reactor;
+  }
+  pool_->Post(Lane::kStore,
+              [reactor, scope, work = std::move(work)] { reactor->Finish(scope->End(work())); });
+  return reactor;
+}
+
 grpc::ServerUnaryReactor* MeshService::GetMesh(grpc::CallbackServerContext* context,
                                                const v1::GetMeshRequest* request,
                                                v1::Mesh* response) {
-  CallScope scope(context, "MeshService.GetMesh", CallKind::kUpkeep, gate_);
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  reactor->Finish(
-      scope.End(scope.admission().ok() ? FindMesh(*request, response) : scope.admission()));
-  return reactor;
+  return Run(context, "MeshService.GetMesh", [=, this] { return FindMesh(*request, response); });
+}
+
+grpc::ServerUnaryReactor* MeshService::ListMeshes(grpc::CallbackServerContext* context,
+                                                  const v1::ListMeshesRequest* request,
+                                                  v1::ListMeshesResponse* response) {
+  return Run(context, "MeshService.ListMeshes", [=, this] { return List(*request, response); });
 }
 
 grpc::ServerUnaryReactor* MeshService::DeleteMesh(grpc::CallbackServerContext* context,
                                                   const v1::DeleteMeshRequest* request,
                                                   google::protobuf::Empty* /*response*/) {
-  CallScope scope(context, "MeshService.DeleteMesh", CallKind::kUpkeep, gate_);
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  reactor->Finish(scope.End(scope.admission().ok() ? RemoveMesh(*request) : scope.admission()));
-  return reactor;
+  return Run(context, "MeshService.DeleteMesh", [=, this] { return RemoveMesh(*request); });
 }
 
 absl::Status MeshService::FindMesh(const v1::GetMeshRequest& request, v1::Mesh* response) {
   TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request.name()));
-  const auto mesh = catalog_->Find(sha256);
-  if (mesh == nullptr) {
-    return NoSuchMesh();
-  }
-  *response = ToProto(*mesh);
+  TF_ASSIGN_OR_RETURN(const MeshView mesh, catalog_->Look(sha256));
+  *response = ToProto(mesh);
+  return absl::OkStatus();
+}
+
+absl::Status MeshService::List(const v1::ListMeshesRequest& request,
+                               v1::ListMeshesResponse* response) {
+  TF_ASSIGN_OR_RETURN(const PageRequest page,
+                      ReadPageRequest(request.page_size(), request.page_token()));
+  TF_ASSIGN_OR_RETURN(const MeshViewPage views, catalog_->List(page.after, page.size));
+  for (const MeshView& view : views.views) *response->add_meshes() = ToProto(view);
+  response->set_next_page_token(views.next);
   return absl::OkStatus();
 }
 
 absl::Status MeshService::RemoveMesh(const v1::DeleteMeshRequest& request) {
   TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request.name()));
-  return catalog_->Remove(sha256) ? absl::OkStatus() : NoSuchMesh();
+  // Without it they could not come back to memory.
+  const int users = catalog_->keeps_meshes() ? registry_->CountMadeFrom(sha256) : 0;
+  if (users > 0) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        users, users == 1 ? " session is" : " sessions are", " made from it; delete them first"));
+  }
+  return catalog_->Remove(sha256);
 }
 
 }  // namespace tissueform

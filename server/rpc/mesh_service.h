@@ -3,10 +3,14 @@
 
 #pragma once
 
+#include <functional>
+#include <string_view>
+
 #include "server/rpc/call_scope.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
+#include "server/session/session_registry.h"
 #include "server/session/worker_pool.h"
 #include "tissueform/v1/mesh_service.grpc.pb.h"
 
@@ -16,24 +20,38 @@ namespace tissueform {
 class MeshService final : public v1::MeshService::CallbackService {
  public:
   MeshService(ServiceGate* gate, const ServiceLimits& limits, MeshCatalog* catalog,
-              WorkerPool* pool, DeadlineTimer* timer)
-      : gate_(gate), limits_(limits), catalog_(catalog), pool_(pool), timer_(timer) {}
+              const SessionRegistry* registry, WorkerPool* pool, DeadlineTimer* timer)
+      : gate_(gate),
+        limits_(limits),
+        catalog_(catalog),
+        registry_(registry),
+        pool_(pool),
+        timer_(timer) {}
 
   grpc::ServerReadReactor<v1::UploadMeshRequest>* UploadMesh(
       grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) override;
   grpc::ServerUnaryReactor* GetMesh(grpc::CallbackServerContext* context,
                                     const v1::GetMeshRequest* request, v1::Mesh* response) override;
+  grpc::ServerUnaryReactor* ListMeshes(grpc::CallbackServerContext* context,
+                                       const v1::ListMeshesRequest* request,
+                                       v1::ListMeshesResponse* response) override;
   grpc::ServerUnaryReactor* DeleteMesh(grpc::CallbackServerContext* context,
                                        const v1::DeleteMeshRequest* request,
                                        google::protobuf::Empty* response) override;
 
  private:
+  // Finishes a call with what `work` says, which may block on the disk.
+  grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::string_view method,
+                                std::function<absl::Status()> work);
+
   absl::Status FindMesh(const v1::GetMeshRequest& request, v1::Mesh* response);
+  absl::Status List(const v1::ListMeshesRequest& request, v1::ListMeshesResponse* response);
   absl::Status RemoveMesh(const v1::DeleteMeshRequest& request);
 
   ServiceGate* const gate_;
   const ServiceLimits limits_;
   MeshCatalog* const catalog_;
+  const SessionRegistry* const registry_;
   WorkerPool* const pool_;
   DeadlineTimer* const timer_;
 };

@@ -99,7 +99,7 @@ absl::Status MeshUploadStream::TakeHeader() {
     return absl::InvalidArgumentError("the first message must be the header");
   }
   MeshAnnouncement announcement = ToAnnouncement(request_.header());
-  if (const auto known = catalog_->Find(announcement.sha256); known != nullptr) {
+  if (const auto known = catalog_->Look(announcement.sha256); known.ok()) {
     *response_->mutable_mesh() = ToProto(*known);
     response_->set_already_existed(true);
     response_->set_committed_bytes(announcement.total_bytes);
@@ -122,7 +122,7 @@ void MeshUploadStream::CheckOnWorker() {
     MutexLock lock(mutex_);
     const absl::Status outcome = stored.status();
     if (stored.ok()) {
-      *response_->mutable_mesh() = ToProto(**stored);
+      *response_->mutable_mesh() = ToProto(MeshView{RecordOf(**stored), *stored});
       response_->set_committed_bytes(committed_bytes);
       // Before the client has its answer: a mesh that it deletes at once is free at once.
       stored->reset();

@@ -3,30 +3,56 @@
 
 #include "server/rpc/resource_conversion.h"
 
+#include <algorithm>
 #include <utility>
+
+#include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
 #include "proto/conversion/answer_conversion.h"
+#include "proto/conversion/geometry_conversion.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "proto/conversion/model_conversion.h"
 #include "proto/conversion/session_conversion.h"
 
 namespace tissueform {
 
+namespace {
+
+constexpr int kPageSize = 100;
+constexpr int kMaxPageSize = 1000;
+constexpr size_t kMaxPageTokenBytes = 128;
+
+void AddPreparation(const Session& session, v1::Session* proto) {
+  const int64_t num_vertices = session.mesh().mesh.num_vertices();
+  const ConstraintSet& constraints = session.constraints();
+  proto->set_vertex_count(num_vertices);
+  proto->set_tet_count(session.mesh().mesh.num_tets());
+  proto->set_fixed_vertex_count(static_cast<int64_t>(constraints.fixed().size()));
+  proto->set_free_vertex_count(num_vertices -
+                               static_cast<int64_t>(constraints.constrained().size()));
+  SetPreparation(session.preparation(), proto);
+  proto->set_bytes_held(session.bytes_held());
+  proto->set_shared_bytes(session.shared_bytes());
+}
+
+}  // namespace
+
 MeshAnnouncement ToAnnouncement(const v1::MeshHeader& header) {
   return {ToPayloadShape(header), header.total_bytes(), header.sha256()};
 }
 
-v1::Mesh ToProto(const StoredMesh& mesh) {
+v1::Mesh ToProto(const MeshView& view) {
+  const MeshRecord& record = view.record;
   v1::Mesh proto;
-  proto.set_name(MeshName(mesh.sha256));
-  proto.set_vertex_count(mesh.mesh.num_vertices());
-  proto.set_tet_count(mesh.mesh.num_tets());
-  for (const CellArray& array : mesh.cell_arrays) {
-    proto.add_cell_arrays(array.name);
+  proto.set_name(MeshName(record.sha256));
+  proto.set_vertex_count(record.shape.num_vertices);
+  proto.set_tet_count(record.shape.num_tets);
+  for (const std::string& name : record.shape.cell_arrays) {
+    proto.add_cell_arrays(name);
   }
-  proto.set_skin_vertex_count(static_cast<int64_t>(mesh.skin.size()));
-  proto.set_bytes_held(mesh.reservation.bytes());
+  proto.set_skin_vertex_count(record.skin_vertex_count);
+  if (view.mesh != nullptr) proto.set_bytes_held(view.mesh->reservation.bytes());
   return proto;
 }
 
@@ -55,26 +81,39 @@ absl::StatusOr<SessionRecord> ToSessionRecord(const v1::CreateSessionRequest& re
   return record;
 }
 
-v1::Session ToProto(const Session& session) {
-  const ConstraintSet& constraints = session.constraints();
-  v1::Session proto;
-  proto.set_name(SessionName(session.id()));
-  proto.set_mesh(MeshName(session.mesh().sha256));
-  proto.set_model(ToProto(session.model()));
-  proto.set_poisson_ratio(session.poisson_ratio());
-  *proto.mutable_gradient_field() = ToProto(session.gradient_field());
-  proto.set_vertex_count(session.mesh().mesh.num_vertices());
-  proto.set_tet_count(session.mesh().mesh.num_tets());
-  proto.set_fixed_vertex_count(static_cast<int64_t>(constraints.fixed().size()));
-  proto.set_free_vertex_count(session.mesh().mesh.num_vertices() -
-                              static_cast<int64_t>(constraints.constrained().size()));
-  for (const HandleRegion& handle : constraints.handles()) {
-    proto.add_handles(handle.name);
-    proto.add_handle_vertex_counts(static_cast<int64_t>(handle.vertices.size()));
+absl::StatusOr<PageRequest> ReadPageRequest(int32_t page_size, const std::string& page_token) {
+  if (page_size < 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("page_size is ", page_size, "; it must be 0 (the server chooses) or more"));
   }
-  SetPreparation(session.preparation(), &proto);
-  proto.set_bytes_held(session.bytes_held());
-  proto.set_shared_bytes(session.shared_bytes());
+  if (page_token.size() > kMaxPageTokenBytes) {
+    return absl::InvalidArgumentError(
+        "page_token is none of this server's; take next_page_token of the page before");
+  }
+  return PageRequest{.size = page_size == 0 ? kPageSize : std::min(page_size, kMaxPageSize),
+                     .after = page_token};
+}
+
+v1::Session ToProto(const SessionRegistry::View& view) {
+  const SessionRecord& record = view.record;
+  v1::Session proto;
+  proto.set_name(SessionName(record.id));
+  proto.set_mesh(MeshName(record.mesh_sha256));
+  proto.set_model(ToProto(record.model));
+  proto.set_poisson_ratio(record.poisson_ratio);
+  *proto.mutable_gradient_field() = ToProto(record.gradient_field);
+  proto.set_fixed_vertex_count(static_cast<int64_t>(record.fixed.size()));
+  for (size_t h = 0; h < record.handles.size(); ++h) {
+    proto.add_handles(record.handles[h].name);
+    proto.add_handle_vertex_counts(static_cast<int64_t>(record.handles[h].vertices.size()));
+    if (!record.last_poses.empty()) {
+      *proto.add_committed_poses() =
+          ToProto(NamedPose{record.handles[h].name, record.last_poses[h]});
+    }
+  }
+  proto.set_state(view.session == nullptr ? v1::SESSION_STATE_STORED : v1::SESSION_STATE_READY);
+  proto.set_etag(record.etag);
+  if (view.session != nullptr) AddPreparation(*view.session, &proto);
   return proto;
 }
 

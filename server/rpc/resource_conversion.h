@@ -3,12 +3,15 @@
 
 #pragma once
 
+#include <cstdint>
+#include <string>
+
 #include "absl/status/statusor.h"
 
 #include "server/auth/identity.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
-#include "server/session/session.h"
+#include "server/session/session_registry.h"
 #include "server/store/session_record.h"
 #include "tissueform/v1/mesh.pb.h"
 #include "tissueform/v1/mesh_service.pb.h"
@@ -19,12 +22,20 @@
 namespace tissueform {
 
 MeshAnnouncement ToAnnouncement(const v1::MeshHeader& header);
-v1::Mesh ToProto(const StoredMesh& mesh);
+v1::Mesh ToProto(const MeshView& view);
 
 // The record of a session that `owner` asks for on `mesh`. Errors: those of ToSessionRequest.
 absl::StatusOr<SessionRecord> ToSessionRecord(const v1::CreateSessionRequest& request,
                                               const StoredMesh& mesh, const Principal& owner,
                                               const ServiceLimits& limits);
-v1::Session ToProto(const Session& session);
+v1::Session ToProto(const SessionRegistry::View& view);
+
+// Which part of a list is asked for.
+struct PageRequest {
+  int size = 100;
+  std::string after;  // names greater than this
+};
+// Errors: InvalidArgument.
+absl::StatusOr<PageRequest> ReadPageRequest(int32_t page_size, const std::string& page_token);
 
 }  // namespace tissueform

@@ -7,7 +7,6 @@
 #include <memory>
 #include <utility>
 
-#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "proto/conversion/session_conversion.h"
@@ -19,18 +18,52 @@ namespace {
 // One CreateSession call. Deletes itself when gRPC is done with it.
 class CreateSessionCall : public grpc::ServerUnaryReactor {
  public:
-  CreateSessionCall(CallScope scope, SessionRegistry* registry, v1::Session* response)
-      : scope_(std::move(scope)), registry_(registry), response_(response) {}
+  CreateSessionCall(CallScope scope, const ServiceLimits& limits, MeshCatalog* catalog,
+                    SessionRegistry* registry, const v1::CreateSessionRequest* request,
+                    v1::Session* response)
+      : scope_(std::move(scope)),
+        limits_(limits),
+        catalog_(catalog),
+        registry_(registry),
+        request_(*request),
+        response_(response) {}
 
-  void Start(SessionRecord record, std::shared_ptr<const StoredMesh> mesh) {
-    registry_->Create(std::move(record), std::move(mesh), cancelled_,
+  void Start() {
+    const absl::StatusOr<std::string> sha256 =
+        scope_.admission().ok() ? ParseMeshName(request_.mesh())
+                                : absl::StatusOr<std::string>(scope_.admission());
+    if (!sha256.ok()) {
+      End(sha256.status());
+    } else if (auto mesh = catalog_->Find(*sha256); mesh != nullptr) {
+      Make(std::move(mesh));
+    } else {
+      registry_->pool().Post(Lane::kStore, [this, sha256 = *sha256] {
+        absl::StatusOr<std::shared_ptr<const StoredMesh>> loaded = catalog_->Load(sha256);
+        if (loaded.ok()) {
+          Make(*std::move(loaded));
+        } else {
+          End(loaded.status());
+        }
+      });
+    }
+  }
+
+  void Make(std::shared_ptr<const StoredMesh> mesh) {
+    absl::StatusOr<SessionRecord> record =
+        ToSessionRecord(request_, *mesh, scope_.principal(), limits_);
+    if (!record.ok()) {
+      End(record.status());
+      return;
+    }
+    registry_->Create(*std::move(record), std::move(mesh), cancelled_,
                       [this](absl::StatusOr<std::shared_ptr<Session>> result) {
                         const absl::Status outcome = result.status();
-                        if (result.ok()) {
-                          session_ = *std::move(result);
-                          *response_ = ToProto(*session_);
+                        if (!result.ok()) {
+                          End(outcome);
+                          return;
                         }
-                        End(outcome);
+                        session_ = *std::move(result);
+                        Describe();
                       });
   }
 
@@ -38,7 +71,15 @@ class CreateSessionCall : public grpc::ServerUnaryReactor {
 
   void OnCancel() override {
     *cancelled_ = true;
-    registry_->CancelCreate(cancelled_);
+    registry_->CancelWait(cancelled_);
+  }
+
+  // Once more from the store, which knows the etag and the times.
+  void Describe() {
+    registry_->Look(session_->id(), [this](const absl::StatusOr<SessionRegistry::View>& view) {
+      if (view.ok()) *response_ = ToProto(*view);
+      End(view.status());
+    });
   }
 
   // A client that has cancelled never learns the name of its session: nobody would ever delete it.
@@ -51,7 +92,10 @@ class CreateSessionCall : public grpc::ServerUnaryReactor {
 
  private:
   CallScope scope_;
+  const ServiceLimits& limits_;
+  MeshCatalog* const catalog_;
   SessionRegistry* const registry_;
+  const v1::CreateSessionRequest& request_;
   v1::Session* const response_;
   const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
   std::shared_ptr<Session> session_;  // written before Finish, read after it
@@ -62,26 +106,58 @@ class CreateSessionCall : public grpc::ServerUnaryReactor {
 grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext* context,
                                                         const v1::CreateSessionRequest* request,
                                                         v1::Session* response) {
-  CallScope scope(context, "SessionService.CreateSession", CallKind::kNewWork, gate_);
-  absl::StatusOr<Creation> creation = scope.admission().ok()
-                                          ? ReadRequest(scope, *request)
-                                          : absl::StatusOr<Creation>(scope.admission());
-  auto* call = new CreateSessionCall(std::move(scope), registry_, response);
-  if (creation.ok()) {
-    call->Start(std::move(creation->record), std::move(creation->mesh));
-  } else {
-    call->End(creation.status());
-  }
+  auto* call = new CreateSessionCall(
+      CallScope(context, "SessionService.CreateSession", CallKind::kNewWork, gate_), limits_,
+      catalog_, registry_, request, response);
+  call->Start();
   return call;
 }
 
 grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext* context,
                                                      const v1::GetSessionRequest* request,
                                                      v1::Session* response) {
-  CallScope scope(context, "SessionService.GetSession", CallKind::kUpkeep, gate_);
+  auto scope =
+      std::make_shared<CallScope>(context, "SessionService.GetSession", CallKind::kUpkeep, gate_);
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  reactor->Finish(
-      scope.End(scope.admission().ok() ? FindSession(*request, response) : scope.admission()));
+  const absl::StatusOr<std::string> id = scope->admission().ok()
+                                             ? ParseSessionName(request->name())
+                                             : absl::StatusOr<std::string>(scope->admission());
+  if (!id.ok()) {
+    reactor->Finish(scope->End(id.status()));
+    return reactor;
+  }
+  registry_->Look(*id,
+                  [reactor, scope, response](const absl::StatusOr<SessionRegistry::View>& view) {
+                    if (view.ok()) *response = ToProto(*view);
+                    reactor->Finish(scope->End(view.status()));
+                  });
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerContext* context,
+                                                       const v1::ListSessionsRequest* request,
+                                                       v1::ListSessionsResponse* response) {
+  auto scope =
+      std::make_shared<CallScope>(context, "SessionService.ListSessions", CallKind::kUpkeep, gate_);
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const absl::StatusOr<PageRequest> page =
+      scope->admission().ok() ? ReadPageRequest(request->page_size(), request->page_token())
+                              : absl::StatusOr<PageRequest>(scope->admission());
+  if (!page.ok()) {
+    reactor->Finish(scope->End(page.status()));
+    return reactor;
+  }
+  registry_->List(
+      {.owner = scope->principal().name, .after = page->after, .limit = page->size},
+      [reactor, scope, response](const absl::StatusOr<SessionRegistry::ViewPage>& views) {
+        if (views.ok()) {
+          for (const SessionRegistry::View& view : views->views) {
+            *response->add_sessions() = ToProto(view);
+          }
+          response->set_next_page_token(views->next);
+        }
+        reactor->Finish(scope->End(views.status()));
+      });
   return reactor;
 }
 
@@ -101,29 +177,6 @@ grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerCont
   registry_->Delete(
       *id, [reactor, scope](const absl::Status& status) { reactor->Finish(scope->End(status)); });
   return reactor;
-}
-
-absl::StatusOr<SessionService::Creation> SessionService::ReadRequest(
-    const CallScope& scope, const v1::CreateSessionRequest& request) {
-  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request.mesh()));
-  Creation creation;
-  creation.mesh = catalog_->Find(sha256);
-  if (creation.mesh == nullptr) {
-    return WithReason(
-        absl::NotFoundError("the server does not have the mesh of this request; upload it"),
-        ErrorReason::kMeshNotFound);
-  }
-  TF_ASSIGN_OR_RETURN(creation.record,
-                      ToSessionRecord(request, *creation.mesh, scope.principal(), limits_));
-  return creation;
-}
-
-absl::Status SessionService::FindSession(const v1::GetSessionRequest& request,
-                                         v1::Session* response) {
-  TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(request.name()));
-  TF_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, registry_->Find(id));
-  *response = ToProto(*session);
-  return absl::OkStatus();
 }
 
 }  // namespace tissueform

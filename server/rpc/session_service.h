@@ -28,21 +28,14 @@ class SessionService final : public v1::SessionService::CallbackService {
   grpc::ServerUnaryReactor* GetSession(grpc::CallbackServerContext* context,
                                        const v1::GetSessionRequest* request,
                                        v1::Session* response) override;
+  grpc::ServerUnaryReactor* ListSessions(grpc::CallbackServerContext* context,
+                                         const v1::ListSessionsRequest* request,
+                                         v1::ListSessionsResponse* response) override;
   grpc::ServerUnaryReactor* DeleteSession(grpc::CallbackServerContext* context,
                                           const v1::DeleteSessionRequest* request,
                                           google::protobuf::Empty* response) override;
 
  private:
-  // What a session is made from.
-  struct Creation {
-    SessionRecord record;
-    std::shared_ptr<const StoredMesh> mesh;
-  };
-
-  absl::StatusOr<Creation> ReadRequest(const CallScope& scope,
-                                       const v1::CreateSessionRequest& request);
-  absl::Status FindSession(const v1::GetSessionRequest& request, v1::Session* response);
-
   ServiceGate* const gate_;
   const ServiceLimits limits_;
   MeshCatalog* const catalog_;

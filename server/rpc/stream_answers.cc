@@ -3,6 +3,7 @@
 
 #include "server/rpc/stream_answers.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -51,27 +52,53 @@ AnswerFrame FrameOf(const WaitingPose& pose, const Deformation& deformation,
 
 }  // namespace
 
-absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ReadConfiguration(
-    const v1::DeformConfiguration& proto, const ServiceLimits& limits, SessionRegistry* registry) {
-  auto configuration = std::make_shared<StreamConfiguration>();
-  TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(proto.session()));
+absl::StatusOr<StreamRequest> ReadStreamRequest(const v1::DeformConfiguration& proto,
+                                                const ServiceLimits& limits) {
+  StreamRequest request;
+  TF_ASSIGN_OR_RETURN(request.session_id, ParseSessionName(proto.session()));
   TF_RETURN_IF_ERROR(CheckEncoding(proto.encoding()));
   if (proto.has_max_unacked()) {
     if (proto.max_unacked() < 1 || proto.max_unacked() > limits.max_unacked) {
       return absl::InvalidArgumentError(absl::StrCat("max_unacked is ", proto.max_unacked(),
                                                      "; it must be 1 to ", limits.max_unacked));
     }
-    configuration->max_unacked = proto.max_unacked();
+    request.max_unacked = proto.max_unacked();
   }
-  TF_ASSIGN_OR_RETURN(configuration->session, registry->Find(id));
+  request.rest = proto;
+  return request;
+}
+
+absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ReadConfiguration(
+    const StreamRequest& request, std::shared_ptr<Session> session) {
+  auto configuration = std::make_shared<StreamConfiguration>();
+  configuration->max_unacked = request.max_unacked;
+  configuration->session = std::move(session);
   const StoredMesh& mesh = configuration->session->mesh();
   TF_ASSIGN_OR_RETURN(configuration->choice,
-                      ToVertexChoice(proto.vertices(), mesh.mesh.num_vertices(), mesh.skin));
+                      ToVertexChoice(request.rest.vertices(), mesh.mesh.num_vertices(), mesh.skin));
   TF_ASSIGN_OR_RETURN(configuration->model,
-                      ToModel(proto.model(), configuration->session->model()));
-  if (proto.has_prepared()) {
-    TF_ASSIGN_OR_RETURN(configuration->response, ReadResponse(proto.prepared(), *configuration));
+                      ToModel(request.rest.model(), configuration->session->model()));
+  if (request.rest.has_prepared()) {
+    TF_ASSIGN_OR_RETURN(configuration->response,
+                        ReadResponse(request.rest.prepared(), *configuration));
   }
+  return configuration;
+}
+
+absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ConfigurationFor(
+    const StreamConfiguration& before, std::shared_ptr<Session> session) {
+  const auto same_name = [](const HandleRegion& a, const HandleRegion& b) {
+    return a.name == b.name;
+  };
+  const std::vector<HandleRegion>& handles = before.session->constraints().handles();
+  const std::vector<HandleRegion>& handles_now = session->constraints().handles();
+  if (before.session->mesh().sha256 != session->mesh().sha256 ||
+      !std::equal(handles.begin(), handles.end(), handles_now.begin(), handles_now.end(),
+                  same_name)) {
+    return absl::AbortedError("the session was updated; open the stream again");
+  }
+  auto configuration = std::make_shared<StreamConfiguration>(before);
+  configuration->session = std::move(session);
   return configuration;
 }
 

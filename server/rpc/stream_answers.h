@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -15,7 +16,6 @@
 #include "server/session/frame_flow.h"
 #include "server/session/limits.h"
 #include "server/session/session.h"
-#include "server/session/session_registry.h"
 #include "tissueform/v1/deform_service.pb.h"
 
 // How a Deform stream answers, without the stream.
@@ -33,9 +33,22 @@ struct StreamConfiguration {
   bool NeedsPreparation() const { return response.has_value() || !session->HasModel(model); }
 };
 
-// Errors: InvalidArgument (a field that is unknown or out of range), NotFound (the session).
+// The part of the first message that can be read without the session.
+struct StreamRequest {
+  std::string session_id;
+  int max_unacked = 2;
+  v1::DeformConfiguration rest;
+};
+// Errors: InvalidArgument (a field that is unknown or out of range).
+absl::StatusOr<StreamRequest> ReadStreamRequest(const v1::DeformConfiguration& proto,
+                                                const ServiceLimits& limits);
 absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ReadConfiguration(
-    const v1::DeformConfiguration& proto, const ServiceLimits& limits, SessionRegistry* registry);
+    const StreamRequest& request, std::shared_ptr<Session> session);
+
+// The same for the session that has come back to memory. Errors: Aborted (it is no longer the same:
+// it was updated).
+absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ConfigurationFor(
+    const StreamConfiguration& before, std::shared_ptr<Session> session);
 
 // What was made for a stream before it began.
 struct StreamBegin {

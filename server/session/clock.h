@@ -12,6 +12,7 @@ namespace tissueform {
 class Clock {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
+  using Duration = std::chrono::steady_clock::duration;
 
   virtual ~Clock() = default;
   // Never goes back.

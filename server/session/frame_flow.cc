@@ -49,6 +49,14 @@ bool FrameFlow::StartSolve() {
   return true;
 }
 
+void FrameFlow::PutBack(WaitingPose pose) {
+  if (mailbox_.has_value()) {
+    mailbox_->coalesced_count += pose.coalesced_count + 1;
+  } else {
+    mailbox_ = std::move(pose);
+  }
+}
+
 void FrameFlow::FinishSolve(std::optional<AnswerFrame> frame) {
   busy_ = false;
   if (!frame.has_value()) return;

@@ -63,6 +63,8 @@ class FrameFlow {
   bool StartSolve();
   // The newest pose at this moment. REQUIRES: StartSolve was true.
   std::optional<WaitingPose> TakePose() { return std::exchange(mailbox_, std::nullopt); }
+  // A pose that was taken and could not be answered, to be answered later unless a newer one waits.
+  void PutBack(WaitingPose pose);
   // The answer, or nothing when there is none. One whose solve was given up (summary.cancelled) is
   // kept only when it is the first to its pose: better than none.
   void FinishSolve(std::optional<AnswerFrame> frame);

@@ -15,6 +15,7 @@ struct ServiceLimits {
   int64_t max_tets = 12'000'000;
   int64_t max_mesh_bytes = int64_t{1} << 30;
   int max_sessions = 64;
+  int max_stored_sessions = 10'000;  // in memory or not
   int max_streams = 64;
   std::chrono::seconds session_idle_ttl{1800};
   // A client that says nothing for so long is given up.

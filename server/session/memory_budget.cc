@@ -69,7 +69,7 @@ absl::Status MemoryBudget::Take(int64_t bytes, absl::string_view what) {
   // Once more and no oftener: it has given back all that can be spared, and another may have taken
   // that. No lock is held, since what is reclaimed comes back through GiveBack.
   if (reclaimer_) {
-    reclaimer_();
+    reclaimer_(bytes);
     if (TryTake(bytes)) {
       return absl::OkStatus();
     }

@@ -46,9 +46,9 @@ class MemoryReservation {
 // Thread-safe. Its lock is held over nothing else.
 class MemoryBudget {
  public:
-  // Asked, without a lock held, when a reservation does not fit: gives back what it can spare. The
-  // reservation is then tried once more.
-  using Reclaimer = std::function<void()>;
+  // Asked, without a lock held, when a reservation of `bytes` does not fit: gives back what it can
+  // spare, so that they do. The reservation is then tried once more.
+  using Reclaimer = std::function<void(int64_t bytes)>;
 
   explicit MemoryBudget(int64_t limit_bytes) : limit_bytes_(limit_bytes) {}
   MemoryBudget(const MemoryBudget&) = delete;

@@ -93,12 +93,35 @@ absl::Status CheckCellArraysFinite(const std::vector<CellArray>& arrays) {
   return absl::OkStatus();
 }
 
+// What a mesh takes while it is checked or read.
+int64_t PeakBytes(const MeshAnnouncement& mesh) {
+  return mesh.total_bytes + kValidationBytesPerTet * mesh.shape.num_tets +
+         kValidationBytesPerVertex * mesh.shape.num_vertices;
+}
+
+absl::Status NoSuchMesh() {
+  return WithReason(absl::NotFoundError("the server does not have this mesh; upload it"),
+                    ErrorReason::kMeshNotFound);
+}
+
 }  // namespace
 
 const CellArray* StoredMesh::FindCellArray(absl::string_view name) const {
   const auto found = std::find_if(cell_arrays.begin(), cell_arrays.end(),
                                   [name](const CellArray& array) { return array.name == name; });
   return found == cell_arrays.end() ? nullptr : &*found;
+}
+
+MeshRecord RecordOf(const StoredMesh& mesh) {
+  MeshRecord record;
+  record.sha256 = mesh.sha256;
+  record.shape = {.num_vertices = mesh.mesh.num_vertices(),
+                  .num_tets = mesh.mesh.num_tets(),
+                  .cell_arrays = {}};
+  for (const CellArray& array : mesh.cell_arrays) record.shape.cell_arrays.push_back(array.name);
+  record.total_bytes = record.shape.TotalBytes();
+  record.skin_vertex_count = static_cast<int64_t>(mesh.skin.size());
+  return record;
 }
 
 MeshUpload::MeshUpload(MeshAnnouncement announcement, int64_t max_chunk_bytes,
@@ -141,16 +164,15 @@ absl::Status MeshUpload::Write(int64_t offset, absl::string_view data, bool fini
   return absl::OkStatus();
 }
 
-MeshCatalog::MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget, const Clock* clock)
-    : limits_(limits), budget_(budget), clock_(clock) {}
+MeshCatalog::MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget, MeshStore* store,
+                         const Clock* clock)
+    : limits_(limits), budget_(budget), store_(store), clock_(clock) {}
 
 absl::StatusOr<std::unique_ptr<MeshUpload>> MeshCatalog::StartUpload(
     MeshAnnouncement announcement) {
   TF_RETURN_IF_ERROR(CheckAnnouncement(announcement, limits_));
-  const int64_t bytes = announcement.total_bytes +
-                        kValidationBytesPerTet * announcement.shape.num_tets +
-                        kValidationBytesPerVertex * announcement.shape.num_vertices;
-  TF_ASSIGN_OR_RETURN(MemoryReservation reservation, budget_->Reserve(bytes, "mesh"));
+  TF_ASSIGN_OR_RETURN(MemoryReservation reservation,
+                      budget_->Reserve(PeakBytes(announcement), "mesh"));
   return std::unique_ptr<MeshUpload>(
       new MeshUpload(std::move(announcement), limits_.max_chunk_bytes, std::move(reservation)));
 }
@@ -177,13 +199,43 @@ absl::StatusOr<std::shared_ptr<const StoredMesh>> MeshCatalog::Finish(
       StoredMesh{std::move(upload->reservation_), sha256, std::move(mesh),
                  std::move(upload->payload_.cell_arrays()), std::move(skin)});
 
+  if (store_ != nullptr) {
+    TF_RETURN_IF_ERROR(store_->Put(
+        RecordOf(*stored),
+        ViewMeshPayload(stored->mesh.positions(), stored->mesh.tets(), stored->cell_arrays)));
+  }
+  return Add(std::move(stored));
+}
+
+std::shared_ptr<const StoredMesh> MeshCatalog::Add(std::shared_ptr<const StoredMesh> mesh) {
   MutexLock lock(mutex_);
-  Entry& entry = meshes_[sha256];
+  Entry& entry = meshes_[mesh->sha256];
   if (entry.mesh == nullptr) {
-    entry.mesh = std::move(stored);
+    entry.mesh = std::move(mesh);
   }
   entry.last_used = clock_->Now();
   return entry.mesh;
+}
+
+absl::StatusOr<std::shared_ptr<const StoredMesh>> MeshCatalog::Load(const std::string& sha256) {
+  if (std::shared_ptr<const StoredMesh> known = Find(sha256); known != nullptr) return known;
+  if (store_ == nullptr) return NoSuchMesh();
+  absl::StatusOr<MeshRecord> record = store_->Find(sha256);
+  if (absl::IsNotFound(record.status())) return NoSuchMesh();
+  TF_RETURN_IF_ERROR(record.status());
+  TF_ASSIGN_OR_RETURN(
+      MemoryReservation reservation,
+      budget_->Reserve(PeakBytes({record->shape, record->total_bytes, sha256}), "mesh"));
+  // The digest says that it is what was checked when it came.
+  TF_ASSIGN_OR_RETURN(MeshPayload payload, store_->Read(sha256));
+  TF_ASSIGN_OR_RETURN(TetMesh mesh,
+                      TetMesh::Create(std::move(payload.positions()), std::move(payload.tets())));
+  std::vector<int32_t> skin = BoundaryVertices(mesh);
+  TF_RETURN_IF_ERROR(reservation.Resize(
+      record->total_bytes + static_cast<int64_t>(skin.size() * sizeof(int32_t)), "mesh"));
+  return Add(std::make_shared<const StoredMesh>(
+      StoredMesh{std::move(reservation), sha256, std::move(mesh), std::move(payload.cell_arrays()),
+                 std::move(skin)}));
 }
 
 std::shared_ptr<const StoredMesh> MeshCatalog::Find(const std::string& sha256) {
@@ -196,22 +248,60 @@ std::shared_ptr<const StoredMesh> MeshCatalog::Find(const std::string& sha256) {
   return found->second.mesh;
 }
 
-bool MeshCatalog::Remove(const std::string& sha256) {
+absl::StatusOr<MeshView> MeshCatalog::Look(const std::string& sha256) {
+  std::shared_ptr<const StoredMesh> mesh = Find(sha256);
+  if (mesh != nullptr) return MeshView{RecordOf(*mesh), std::move(mesh)};
+  if (store_ == nullptr) return NoSuchMesh();
+  absl::StatusOr<MeshRecord> record = store_->Find(sha256);
+  if (absl::IsNotFound(record.status())) return NoSuchMesh();
+  TF_RETURN_IF_ERROR(record.status());
+  return MeshView{*std::move(record), nullptr};
+}
+
+absl::StatusOr<MeshViewPage> MeshCatalog::List(const std::string& after, int limit) {
+  MeshViewPage page;
+  if (store_ != nullptr) {
+    TF_ASSIGN_OR_RETURN(MeshStore::Page stored, store_->List(after, limit));
+    page.next = std::move(stored.next);
+    MutexLock lock(mutex_);
+    for (MeshRecord& record : stored.records) {
+      const auto known = meshes_.find(record.sha256);
+      page.views.push_back(
+          {std::move(record), known == meshes_.end() ? nullptr : known->second.mesh});
+    }
+    return page;
+  }
+  MutexLock lock(mutex_);
+  for (auto entry = meshes_.upper_bound(after); entry != meshes_.end(); ++entry) {
+    if (page.views.size() == static_cast<size_t>(limit)) {
+      page.next = page.views.back().record.sha256;
+      break;
+    }
+    page.views.push_back({RecordOf(*entry->second.mesh), entry->second.mesh});
+  }
+  return page;
+}
+
+absl::Status MeshCatalog::Remove(const std::string& sha256) {
+  // From the store first: what fails there is still known.
+  if (store_ != nullptr) {
+    const absl::Status removed = store_->Delete(sha256);
+    if (absl::IsNotFound(removed)) return NoSuchMesh();
+    TF_RETURN_IF_ERROR(removed);
+  }
   std::shared_ptr<const StoredMesh> removed;  // destroyed after the lock is released
   MutexLock lock(mutex_);
   const auto found = meshes_.find(sha256);
-  if (found == meshes_.end()) {
-    return false;
-  }
+  if (found == meshes_.end()) return store_ == nullptr ? NoSuchMesh() : absl::OkStatus();
   removed = std::move(found->second.mesh);
   meshes_.erase(found);
-  return true;
+  return absl::OkStatus();
 }
 
-int MeshCatalog::RemoveIdle() {
+int MeshCatalog::RemoveIdle(Clock::Duration idle) {
   std::vector<std::shared_ptr<const StoredMesh>> removed;  // destroyed after the lock is released
   MutexLock lock(mutex_);
-  const auto cutoff = clock_->Now() - limits_.session_idle_ttl;
+  const Clock::TimePoint cutoff = clock_->Now() - idle;
   for (auto entry = meshes_.begin(); entry != meshes_.end();) {
     // New users come through this map alone: with one reference nobody can gain another now.
     if (entry->second.mesh.use_count() == 1 && entry->second.last_used <= cutoff) {

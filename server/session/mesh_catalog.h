@@ -19,6 +19,7 @@
 #include "server/session/clock.h"
 #include "server/session/limits.h"
 #include "server/session/memory_budget.h"
+#include "server/store/mesh_store.h"
 
 namespace tissueform {
 
@@ -32,6 +33,18 @@ struct StoredMesh {
 
   // Null when the mesh has no array of that name.
   const CellArray* FindCellArray(absl::string_view name) const;
+};
+
+// A mesh as it is kept, and itself while it is in memory.
+struct MeshView {
+  MeshRecord record;
+  std::shared_ptr<const StoredMesh> mesh;  // null: in the store only
+};
+MeshRecord RecordOf(const StoredMesh& mesh);
+
+struct MeshViewPage {
+  std::vector<MeshView> views;
+  std::string next;  // MeshStore::Page::next
 };
 
 // What a client says of a mesh before it sends it.
@@ -64,14 +77,19 @@ class MeshUpload {
   bool finished_ = false;
 };
 
-// The meshes of the server by their SHA-256.
+// The meshes of the server by their SHA-256: those in use are in memory, and where there is a store
+// all are in it.
 //
 // Thread-safe.
 class MeshCatalog {
  public:
-  // `budget` must outlive the catalog and all its meshes, `clock` the catalog.
-  MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget,
+  // `budget` must outlive the catalog and all its meshes, `store` (null: nothing is kept) and
+  // `clock` the catalog.
+  MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget, MeshStore* store = nullptr,
               const Clock* clock = Clock::System());
+
+  // What is not in memory can be had again.
+  bool keeps_meshes() const { return store_ != nullptr; }
 
   // Checks what is announced and reserves memory for it.
   //
@@ -82,19 +100,29 @@ class MeshCatalog {
   // Checks digest and content, and keeps the mesh. Computes for a while: call it on a worker. Where
   // the same mesh has arrived in the meantime, that one is returned.
   //
-  // Errors: DataLoss (wrong digest), InvalidArgument (NaN, infinity, not usable). REQUIRES:
-  // upload->finished().
+  // Errors: DataLoss (wrong digest), InvalidArgument (NaN, infinity, not usable), those of
+  // MeshStore::Put. REQUIRES: upload->finished().
   absl::StatusOr<std::shared_ptr<const StoredMesh>> Finish(std::unique_ptr<MeshUpload> upload);
 
-  // Null when the server does not have it.
+  // In memory. Null when it is not.
   std::shared_ptr<const StoredMesh> Find(const std::string& sha256);
 
-  // Users keep the mesh until they end. False when there was none.
-  bool Remove(const std::string& sha256);
+  // From memory or the store. Blocks on the disk.
+  //
+  // Errors: NotFound; ResourceExhausted (no room); those of MeshStore::Read.
+  absl::StatusOr<std::shared_ptr<const StoredMesh>> Load(const std::string& sha256);
 
-  // Forgets the meshes that nobody uses and nobody has asked for within the idle TTL. Returns how
-  // many.
-  int RemoveIdle();
+  // Without reading it. Blocks on the disk. Errors: NotFound, those of MeshStore::Find and List.
+  absl::StatusOr<MeshView> Look(const std::string& sha256);
+  absl::StatusOr<MeshViewPage> List(const std::string& after, int limit);
+
+  // Users in memory keep the mesh until they end. Blocks on the disk. Errors: NotFound, those of
+  // MeshStore::Delete.
+  absl::Status Remove(const std::string& sha256);
+
+  // Takes those meshes out of memory that nobody uses and nobody has asked for within `idle`.
+  // Returns how many.
+  int RemoveIdle(Clock::Duration idle);
 
  private:
   struct Entry {
@@ -102,9 +130,12 @@ class MeshCatalog {
     Clock::TimePoint last_used;
   };
 
+  std::shared_ptr<const StoredMesh> Add(std::shared_ptr<const StoredMesh> mesh);
+
   // Constant.
   const ServiceLimits limits_;
   MemoryBudget* const budget_;
+  MeshStore* const store_;
   const Clock* const clock_;
 
   Mutex mutex_;

@@ -203,10 +203,12 @@ absl::StatusOr<std::optional<PreparedAnswer>> Session::Respond(const ResponseCla
   return std::optional<PreparedAnswer>(std::move(answer));
 }
 
-void Session::Close() {
+void Session::Close(CloseReason reason) {
   std::optional<Models> closed;  // ends without the lock
   {
     MutexLock lock(mutex_);
+    // First: who finds it closed asks why.
+    evicted_ = reason == CloseReason::kEvicted;
     std::swap(closed, models_);
     own_bytes_ = 0;
   }

@@ -78,6 +78,7 @@ class Session {
 
   const std::string& id() const { return id_; }
   const StoredMesh& mesh() const { return *mesh_; }
+  const std::shared_ptr<const StoredMesh>& shared_mesh() const { return mesh_; }
   const ConstraintSet& constraints() const { return constraints_; }
   DeformationModel model() const { return options_.model; }
   double poisson_ratio() const { return options_.preparation.poisson_ratio; }
@@ -109,8 +110,8 @@ class Session {
 
   // On the strand. `poses` has one entry per handle, in the order of the constraints.
   //
-  // Errors: InvalidArgument (a pose that is not legal), NotFound (the session was closed),
-  // FailedPrecondition (a model that was not prepared).
+  // Errors: InvalidArgument (a pose that is not legal), NotFound (the session was closed, see
+  // evicted), FailedPrecondition (a model that was not prepared).
   absl::StatusOr<Deformation> Deform(DeformationModel model, absl::Span<const HandlePose> poses,
                                      const DeformControl& control);
 
@@ -119,9 +120,14 @@ class Session {
   absl::StatusOr<std::optional<PreparedAnswer>> Respond(const ResponseClaim& claim,
                                                         absl::Span<const HandlePose> poses);
 
-  // On the strand. Gives the memory back; later calls of Deform fail. What is being made for the
-  // session at this moment (see making()) is given back when that ends.
-  void Close();
+  enum class CloseReason { kDeleted, kEvicted };
+
+  // Any thread; on the strand where the memory is to be free afterwards even if something is being
+  // solved. Gives the memory back; later calls of Deform fail. What is being made for the session
+  // at this moment (see making()) is given back when that ends.
+  void Close(CloseReason reason);
+  // Any thread. Closed, but the server still has the session: SessionRegistry::Open gives another.
+  bool evicted() const { return evicted_; }
   // Any thread. Whether a call of PrepareModel or PrepareResponse is under way.
   bool making() const { return making_; }
 
@@ -171,6 +177,7 @@ class Session {
   Strand making_strand_;  // the preparation's
   std::atomic<int64_t> own_bytes_ = 0;
   std::atomic<bool> making_ = false;
+  std::atomic<bool> evicted_ = false;
   std::atomic<Clock::TimePoint> last_used_;
 
   mutable Mutex mutex_;

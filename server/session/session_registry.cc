@@ -4,17 +4,20 @@
 #include "server/session/session_registry.h"
 
 #include <algorithm>
-#include <iterator>
+#include <future>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "spdlog/spdlog.h"
 
 #include "core/base/error_reason.h"
+#include "core/base/status_macros.h"
 #include "server/auth/identity.h"
 
 namespace tissueform {
 namespace {
+
+constexpr int kPageSize = 1000;
 
 absl::Status NoSuchSession(const std::string& id) {
   return WithReason(absl::NotFoundError(absl::StrCat(
@@ -45,204 +48,308 @@ absl::Status EndingId(const std::string& id) {
       ErrorReason::kSessionBeingDeleted);
 }
 
+absl::Status TooMany(int limit, absl::string_view what, absl::string_view remedy) {
+  return WithReason(absl::ResourceExhaustedError(absl::StrCat("the server ", what, " ", limit,
+                                                              " sessions, as many as it may", remedy)),
+                    ErrorReason::kTooManySessions, {{"limit", absl::StrCat(limit)}});
+}
+
 // Where nobody waits for the end of a session.
 void WarnIfLeftBehind(const absl::Status& status) {
   if (!status.ok()) spdlog::warn("a session's record stays behind: {}", status.ToString());
 }
 
-// This process is the only one that writes to its store; a store that outlives its server gives
-// each start an epoch of its own.
+// This process is the only one that writes to its store: a store on disk is locked by it.
 constexpr int64_t kEpoch = 1;
+
+absl::StatusOr<SessionStore::Page> ListAndWait(SessionStore* store,
+                                               const SessionStore::ListRequest& request) {
+  std::promise<absl::StatusOr<SessionStore::Page>> answer;
+  store->List(request, [&answer](absl::StatusOr<SessionStore::Page> page) {
+    answer.set_value(std::move(page));
+  });
+  return answer.get_future().get();
+}
 
 }  // namespace
 
 SessionRegistry::SessionRegistry(const ServiceLimits& limits, MemoryBudget* budget,
-                                 WorkerPool* pool, SessionStore* store, const Clock* clock)
+                                 WorkerPool* pool, SessionStore* store, MeshCatalog* catalog,
+                                 const Clock* clock)
     : limits_(limits),
       budget_(budget),
       pool_(pool),
       store_(store),
+      catalog_(catalog),
       clock_(clock),
       preparations_(budget, pool) {}
 
+absl::Status SessionRegistry::LearnKnown() {
+  SessionStore::ListRequest request{.owner = std::nullopt, .after = "", .limit = kPageSize};
+  do {
+    TF_ASSIGN_OR_RETURN(SessionStore::Page page, ListAndWait(store_, request));
+    MutexLock lock(mutex_);
+    for (SessionRecord& record : page.records) {
+      KnownSession known;
+      known.key = {std::move(record.request_id), std::move(record.request_fingerprint)};
+      known.mesh_sha256 = std::move(record.mesh_sha256);
+      known.last_used = clock_->Now();
+      table_.Add(record.id, std::move(known));
+    }
+    request.after = std::move(page.next);
+  } while (!request.after.empty());
+  return absl::OkStatus();
+}
+
 void SessionRegistry::Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
-                             CancelFlag cancelled, const CreateCallback& done) {
+                             CancelFlag cancelled, const SessionCallback& done) {
   if (record.id.empty()) {
     record.id = RandomId();
   }
-  Admission admission = Admit(record, Waiter{std::move(cancelled), done});
-  if (!admission.refusal.ok()) {
-    done(std::move(admission.refusal));
-    return;
-  }
-  if (admission.existing != nullptr) {
-    done(std::move(admission.existing));
-    return;
-  }
-  if (admission.started == nullptr) {
-    return;
-  }
-  std::shared_ptr<SharedPreparation> preparation = preparations_.Find(record);
-  Strand& strand = preparation->strand();
-  strand.Post(Lane::kBatch,
-              [this, creation = std::move(admission.started), record = std::move(record),
-               mesh = std::move(mesh), preparation = std::move(preparation)]() mutable {
-                Make(creation, std::move(record), std::move(mesh), std::move(preparation));
-              });
-}
-
-void SessionRegistry::Make(const std::shared_ptr<Creation>& creation, SessionRecord record,
-                           std::shared_ptr<const StoredMesh> mesh,
-                           std::shared_ptr<SharedPreparation> preparation) {
-  const Cancellation cancellation([this, &creation] { return AllCancelled(*creation); });
-  absl::StatusOr<std::shared_ptr<Session>> session = Session::Create(
-      record, std::move(mesh), std::move(preparation), budget_, pool_, clock_, cancellation);
-  if (!session.ok()) {
-    FinishCreation(creation, session.status());
-    return;
-  }
-  // After the session, so that no record tells of one that could not be made.
-  store_->Create(std::move(record), kEpoch,
-                 [this, creation, session = *std::move(session)](
-                     const absl::StatusOr<SessionRecord>& stored) mutable {
-                   if (stored.ok()) {
-                     FinishCreation(creation, std::move(session));
-                   } else {
-                     // Its memory is free before anybody hears of the failure and tries again.
-                     session.reset();
-                     FinishCreation(creation, stored.status());
-                   }
-                 });
-}
-
-SessionRegistry::Admission SessionRegistry::Admit(const SessionRecord& record,
-                                                  const Waiter& waiter) {
-  const RequestKey key{record.request_id, record.request_fingerprint};
-  bool full = false;
+  MakeRoom();
+  const SessionWaiter waiter{std::move(cancelled), done};
+  Admission admission;
   {
     MutexLock lock(mutex_);
-    full = Full();
+    admission = AdmitCreate(record, waiter);
   }
-  // Only now: nothing is forgotten while there is room. Not under the lock, which RemoveIdle takes
-  // and leaves before sessions end; others may come meanwhile, so whether there is room is asked
-  // again below.
-  if (full) {
-    RemoveIdle();
+  if (!admission.refusal.ok()) {
+    done(std::move(admission.refusal));
+  } else if (admission.existing != nullptr) {
+    done(std::move(admission.existing));
+  } else if (admission.started != nullptr && admission.started->restores) {
+    StartRestore(admission.started);
+  } else if (admission.started != nullptr) {
+    PostMake(admission.started, std::move(record), std::move(mesh));
   }
+}
+
+void SessionRegistry::Open(const std::string& id, CancelFlag cancelled,
+                           const SessionCallback& done) {
+  if (std::shared_ptr<Session> session = Loaded(id); session != nullptr) {
+    done(std::move(session));
+    return;
+  }
+  MakeRoom();
   Admission admission;
-  MutexLock lock(mutex_);
-  if (!key.request_id.empty() && JoinEarlierRequest(key, waiter, &admission)) {
-    return admission;
+  {
+    MutexLock lock(mutex_);
+    admission = AdmitOpen(id, {std::move(cancelled), done});
   }
-  if (IsTaken(record.id)) {
+  if (!admission.refusal.ok()) {
+    done(std::move(admission.refusal));
+  } else if (admission.existing != nullptr) {
+    done(std::move(admission.existing));
+  } else if (admission.started != nullptr) {
+    StartRestore(admission.started);
+  }
+}
+
+// Only now: nothing leaves memory while there is room. Not under the lock, which Evict takes and
+// leaves before sessions end; others may come meanwhile, so whether there is room is asked again.
+void SessionRegistry::MakeRoom() {
+  const auto has_room = [this] {
+    MutexLock lock(mutex_);
+    return !Full();
+  };
+  if (has_room()) return;
+  Evict(has_room);
+  if (!catalog_->keeps_meshes() && !has_room()) RemoveIdle();
+}
+
+SessionRegistry::Admission SessionRegistry::AdmitCreate(const SessionRecord& record,
+                                                        const SessionWaiter& waiter) {
+  const RequestKey key{record.request_id, record.request_fingerprint};
+  Admission admission;
+  if (!key.request_id.empty() && JoinEarlierRequest(key, waiter, &admission)) return admission;
+  if (table_.Find(record.id) != nullptr || table_.FindMaking(record.id) != nullptr) {
     admission.refusal = TakenId(record.id);
-    return admission;
-  }
-  if (ending_.find(record.id) != ending_.end()) {
+  } else if (ending_.contains(record.id)) {
     admission.refusal = EndingId(record.id);
-    return admission;
+  } else if (table_.num_known() >= static_cast<size_t>(limits_.max_stored_sessions)) {
+    admission.refusal = TooMany(limits_.max_stored_sessions, "keeps",
+                                "; delete one or raise --max-stored-sessions");
+  } else {
+    admission.refusal = CheckRoom();
   }
-  if (Full()) {
-    admission.refusal =
-        WithReason(absl::ResourceExhaustedError(absl::StrCat(
-                       "the server holds ", limits_.max_sessions,
-                       " sessions, as many as it may; delete one or raise --max-sessions")),
-                   ErrorReason::kTooManySessions, {{"limit", absl::StrCat(limits_.max_sessions)}});
-    return admission;
+  if (admission.refusal.ok()) {
+    admission.started = table_.StartMaking(record.id, key, /*restores=*/false, waiter);
   }
-  admission.started = std::make_shared<Creation>(Creation{record.id, key, {waiter}});
-  creations_.push_back(admission.started);
   return admission;
 }
 
-bool SessionRegistry::IsTaken(const std::string& id) const {
-  return sessions_.find(id) != sessions_.end() ||
-         std::any_of(creations_.begin(), creations_.end(),
-                     [&id](const auto& creation) { return creation->id == id; });
+SessionRegistry::Admission SessionRegistry::AdmitOpen(const std::string& id,
+                                                      const SessionWaiter& waiter) {
+  Admission admission;
+  KnownSession* known = table_.Find(id);
+  if (known == nullptr) {
+    admission.refusal = NoSuchSession(id);
+  } else if (known->session != nullptr) {
+    known->session->Touch();
+    admission.existing = known->session;
+  } else if (const MakingPtr making = table_.FindMaking(id); making != nullptr) {
+    making->waiters.push_back(waiter);
+  } else if (admission.refusal = CheckRoom(); admission.refusal.ok()) {
+    admission.started = table_.StartMaking(id, known->key, /*restores=*/true, waiter);
+  }
+  return admission;
 }
 
-bool SessionRegistry::JoinEarlierRequest(const RequestKey& key, const Waiter& waiter,
+bool SessionRegistry::JoinEarlierRequest(const RequestKey& key, const SessionWaiter& waiter,
                                          Admission* admission) {
-  if (const auto known = session_of_request_.find(key.request_id);
-      known != session_of_request_.end()) {
-    Entry& entry = sessions_.at(known->second);
-    if (entry.key.fingerprint != key.fingerprint) {
-      admission->refusal = OtherRequest(key.request_id);
-      return true;
-    }
-    ++entry.claims;
-    entry.session->Touch();
-    admission->existing = entry.session;
-    return true;
-  }
-  const auto creation = std::find_if(
-      creations_.begin(), creations_.end(),
-      [&key](const auto& candidate) { return candidate->key.request_id == key.request_id; });
-  if (creation == creations_.end()) {
-    return false;
-  }
-  if ((*creation)->key.fingerprint != key.fingerprint) {
+  KnownSession* known = table_.FindRequest(key.request_id);
+  const MakingPtr making = known == nullptr ? table_.FindMakingOfRequest(key.request_id) : nullptr;
+  if (known == nullptr && making == nullptr) return false;
+  if ((known != nullptr ? known->key : making->key).fingerprint != key.fingerprint) {
     admission->refusal = OtherRequest(key.request_id);
-  } else if ((*creation)->waiters.empty()) {
+  } else if (known != nullptr) {
+    *admission = AdmitOpen(table_.IdOfRequest(key.request_id), waiter);
+    if (admission->refusal.ok()) ++known->claims;
+  } else if (making->waiters.empty()) {
     // It is being given up, perhaps past the last moment at which somebody could join.
-    admission->refusal = EndingId((*creation)->id);
+    admission->refusal = EndingId(making->id);
   } else {
-    (*creation)->waiters.push_back(waiter);
+    making->waiters.push_back(waiter);
   }
   return true;
 }
 
+absl::Status SessionRegistry::CheckRoom() const {
+  if (!Full()) return absl::OkStatus();
+  return TooMany(limits_.max_sessions, "holds",
+                 " in memory, and all are in use; try again in a moment, delete one, or raise "
+                 "--max-sessions");
+}
+
 bool SessionRegistry::Full() const {
-  return sessions_.size() + creations_.size() >= static_cast<size_t>(limits_.max_sessions);
+  return table_.num_loaded() >= static_cast<size_t>(limits_.max_sessions);
 }
 
-bool SessionRegistry::AllCancelled(const Creation& creation) const {
+void SessionRegistry::StartRestore(const MakingPtr& making) {
+  store_->Get(making->id, [this, making](absl::StatusOr<SessionRecord> record) {
+    if (!record.ok()) {
+      FinishRestore(making, record.status());
+      return;
+    }
+    // Reading a mesh takes its time.
+    pool_->Post(Lane::kStore, [this, making, record = *std::move(record)]() mutable {
+      absl::StatusOr<std::shared_ptr<const StoredMesh>> mesh = catalog_->Load(record.mesh_sha256);
+      if (mesh.ok()) {
+        PostMake(making, std::move(record), *std::move(mesh));
+      } else {
+        FinishRestore(making, mesh.status());
+      }
+    });
+  });
+}
+
+void SessionRegistry::PostMake(const MakingPtr& making, SessionRecord record,
+                               std::shared_ptr<const StoredMesh> mesh) {
+  std::shared_ptr<SharedPreparation> preparation = preparations_.Find(record);
+  Strand& strand = preparation->strand();
+  strand.Post(Lane::kBatch, [this, making, record = std::move(record), mesh = std::move(mesh),
+                             preparation = std::move(preparation)]() mutable {
+    Make(making, std::move(record), std::move(mesh), std::move(preparation));
+  });
+}
+
+void SessionRegistry::Make(const MakingPtr& making, SessionRecord record,
+                           std::shared_ptr<const StoredMesh> mesh,
+                           std::shared_ptr<SharedPreparation> preparation) {
+  const Cancellation cancellation([this, &making] { return AllCancelled(*making); });
+  absl::StatusOr<std::shared_ptr<Session>> session = Session::Create(
+      record, std::move(mesh), std::move(preparation), budget_, pool_, clock_, cancellation);
+  if (making->restores) {
+    FinishRestore(making, std::move(session));
+    return;
+  }
+  if (!session.ok()) {
+    FinishCreation(making, session.status());
+    return;
+  }
+  // After the session, so that no record tells of one that could not be made.
+  store_->Create(std::move(record), kEpoch,
+                 [this, making, session = *std::move(session)](
+                     const absl::StatusOr<SessionRecord>& stored) mutable {
+                   if (stored.ok()) {
+                     FinishCreation(making, std::move(session));
+                   } else {
+                     // Its memory is free before anybody hears of the failure and tries again.
+                     session.reset();
+                     FinishCreation(making, stored.status());
+                   }
+                 });
+}
+
+bool SessionRegistry::AllCancelled(const SessionMaking& making) const {
   MutexLock lock(mutex_);
-  return std::all_of(creation.waiters.begin(), creation.waiters.end(),
-                     [](const Waiter& waiter) { return waiter.cancelled->load(); });
+  return std::all_of(making.waiters.begin(), making.waiters.end(),
+                     [](const SessionWaiter& waiter) { return waiter.cancelled->load(); });
 }
 
-void SessionRegistry::FinishCreation(const std::shared_ptr<Creation>& creation,
+void SessionRegistry::FinishCreation(const MakingPtr& making,
                                      absl::StatusOr<std::shared_ptr<Session>> result) {
-  std::vector<Waiter> waiters;
+  std::vector<SessionWaiter> waiters;
   bool nobody_waits = false;
   {
     MutexLock lock(mutex_);
-    creations_.erase(std::find(creations_.begin(), creations_.end(), creation));
-    waiters = std::move(creation->waiters);
+    waiters = table_.EndMaking(making);
     nobody_waits = waiters.empty();  // all have cancelled
     if (result.ok() && nobody_waits) {
-      ending_.insert((*result)->id());
+      ending_.insert(making->id);
     } else if (result.ok()) {
-      const std::string& id = (*result)->id();
-      sessions_[id] = Entry{*result, creation->key, static_cast<int>(waiters.size())};
-      if (!creation->key.request_id.empty()) {
-        session_of_request_[creation->key.request_id] = id;
-      }
+      KnownSession known;
+      known.session = *result;
+      known.key = making->key;
+      known.mesh_sha256 = (*result)->mesh().sha256;
+      known.claims = static_cast<int>(waiters.size());
+      table_.Add(making->id, std::move(known));
     }
   }
   if (result.ok() && nobody_waits) {
     End(*result, WarnIfLeftBehind);
   }
-  for (const Waiter& waiter : waiters) {
+  for (const SessionWaiter& waiter : waiters) {
     waiter.done(result);
   }
 }
 
-void SessionRegistry::CancelCreate(const CancelFlag& cancelled) {
-  std::vector<Waiter> gone;
+void SessionRegistry::FinishRestore(const MakingPtr& making,
+                                    absl::StatusOr<std::shared_ptr<Session>> result) {
+  std::vector<SessionWaiter> waiters;
+  std::shared_ptr<Session> unwanted;
+  bool again = false;
   {
     MutexLock lock(mutex_);
-    for (const std::shared_ptr<Creation>& creation : creations_) {
-      std::vector<Waiter>& waiters = creation->waiters;
-      const auto first_gone = std::partition(
-          waiters.begin(), waiters.end(),
-          [&cancelled](const Waiter& waiter) { return waiter.cancelled != cancelled; });
-      std::move(first_gone, waiters.end(), std::back_inserter(gone));
-      waiters.erase(first_gone, waiters.end());
+    KnownSession* known = table_.Find(making->id);
+    // All who waited had cancelled, and then somebody came.
+    again = absl::IsCancelled(result.status()) && known != nullptr && !making->waiters.empty();
+    if (!again) waiters = table_.EndMaking(making);
+    if (result.ok() && known != nullptr) {
+      known->session = *result;
+      known->mesh.reset();
+    } else if (result.ok()) {
+      unwanted = *std::move(result);
+      result = NoSuchSession(making->id);  // deleted meanwhile
     }
   }
-  for (const Waiter& waiter : gone) {
+  if (again) {
+    StartRestore(making);
+    return;
+  }
+  if (unwanted != nullptr) unwanted->Close(Session::CloseReason::kDeleted);
+  for (const SessionWaiter& waiter : waiters) {
+    waiter.done(result);
+  }
+}
+
+void SessionRegistry::CancelWait(const CancelFlag& cancelled) {
+  std::vector<SessionWaiter> gone;
+  {
+    MutexLock lock(mutex_);
+    gone = table_.TakeWaiters(cancelled);
+  }
+  for (const SessionWaiter& waiter : gone) {
     waiter.done(absl::CancelledError("the client has cancelled the call"));
   }
 }
@@ -250,21 +357,17 @@ void SessionRegistry::CancelCreate(const CancelFlag& cancelled) {
 void SessionRegistry::Abandon(const std::shared_ptr<Session>& session) {
   {
     MutexLock lock(mutex_);
-    const auto found = sessions_.find(session->id());
+    KnownSession* known = table_.Find(session->id());
     // Clients choose ids: another session may have it by now.
-    if (found == sessions_.end() || found->second.session != session ||
-        --found->second.claims > 0) {
-      return;
-    }
+    if (known == nullptr || known->session != session || --known->claims > 0) return;
     Take(session->id());
   }
   End(session, WarnIfLeftBehind);
 }
 
-void SessionRegistry::End(const std::shared_ptr<Session>& session,
-                          const std::function<void(absl::Status)>& done) {
+void SessionRegistry::End(const std::shared_ptr<Session>& session, const StatusCallback& done) {
   session->strand().Post(Lane::kSolves, [this, session, done] {
-    session->Close();
+    session->Close(Session::CloseReason::kDeleted);
     // What is being made for it holds memory until that ends.
     const auto forget = [this, id = session->id(), done] { Forget(id, done); };
     if (session->making()) {
@@ -275,7 +378,7 @@ void SessionRegistry::End(const std::shared_ptr<Session>& session,
   });
 }
 
-void SessionRegistry::Forget(const std::string& id, std::function<void(absl::Status)> done) {
+void SessionRegistry::Forget(const std::string& id, StatusCallback done) {
   store_->Delete(id, "", kEpoch, [this, id, done = std::move(done)](const absl::Status& status) {
     {
       MutexLock lock(mutex_);
@@ -285,42 +388,98 @@ void SessionRegistry::Forget(const std::string& id, std::function<void(absl::Sta
   });
 }
 
-absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string& id) {
+std::shared_ptr<Session> SessionRegistry::Loaded(const std::string& id) {
   MutexLock lock(mutex_);
-  const auto found = sessions_.find(id);
-  if (found == sessions_.end()) {
-    return NoSuchSession(id);
-  }
-  found->second.session->Touch();
-  return found->second.session;
+  const KnownSession* known = table_.Find(id);
+  if (known == nullptr || known->session == nullptr) return nullptr;
+  known->session->Touch();
+  return known->session;
 }
 
-void SessionRegistry::Delete(const std::string& id, const std::function<void(absl::Status)>& done) {
-  std::shared_ptr<Session> session;
+absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string& id) {
+  std::shared_ptr<Session> session = Loaded(id);
+  if (session == nullptr) return NoSuchSession(id);
+  return session;
+}
+
+void SessionRegistry::Look(const std::string& id,
+                           const std::function<void(absl::StatusOr<View>)>& done) {
+  store_->Get(id, [this, id, done](absl::StatusOr<SessionRecord> record) {
+    if (record.ok()) {
+      std::shared_ptr<Session> session = Loaded(id);
+      done(View{*std::move(record), std::move(session)});
+    } else {
+      done(absl::IsNotFound(record.status()) ? NoSuchSession(id) : record.status());
+    }
+  });
+}
+
+void SessionRegistry::List(const SessionStore::ListRequest& request,
+                           const std::function<void(absl::StatusOr<ViewPage>)>& done) {
+  store_->List(request, [this, done](absl::StatusOr<SessionStore::Page> page) {
+    if (!page.ok()) {
+      done(page.status());
+      return;
+    }
+    ViewPage views{.views = {}, .next = std::move(page->next)};
+    {
+      MutexLock lock(mutex_);
+      for (SessionRecord& record : page->records) {
+        const KnownSession* known = table_.Find(record.id);
+        views.views.push_back({std::move(record), known == nullptr ? nullptr : known->session});
+      }
+    }
+    done(std::move(views));
+  });
+}
+
+void SessionRegistry::CommitPoses(const std::string& id, std::vector<HandlePose> poses,
+                                  StatusCallback done) {
+  store_->CommitPoses(id, std::move(poses), kEpoch, std::move(done));
+}
+
+void SessionRegistry::Delete(const std::string& id, const StatusCallback& done) {
+  std::optional<KnownSession> known;
   {
     MutexLock lock(mutex_);
-    session = Take(id);
+    known = Take(id);
   }
-  if (session == nullptr) {
+  if (!known.has_value()) {
     done(NoSuchSession(id));
-    return;
+  } else if (known->session == nullptr) {
+    Forget(id, done);
+  } else {
+    End(known->session, done);
   }
-  End(session, done);
+}
+
+int SessionRegistry::Evict(const std::function<bool()>& enough) {
+  int count = 0;
+  while (!enough()) {
+    std::shared_ptr<Session> evicted;
+    {
+      MutexLock lock(mutex_);
+      const std::string id = table_.LeastRecentlyUsed(clock_->Now() - kInUse);
+      if (id.empty()) break;
+      KnownSession* known = table_.Find(id);
+      evicted = std::move(known->session);
+      known->last_used = evicted->last_used();
+      if (!catalog_->keeps_meshes()) known->mesh = evicted->shared_mesh();
+    }
+    // Here and now, whoever still holds it: nothing is being solved in a session not in use.
+    evicted->Close(Session::CloseReason::kEvicted);
+    ++count;
+  }
+  if (count > 0) spdlog::info("{} sessions that were not in use have left memory", count);
+  return count;
 }
 
 int SessionRegistry::RemoveIdle() {
-  std::vector<std::shared_ptr<Session>> removed;
+  std::vector<std::pair<std::string, KnownSession>> removed;
   {
     MutexLock lock(mutex_);
-    const auto cutoff = clock_->Now() - limits_.session_idle_ttl;
-    std::vector<std::string> idle;
-    for (const auto& [id, entry] : sessions_) {
-      if (entry.session->last_used() <= cutoff) {
-        idle.push_back(id);
-      }
-    }
-    for (const std::string& id : idle) {
-      removed.push_back(Take(id));
+    for (const std::string& id : table_.UnusedSince(clock_->Now() - limits_.session_idle_ttl)) {
+      removed.emplace_back(id, *Take(id));
     }
   }
   const int count = static_cast<int>(removed.size());
@@ -328,36 +487,27 @@ int SessionRegistry::RemoveIdle() {
     spdlog::info("removed {} sessions that were idle for more than {} s", count,
                  limits_.session_idle_ttl.count());
   }
-  for (std::shared_ptr<Session>& session : removed) {
-    Forget(session->id(), WarnIfLeftBehind);
-    // Usually the last reference, which frees the memory here and now. A silent stream may hold
-    // another one: then the strand does it.
-    if (session.use_count() > 1) {
-      Strand& strand = session->strand();
-      strand.Post(Lane::kSolves, [held = std::move(session)] { held->Close(); });
-    }
-    session.reset();
+  for (auto& [id, known] : removed) {
+    if (known.session != nullptr) known.session->Close(Session::CloseReason::kDeleted);
+    Forget(id, WarnIfLeftBehind);
   }
   return count;
 }
 
 int SessionRegistry::size() const {
   MutexLock lock(mutex_);
-  return static_cast<int>(sessions_.size());
+  return static_cast<int>(table_.num_loaded_in_table());
 }
 
-std::shared_ptr<Session> SessionRegistry::Take(const std::string& id) {
-  const auto found = sessions_.find(id);
-  if (found == sessions_.end()) {
-    return nullptr;
-  }
-  if (!found->second.key.request_id.empty()) {
-    session_of_request_.erase(found->second.key.request_id);
-  }
-  std::shared_ptr<Session> session = std::move(found->second.session);
-  sessions_.erase(found);
-  ending_.insert(id);
-  return session;
+int SessionRegistry::CountMadeFrom(const std::string& mesh_sha256) const {
+  MutexLock lock(mutex_);
+  return table_.CountMadeFrom(mesh_sha256);
+}
+
+std::optional<KnownSession> SessionRegistry::Take(const std::string& id) {
+  std::optional<KnownSession> known = table_.Take(id);
+  if (known.has_value()) ending_.insert(id);
+  return known;
 }
 
 }  // namespace tissueform

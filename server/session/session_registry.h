@@ -3,10 +3,10 @@
 
 #pragma once
 
-#include <atomic>
+#include <chrono>
 #include <functional>
-#include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -18,24 +18,47 @@
 #include "server/session/clock.h"
 #include "server/session/limits.h"
 #include "server/session/memory_budget.h"
+#include "server/session/mesh_catalog.h"
 #include "server/session/session.h"
+#include "server/session/session_table.h"
 #include "server/session/shared_preparation.h"
 #include "server/session/worker_pool.h"
 #include "server/store/session_store.h"
 
 namespace tissueform {
 
-// The sessions of the server by their id: in memory, each with its record in a store.
+// The sessions of the server by their id: each has its record in a store, and those that are used
+// are in memory. One that was not used for a while leaves memory when room is needed (it is
+// evicted) and is made again from its record when it is opened.
 //
 // Thread-safe. Callbacks are called without a lock held, from the calling thread or from a worker.
 class SessionRegistry {
  public:
-  using CancelFlag = std::shared_ptr<const std::atomic<bool>>;
-  using CreateCallback = std::function<void(absl::StatusOr<std::shared_ptr<Session>>)>;
+  using CancelFlag = SessionWaiter::CancelFlag;
+  using SessionCallback = std::function<void(absl::StatusOr<std::shared_ptr<Session>>)>;
+  using StatusCallback = std::function<void(absl::Status)>;
+
+  // What was used within this time is not evicted: a server that would take sessions from those who
+  // work with them refuses instead.
+  static constexpr std::chrono::seconds kInUse{10};
+
+  // A session as it is kept, and itself while it is in memory.
+  struct View {
+    SessionRecord record;
+    std::shared_ptr<Session> session;  // null: in the store only
+  };
+  struct ViewPage {
+    std::vector<View> views;
+    std::string next;  // SessionStore::Page::next
+  };
 
   // All pointers must outlive the registry and all its sessions.
   SessionRegistry(const ServiceLimits& limits, MemoryBudget* budget, WorkerPool* pool,
-                  SessionStore* store, const Clock* clock = Clock::System());
+                  SessionStore* store, MeshCatalog* catalog, const Clock* clock = Clock::System());
+
+  // Learns which sessions the store has. Call it before anything else; blocks. Errors: those of
+  // SessionStore::List.
+  absl::Status LearnKnown();
 
   // Makes a session of `record` on a worker, keeps the record and calls `done` once. A record
   // without id gets a random one. Calls with the same request id share one session; its making
@@ -48,93 +71,111 @@ class SessionRegistry {
   // ResourceExhausted (too many sessions); InvalidArgument (the request id belongs to another
   // request); Cancelled.
   void Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh, CancelFlag cancelled,
-              const CreateCallback& done);
+              const SessionCallback& done);
 
-  // Answers those callers of Create at once with Cancelled who came with this flag and still wait;
-  // what is made for nobody else stops at its next stage.
-  void CancelCreate(const CancelFlag& cancelled);
+  // Gives the session, made again from its record where it is not in memory. At once where it is.
+  //
+  // Errors: NotFound; those of Session::Create, SessionStore::Get and MeshCatalog::Load;
+  // ResourceExhausted; Cancelled.
+  void Open(const std::string& id, CancelFlag cancelled, const SessionCallback& done);
 
-  // Takes back one claim of a caller who never saw the answer. The session ends with its last
-  // claim.
+  // Answers those callers of Create and Open at once with Cancelled who came with this flag and
+  // still wait; what is made for nobody else stops at its next stage.
+  void CancelWait(const CancelFlag& cancelled);
+
+  // Takes back one claim of a caller who never saw the answer of Create. The session ends with its
+  // last claim.
   void Abandon(const std::shared_ptr<Session>& session);
 
-  // Errors: NotFound.
+  // In memory only. Errors: NotFound.
   absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& id);
+
+  // Without making it. Errors: NotFound, those of SessionStore::Get and List.
+  void Look(const std::string& id, const std::function<void(absl::StatusOr<View>)>& done);
+  void List(const SessionStore::ListRequest& request,
+            const std::function<void(absl::StatusOr<ViewPage>)>& done);
+
+  // Keeps the poses as the session's last ones; `done` when they are durable as far as the store
+  // is. Errors: those of SessionStore::CommitPoses.
+  void CommitPoses(const std::string& id, std::vector<HandlePose> poses, StatusCallback done);
 
   // Calls `done` when the memory of the session is free and its record is gone. Errors: NotFound,
   // those of SessionStore::Delete.
-  void Delete(const std::string& id, const std::function<void(absl::Status)>& done);
+  void Delete(const std::string& id, const StatusCallback& done);
 
-  // Ends the sessions that were idle for longer than the TTL. Returns how many.
+  // Evicts sessions that are not in use, those first that were used longest ago, until `enough` or
+  // none is left. Returns how many.
+  int Evict(const std::function<bool()>& enough);
+
+  // Ends the sessions that were idle for longer than the TTL, records and all: for stores in
+  // memory, whose meshes nobody else keeps. Returns how many.
   int RemoveIdle();
 
+  // In memory.
   int size() const;
+  // In memory or not.
+  int CountMadeFrom(const std::string& mesh_sha256) const;
+
+  WorkerPool& pool() { return *pool_; }
 
  private:
-  struct Waiter {
-    CancelFlag cancelled;
-    CreateCallback done;
-  };
-  // What makes a creation idempotent.
-  struct RequestKey {
-    std::string request_id;
-    std::string fingerprint;
-  };
-  // A session that is being made.
-  struct Creation {
-    std::string id;
-    RequestKey key;
-    std::vector<Waiter> waiters;  // guarded by the mutex of the registry
-  };
-  struct Entry {
-    std::shared_ptr<Session> session;
-    RequestKey key;
-    int claims = 0;
-  };
-  // What became of a call of Create when it arrived.
+  using MakingPtr = SessionTable::MakingPtr;
+
+  // What became of a call when it arrived.
   struct Admission {
     absl::Status refusal;
     std::shared_ptr<Session> existing;
-    std::shared_ptr<Creation> started;  // all three empty: joined a creation that is under way
+    MakingPtr started;  // all three empty: joined a making that is under way
   };
 
-  Admission Admit(const SessionRecord& record, const Waiter& waiter) ABSL_LOCKS_EXCLUDED(mutex_);
-  bool IsTaken(const std::string& id) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // False when no session and no creation has the request id.
-  bool JoinEarlierRequest(const RequestKey& key, const Waiter& waiter, Admission* admission)
+  Admission AdmitCreate(const SessionRecord& record, const SessionWaiter& waiter)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Admission AdmitOpen(const std::string& id, const SessionWaiter& waiter)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // False when no session and no making has the request id.
+  bool JoinEarlierRequest(const RequestKey& key, const SessionWaiter& waiter, Admission* admission)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Errors: ResourceExhausted.
+  absl::Status CheckRoom() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool Full() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Tries to have room for one more session in memory.
+  void MakeRoom() ABSL_LOCKS_EXCLUDED(mutex_);
+
+  // Reads what a session is made of, and makes it.
+  void StartRestore(const MakingPtr& making);
+  void PostMake(const MakingPtr& making, SessionRecord record,
+                std::shared_ptr<const StoredMesh> mesh);
   // On the preparation's strand.
-  void Make(const std::shared_ptr<Creation>& creation, SessionRecord record,
-            std::shared_ptr<const StoredMesh> mesh, std::shared_ptr<SharedPreparation> preparation)
+  void Make(const MakingPtr& making, SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
+            std::shared_ptr<SharedPreparation> preparation) ABSL_LOCKS_EXCLUDED(mutex_);
+  bool AllCancelled(const SessionMaking& making) const ABSL_LOCKS_EXCLUDED(mutex_);
+  void FinishCreation(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
       ABSL_LOCKS_EXCLUDED(mutex_);
-  bool AllCancelled(const Creation& creation) const ABSL_LOCKS_EXCLUDED(mutex_);
-  void FinishCreation(const std::shared_ptr<Creation>& creation,
-                      absl::StatusOr<std::shared_ptr<Session>> result) ABSL_LOCKS_EXCLUDED(mutex_);
+  void FinishRestore(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   // Ends a session that was taken out, and its record.
-  void End(const std::shared_ptr<Session>& session, const std::function<void(absl::Status)>& done)
+  void End(const std::shared_ptr<Session>& session, const StatusCallback& done)
       ABSL_LOCKS_EXCLUDED(mutex_);
   // Takes the record of a session that has ended out of the store; then its id is free again.
-  void Forget(const std::string& id, std::function<void(absl::Status)> done)
-      ABSL_LOCKS_EXCLUDED(mutex_);
+  void Forget(const std::string& id, StatusCallback done) ABSL_LOCKS_EXCLUDED(mutex_);
   // Whoever takes a session forgets it in the end.
-  std::shared_ptr<Session> Take(const std::string& id) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::optional<KnownSession> Take(const std::string& id) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::shared_ptr<Session> Loaded(const std::string& id) ABSL_LOCKS_EXCLUDED(mutex_);
 
   // Constant.
   const ServiceLimits limits_;
   MemoryBudget* const budget_;
   WorkerPool* const pool_;
   SessionStore* const store_;
+  MeshCatalog* const catalog_;
   const Clock* const clock_;
 
   // Self-synchronised.
   SharedPreparations preparations_;
 
   mutable Mutex mutex_;
-  std::map<std::string, Entry> sessions_ ABSL_GUARDED_BY(mutex_);
+  SessionTable table_ ABSL_GUARDED_BY(mutex_);
   std::set<std::string> ending_ ABSL_GUARDED_BY(mutex_);  // taken out, but still in the store
-  std::map<std::string, std::string> session_of_request_ ABSL_GUARDED_BY(mutex_);
-  std::vector<std::shared_ptr<Creation>> creations_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace tissueform

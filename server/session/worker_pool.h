@@ -21,9 +21,10 @@ enum class Lane {
   kFrames,      // products of prepared answers: below a millisecond, somebody looks at it
   kSolves,      // one back-substitution, and what ends sessions
   kIterations,  // answers of many solves
+  kStore,       // waits for the disk
   kBatch,       // factorisations, checks of meshes: seconds
 };
-inline constexpr size_t kLanes = 4;
+inline constexpr size_t kLanes = 5;
 
 // The threads that do all numerical work. Jobs of a lane start in the order of posting.
 //

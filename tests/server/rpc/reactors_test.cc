@@ -122,10 +122,10 @@ class ReactorsTest : public ::testing::Test {
   MeshCatalog catalog_{limits_, &budget_};
   std::unique_ptr<WorkerPool> workers_ = std::make_unique<WorkerPool>(kWorkers);
   InMemorySessionStore store_;
-  SessionRegistry registry_{limits_, &budget_, workers_.get(), &store_};
+  SessionRegistry registry_{limits_, &budget_, workers_.get(), &store_, &catalog_};
   DeformStreams streams_{limits_.max_streams};
   DeadlineTimer timer_;
-  MeshService mesh_service_{&gate_, limits_, &catalog_, workers_.get(), &timer_};
+  MeshService mesh_service_{&gate_, limits_, &catalog_, &registry_, workers_.get(), &timer_};
   SessionService session_service_{&gate_, limits_, &catalog_, &registry_};
   DeformService deform_service_{&gate_, limits_, &registry_, &streams_, &timer_};
   std::unique_ptr<WorkerPool> reactions_ = std::make_unique<WorkerPool>(4);
@@ -282,7 +282,7 @@ TEST_F(ReactorsTest, AConfiguredStreamMayRest) {
 TEST_F(ReactorsTest, ASilentUploadIsGivenUpAndItsMemoryIsFree) {
   ServiceLimits impatient = limits_;
   impatient.upload_silence = std::chrono::milliseconds(20);
-  MeshService service(&gate_, impatient, &catalog_, workers_.get(), &timer_);
+  MeshService service(&gate_, impatient, &catalog_, &registry_, workers_.get(), &timer_);
   const MeshAnnouncement announcement = sample_.Announcement();
   for (const bool with_header : {false, true}) {
     v1::UploadMeshResponse response;

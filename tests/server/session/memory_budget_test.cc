@@ -71,7 +71,7 @@ TEST(MemoryBudgetTest, ReclaimingMakesRoomForOneMoreTry) {
   MemoryBudget budget(100);
   MemoryReservation idle;
   int calls = 0;
-  budget.set_reclaimer([&] {
+  budget.set_reclaimer([&](int64_t /*bytes*/) {
     ++calls;
     idle = MemoryReservation();
   });

@@ -52,7 +52,7 @@ TEST_F(MeshCatalogTest, AMeshComesOutAsItWentInWhateverTheChunks) {
     ASSERT_NE(stored->FindCellArray("youngs_modulus_pa"), nullptr);
     EXPECT_EQ(stored->FindCellArray("youngs_modulus_pa")->values, sample_.cell_arrays[0].values);
     EXPECT_EQ(stored->FindCellArray("other"), nullptr);
-    EXPECT_TRUE(catalog_.Remove(stored->sha256));
+    EXPECT_THAT(catalog_.Remove(stored->sha256), IsOk());
   }
 }
 
@@ -66,7 +66,7 @@ TEST_F(MeshCatalogTest, TheSameMeshTwiceIsKeptOnce) {
 
 TEST_F(MeshCatalogTest, ARemovedMeshLivesAsLongAsItsUsers) {
   auto stored = Store(sample_, &catalog_);
-  EXPECT_TRUE(catalog_.Remove(stored->sha256));
+  EXPECT_THAT(catalog_.Remove(stored->sha256), IsOk());
   EXPECT_EQ(catalog_.Find(stored->sha256), nullptr);
   EXPECT_GT(budget_.reserved_bytes(), 0);
   stored.reset();
@@ -74,31 +74,29 @@ TEST_F(MeshCatalogTest, ARemovedMeshLivesAsLongAsItsUsers) {
 }
 
 TEST_F(MeshCatalogTest, OnlyUnusedMeshesPastTheTtlAreIdle) {
-  ServiceLimits impatient;
-  impatient.session_idle_ttl = std::chrono::seconds(0);
-  MeshCatalog catalog(impatient, &budget_);
+  MeshCatalog catalog(limits_, &budget_);
   auto stored = Store(sample_, &catalog);
-  EXPECT_EQ(catalog.RemoveIdle(), 0);
+  EXPECT_EQ(catalog.RemoveIdle(std::chrono::seconds(0)), 0);
   stored.reset();
-  EXPECT_EQ(catalog.RemoveIdle(), 1);
+  EXPECT_EQ(catalog.RemoveIdle(std::chrono::seconds(0)), 1);
   EXPECT_EQ(budget_.reserved_bytes(), 0);
 
   Store(sample_, &catalog_);  // TTL of half an hour
-  EXPECT_EQ(catalog_.RemoveIdle(), 0);
+  EXPECT_EQ(catalog_.RemoveIdle(limits_.session_idle_ttl), 0);
 }
 
 TEST_F(MeshCatalogTest, AMeshIsIdleFromTheEndOfItsTtlAndNotBefore) {
   FakeClock clock;
-  MeshCatalog catalog(limits_, &budget_, &clock);
+  MeshCatalog catalog(limits_, &budget_, nullptr, &clock);
   const std::string sha256 = Store(sample_, &catalog)->sha256;
   constexpr std::chrono::nanoseconds kTick{1};
   clock.Advance(limits_.session_idle_ttl - kTick);
-  EXPECT_EQ(catalog.RemoveIdle(), 0) << "just before";
+  EXPECT_EQ(catalog.RemoveIdle(limits_.session_idle_ttl), 0) << "just before";
   EXPECT_NE(catalog.Find(sha256), nullptr) << "and asking for it begins its time again";
   clock.Advance(limits_.session_idle_ttl - kTick);
-  EXPECT_EQ(catalog.RemoveIdle(), 0);
+  EXPECT_EQ(catalog.RemoveIdle(limits_.session_idle_ttl), 0);
   clock.Advance(kTick);
-  EXPECT_EQ(catalog.RemoveIdle(), 1) << "just after";
+  EXPECT_EQ(catalog.RemoveIdle(limits_.session_idle_ttl), 1) << "just after";
   EXPECT_EQ(catalog.Find(sha256), nullptr);
 }
 

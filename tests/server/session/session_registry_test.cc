@@ -92,11 +92,12 @@ class SessionRegistryTest : public ::testing::Test {
     bar_.reset();
     catalog_.reset();
     budget_ = std::make_unique<MemoryBudget>(budget_bytes);
-    catalog_ = std::make_unique<MeshCatalog>(limits, budget_.get(), &clock_);
+    catalog_ = std::make_unique<MeshCatalog>(limits, budget_.get(), nullptr, &clock_);
     pool_ = std::make_unique<WorkerPool>(1);
     registry_ =
-        std::make_unique<SessionRegistry>(limits, budget_.get(), pool_.get(), &store_, &clock_);
-    budget_->set_reclaimer([this] { registry_->RemoveIdle(); });
+        std::make_unique<SessionRegistry>(limits, budget_.get(), pool_.get(), &store_,
+                                          catalog_.get(), &clock_);
+    budget_->set_reclaimer([this](int64_t /*bytes*/) { registry_->RemoveIdle(); });
     bar_ = Store(SampleMesh(Bar({2, 2, 3})), catalog_.get());
     mesh_bytes_ = budget_->reserved_bytes();
   }
@@ -248,7 +249,7 @@ TEST_F(SessionRegistryTest, ACancelledCallerIsAnsweredAtOnceAndWhatWasMadeForItE
   const auto cancelled = std::make_shared<std::atomic<bool>>(false);
   std::future<CreateResult> result = Create({"id", "print", "chosen"}, cancelled);
   *cancelled = true;
-  registry_->CancelCreate(cancelled);
+  registry_->CancelWait(cancelled);
   // The worker has not begun.
   EXPECT_THAT(result.get(), StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
   EXPECT_THAT(Create({"id", "print", "chosen"}).get(),
@@ -265,7 +266,7 @@ TEST_F(SessionRegistryTest, ACancelledCallerIsAnsweredAtOnceAndWhatWasMadeForItE
 TEST_F(SessionRegistryTest, ASessionThatNobodyWaitsForAnyMoreEndsThoughItIsMade) {
   const auto cancelled = std::make_shared<std::atomic<bool>>(false);
   // After its last stage: too late to stop early.
-  store_.before_create = [&] { registry_->CancelCreate(cancelled); };
+  store_.before_create = [&] { registry_->CancelWait(cancelled); };
   EXPECT_THAT(Create({}, cancelled).get(),
               StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
   Drain();

@@ -100,7 +100,7 @@ TEST_F(SessionTest, AnswersAsTheModelDoes) {
                        session->constraints(), options));
     ASSERT_OK_AND_ASSIGN(const Deformation direct, deformer->Deform({Turn(10)}));
     EXPECT_EQ(answer.positions, direct.positions);
-    session->Close();
+    session->Close(Session::CloseReason::kDeleted);
   }
 }
 
@@ -188,13 +188,13 @@ TEST_F(SessionTest, IllegalPosesAreRefused) {
 
 TEST_F(SessionTest, AClosedSessionHoldsNothingAndAnswersNothing) {
   ASSERT_OK_AND_ASSIGN(const auto session, Create(BarRecord(*bar_)));
-  session->Close();
+  session->Close(Session::CloseReason::kDeleted);
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
   const auto closed = StatusIs(absl::StatusCode::kNotFound, HasSubstr("sessions/id"));
   EXPECT_THAT(session->Deform(session->model(), {Turn(1)}, {}), closed);
   EXPECT_THAT(session->PrepareModel(DeformationModel::kArap, {}), closed);
   EXPECT_THAT(Respond(session.get(), {.vertices = {0}}, Turn(1)), closed);
-  session->Close();  // does no harm
+  session->Close(Session::CloseReason::kDeleted);  // does no harm
 }
 
 TEST_F(SessionTest, ASecondSessionOfTheSameTakesATenthAndAnswersAlike) {
@@ -207,10 +207,10 @@ TEST_F(SessionTest, ASecondSessionOfTheSameTakesATenthAndAnswersAlike) {
   EXPECT_EQ(more, second->bytes_held() - second->shared_bytes());
   EXPECT_LE(10 * more, reserved);
   ASSERT_OK_AND_ASSIGN(const Deformation a, first->Deform(record.model, {Turn(10)}, {}));
-  first->Close();
+  first->Close(Session::CloseReason::kDeleted);
   ASSERT_OK_AND_ASSIGN(const Deformation b, second->Deform(record.model, {Turn(10)}, {}));
   EXPECT_EQ(a.positions, b.positions);
-  second->Close();
+  second->Close(Session::CloseReason::kDeleted);
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
 }
 
@@ -218,7 +218,7 @@ TEST_F(SessionTest, AClosedSessionTakesThePreparedAnswersFromItsStreams) {
   ASSERT_OK_AND_ASSIGN(const auto session, Create(BarRecord(*bar_)));
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<ResponseClaim> claim,
                        session->PrepareResponse({.vertices = {0}}, {}));
-  session->Close();
+  session->Close(Session::CloseReason::kDeleted);
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
   EXPECT_THAT(session->Respond(*claim, {Turn(1)}),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("sessions/id")));

@@ -1,0 +1,110 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/session/session_table.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+namespace tissueform {
+
+KnownSession* SessionTable::Find(const std::string& id) {
+  const auto found = known_.find(id);
+  return found == known_.end() ? nullptr : &found->second;
+}
+
+std::string SessionTable::IdOfRequest(const std::string& request_id) const {
+  const auto found = session_of_request_.find(request_id);
+  return found == session_of_request_.end() ? "" : found->second;
+}
+
+KnownSession* SessionTable::FindRequest(const std::string& request_id) {
+  return Find(IdOfRequest(request_id));
+}
+
+SessionTable::MakingPtr SessionTable::FindMaking(const std::string& id) const {
+  const auto found = std::find_if(makings_.begin(), makings_.end(),
+                                  [&id](const MakingPtr& making) { return making->id == id; });
+  return found == makings_.end() ? nullptr : *found;
+}
+
+SessionTable::MakingPtr SessionTable::FindMakingOfRequest(const std::string& request_id) const {
+  const auto found = std::find_if(
+      makings_.begin(), makings_.end(),
+      [&request_id](const MakingPtr& making) { return making->key.request_id == request_id; });
+  return found == makings_.end() ? nullptr : *found;
+}
+
+void SessionTable::Add(const std::string& id, KnownSession known) {
+  if (!known.key.request_id.empty()) session_of_request_[known.key.request_id] = id;
+  known_.emplace(id, std::move(known));
+}
+
+std::optional<KnownSession> SessionTable::Take(const std::string& id) {
+  auto node = known_.extract(id);
+  if (node.empty()) return std::nullopt;
+  session_of_request_.erase(node.mapped().key.request_id);
+  return std::move(node.mapped());
+}
+
+SessionTable::MakingPtr SessionTable::StartMaking(std::string id, RequestKey key, bool restores,
+                                                  SessionWaiter waiter) {
+  makings_.push_back(std::make_shared<SessionMaking>(
+      SessionMaking{std::move(id), std::move(key), restores, {std::move(waiter)}}));
+  return makings_.back();
+}
+
+std::vector<SessionWaiter> SessionTable::EndMaking(const MakingPtr& making) {
+  makings_.erase(std::find(makings_.begin(), makings_.end(), making));
+  return std::move(making->waiters);
+}
+
+std::vector<SessionWaiter> SessionTable::TakeWaiters(const SessionWaiter::CancelFlag& cancelled) {
+  std::vector<SessionWaiter> taken;
+  for (const MakingPtr& making : makings_) {
+    std::vector<SessionWaiter>& waiters = making->waiters;
+    const auto first = std::stable_partition(
+        waiters.begin(), waiters.end(),
+        [&cancelled](const SessionWaiter& waiter) { return waiter.cancelled != cancelled; });
+    std::move(first, waiters.end(), std::back_inserter(taken));
+    waiters.erase(first, waiters.end());
+  }
+  return taken;
+}
+
+std::string SessionTable::LeastRecentlyUsed(Clock::TimePoint before) const {
+  std::string oldest;
+  for (const auto& [id, known] : known_) {
+    if (known.session == nullptr || known.session->making()) continue;
+    if (const Clock::TimePoint used = known.session->last_used(); used < before) {
+      before = used;
+      oldest = id;
+    }
+  }
+  return oldest;
+}
+
+std::vector<std::string> SessionTable::UnusedSince(Clock::TimePoint until) const {
+  std::vector<std::string> unused;
+  for (const auto& [id, known] : known_) {
+    const Clock::TimePoint used =
+        known.session == nullptr ? known.last_used : known.session->last_used();
+    if (used <= until && FindMaking(id) == nullptr) unused.push_back(id);
+  }
+  return unused;
+}
+
+int SessionTable::CountMadeFrom(const std::string& mesh_sha256) const {
+  return static_cast<int>(std::count_if(
+      known_.begin(), known_.end(),
+      [&mesh_sha256](const auto& entry) { return entry.second.mesh_sha256 == mesh_sha256; }));
+}
+
+size_t SessionTable::num_loaded_in_table() const {
+  return static_cast<size_t>(std::count_if(known_.begin(), known_.end(), [](const auto& entry) {
+    return entry.second.session != nullptr;
+  }));
+}
+
+}  // namespace tissueform

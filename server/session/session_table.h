@@ -1,0 +1,98 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+#include "server/session/clock.h"
+#include "server/session/session.h"
+
+namespace tissueform {
+
+// What makes a creation idempotent: the same id again with the same fingerprint is the same
+// request.
+struct RequestKey {
+  std::string request_id;  // empty: none
+  std::string fingerprint;
+};
+
+// Somebody who waits for a session.
+struct SessionWaiter {
+  using CancelFlag = std::shared_ptr<const std::atomic<bool>>;
+
+  CancelFlag cancelled;
+  std::function<void(absl::StatusOr<std::shared_ptr<Session>>)> done;
+};
+
+// A session that is being made, or made again from its record.
+struct SessionMaking {
+  std::string id;
+  RequestKey key;
+  bool restores = false;
+  std::vector<SessionWaiter> waiters;  // guarded by the owner of the table
+};
+
+// A session that the server knows.
+struct KnownSession {
+  std::shared_ptr<Session> session;  // null: it is in the store only
+  RequestKey key;
+  std::string mesh_sha256;
+  int claims = 1;                          // who has seen its name
+  Clock::TimePoint last_used;              // while there is no session
+  std::shared_ptr<const StoredMesh> mesh;  // while there is none: what could not be read again
+};
+
+// Which sessions there are, which are being made, and who waits for them. No threads, no store:
+// its owner guards it and acts.
+class SessionTable {
+ public:
+  using MakingPtr = std::shared_ptr<SessionMaking>;
+
+  // Null where there is none.
+  KnownSession* Find(const std::string& id);
+  KnownSession* FindRequest(const std::string& request_id);
+  // Empty where there is none.
+  std::string IdOfRequest(const std::string& request_id) const;
+  MakingPtr FindMaking(const std::string& id) const;
+  MakingPtr FindMakingOfRequest(const std::string& request_id) const;
+
+  // REQUIRES: the id is not known.
+  void Add(const std::string& id, KnownSession known);
+  // Empty when it is not known.
+  std::optional<KnownSession> Take(const std::string& id);
+
+  MakingPtr StartMaking(std::string id, RequestKey key, bool restores, SessionWaiter waiter);
+  // Those who still wait for it. REQUIRES: under way.
+  std::vector<SessionWaiter> EndMaking(const MakingPtr& making);
+  // Whoever came with this flag and still waits, taken out.
+  std::vector<SessionWaiter> TakeWaiters(const SessionWaiter::CancelFlag& cancelled);
+
+  // Of those in memory the one that was used longest ago, unless that is after `before` or
+  // something is being made for it. Empty when there is none.
+  std::string LeastRecentlyUsed(Clock::TimePoint before) const;
+  // Of all: those used last at `until` or before.
+  std::vector<std::string> UnusedSince(Clock::TimePoint until) const;
+
+  int CountMadeFrom(const std::string& mesh_sha256) const;
+
+  // In memory, or on the way there.
+  size_t num_loaded() const { return num_loaded_in_table() + makings_.size(); }
+  size_t num_known() const { return known_.size(); }
+  size_t num_loaded_in_table() const;
+
+ private:
+  std::map<std::string, KnownSession> known_;              // by id
+  std::map<std::string, std::string> session_of_request_;  // request id: id
+  std::vector<MakingPtr> makings_;
+};
+
+}  // namespace tissueform
