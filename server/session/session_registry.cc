@@ -49,8 +49,8 @@ absl::Status EndingId(const std::string& id) {
 }
 
 absl::Status TooMany(int limit, absl::string_view what, absl::string_view remedy) {
-  return WithReason(absl::ResourceExhaustedError(absl::StrCat("the server ", what, " ", limit,
-                                                              " sessions, as many as it may", remedy)),
+  return WithReason(absl::ResourceExhaustedError(absl::StrCat(
+                        "the server ", what, " ", limit, " sessions, as many as it may", remedy)),
                     ErrorReason::kTooManySessions, {{"limit", absl::StrCat(limit)}});
 }
 

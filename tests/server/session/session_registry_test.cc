@@ -94,9 +94,8 @@ class SessionRegistryTest : public ::testing::Test {
     budget_ = std::make_unique<MemoryBudget>(budget_bytes);
     catalog_ = std::make_unique<MeshCatalog>(limits, budget_.get(), nullptr, &clock_);
     pool_ = std::make_unique<WorkerPool>(1);
-    registry_ =
-        std::make_unique<SessionRegistry>(limits, budget_.get(), pool_.get(), &store_,
-                                          catalog_.get(), &clock_);
+    registry_ = std::make_unique<SessionRegistry>(limits, budget_.get(), pool_.get(), &store_,
+                                                  catalog_.get(), &clock_);
     budget_->set_reclaimer([this](int64_t /*bytes*/) { registry_->RemoveIdle(); });
     bar_ = Store(SampleMesh(Bar({2, 2, 3})), catalog_.get());
     mesh_bytes_ = budget_->reserved_bytes();
