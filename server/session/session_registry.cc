@@ -323,7 +323,9 @@ void SessionRegistry::FinishRestore(const MakingPtr& making,
     MutexLock lock(mutex_);
     KnownSession* known = table_.Find(making->id);
     // All who waited had cancelled, and then somebody came.
-    again = absl::IsCancelled(result.status()) && known != nullptr && !making->waiters.empty();
+    again = absl::IsCancelled(result.status()) && known != nullptr &&
+            std::any_of(making->waiters.begin(), making->waiters.end(),
+                        [](const SessionWaiter& waiter) { return !waiter.cancelled->load(); });
     if (!again) waiters = table_.EndMaking(making);
     if (result.ok() && known != nullptr) {
       known->session = *result;

@@ -15,9 +15,11 @@
 #include "proto/conversion/session_conversion.h"
 #include "server/rpc/deform_service.h"
 #include "server/rpc/mesh_service.h"
+#include "server/rpc/resource_conversion.h"
 #include "server/rpc/session_service.h"
 #include "server/store/in_memory_session_store.h"
 #include "tests/server/rpc/fake_calls.h"
+#include "tests/testing/fake_clock.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/session_samples.h"
 #include "tests/testing/status_matchers.h"
@@ -122,7 +124,8 @@ class ReactorsTest : public ::testing::Test {
   MeshCatalog catalog_{limits_, &budget_};
   std::unique_ptr<WorkerPool> workers_ = std::make_unique<WorkerPool>(kWorkers);
   InMemorySessionStore store_;
-  SessionRegistry registry_{limits_, &budget_, workers_.get(), &store_, &catalog_};
+  FakeClock clock_;
+  SessionRegistry registry_{limits_, &budget_, workers_.get(), &store_, &catalog_, &clock_};
   DeformStreams streams_{limits_.max_streams};
   DeadlineTimer timer_;
   MeshService mesh_service_{&gate_, limits_, &catalog_, &registry_, workers_.get(), &timer_};
@@ -150,6 +153,68 @@ TEST_F(ReactorsTest, AStreamAnswersAndEnds) {
   EXPECT_EQ(streams_.size(), 0);
 }
 
+TEST_F(ReactorsTest, AStreamGoesOnWhenItsSessionHadLeftMemory) {
+  for (const bool prepared : {false, true}) {
+    SCOPED_TRACE(prepared);
+    FakeStream stream(reactions_.get());
+    stream.Bind(deform_service_.Deform(nullptr));
+    v1::DeformRequest configuration = Configuration(MakeSession());
+    if (prepared) configuration.mutable_configuration()->mutable_prepared();
+    stream.Send(configuration);
+    EXPECT_TRUE(stream.Receive()->has_started());
+    for (uint64_t sequence = 1; sequence <= 3; ++sequence) {
+      stream.Send(Pose(sequence));
+      if (sequence > 1) {
+        EXPECT_TRUE(stream.Receive()->notice().has_evicted());
+        EXPECT_TRUE(stream.Receive()->notice().has_restored());
+      }
+      const auto response = stream.Receive();
+      ASSERT_TRUE(response.has_value() && response->has_frame());
+      EXPECT_EQ(response->frame().sequence(), sequence);
+      EXPECT_EQ(response->frame().summary().prepared(), prepared);
+      ExpectAnswers(response->frame());
+      stream.Send(Ack(sequence));
+      clock_.Advance(2 * SessionRegistry::kInUse);
+      EXPECT_EQ(registry_.Evict([] { return false; }), 1);
+    }
+    stream.CloseSending();
+    EXPECT_FALSE(stream.Receive().has_value());
+    EXPECT_TRUE(stream.WaitUntilDone()->ok());
+  }
+}
+
+TEST_F(ReactorsTest, CommitsAreAnsweredEachOrByANewerOne) {
+  const std::string session = MakeSession();
+  FakeStream stream(reactions_.get());
+  stream.Bind(deform_service_.Deform(nullptr));
+  stream.Send(Configuration(session));
+  EXPECT_TRUE(stream.Receive()->has_started());
+  constexpr uint64_t kLast = 20;
+  for (uint64_t sequence = 1; sequence <= kLast; ++sequence) {
+    v1::DeformRequest pose = Pose(sequence);
+    pose.mutable_pose()->set_commit(true);
+    stream.Send(pose);
+  }
+  stream.CloseSending();
+  uint64_t committed = 0;
+  while (const auto response = stream.Receive()) {
+    if (!response->has_notice()) continue;
+    EXPECT_GT(response->notice().committed().sequence(), committed);
+    EXPECT_EQ(response->notice().committed().failure(), "");
+    committed = response->notice().committed().sequence();
+  }
+  EXPECT_TRUE(stream.WaitUntilDone()->ok());
+  EXPECT_EQ(committed, kLast) << "also the last one, whose client had closed its side";
+  v1::Session description;
+  registry_.Look(session.substr(session.find('/') + 1),
+                 [&description](const absl::StatusOr<SessionRegistry::View>& view) {
+                   ASSERT_THAT(view, IsOk());
+                   description = ToProto(*view);
+                 });
+  ASSERT_EQ(description.committed_poses_size(), 1);
+  EXPECT_EQ(description.committed_poses(0).translation_mm().z(), kLast / 64.0);
+}
+
 TEST_F(ReactorsTest, StreamsSurviveWhateverTheClientDoes) {
   const std::string session = MakeSession();
   for (uint32_t seed = 1; seed <= 60; ++seed) {
@@ -165,6 +230,10 @@ TEST_F(ReactorsTest, StreamsSurviveWhateverTheClientDoes) {
       switch (random() % 16) {
         case 0:
           cancelled = random() % 4 == 0;
+          break;
+        case 2:
+          clock_.Advance(2 * SessionRegistry::kInUse);
+          registry_.Evict([] { return false; });
           break;
         case 1:
           streams_.NotifyDraining();

@@ -1,0 +1,226 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// Sessions that leave memory and come back from their records (server/session/session_registry.h).
+
+#include <atomic>
+#include <future>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "server/session/session_registry.h"
+#include "server/store/in_memory_session_store.h"
+#include "tests/testing/fake_clock.h"
+#include "tests/testing/meshes.h"
+#include "tests/testing/session_samples.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using testing::Bar;
+using testing::BarRecord;
+using testing::FakeClock;
+using testing::IsOk;
+using testing::SampleMesh;
+using testing::StatusIs;
+using testing::Store;
+
+using Opened = absl::StatusOr<std::shared_ptr<Session>>;
+
+class SessionEvictionTest : public ::testing::Test {
+ protected:
+  SessionEvictionTest() {
+    Restart();
+    bar_ = Store(SampleMesh(Bar({2, 2, 3})), &catalog_);
+    mesh_bytes_ = budget_.reserved_bytes();
+  }
+
+  // A registry that knows what the store has.
+  void Restart(int max_sessions = 64) {
+    limits_.max_sessions = max_sessions;
+    pool_.reset();
+    registry_.reset();
+    pool_ = std::make_unique<WorkerPool>(1);
+    registry_ = std::make_unique<SessionRegistry>(limits_, &budget_, pool_.get(), &store_,
+                                                  &catalog_, &clock_);
+    ASSERT_THAT(registry_->LearnKnown(), IsOk());
+  }
+
+  // A session of that id; empty: the store's choice.
+  std::future<Opened> Create(const std::string& id, const std::string& request_id = "") {
+    SessionRecord record = BarRecord(*bar_);
+    record.id = id;
+    record.request_id = request_id;
+    auto promise = std::make_shared<std::promise<Opened>>();
+    registry_->Create(std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
+                      [promise](Opened session) { promise->set_value(std::move(session)); });
+    return promise->get_future();
+  }
+
+  std::future<Opened> Open(const std::string& id, SessionRegistry::CancelFlag cancelled =
+                                                      std::make_shared<std::atomic<bool>>()) {
+    auto promise = std::make_shared<std::promise<Opened>>();
+    registry_->Open(id, std::move(cancelled),
+                    [promise](Opened session) { promise->set_value(std::move(session)); });
+    return promise->get_future();
+  }
+
+  absl::Status Delete(const std::string& id) {
+    std::promise<absl::Status> done;
+    registry_->Delete(id, [&done](absl::Status status) { done.set_value(std::move(status)); });
+    return done.get_future().get();
+  }
+
+  int EvictAll() {
+    return registry_->Evict([] { return false; });
+  }
+
+  // Holds the only batch worker until the result is set.
+  std::promise<void> HoldWorker() {
+    std::promise<void> release;
+    pool_->Post(Lane::kBatch, [held = release.get_future().share()] { held.wait(); });
+    return release;
+  }
+
+  static Positions Answer(Session& session) {
+    HandlePose pose;
+    pose.translation_mm = {1, 2, 3};
+    const auto answer = session.Deform(session.model(), {pose}, {});
+    EXPECT_THAT(answer, IsOk());
+    return answer.ok() ? answer->positions : Positions();
+  }
+
+  FakeClock clock_;
+  ServiceLimits limits_;
+  MemoryBudget budget_{64 << 20};
+  MeshCatalog catalog_{limits_, &budget_, nullptr, &clock_};
+  InMemorySessionStore store_;
+  std::unique_ptr<SessionRegistry> registry_;
+  std::unique_ptr<WorkerPool> pool_;
+  std::shared_ptr<const StoredMesh> bar_;
+  int64_t mesh_bytes_ = 0;
+};
+
+TEST_F(SessionEvictionTest, WhatIsNotInUseGivesItsMemoryAndComesBackWithTheSameAnswers) {
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> before, Create("bar").get());
+  const Positions answer = Answer(*before);
+  clock_.Advance(SessionRegistry::kInUse);
+  EXPECT_EQ(EvictAll(), 0) << "it was used until now";
+  clock_.Advance(std::chrono::nanoseconds(1));
+  EXPECT_EQ(EvictAll(), 1);
+  EXPECT_EQ(registry_->size(), 0);
+  EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_) << "though somebody holds it";
+  EXPECT_TRUE(before->evicted());
+  EXPECT_THAT(before->Deform(before->model(), {HandlePose()}, {}),
+              StatusIs(absl::StatusCode::kNotFound));
+
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> after, Open("bar").get());
+  EXPECT_NE(after, before);
+  EXPECT_EQ(Answer(*after), answer) << "to the last bit";
+  EXPECT_EQ(registry_->size(), 1);
+  EXPECT_EQ(Open("bar").get().value(), after);
+}
+
+TEST_F(SessionEvictionTest, ThoseUsedLongestAgoGoFirstAndNoMoreThanAreNeeded) {
+  for (const char* id : {"a", "b", "c"}) {
+    ASSERT_THAT(Create(id).get(), IsOk());
+    clock_.Advance(std::chrono::seconds(1));
+  }
+  ASSERT_THAT(Open("a").get(), IsOk());
+  clock_.Advance(2 * SessionRegistry::kInUse);
+  int asked = 0;
+  EXPECT_EQ(registry_->Evict([&asked] { return ++asked > 2; }), 2);
+  EXPECT_THAT(registry_->Find("a"), IsOk());
+  EXPECT_FALSE(registry_->Find("b").ok());
+  EXPECT_FALSE(registry_->Find("c").ok());
+}
+
+TEST_F(SessionEvictionTest, AFullServerMakesRoomByEvictionOrRefuses) {
+  Restart(/*max_sessions=*/1);
+  ASSERT_THAT(Create("a").get(), IsOk());
+  EXPECT_THAT(Create("b").get(),
+              StatusIs(absl::StatusCode::kResourceExhausted, ::testing::HasSubstr("in use")));
+  clock_.Advance(2 * SessionRegistry::kInUse);
+  EXPECT_THAT(Create("b").get(), IsOk());
+  EXPECT_THAT(Open("a").get(), StatusIs(absl::StatusCode::kResourceExhausted));
+  clock_.Advance(2 * SessionRegistry::kInUse);
+  EXPECT_THAT(Open("a").get(), IsOk());
+  EXPECT_EQ(registry_->size(), 1);
+}
+
+TEST_F(SessionEvictionTest, ARestartKnowsItsSessionsAndTheirRequests) {
+  ASSERT_THAT(Create("a", "request").get(), IsOk());
+  Restart();
+  EXPECT_EQ(registry_->size(), 0);
+  EXPECT_THAT(Create("a").get(), StatusIs(absl::StatusCode::kAlreadyExists));
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> again, Create("other", "request").get());
+  EXPECT_EQ(again->id(), "a");
+  // Its first owner has seen the name: who joined and went away does not take it along.
+  registry_->Abandon(again);
+  EXPECT_THAT(registry_->Find("a"), IsOk());
+  EXPECT_THAT(Delete("a"), IsOk());
+  EXPECT_THAT(Open("a").get(), StatusIs(absl::StatusCode::kNotFound));
+}
+
+TEST_F(SessionEvictionTest, OpenersShareOneRestore) {
+  ASSERT_THAT(Create("a").get(), IsOk());
+  Restart();
+  std::promise<void> release = HoldWorker();
+  std::future<Opened> first = Open("a");
+  std::future<Opened> second = Open("a");
+  release.set_value();
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, first.get());
+  EXPECT_EQ(second.get().value(), session);
+}
+
+TEST_F(SessionEvictionTest, ACancelledOpenerIsAnsweredAtOnceAndTheOthersGetTheSession) {
+  ASSERT_THAT(Create("a").get(), IsOk());
+  Restart();
+  std::promise<void> release = HoldWorker();
+  const auto cancelled = std::make_shared<std::atomic<bool>>();
+  std::future<Opened> impatient = Open("a", cancelled);
+  *cancelled = true;
+  registry_->CancelWait(cancelled);
+  EXPECT_THAT(impatient.get(), StatusIs(absl::StatusCode::kCancelled));
+  std::future<Opened> patient = Open("a");  // joins what nobody waits for any longer
+  release.set_value();
+  EXPECT_THAT(patient.get(), IsOk());
+}
+
+TEST_F(SessionEvictionTest, WhatIsDeletedWhileItComesBackDoesNotComeBack) {
+  ASSERT_THAT(Create("a").get(), IsOk());
+  Restart();
+  std::promise<void> release = HoldWorker();
+  std::future<Opened> opened = Open("a");
+  EXPECT_THAT(Delete("a"), IsOk());
+  release.set_value();
+  EXPECT_THAT(opened.get(), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
+  EXPECT_THAT(Open("a").get(), StatusIs(absl::StatusCode::kNotFound));
+}
+
+TEST_F(SessionEvictionTest, CommittedPosesAreInTheRecord) {
+  ASSERT_THAT(Create("a").get(), IsOk());
+  HandlePose pose;
+  pose.translation_mm = {4, 5, 6};
+  std::promise<absl::Status> committed;
+  registry_->CommitPoses(
+      "a", {pose}, [&committed](absl::Status status) { committed.set_value(std::move(status)); });
+  EXPECT_THAT(committed.get_future().get(), IsOk());
+  std::promise<absl::StatusOr<SessionRegistry::View>> looked;
+  registry_->Look("a", [&looked](absl::StatusOr<SessionRegistry::View> view) {
+    looked.set_value(std::move(view));
+  });
+  ASSERT_OK_AND_ASSIGN(const SessionRegistry::View view, looked.get_future().get());
+  ASSERT_EQ(view.record.last_poses.size(), 1U);
+  EXPECT_EQ(view.record.last_poses[0].translation_mm, pose.translation_mm);
+}
+
+}  // namespace
+}  // namespace tissueform
