@@ -24,7 +24,7 @@ struct DamagedItem {
 
 struct DurableStoreOptions {
   UnixClock clock = SystemUnixSeconds;
-  UploadLimits uploads;
+  UploadLimits uploads = {};
   // Blobs whose digest is checked at the start, in bytes, the newest first; of the others only the
   // size. Those are checked whenever they are read.
   int64_t max_checked_bytes = int64_t{4} << 30;

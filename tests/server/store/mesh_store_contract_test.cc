@@ -36,6 +36,7 @@ class MeshStoreContractTest : public ::testing::TestWithParam<StoresCase> {
   }
   static std::vector<std::string> Names(const std::vector<MeshRecord>& records) {
     std::vector<std::string> names;
+    names.reserve(records.size());
     for (const MeshRecord& record : records) names.push_back(record.sha256);
     return names;
   }
@@ -105,6 +106,7 @@ TEST_P(MeshStoreContractTest, ARecordThatIsNotOfThePayloadIsRefused) {
 
 TEST_P(MeshStoreContractTest, ListsByNamePageAfterPage) {
   std::vector<std::string> names;
+  names.reserve(5);
   for (int number = 0; number < 5; ++number) names.push_back(Put(number));
   std::sort(names.begin(), names.end());
   std::vector<std::string> found;

@@ -26,6 +26,7 @@ class PredictionStoreContractTest : public ::testing::TestWithParam<StoresCase> 
  protected:
   static std::vector<std::string> Ids(const PredictionStore::Page& page) {
     std::vector<std::string> ids;
+    ids.reserve(page.records.size());
     for (const PredictionRecord& record : page.records) ids.push_back(record.id);
     return ids;
   }

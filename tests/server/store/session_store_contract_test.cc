@@ -14,6 +14,7 @@
 
 #include "server/store/session_store.h"
 #include "tests/server/store/stores_case.h"
+#include "tests/server/store/waiting_calls.h"
 #include "tests/testing/status_matchers.h"
 
 // What every session store must do. A new store adds itself to AllStores.
@@ -43,30 +44,27 @@ class SessionStoreContractTest : public ::testing::TestWithParam<StoresCase> {
   }
 
   Result Create(const SessionRecord& record, int64_t epoch = 1) {
-    return Wait<Result>([&](auto done) { store_->Create(record, epoch, done); });
+    return CreateSession(*store_, record, epoch);
   }
-  Result Get(const std::string& id) {
-    return Wait<Result>([&](auto done) { store_->Get(id, done); });
-  }
+  Result Get(const std::string& id) { return GetSession(*store_, id); }
   Result Update(const SessionRecord& record, int64_t epoch = 1) {
-    return Wait<Result>([&](auto done) { store_->Update(record, epoch, done); });
+    return UpdateSession(*store_, record, epoch);
   }
   absl::Status Delete(const std::string& id, const std::string& etag = "", int64_t epoch = 1) {
-    return Wait<absl::Status>([&](auto done) { store_->Delete(id, etag, epoch, done); });
+    return DeleteSession(*store_, id, etag, epoch);
   }
   absl::StatusOr<SessionStore::Page> List(const SessionStore::ListRequest& request) {
-    return Wait<absl::StatusOr<SessionStore::Page>>(
-        [&](auto done) { store_->List(request, done); });
+    return ListSessions(*store_, request);
   }
   absl::Status CommitPoses(const std::string& id, const std::vector<HandlePose>& poses,
                            int64_t epoch = 1) {
-    return Wait<absl::Status>([&](auto done) { store_->CommitPoses(id, poses, epoch, done); });
+    return tissueform::CommitPoses(*store_, id, poses, epoch);
   }
   absl::Status Touch(const std::vector<std::string>& ids, int64_t now_s) {
-    return Wait<absl::Status>([&](auto done) { store_->Touch(ids, now_s, done); });
+    return WaitFor<absl::Status>([&](auto done) { store_->Touch(ids, now_s, done); });
   }
   absl::StatusOr<SessionStore::Page> ListUnused(int64_t before_s, int limit = 100) {
-    return Wait<absl::StatusOr<SessionStore::Page>>(
+    return WaitFor<absl::StatusOr<SessionStore::Page>>(
         [&](auto done) { store_->ListUnused(before_s, limit, done); });
   }
   static HandlePose Moved(double x_mm) {
@@ -78,14 +76,6 @@ class SessionStoreContractTest : public ::testing::TestWithParam<StoresCase> {
     std::vector<std::string> ids;
     for (const SessionRecord& record : page.records) ids.push_back(record.id);
     return ids;
-  }
-
-  template <typename Answer, typename Call>
-  static Answer Wait(Call call) {
-    auto promise = std::make_shared<std::promise<Answer>>();
-    auto future = promise->get_future();
-    call([promise](Answer answer) { promise->set_value(std::move(answer)); });
-    return future.get();
   }
 
   // The store's clock.

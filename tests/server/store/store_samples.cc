@@ -63,6 +63,13 @@ SessionRecord SampleSession(const std::string& id, int number) {
   return record;
 }
 
+std::vector<HandlePose> SamplePoses(int number) {
+  std::vector<HandlePose> poses(2);
+  poses[0].translation_mm = {1.0 * number, 2, 3};
+  poses[1].rotation_vector = {0, 0.01 * number, 0};
+  return poses;
+}
+
 PredictionRecord SamplePrediction(const std::string& id, const std::string& owner,
                                   const std::string& session, int64_t vertex_count) {
   PredictionRecord record;

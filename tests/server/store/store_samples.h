@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "core/mesh_payload/mesh_payload.h"
 #include "server/store/mesh_store.h"
@@ -23,6 +24,8 @@ UploadAnnouncement AnnouncementOf(const MeshPayload& payload);
 std::string BytesOf(const MeshPayload& payload);
 
 SessionRecord SampleSession(const std::string& id, int number);
+// For the handles of a sample session.
+std::vector<HandlePose> SamplePoses(int number);
 
 PredictionRecord SamplePrediction(const std::string& id, const std::string& owner = "planner",
                                   const std::string& session = "s", int64_t vertex_count = 40);

@@ -9,9 +9,31 @@
 
 #include "gtest/gtest.h"
 
+#include "server/store/data_folder.h"
+#include "server/store/durable_store.h"
 #include "server/store/in_memory_stores.h"
 
 namespace tissueform {
+namespace {
+
+// A durable store in a folder that goes with it.
+class ScratchDurableStore final : public Stores {
+ public:
+  explicit ScratchDurableStore(UnixClock clock)
+      : store_(*DurableStore::Open(*DataFolder::Open(folder_ / "data"),
+                                   {.clock = std::move(clock)})) {}
+
+  SessionStore& sessions() override { return store_->sessions(); }
+  MeshStore& meshes() override { return store_->meshes(); }
+  UploadStore& uploads() override { return store_->uploads(); }
+  PredictionStore& predictions() override { return store_->predictions(); }
+
+ private:
+  const ScratchFolder folder_;
+  const std::unique_ptr<DurableStore> store_;
+};
+
+}  // namespace
 
 ScratchFolder::ScratchFolder() : path_(::testing::TempDir() + "store-XXXXXX") {
   if (mkdtemp(path_.data()) == nullptr) std::abort();
@@ -23,7 +45,10 @@ ScratchFolder::~ScratchFolder() {
 }
 
 std::vector<StoresCase> AllStores() {
-  return {{"InMemory", [](UnixClock clock) { return *OpenInMemoryStores(std::move(clock)); }}};
+  return {{"InMemory", [](UnixClock clock) { return *OpenInMemoryStores(std::move(clock)); }},
+          {"Durable", [](UnixClock clock) {
+             return std::make_unique<ScratchDurableStore>(std::move(clock));
+           }}};
 }
 
 }  // namespace tissueform

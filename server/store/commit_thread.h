@@ -1,0 +1,73 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "absl/status/status.h"
+
+#include "core/base/mutex.h"
+#include "server/store/database.h"
+
+namespace tissueform {
+
+// The one thread that reads and writes a database. Jobs run in the order in which they came; those
+// that wait are committed together, because a commit costs what its sync costs, however many rows
+// it writes. A job is answered after its commit.
+class CommitThread {
+ public:
+  struct Job {
+    // Reads and writes rows. Nothing of it stays when it fails. It may be called again after a
+    // commit that failed, so what it leaves outside the database must be what its last call left.
+    std::function<absl::Status(Database&)> work;
+    // After the commit of a work that was OK; what it says is the answer. May be null. It reads
+    // rows only.
+    std::function<absl::Status(Database&)> after = nullptr;
+    // Whether something was deleted for good: it is answered when it has left the log, too (unless
+    // a reader keeps the log; then that is tried again until it is done).
+    bool erases = false;
+    // Called once, on this thread, without a lock held. It may submit, but not Run.
+    std::function<void(absl::Status)> done = nullptr;
+  };
+
+  // `check` is asked after every commit; its error is the answer to all that was in it.
+  CommitThread(std::unique_ptr<Database> database, std::function<absl::Status()> check);
+  // Answers all that was submitted.
+  ~CommitThread();
+  CommitThread(const CommitThread&) = delete;
+  CommitThread& operator=(const CommitThread&) = delete;
+
+  // Any thread.
+  void Submit(Job job);
+  // Submits and waits. Any thread but its own, where it is an Internal error.
+  absl::Status Run(Job job);
+
+ private:
+  void Loop();
+  // The jobs that wait, when there are some; none when it is time to end, or to empty the log.
+  std::vector<Job> Next(bool* ending);
+  void Answer(std::vector<Job> jobs);
+  // Answers of `jobs` in one transaction. Not OK when the transaction has failed as a whole.
+  absl::Status CommitTogether(std::vector<Job>& jobs, std::vector<absl::Status>* answers);
+  absl::Status CommitAlone(Job& job);
+  void TruncateLog();
+
+  // The thread's.
+  const std::unique_ptr<Database> database_;
+  const std::function<absl::Status()> check_;
+  bool log_holds_erased_ = false;
+
+  Mutex mutex_;
+  ConditionVariable changed_;
+  std::deque<Job> waiting_ ABSL_GUARDED_BY(mutex_);
+  bool ending_ ABSL_GUARDED_BY(mutex_) = false;
+
+  std::thread thread_;  // last: it uses the others
+};
+
+}  // namespace tissueform

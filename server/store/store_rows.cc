@@ -1,0 +1,77 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/store/store_rows.h"
+
+#include <utility>
+
+#include "core/base/status_macros.h"
+#include "server/store/store_errors.h"
+
+namespace tissueform {
+namespace {
+
+// Columns of the selections that have names here.
+enum SessionColumn { kId = 1, kOwner, kRecord, kEtag, kEpoch, kHandles, kPoses, kCreated, kUsed };
+
+}  // namespace
+
+absl::StatusOr<SessionRecord> ReadSessionAtRest(const Database::Query& row) {
+  TF_ASSIGN_OR_RETURN(const absl::string_view bytes, Unseal(row.Bytes(kRecord)));
+  TF_ASSIGN_OR_RETURN(SessionRecord record, ParseRecord(bytes));
+  record.etag = std::string(row.Text(kEtag));
+  record.epoch = row.Integer(kEpoch);
+  record.created_s = row.Integer(kCreated);
+  record.last_used_s = row.Integer(kUsed);
+  if (record.id != row.Text(kId) || record.owner != row.Text(kOwner)) {
+    return Damaged("a session's record", "it is that of another");
+  }
+  if (record.etag.empty() || row.Integer(kHandles) != static_cast<int64_t>(record.handles.size())) {
+    return Damaged("a session's record", "it does not agree with its state");
+  }
+  return record;
+}
+
+absl::StatusOr<SessionRecord> ReadSession(const Database::Query& row) {
+  TF_ASSIGN_OR_RETURN(SessionRecord record, ReadSessionAtRest(row));
+  TF_ASSIGN_OR_RETURN(const absl::string_view bytes, Unseal(row.Bytes(kPoses)));
+  TF_ASSIGN_OR_RETURN(record.last_poses, ParsePoses(bytes));
+  if (CheckPoseCount(record.id, record.last_poses.size(), record.handles.size()).ok()) {
+    return record;
+  }
+  return Damaged("a session's record", "its poses are not of its handles");
+}
+
+absl::StatusOr<MeshRecord> ReadMesh(const Database::Query& row) {
+  TF_ASSIGN_OR_RETURN(const absl::string_view bytes, Unseal(row.Bytes(2)));
+  TF_ASSIGN_OR_RETURN(MeshRecord record, ParseMesh(bytes));
+  if (record.sha256 != row.Text(1)) return Damaged("a mesh's record", "it is that of another");
+  record.last_used_s = row.Integer(3);
+  return record;
+}
+
+absl::StatusOr<PredictionRow> ReadPrediction(const Database::Query& row) {
+  TF_ASSIGN_OR_RETURN(const absl::string_view bytes, Unseal(row.Bytes(5)));
+  TF_ASSIGN_OR_RETURN(PredictionRow prediction, ParsePrediction(bytes));
+  const PredictionRecord& record = prediction.record;
+  if (record.id != row.Text(1) || record.owner != row.Text(2) || record.session != row.Text(3) ||
+      prediction.positions_sha256 != row.Text(4)) {
+    return Damaged("a prediction's record", "it is that of another");
+  }
+  return prediction;
+}
+
+absl::StatusOr<bool> IsClaimed(Database& database, const std::string& sha256) {
+  Database::Query query = database.Prepare(
+      "SELECT EXISTS (SELECT 1 FROM meshes WHERE sha256 = ?1) OR "
+      "EXISTS (SELECT 1 FROM predictions WHERE positions_sha256 = ?1)");
+  TF_RETURN_IF_ERROR(query.Bind(sha256).Step().status());
+  return query.Integer(0) != 0;
+}
+
+absl::Status RemoveUnclaimed(Database& database, BlobStore& blobs, const std::string& sha256) {
+  TF_ASSIGN_OR_RETURN(const bool claimed, IsClaimed(database, sha256));
+  return claimed ? absl::OkStatus() : blobs.Remove(sha256);
+}
+
+}  // namespace tissueform

@@ -1,0 +1,37 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "server/store/blob_store.h"
+#include "server/store/database.h"
+#include "server/store/session_record.h"
+#include "server/store/store_records.h"
+
+// How rows become records; what the stores of a database and its check at the start share. A
+// statement begins with one of these selections. Errors of reading: DataLoss.
+namespace tissueform {
+
+#define TF_SELECT_SESSIONS                                                           \
+  "SELECT sessions.key, id, owner, record, etag, epoch, handles, poses, created_s, " \
+  "last_used_s FROM sessions LEFT JOIN session_states ON session_states.key = sessions.key "
+#define TF_SELECT_MESHES "SELECT key, sha256, record, last_used_s FROM meshes "
+#define TF_SELECT_PREDICTIONS \
+  "SELECT key, id, owner, session, positions_sha256, record FROM predictions "
+
+// At rest: without its poses, which may be damaged alone.
+absl::StatusOr<SessionRecord> ReadSessionAtRest(const Database::Query& row);
+absl::StatusOr<SessionRecord> ReadSession(const Database::Query& row);
+absl::StatusOr<MeshRecord> ReadMesh(const Database::Query& row);
+absl::StatusOr<PredictionRow> ReadPrediction(const Database::Query& row);
+
+// Removes the blob when no row claims it.
+absl::Status RemoveUnclaimed(Database& database, BlobStore& blobs, const std::string& sha256);
+absl::StatusOr<bool> IsClaimed(Database& database, const std::string& sha256);
+
+}  // namespace tissueform

@@ -1,0 +1,143 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/store/store_schema.h"
+
+#include <array>
+#include <string>
+
+#include "absl/cleanup/cleanup.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "server/store/fault_points.h"
+
+namespace tissueform {
+namespace {
+
+constexpr int64_t kApplicationId = 0x54'69'73'46;  // "TisF": file(1) and we know the database by it
+
+constexpr char kTablesOfVersion1[] =
+    "CREATE TABLE sessions (key INTEGER PRIMARY KEY, id TEXT NOT NULL UNIQUE, "
+    "owner TEXT NOT NULL, record BLOB NOT NULL) STRICT;"
+    "CREATE TABLE session_states (key INTEGER PRIMARY KEY REFERENCES sessions(key) ON DELETE "
+    "CASCADE, etag TEXT NOT NULL, epoch INTEGER NOT NULL, handles INTEGER NOT NULL, "
+    "poses BLOB NOT NULL) STRICT;"
+    "CREATE TABLE meshes (key INTEGER PRIMARY KEY, sha256 TEXT NOT NULL UNIQUE, "
+    "record BLOB NOT NULL) STRICT;";
+
+constexpr char kVersion2[] =
+    "ALTER TABLE session_states ADD COLUMN created_s INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE session_states ADD COLUMN last_used_s INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE meshes ADD COLUMN last_used_s INTEGER NOT NULL DEFAULT 0;"
+    "CREATE TABLE predictions (key INTEGER PRIMARY KEY, id TEXT NOT NULL UNIQUE, "
+    "owner TEXT NOT NULL, session TEXT NOT NULL, positions_sha256 TEXT NOT NULL, "
+    "record BLOB NOT NULL) STRICT;"
+    "CREATE INDEX predictions_by_positions ON predictions(positions_sha256);";
+
+absl::StatusOr<int64_t> Pragma(Database& database, const char* sql) {
+  Database::Query query = database.Prepare(sql);
+  TF_ASSIGN_OR_RETURN(const bool row, query.Step());
+  return row ? query.Integer(0) : 0;
+}
+
+absl::Status Change(Database& database, int64_t version, int64_t now_s) {
+  if (version < 1) TF_RETURN_IF_ERROR(database.Execute(kTablesOfVersion1));
+  if (version < 2) {
+    TF_RETURN_IF_ERROR(database.Execute(kVersion2));
+    TF_RETURN_IF_ERROR(database.Execute(
+        absl::StrCat("UPDATE session_states SET created_s = ", now_s, ", last_used_s = ", now_s,
+                     ";", "UPDATE meshes SET last_used_s = ", now_s)));
+  }
+  TF_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA application_id=", kApplicationId,
+                                                   ";PRAGMA user_version=", kSchemaVersion)));
+  TF_FAULT_POINT("schema.changed");
+  return database.Execute("COMMIT");
+}
+
+struct Table {
+  const char* rising;   // all columns, key first
+  const char* falling;  // the same from the other end
+  const char* insert;
+  int columns;
+};
+
+constexpr std::array<Table, 4> kTables = {{
+    {"SELECT key, id, owner, record FROM sessions ORDER BY key",
+     "SELECT key, id, owner, record FROM sessions ORDER BY key DESC",
+     "INSERT OR IGNORE INTO sessions (key, id, owner, record) VALUES (?, ?, ?, ?)", 4},
+    {"SELECT key, etag, epoch, handles, poses, created_s, last_used_s FROM session_states ORDER BY "
+     "key",
+     "SELECT key, etag, epoch, handles, poses, created_s, last_used_s FROM session_states ORDER BY "
+     "key DESC",
+     "INSERT OR IGNORE INTO session_states (key, etag, epoch, handles, poses, created_s, "
+     "last_used_s) SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7 WHERE EXISTS (SELECT 1 FROM sessions WHERE "
+     "key = ?1)",
+     7},
+    {"SELECT key, sha256, record, last_used_s FROM meshes ORDER BY key",
+     "SELECT key, sha256, record, last_used_s FROM meshes ORDER BY key DESC",
+     "INSERT OR IGNORE INTO meshes (key, sha256, record, last_used_s) VALUES (?, ?, ?, ?)", 4},
+    {"SELECT key, id, owner, session, positions_sha256, record FROM predictions ORDER BY key",
+     "SELECT key, id, owner, session, positions_sha256, record FROM predictions ORDER BY key DESC",
+     "INSERT OR IGNORE INTO predictions (key, id, owner, session, positions_sha256, record) VALUES "
+     "(?, ?, ?, ?, ?, ?)",
+     6},
+}};
+
+// True at the end of the table, false at a page that cannot be read.
+absl::StatusOr<bool> CopyRows(Database& damaged, Database& fresh, const Table& table,
+                              const char* select) {
+  Database::Query rows = damaged.Prepare(select);
+  for (;;) {
+    const absl::StatusOr<bool> row = rows.Step();
+    if (!row.ok() || !*row) return row.ok();
+    Database::Query insert = fresh.Prepare(table.insert);
+    for (int column = 0; column < table.columns; ++column) rows.CopyColumn(column, &insert);
+    // A row may be readable and yet not fit into the tables; only a full disk ends the copy.
+    if (const absl::Status status = insert.Run(); absl::IsResourceExhausted(status)) return status;
+  }
+}
+
+}  // namespace
+
+absl::Status PrepareSchema(Database& database, int64_t now_s) {
+  TF_ASSIGN_OR_RETURN(const int64_t version, Pragma(database, "PRAGMA user_version"));
+  TF_ASSIGN_OR_RETURN(const int64_t application, Pragma(database, "PRAGMA application_id"));
+  TF_ASSIGN_OR_RETURN(const int64_t pages, Pragma(database, "SELECT count(*) FROM sqlite_schema"));
+  if (application != kApplicationId && (application != 0 || pages > 0 || version != 0)) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "database ", database.path(), " is not one of tissueform; name another --data-dir"));
+  }
+  if (version > kSchemaVersion) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "database ", database.path(), " has been written by a newer server (version ", version,
+        ", this one knows ", kSchemaVersion, "); start that one, or name another --data-dir"));
+  }
+  if (version == kSchemaVersion) return absl::OkStatus();
+  TF_RETURN_IF_ERROR(database.Execute("BEGIN IMMEDIATE"));
+  absl::Cleanup roll_back = [&database] {
+    if (database.in_transaction()) database.Execute("ROLLBACK").IgnoreError();
+  };
+  return Change(database, version, now_s);
+}
+
+absl::Status QuickCheck(Database& database) {
+  Database::Query query = database.Prepare("PRAGMA quick_check(1)");
+  TF_ASSIGN_OR_RETURN(const bool row, query.Step());
+  if (row && query.Text(0) == "ok") return absl::OkStatus();
+  return absl::DataLossError(row ? query.Text(0) : "quick_check says nothing");
+}
+
+absl::Status CopyReadableRows(Database& damaged, Database& fresh) {
+  TF_RETURN_IF_ERROR(fresh.Execute("BEGIN IMMEDIATE"));
+  absl::Cleanup roll_back = [&fresh] {
+    if (fresh.in_transaction()) fresh.Execute("ROLLBACK").IgnoreError();
+  };
+  for (const Table& table : kTables) {
+    TF_ASSIGN_OR_RETURN(const bool whole, CopyRows(damaged, fresh, table, table.rising));
+    if (!whole) TF_RETURN_IF_ERROR(CopyRows(damaged, fresh, table, table.falling).status());
+  }
+  return fresh.Execute("COMMIT");
+}
+
+}  // namespace tissueform

@@ -1,0 +1,40 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "server/store/database.h"
+
+namespace tissueform {
+
+// The tables of a store. A record is its sealed bytes (store_records.h); beside it stand only what
+// rows are found by and what changes often.
+//
+//   sessions        id, owner, record without its poses
+//   session_states  what a session's writes change: etag, epoch, poses, times. A row of its own, so
+//                   that the commit of a pose writes one small page and not the record.
+//   meshes          sha256, record, last_used_s; the payload is the blob sha256
+//   predictions     id, owner, session, record; the positions are the blob positions_sha256
+//
+// Version 1 had neither times nor predictions.
+inline constexpr int64_t kSchemaVersion = 2;
+
+// Makes the tables in an empty database, or brings those of the version before up to date, in one
+// transaction; rows that had no times get `now_s`.
+//
+// Errors: FailedPrecondition (a newer version, or not a database of ours), or those of Database.
+absl::Status PrepareSchema(Database& database, int64_t now_s);
+
+// OK when SQLite finds nothing wrong with the file; otherwise DataLoss with its first complaint.
+absl::Status QuickCheck(Database& database);
+
+// Copies what rows can still be read from a damaged database of this version into an empty one with
+// tables. Pages that cannot be read are stepped over from both ends of a table.
+absl::Status CopyReadableRows(Database& damaged, Database& fresh);
+
+}  // namespace tissueform
