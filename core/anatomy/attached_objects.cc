@@ -32,6 +32,11 @@ constexpr double kFaintTubeMm2 = 45;
 constexpr double kTubeMm = 40;
 constexpr double kCordMm2 = 30;
 constexpr double kCordMm = 60;
+// One real cord of 4 mm, at voxels of 1 to 2 mm: ridges of 4 to 9 mm2, up to 180 mm long, of which
+// a tenth or more is denser than this; skin and lips have less.
+constexpr double kRidgeMm2 = 12;
+constexpr int16_t kDenserThanSkinHu = 100;
+constexpr double kLeastDenserThanSkin = 0.05;
 constexpr double kLargestPartMm3 = 20e3;
 constexpr double kLongestPartMm = 120;
 constexpr double kMostInHull = 0.5;
@@ -73,9 +78,12 @@ double ShareIn(const LabelGrid& piece, const LabelGrid& other) {
          static_cast<double>(CountVoxels(piece));
 }
 
+LabelGrid DenserThan(int16_t limit_hu, const LabelGrid& piece, const HuGrid& hu) {
+  return Both(piece, MaskWhere(hu, [limit_hu](int16_t value) { return value > limit_hu; }));
+}
+
 double ShareNearDense(const LabelGrid& piece, const HuGrid& hu) {
-  const LabelGrid dense =
-      Both(piece, MaskWhere(hu, [](int16_t value) { return value > kDenseHu; }));
+  const LabelGrid dense = DenserThan(kDenseHu, piece, hu);
   if (CountVoxels(dense) == 0) return 0;
   return ShareIn(piece, MaskWhere(DistanceMm(dense), [](float mm) { return mm <= kNearDenseMm; }));
 }
@@ -94,12 +102,37 @@ std::optional<ObjectKind> KindOf(const LabelGrid& piece, const VoxelBox& box,
   const double length_mm = LengthMm(box, piece.geometry.spacing_mm);
   const double volume_mm3 = VolumeMm3(piece);
   const double section_mm2 = volume_mm3 / length_mm;
-  if (ShareIn(piece, Crop(pieces.hull, box)) < kMostInHull) {
+  const auto margin_mm = static_cast<float>(piece.geometry.spacing_mm);
+  const LabelGrid hull =
+      MaskWhere(Crop(pieces.beyond_hull, box), [=](float mm) { return mm <= margin_mm; });
+  if (ShareIn(piece, hull) < kMostInHull) {
     if (length_mm >= kCordMm && section_mm2 < kCordMm2) return ObjectKind::kCord;
     if (length_mm >= kTubeMm && IsTube(piece, box, section_mm2, pieces)) return ObjectKind::kTube;
   }
   if (volume_mm3 > kLargestPartMm3 || length_mm > kLongestPartMm) return ObjectKind::kUnknown;
   return std::nullopt;
+}
+
+// The ridges on the thick part, and what stands out of it.
+LabelGrid RidgesOf(const ThinPieces& pieces, const FloatGrid& to_core,
+                   const FloatGrid& to_outside) {
+  LabelGrid ridges(pieces.tissue.geometry);
+  for (size_t i = 0; i < ridges.values.size(); ++i) {
+    const bool stands_out =
+        to_core.values[i] > pieces.radius_mm && pieces.beyond_hull.values[i] > 0;
+    const bool is_outermost = to_outside.values[i] < kOutermostMm;
+    ridges.values[i] = pieces.tissue.values[i] != 0 && stands_out && is_outermost ? 1 : 0;
+  }
+  return ridges;
+}
+
+std::optional<ObjectKind> KindOfRidge(const LabelGrid& ridge, const VoxelBox& box,
+                                      const ThinPieces& pieces) {
+  const double length_mm = LengthMm(box, ridge.geometry.spacing_mm);
+  if (length_mm < kCordMm || VolumeMm3(ridge) >= kRidgeMm2 * length_mm) return std::nullopt;
+  const LabelGrid dense = DenserThan(kDenserThanSkinHu, ridge, Crop(pieces.hu, box));
+  if (ShareIn(ridge, dense) < kLeastDenserThanSkin) return std::nullopt;
+  return ObjectKind::kCord;
 }
 
 LabelGrid PieceIn(const Components& components, int32_t label, const VoxelBox& box) {
@@ -117,14 +150,43 @@ Eigen::Vector3d MiddleOf(const LabelGrid& piece) {
 }
 
 // The layer of the wall that the opening's margin of a voxel has left beside objects.
-void TakeStumps(const ThinPieces& pieces, LabelGrid* removed) {
-  const FloatGrid to_core = DistanceMm(pieces.core);
+void TakeStumps(const ThinPieces& pieces, const FloatGrid& to_core, LabelGrid* removed) {
   const double near_mm = 2 * removed->geometry.spacing_mm;
   const FloatGrid to_removed = DistanceMm(*removed);
   for (size_t i = 0; i < removed->values.size(); ++i) {
     if (pieces.tissue.values[i] != 0 && to_core.values[i] > pieces.radius_mm &&
         to_removed.values[i] <= near_mm) {
       removed->values[i] = 1;
+    }
+  }
+}
+
+// What was found so far.
+struct FoundObjects {
+  LabelGrid removed;
+  std::vector<AttachedObject> objects;
+  std::vector<VoxelBox> boxes;
+};
+
+// Adds the connected parts of a mask that are objects.
+template <typename Kind>
+void AddObjects(const LabelGrid& mask, const Kind& kind_of, FoundObjects* found) {
+  const auto smallest = std::ceil(kSmallestMm3 / VoxelVolumeMm3(mask.geometry));
+  const Components components =
+      LabelComponents(mask, Neighbours::kCorners, static_cast<int64_t>(smallest));
+  const std::vector<VoxelBox> boxes = BoxesOf(components);
+  for (size_t k = 0; k < boxes.size(); ++k) {
+    const auto label = static_cast<int32_t>(k + 1);
+    const LabelGrid piece = PieceIn(components, label, boxes[k]);
+    const std::optional<ObjectKind> kind = kind_of(piece, boxes[k]);
+    if (!kind) continue;
+    found->objects.push_back({.kind = *kind,
+                              .volume_mm3 = VolumeMm3(piece),
+                              .middle_mm = MiddleOf(piece),
+                              .contact_mm = {}});
+    found->boxes.push_back(boxes[k]);
+    for (size_t i = 0; i < found->removed.values.size(); ++i) {
+      if (components.labels.values[i] == label) found->removed.values[i] = 1;
     }
   }
 }
@@ -158,41 +220,38 @@ void AddContacts(const LabelGrid& head, const LabelGrid& removed,
 HeadWithoutObjects PartObjects(const ThinPieces& pieces) {
   const LabelGrid& tissue = pieces.tissue;
   const FloatGrid to_outside = DistanceMm(pieces.outside);
+  const auto margin_mm = static_cast<float>(tissue.geometry.spacing_mm);
   LabelGrid thin(tissue.geometry);
   HeadWithoutObjects result{.head = pieces.thick, .objects = {}};
   for (size_t i = 0; i < tissue.values.size(); ++i) {
     if (tissue.values[i] == 0 || pieces.thick.values[i] != 0) continue;
     if (to_outside.values[i] < kOutermostMm) thin.values[i] = 1;
-    const bool inner = thin.values[i] == 0 && pieces.hull.values[i] != 0;
+    const bool inner = thin.values[i] == 0 && pieces.beyond_hull.values[i] <= margin_mm;
     result.head.values[i] = thin.values[i] != 0 || inner ? 1 : 0;
   }
-  const auto smallest = std::ceil(kSmallestMm3 / VoxelVolumeMm3(tissue.geometry));
-  const Components components =
-      LabelComponents(thin, Neighbours::kCorners, static_cast<int64_t>(smallest));
-  const std::vector<VoxelBox> boxes = BoxesOf(components);
-
-  LabelGrid removed(tissue.geometry);
-  std::vector<VoxelBox> object_boxes;
-  for (size_t k = 0; k < boxes.size(); ++k) {
-    const auto label = static_cast<int32_t>(k + 1);
-    const LabelGrid piece = PieceIn(components, label, boxes[k]);
-    const std::optional<ObjectKind> kind = KindOf(piece, boxes[k], pieces);
-    if (!kind) continue;
-    result.objects.push_back({.kind = *kind,
-                              .volume_mm3 = VolumeMm3(piece),
-                              .middle_mm = MiddleOf(piece),
-                              .contact_mm = {}});
-    object_boxes.push_back(boxes[k]);
-    for (size_t i = 0; i < removed.values.size(); ++i) {
-      if (components.labels.values[i] == label) removed.values[i] = 1;
-    }
+  FoundObjects found{.removed = LabelGrid(tissue.geometry), .objects = {}, .boxes = {}};
+  AddObjects(
+      thin, [&](const LabelGrid& piece, const VoxelBox& box) { return KindOf(piece, box, pieces); },
+      &found);
+  const FloatGrid to_core = DistanceMm(pieces.core);
+  LabelGrid ridges = RidgesOf(pieces, to_core, to_outside);
+  for (size_t i = 0; i < ridges.values.size(); ++i) {
+    if (found.removed.values[i] != 0) ridges.values[i] = 0;
   }
-  if (!result.objects.empty()) TakeStumps(pieces, &removed);
-  for (size_t i = 0; i < removed.values.size(); ++i) {
-    if (removed.values[i] != 0) result.head.values[i] = 0;
+  AddObjects(
+      ridges,
+      [&](const LabelGrid& ridge, const VoxelBox& box) { return KindOfRidge(ridge, box, pieces); },
+      &found);
+  if (!found.objects.empty()) TakeStumps(pieces, to_core, &found.removed);
+  for (size_t i = 0; i < found.removed.values.size(); ++i) {
+    if (found.removed.values[i] != 0) result.head.values[i] = 0;
   }
   result.head = LargestComponent(result.head, Neighbours::kFaces);
-  AddContacts(result.head, removed, object_boxes, &result.objects);
+  result.objects = std::move(found.objects);
+  AddContacts(result.head, found.removed, found.boxes, &result.objects);
+  std::stable_sort(
+      result.objects.begin(), result.objects.end(),
+      [](const AttachedObject& a, const AttachedObject& b) { return a.volume_mm3 > b.volume_mm3; });
   std::erase_if(result.objects, [](const AttachedObject& o) { return o.contact_mm.empty(); });
   return result;
 }

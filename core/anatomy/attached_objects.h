@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "core/anatomy/grid_operations.h"
+#include "core/anatomy/itk_filters.h"
 #include "core/ct/voxel_grid.h"
 
 namespace tissueform {
@@ -40,8 +41,10 @@ struct ThinPieces {
   double radius_mm = 0;
   const LabelGrid& thick;  // what of the tissue lies near the core
   const LabelGrid&
-      outside;            // air that a ball from outside reaches, which a nostril does not let in
-  const LabelGrid& hull;  // the head with its hollow parts; a tube on the skin stands out of it
+      outside;  // air that a ball from outside reaches, which a nostril does not let in
+  // How far outside the head with its hollow parts a voxel lies, mm; not positive in it. A tube on
+  // the skin stands out of it.
+  const FloatGrid& beyond_hull;
 };
 
 struct HeadWithoutObjects {
@@ -58,6 +61,9 @@ struct HeadWithoutObjects {
 //   a cord: most of it stands out of the hull, it is at least 60 mm long, and its mean section is
 //     under 30 mm2. An ear has more than twice that, and a finger is not thin;
 //   larger than two ears (20 cm3, or 120 mm long).
+// A cord that lies on the skin all along is thin nowhere, but a ridge on the thick part: what
+// stands out of the core's distance and of the hull, 60 mm long or more, with a section under 12
+// mm2 (an ear's rim has 15 to 18), and denser than skin here and there. Lashes and hair are not.
 // What touches nothing is left out without a word. Where a tube lay, the head ends at the core's
 // distance, without the rest of the wall that a voxel's blur had joined to the skin.
 HeadWithoutObjects PartObjects(const ThinPieces& pieces);

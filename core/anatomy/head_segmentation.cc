@@ -47,12 +47,13 @@ ThickPart ThickPartOf(const LabelGrid& tissue, double radius_mm) {
   return part;
 }
 
-// The head with its hollow parts, and a voxel round it. The walls of a nose are 2 to 3 mm thin, but
-// with the air that it holds, which a ball from outside does not reach, it is as thick as a thumb.
-LabelGrid HullOf(const LabelGrid& outside) {
+// How far outside the head with its hollow parts. The walls of a nose are 2 to 3 mm thin, but with
+// the air that it holds, which a ball from outside does not reach, it is as thick as a thumb.
+FloatGrid BeyondHull(const LabelGrid& outside) {
   const LabelGrid solid = MaskWhere(outside, [](uint8_t value) { return value == 0; });
-  const LabelGrid core = LargestComponent(Erode(solid, kHollowPartMm), Neighbours::kFaces);
-  return Dilate(core, kHollowPartMm + outside.geometry.spacing_mm);
+  FloatGrid beyond = DistanceMm(LargestComponent(Erode(solid, kHollowPartMm), Neighbours::kFaces));
+  for (float& mm : beyond.values) mm -= static_cast<float>(kHollowPartMm);
+  return beyond;
 }
 
 LabelGrid WithoutSpecks(const LabelGrid& mask, double smallest_mm3) {
@@ -151,7 +152,7 @@ absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
                                            .radius_mm = options.opening_radius_mm,
                                            .thick = thick.near,
                                            .outside = outside,
-                                           .hull = HullOf(outside)});
+                                           .beyond_hull = BeyondHull(outside)});
   const VoxelBox box = Grown(BoundingBox(parted.head), kMarginVoxels, ct.geometry);
 
   HeadSegmentation result;

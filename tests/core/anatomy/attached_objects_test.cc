@@ -118,6 +118,46 @@ TEST(AttachedObjectsTest, ATubeIsTakenAwayAndItsPlaceOnTheSkinIsTold) {
   }
 }
 
+// A string of one voxel's width, up to 4 mm before the skin of the left cheek, from brow to chin.
+bool InCord(const HuGrid& bare, const Vector3d& p) {
+  return std::abs(p.x() - 30) < 1.3 && p.z() > -70 && p.z() < 30 && p.y() < 0 &&
+         Interpolate(bare, p) < -500 && Interpolate(bare, p + Vector3d(0, 4, 0)) > -500;
+}
+
+TEST(AttachedObjectsTest, ACordThatLiesOnTheSkinAllAlongIsTakenAwayAndTold) {
+  const HuGrid bare = HeadPhantom();
+  const HuGrid ct = Painted([&](const Vector3d& p, int16_t) -> std::optional<int16_t> {
+    if (InCord(bare, p)) return int16_t{250};
+    return std::nullopt;
+  });
+  ASSERT_OK_AND_ASSIGN(const HeadSegmentation head, SegmentHead(ct));
+  ASSERT_EQ(head.objects.size(), 1U);
+  EXPECT_EQ(head.objects[0].kind, ObjectKind::kCord);
+  EXPECT_NEAR(head.objects[0].middle_mm.x(), 30, 2);
+  EXPECT_GT(head.objects[0].contact_mm.size(), 30U);
+  for (const Vector3d& place : head.objects[0].contact_mm) EXPECT_NEAR(place.x(), 30, 3 * 2.5);
+  // Of what stands out of the skin by more than a voxel.
+  EXPECT_LT(ShareKept(ct, head,
+                      [&](const Vector3d& p) {
+                        return InCord(bare, p) && Interpolate(bare, p + Vector3d(0, 2, 0)) < -500;
+                      }),
+            0.02);
+  EXPECT_GT(testing::DiceOverlap(
+                head.head, testing::AtPlaceOf(head.head.geometry, testing::HeadPhantomMask())),
+            0.997);
+}
+
+TEST(AttachedObjectsTest, AFoldOfSkinOfThatShapeIsKept) {
+  const HuGrid bare = HeadPhantom();
+  const HuGrid ct = Painted([&](const Vector3d& p, int16_t) -> std::optional<int16_t> {
+    if (InCord(bare, p)) return kSoftHu;
+    return std::nullopt;
+  });
+  ASSERT_OK_AND_ASSIGN(const HeadSegmentation head, SegmentHead(ct));
+  EXPECT_TRUE(head.objects.empty());
+  EXPECT_EQ(ShareKept(ct, head, [&](const Vector3d& p) { return InCord(bare, p); }), 1);
+}
+
 // A blanket that touches an ear may take it, but not unseen.
 TEST(AttachedObjectsTest, AnEarThatASheetTakesWithItIsTold) {
   const HuGrid ct = Painted([](const Vector3d& p, int16_t hu) -> std::optional<int16_t> {
