@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/plan_report/coverage_report.h"
 #include "client/plan_report/objects_report.h"
 #include "core/planning/json_values.h"
 
@@ -72,7 +73,8 @@ Json BoneJson(const PlanBuild& build, const PlanMeasures& measures) {
   return bone;
 }
 
-Json LandmarksJson(const Landmarks& landmarks) {
+Json LandmarksJson(const PlanBuild& build) {
+  const Landmarks& landmarks = build.landmarks;
   Json json = {{"unit", "mm, LPS"}};
   for (const auto& [name, point] :
        {std::pair("menton", landmarks.menton),
@@ -101,7 +103,8 @@ Json LandmarksJson(const Landmarks& landmarks) {
         std::pair("mouth_corner_right", landmarks.mouth_corner.right)}) {
     json[name] = ToJson(point);
   }
-  json["nose_prominence_mm"] = landmarks.nose_prominence_mm;
+  json["nose_prominence_mm"] =
+      NoseIsCut(build.coverage) ? Json(nullptr) : Json(landmarks.nose_prominence_mm);
   for (const auto& [name, plane] : {std::pair("midsagittal_plane", landmarks.midsagittal),
                                     std::pair("lower_teeth_plane", landmarks.lower_teeth),
                                     std::pair("upper_teeth_plane", landmarks.upper_teeth),

@@ -15,7 +15,7 @@ namespace tissueform {
 
 nlohmann::ordered_json HeadJson(const PlanBuild& build);
 nlohmann::ordered_json BoneJson(const PlanBuild& build, const PlanMeasures& measures);
-nlohmann::ordered_json LandmarksJson(const Landmarks& landmarks);
+nlohmann::ordered_json LandmarksJson(const PlanBuild& build);
 nlohmann::ordered_json SegmentsJson(const PlanBuild& build);
 nlohmann::ordered_json RegionJson(const PlanBuild& build);
 nlohmann::ordered_json SoftTissueJson(const SoftTissue& soft_tissue);

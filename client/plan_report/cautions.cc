@@ -24,6 +24,7 @@ constexpr double kLittleUnderChinMm = 15;
 
 std::vector<std::string> Cautions(const PlanBuild& build) {
   std::vector<std::string> cautions = CoverageCautions(build.coverage);
+  for (std::string& caution : CutCautions(build.coverage)) cautions.push_back(std::move(caution));
   for (std::string& caution : ObjectsCautions(build)) cautions.push_back(std::move(caution));
   for (std::string& caution : MetalCautions(build)) cautions.push_back(std::move(caution));
   for (std::string& caution :
@@ -31,7 +32,13 @@ std::vector<std::string> Cautions(const PlanBuild& build) {
     cautions.push_back(std::move(caution));
   }
   const double nose_mm = build.landmarks.nose_prominence_mm;
-  if (nose_mm < kFlatNoseMm) {
+  if (NoseIsCut(build.coverage)) {
+    cautions.push_back(
+        "The CT does not hold the whole nose: how far it stands out is not judged. There may be no "
+        "tip to predict, and what is called nose may lie near the upper lip and move more than a "
+        "tip "
+        "does.");
+  } else if (nose_mm < kFlatNoseMm) {
     cautions.push_back(absl::StrFormat(
         "The nose is cut off or pressed flat in this CT: its foremost skin stands %.1f mm before "
         "the skin under it. There is no tip to predict, and what is called nose lies near "

@@ -4,9 +4,11 @@
 #include "client/plan_report/coverage_report.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 
 #include "core/planning/json_values.h"
 
@@ -26,6 +28,10 @@ constexpr double kLooserThanSkinHu = -180;
 const Colour kCoveredColour = kTissueColour;
 const Colour kMissingColour{0.85, 0.10, 0.10};
 const Colour kGapColour{0.45, 0.00, 0.05};
+const Colour kScannerCutColour{0.35, 0.45, 0.70};
+
+// Of a region: less of it at a cut is its edge, not itself.
+constexpr double kLeastCutMm2 = 10;
 
 std::string Words(SkinRegion region) {
   switch (region) {
@@ -85,6 +91,34 @@ std::string GapText(const SkinGap& gap, double limit_mm) {
                           gap.hu_behind);
   }
   return text;
+}
+
+// "the nose (1234 mm2) and the upper lip (56 mm2)"; empty where no named region is cut.
+std::string CutRegionsText(const ScannerCut& cut) {
+  std::vector<std::string> parts;
+  for (const SkinRegion region : kNamedSkinRegions) {
+    const double mm2 = cut.region_mm2[static_cast<size_t>(region)];
+    if (mm2 < kLeastCutMm2) continue;
+    parts.push_back(absl::StrFormat("%s (%.0f mm2)", Words(region), mm2));
+  }
+  return absl::StrJoin(parts, ", ");
+}
+
+Json CutsJson(const std::vector<ScannerCut>& cuts) {
+  Json list = Json::array();
+  for (const ScannerCut& cut : cuts) {
+    Json regions = Json::object();
+    for (size_t r = 0; r < cut.region_mm2.size(); ++r) {
+      if (cut.region_mm2[r] < kLeastCutMm2) continue;
+      regions[KeyOf(static_cast<SkinRegion>(r))] = cut.region_mm2[r];
+    }
+    list.push_back({{"area_mm2", cut.area_mm2},
+                    {"middle_mm", ToJson(cut.middle)},
+                    {"low_mm", ToJson(cut.low)},
+                    {"high_mm", ToJson(cut.high)},
+                    {"area_mm2_by_region", std::move(regions)}});
+  }
+  return list;
 }
 
 Json PartJson(const CoveredPart& part) {
@@ -159,6 +193,31 @@ std::vector<std::string> CoverageCautions(const SkinCoverage& coverage) {
   return cautions;
 }
 
+std::vector<std::string> CutCautions(const SkinCoverage& coverage) {
+  std::vector<std::string> cautions;
+  for (const ScannerCut& cut : coverage.cuts) {
+    std::string text = absl::StrFormat(
+        "The scanner's circle, or a side of the CT, cuts the face at %s: %.0f mm2, between %s and "
+        "%s. What lies beyond is not in the CT and not in the model. The cut is no skin: it is "
+        "counted neither as covered nor as missing.",
+        PlaceText(cut.middle), cut.area_mm2, PlaceText(cut.low), PlaceText(cut.high));
+    const std::string regions = CutRegionsText(cut);
+    if (!regions.empty()) {
+      absl::StrAppend(
+          &text, " It lies in the front of the face that a prediction is looked at for: of ",
+          regions, " no skin is predicted there, and nothing about its shape is judged.");
+    }
+    cautions.push_back(std::move(text));
+  }
+  return cautions;
+}
+
+bool NoseIsCut(const SkinCoverage& coverage) {
+  return std::any_of(coverage.cuts.begin(), coverage.cuts.end(), [](const ScannerCut& cut) {
+    return cut.region_mm2[static_cast<size_t>(SkinRegion::kNose)] >= kLeastCutMm2;
+  });
+}
+
 Json CoverageJson(const SkinCoverage& coverage) {
   Json json = {
       {"means", "the CT's outer skin in the region of interest, by area, against the mesh's skin"},
@@ -171,6 +230,7 @@ Json CoverageJson(const SkinCoverage& coverage) {
   json["gaps_beyond_4_mm"] = GapsJson(coverage.gaps);
   json["hole_mm"] = coverage.hole_mm;
   json["holes"] = GapsJson(coverage.holes);
+  json["cut_by_scanner"] = CutsJson(coverage.cuts);
   json["mesh_skin_mm2"] = coverage.mesh_skin_mm2;
   json["mesh_skin_on_bone_share"] = BoneShare(coverage);
   return json;
@@ -184,22 +244,33 @@ std::vector<Scene> CoverageScenes(const SkinCoverage& coverage) {
                                      : mm > coverage.tolerance_mm                 ? kMissingColour
                                                                                   : kCoveredColour);
   }
+  std::vector<SurfaceLayer> layers = {std::move(layer)};
+  if (coverage.cut_triangles.rows() > 0) {
+    layers.push_back({.positions = coverage.cut_positions,
+                      .triangles = coverage.cut_triangles,
+                      .colour = kScannerCutColour,
+                      .edges = false});
+  }
   std::vector<Scene> scenes;
   for (const auto& [title, from] : {std::pair("from the front", Vector3d(0, -1, 0)),
                                     std::pair("from the left, front", Vector3d(0.75, -0.75, 0.1)),
                                     std::pair("from the right, front", Vector3d(-0.75, -0.75, 0.1)),
                                     std::pair("from below", Vector3d(0, -0.7, -0.7))}) {
-    scenes.push_back({.title = title, .surfaces = {layer}, .view = {from}});
+    scenes.push_back({.title = title, .surfaces = layers, .view = {from}});
   }
   return scenes;
 }
 
 std::vector<LegendEntry> CoverageLegend(const SkinCoverage& coverage) {
   const double gap_mm = std::max(kGapMm, coverage.tolerance_mm);
-  return {
+  std::vector<LegendEntry> legend = {
       {absl::StrFormat("within %.1f mm of the mesh's skin", coverage.tolerance_mm), kCoveredColour},
       {absl::StrFormat("missing: farther than %.1f mm", coverage.tolerance_mm), kMissingColour},
       {absl::StrFormat("farther than %.1f mm", gap_mm), kGapColour}};
+  if (coverage.cut_triangles.rows() > 0) {
+    legend.push_back({"cut by the scanner's circle: no skin", kScannerCutColour});
+  }
+  return legend;
 }
 
 }  // namespace tissueform

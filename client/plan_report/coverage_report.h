@@ -24,6 +24,13 @@ std::vector<QualityCheck> CheckCoverage(const SkinCoverage& coverage);
 // mesh's skin: place and millimetres.
 std::vector<std::string> CoverageCautions(const SkinCoverage& coverage);
 
+// A sentence for every place where the scanner's circle or a side of the CT cuts what is modelled:
+// where, how many mm2, of what, and that nothing is judged there.
+std::vector<std::string> CutCautions(const SkinCoverage& coverage);
+
+// Whether the nose, or a part of it, is cut off so: its prominence then means nothing.
+bool NoseIsCut(const SkinCoverage& coverage);
+
 // The key "coverage" of report.json (docs/recipe-format.md).
 nlohmann::ordered_json CoverageJson(const SkinCoverage& coverage);
 

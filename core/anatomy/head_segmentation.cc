@@ -12,6 +12,7 @@
 #include "core/anatomy/itk_filters.h"
 #include "core/anatomy/metal_in_bone.h"
 #include "core/anatomy/outer_skin.h"
+#include "core/anatomy/scanner_cut.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -138,7 +139,8 @@ void RemoveObjects(const LabelGrid& tissue, HeadSegmentation* result) {
 
 absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
                                              const HeadSegmentationOptions& options,
-                                             const StageFunction& tell, const LabelGrid& metal) {
+                                             const StageFunction& tell, const LabelGrid& metal,
+                                             const LabelGrid& unscanned) {
   TellStage(tell, "finding the head", 0);
   const auto is_tissue = [&](int16_t hu) { return hu > options.tissue_above_hu; };
   const LabelGrid tissue = MaskWhere(ct, is_tissue);
@@ -162,6 +164,8 @@ absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
   result.hu = Crop(ct, box);
   result.metal = metal.values.empty() ? LabelGrid(result.hu.geometry) : Crop(metal, box);
   RemoveObjects(MaskWhere(result.hu, is_tissue), &result);
+  result.cut =
+      CutVoxels(result.head, unscanned.values.empty() ? LabelGrid() : Crop(unscanned, box));
 
   TellStage(tell, "finding bone", 0.6);
   const LabelGrid dense =

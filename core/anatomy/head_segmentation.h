@@ -34,6 +34,9 @@ struct HeadSegmentation {
   // 1 for fillings, brackets and wires, which are bone as well: they belong to the teeth they sit
   // on. All 0 where there is no metal.
   LabelGrid metal;
+  // The head's voxels (1) that end where the CT does, not where the head does
+  // (core/anatomy/scanner_cut.h); without voxels where there are none.
+  LabelGrid cut;
   HeadSegmentationOptions options;
 
   double streaks_mm3 = 0;  // dense as bone, but taken for what metal's streaks have left
@@ -46,13 +49,15 @@ struct HeadSegmentation {
 // Finds the largest body of tissue with the thin parts that hang on it (ears, the walls of a nose),
 // without objects that touch it, and its bone.
 //
-// `metal` is a mask on the CT's grid, or has no voxels where there is none.
+// `metal`, and `unscanned` (core/ct/unscanned.h), are masks on the CT's grid, or have no voxels
+// where there is none.
 //
 // Errors: InvalidArgument when there is too little tissue or bone for a head, or when no soft
 // tissue covers the bone (a skull, a phantom).
 absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
                                              const HeadSegmentationOptions& options = {},
                                              const StageFunction& tell = nullptr,
-                                             const LabelGrid& metal = {});
+                                             const LabelGrid& metal = {},
+                                             const LabelGrid& unscanned = {});
 
 }  // namespace tissueform

@@ -12,6 +12,7 @@
 #include "core/anatomy/itk_filters.h"
 #include "core/anatomy/surface_extraction.h"
 #include "core/base/status_macros.h"
+#include "core/ct/unscanned.h"
 #include "core/plan_building/contact_trial.h"
 
 namespace tissueform {
@@ -58,6 +59,7 @@ struct ResampledCt {
   CtProvenance provenance;
   std::array<int, 3> size = {0, 0, 0};  // of the CT as it was read
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Zero();
+  LabelGrid unscanned;  // core/ct/unscanned.h
   CtWithMetal ct;
 };
 
@@ -87,17 +89,19 @@ absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Re
   ResampledCt result{.provenance = std::move(volume.provenance),
                      .size = volume.size,
                      .spacing_mm = volume.spacing_mm,
+                     .unscanned = {},
                      .ct = {}};
+  TF_ASSIGN_OR_RETURN(result.unscanned, ResampleUnscanned(volume, recipe.spacing_mm, threads));
   TF_ASSIGN_OR_RETURN(result.ct, ResampleWithoutStreaks(std::move(volume), recipe.spacing_mm,
                                                         recipe.metal, threads));
   return result;
 }
 
-absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const Recipe& recipe,
-                                    Progress* progress) {
+absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unscanned,
+                                    const Recipe& recipe, Progress* progress) {
   progress->Begin("finding the head and its bone", 0.12, 0.3);
-  TF_ASSIGN_OR_RETURN(HeadSegmentation head,
-                      SegmentHead(ct.hu, recipe.segmentation, progress->Parts(), ct.metal));
+  TF_ASSIGN_OR_RETURN(HeadSegmentation head, SegmentHead(ct.hu, recipe.segmentation,
+                                                         progress->Parts(), ct.metal, unscanned));
   progress->Begin("telling the bones apart", 0.3, 0.42);
   absl::StatusOr<BoneParts> parts =
       SeparateBoneParts(head, recipe.occlusal_plane, progress->Parts());
@@ -225,7 +229,7 @@ absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTiss
   TF_ASSIGN_OR_RETURN(
       PlanningRegions regions,
       AssignRegions(built.mesh, built.surface.num_vertices(), soft_tissue, names, contact_band_mm,
-                    anatomy.landmarks, {head.hu, tissue_above_hu}));
+                    anatomy.landmarks, {head.hu, tissue_above_hu, &head.cut}));
   TF_ASSIGN_OR_RETURN(ReleasedContacts released,
                       ReleaseTornContacts({.mesh = built.mesh,
                                            .youngs_modulus_pa = stiffness.youngs_modulus_pa,
@@ -248,7 +252,8 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
   Progress progress(options.tell);
   SetFilterThreads(options.threads);
   TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(ct_path, recipe, options.threads, &progress));
-  TF_ASSIGN_OR_RETURN(Anatomy anatomy, FindAnatomy(ct.ct, recipe, &progress));
+  TF_ASSIGN_OR_RETURN(Anatomy anatomy, FindAnatomy(ct.ct, ct.unscanned, recipe, &progress));
+  ct.unscanned = {};
   ct.ct.hu = {};  // the head has its own: as large as the CT, and the next stages need the room
   TF_ASSIGN_OR_RETURN(DividedBone bone, CutBone(anatomy, recipe.segments, &progress));
   TF_ASSIGN_OR_RETURN(SoftTissue soft_tissue,

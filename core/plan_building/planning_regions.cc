@@ -25,11 +25,14 @@ constexpr uint8_t kFixed = 1;
 
 // What a vertex of the boundary touches: a label of bone, or these.
 constexpr uint8_t kAir = 0;
-constexpr uint8_t kLeftOut = 253;  // tissue that is not modelled: brain, thin sheets
+constexpr uint8_t kLeftOut = 253;  // tissue that is not modelled: brain, thin sheets, cut off
 constexpr uint8_t kCut = 254;
 
 // Half a voxel is what sampling leaves open where a surface lies, and a little for remeshing.
 constexpr double kCutVoxels = 0.6;
+// So near to the voxels that the scanner's circle cuts what faces air is no skin: half a voxel to
+// their faces, and what remeshing leaves open.
+constexpr double kAtCutVoxels = 1.2;
 // How far from a vertex of the mesh the voxel is looked for that it lies on.
 constexpr int kSearchVoxels = 3;
 
@@ -74,10 +77,15 @@ uint8_t NearestOther(const Eigen::Vector3d& place, const LabelGrid& labels, cons
 std::vector<uint8_t> TouchedBy(const TetMesh& mesh, Eigen::Index boundary_vertices,
                                const SoftTissue& soft_tissue, const PlanningCt& ct) {
   std::vector<uint8_t> touched(static_cast<size_t>(boundary_vertices));
+  const bool has_cut = ct.cut != nullptr && !ct.cut->values.empty();
+  const FloatGrid to_cut = has_cut ? DistanceMm(*ct.cut) : FloatGrid();
   for (Eigen::Index v = 0; v < boundary_vertices; ++v) {
     const Eigen::Vector3d place = mesh.positions().row(v);
-    touched[static_cast<size_t>(v)] =
-        IsOnCut(place, soft_tissue) ? kCut : NearestOther(place, soft_tissue.labels, ct);
+    uint8_t& by = touched[static_cast<size_t>(v)];
+    by = IsOnCut(place, soft_tissue) ? kCut : NearestOther(place, soft_tissue.labels, ct);
+    if (by != kAir || !has_cut) continue;
+    const double near_mm = kAtCutVoxels * to_cut.geometry.spacing_mm;
+    if (Interpolate(to_cut, place) <= near_mm) by = kLeftOut;
   }
   return touched;
 }

@@ -21,14 +21,15 @@ namespace tissueform {
 struct PlanningCt {
   const HuGrid& hu;
   double tissue_above_hu = 0;
+  const LabelGrid* cut = nullptr;  // HeadSegmentation::cut; null or without voxels: none
 };
 
 // What every vertex of a planning mesh is. Numbers of `anatomy`: 0 free, 1 fixed (bone that stays,
-// and the cuts), 2.. the moved segments.
+// and the cuts of the region), 2.. the moved segments.
 struct PlanningRegions {
   std::vector<uint8_t> anatomy;      // #V
   std::vector<uint8_t> skin_region;  // #V, SkinRegion; 0 also inside and off the skin
-  std::vector<bool> on_skin;         // #V: facing air, not a cut
+  std::vector<bool> on_skin;         // #V: facing air, not a cut of any kind
   std::vector<bool> on_bone;         // #V: on bone of either kind, in the contact band too
 
   int64_t freed_by_contact = 0;  // vertices on bone that were left free
@@ -39,6 +40,8 @@ double LargestMoveMm(const LabelGrid& labels, uint8_t label, const HandlePose& p
 
 // A vertex of the boundary is on a cut where a plane of the region is nearer than 0.6 voxels, and
 // on what the nearest voxel outside the soft tissue is: bone that stays, a segment, or air.
+//
+// Where the scanner's circle cuts the head, a vertex is free, but no skin.
 //
 // Bone nearer than `contact_band_mm` to bone that moves otherwise (teeth, the walls of a cut, a
 // joint) is left free on both sides, so that tissue between them is not torn; and so are the

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -73,10 +74,15 @@ TriangleMesh KeepTriangles(const TriangleMesh& surface, const std::vector<bool>&
   return KeepParts(surface, parts, {false, true});
 }
 
+struct OuterSkin {
+  TriangleMesh skin;
+  std::optional<TriangleMesh> cut;  // what the scanner's circle or the CT's side makes of it
+};
+
 // The outer skin of the CT within the region of interest; teeth that an open mouth shows are none.
-absl::StatusOr<TriangleMesh> OuterSkin(const HeadSegmentation& head, const LabelGrid& outside_air,
-                                       const Landmarks& landmarks, const RegionOfInterest& region,
-                                       double tolerance_mm) {
+absl::StatusOr<OuterSkin> FindOuterSkin(const HeadSegmentation& head, const LabelGrid& outside_air,
+                                        const Landmarks& landmarks, const RegionOfInterest& region,
+                                        double tolerance_mm) {
   FloatGrid hu(head.hu.geometry);
   std::copy(head.hu.values.begin(), head.hu.values.end(), hu.values.begin());
   SurfaceExtractionOptions extraction;
@@ -95,17 +101,32 @@ absl::StatusOr<TriangleMesh> OuterSkin(const HeadSegmentation& head, const Label
   // plane shaves shows it most.
   const double margin_mm = std::max(head.hu.geometry.spacing_mm, tolerance_mm);
   const TriangleSizes sizes = SizesOf(surface);
-  std::vector<bool> kept;
-  bool any = false;
+  const FloatGrid to_cut = head.cut.values.empty() ? FloatGrid() : DistanceMm(head.cut);
+  const auto is_cut = [&](const Eigen::Vector3d& place) {
+    return !to_cut.values.empty() && Interpolate(to_cut, place) <= margin_mm;
+  };
+  std::vector<bool> is_skin;
+  std::vector<bool> is_end;
   for (Eigen::Index f = 0; f < surface.num_triangles(); ++f) {
     const auto triangle = surface.triangles().row(f);
-    kept.push_back(is_outer[triangle[0]] && is_outer[triangle[1]] && is_outer[triangle[2]] &&
-                   LeastHeightMm(planes, sizes.middles.row(f)) >= margin_mm);
-    any = any || kept.back();
+    const Eigen::Vector3d middle = sizes.middles.row(f);
+    const bool within = is_outer[triangle[0]] && is_outer[triangle[1]] && is_outer[triangle[2]] &&
+                        LeastHeightMm(planes, middle) >= margin_mm;
+    is_end.push_back(within && is_cut(middle));
+    is_skin.push_back(within && !is_end.back());
   }
-  if (any) return KeepTriangles(surface, kept);
+  const auto any = [](const std::vector<bool>& of) {
+    return std::find(of.begin(), of.end(), true) != of.end();
+  };
+  if (any(is_skin)) {
+    OuterSkin outer{.skin = KeepTriangles(surface, is_skin), .cut = std::nullopt};
+    if (any(is_end)) outer.cut = KeepTriangles(surface, is_end);
+    return outer;
+  }
   return absl::InvalidArgumentError(
-      "no outer skin lies within the region of interest; move its planes");
+      "no outer skin lies within the region of interest, or none that the CT's border does not "
+      "cut; "
+      "move its planes");
 }
 
 // The triangles of a mesh's boundary with a corner on skin.
@@ -211,9 +232,10 @@ absl::StatusOr<SkinCoverage> MeasureSkinCoverage(const HeadSegmentation& head,
                                                  double ct_voxel_mm, int threads) {
   const double tolerance_mm = std::max(kLeastToleranceMm, ct_voxel_mm);
   TF_ASSIGN_OR_RETURN(
-      const TriangleMesh skin,
-      OuterSkin(head, mesh.outside_air != nullptr ? *mesh.outside_air : OutsideAir(head), landmarks,
-                mesh.region, tolerance_mm));
+      const OuterSkin outer,
+      FindOuterSkin(head, mesh.outside_air != nullptr ? *mesh.outside_air : OutsideAir(head),
+                    landmarks, mesh.region, tolerance_mm));
+  const TriangleMesh& skin = outer.skin;
   TF_ASSIGN_OR_RETURN(const TriangleMesh mesh_skin, SkinOf(mesh));
   const TriangleSizes sizes = SizesOf(skin);
   const Eigen::VectorXd distances = DistancesToSurface(sizes.middles, mesh_skin, threads);
@@ -232,6 +254,11 @@ absl::StatusOr<SkinCoverage> MeasureSkinCoverage(const HeadSegmentation& head,
   const MeasuredSkin measured{head.hu, skin, sizes, names, coverage.distance_mm};
   coverage.gaps = PartsBeyond(kGapMm, measured);
   coverage.holes = PartsBeyond(coverage.hole_mm, measured);
+  coverage.cuts = MeasureCuts(head.cut, head.head, mesh.region.planes(), landmarks);
+  if (outer.cut) {
+    coverage.cut_positions = outer.cut->positions();
+    coverage.cut_triangles = outer.cut->triangles();
+  }
   CountBone(mesh, skin, threads, &coverage);
   coverage.positions = skin.positions();
   coverage.triangles = skin.triangles();

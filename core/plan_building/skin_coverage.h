@@ -9,6 +9,7 @@
 
 #include "core/anatomy/head_segmentation.h"
 #include "core/anatomy/landmarks.h"
+#include "core/anatomy/scanner_cut.h"
 #include "core/anatomy/soft_tissue.h"
 #include "core/mesh/skin_region.h"
 #include "core/mesh/triangle_mesh.h"
@@ -59,6 +60,10 @@ struct SkinCoverage {
   std::vector<SkinGap> holes;  // by falling area
   double hole_mm = kHoleMm;    // that they are farther than
 
+  // Where the scanner's circle or a side of the CT cuts what is modelled. It is no skin of the CT,
+  // and nothing is measured there or within the tolerance beside it.
+  std::vector<ScannerCut> cuts;
+
   // Of the mesh's boundary where the CT has its skin: what lies on bone or is held by it.
   double mesh_skin_mm2 = 0;
   double mesh_skin_on_bone_mm2 = 0;
@@ -68,6 +73,9 @@ struct SkinCoverage {
   std::vector<double> distance_mm;
   Positions positions;
   TriangleIndices triangles;
+  // What would be skin there if it were not at a cut, #G triangles; for pictures.
+  Positions cut_positions;
+  TriangleIndices cut_triangles;
 };
 
 // What a plan's mesh is and where it lies.
@@ -78,7 +86,8 @@ struct MeshedSkin {
   const LabelGrid* outside_air = nullptr;  // OutsideAir(head); null: found anew
 };
 
-// Within a voxel of the planes of the region of interest nothing is counted. `ct_voxel_mm` is the
+// Within a voxel of the planes of the region of interest, and of HeadSegmentation::cut, nothing is
+// counted. `ct_voxel_mm` is the
 // longest side of a voxel of the CT as it was read. The result does not depend on `threads`.
 //
 // Errors: those of ExtractSurface; InvalidArgument when no outer skin lies in the region.

@@ -13,6 +13,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 SkinCoverage WithNose(double covered_mm2) {
   SkinCoverage coverage;
@@ -47,6 +48,33 @@ TEST(CoverageReportTest, ARegionCannotHideInTheWhole) {
   EXPECT_THAT(CoverageCautions(coverage),
               ElementsAre(AllOf(HasSubstr("1.0 % of the nose"), HasSubstr("0.2 of 20.0 cm2"),
                                 HasSubstr("13.3 mm at (-96, 17, -6) mm"))));
+}
+
+ScannerCut CutOf(SkinRegion region, double mm2) {
+  ScannerCut cut;
+  cut.area_mm2 = mm2 + 200;
+  cut.region_mm2.assign(kNamedSkinRegions.size() + 1, 0);
+  cut.region_mm2[0] = 200;
+  cut.region_mm2[static_cast<size_t>(region)] += mm2;
+  cut.middle = {1, 2, 3};
+  cut.low = {0, 1, 2};
+  cut.high = {2, 3, 4};
+  return cut;
+}
+
+TEST(CoverageReportTest, ACutOfTheScannersCircleIsToldAndNoReasonToRefuse) {
+  SkinCoverage coverage = WithNose(2000);
+  coverage.cuts = {CutOf(SkinRegion::kNose, 345), CutOf(SkinRegion::kNone, 12)};
+  EXPECT_THAT(Passed(coverage), ElementsAre(true, true, true, true));
+  EXPECT_THAT(CutCautions(coverage),
+              ElementsAre(AllOf(HasSubstr("at (1, 2, 3) mm: 545 mm2"),
+                                HasSubstr("between (0, 1, 2) mm and (2, 3, 4) mm"),
+                                HasSubstr("looked at for: of the nose (345 mm2)")),
+                          AllOf(HasSubstr("212 mm2"), Not(HasSubstr("looked at")))));
+  EXPECT_TRUE(NoseIsCut(coverage));
+  coverage.cuts.erase(coverage.cuts.begin());
+  EXPECT_FALSE(NoseIsCut(coverage));
+  EXPECT_EQ(CoverageJson(coverage)["cut_by_scanner"].size(), 1U);
 }
 
 TEST(CoverageReportTest, GapsAndHolesAreToldWithTheirPlace) {

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
 // The face that the CT shows is in the mesh, and where it is not, no measure says that it is: on
-// the bundled head, and on the same head with a nose of thin walls.
+// the bundled head, and on the same head with a nose of thin walls, or one that the scanner's
+// circle cuts.
 
 #include <array>
 #include <cmath>
@@ -20,6 +21,7 @@
 #include "core/base/status_macros.h"
 #include "core/ct/ct_volume_reader.h"
 #include "core/ct/isotropic_resample.h"
+#include "core/ct/unscanned.h"
 #include "core/mesh/tet_topology.h"
 #include "core/plan_building/planning_regions.h"
 #include "core/plan_building/skin_coverage.h"
@@ -51,17 +53,20 @@ struct Face {
   }
 };
 
-absl::StatusOr<HuGrid> BundledCt(double spacing_mm) {
+absl::StatusOr<CtVolume> BundledVolume() {
   CtReadOptions options;
   options.hu_offset = -1024;
   options.axes = "RPI";
-  TF_ASSIGN_OR_RETURN(const CtVolume volume,
-                      ReadCtVolume(TestDataPath("ct/headsq/headsq_quarter.nhdr"), options));
+  return ReadCtVolume(TestDataPath("ct/headsq/headsq_quarter.nhdr"), options);
+}
+
+absl::StatusOr<HuGrid> BundledCt(double spacing_mm) {
+  TF_ASSIGN_OR_RETURN(const CtVolume volume, BundledVolume());
   return ResampleIsotropic(volume, spacing_mm, {.threads = 2});
 }
 
-absl::StatusOr<Face> FaceOf(const HuGrid& ct) {
-  TF_ASSIGN_OR_RETURN(HeadSegmentation head, SegmentHead(ct));
+absl::StatusOr<Face> FaceOf(const HuGrid& ct, const LabelGrid& unscanned = {}) {
+  TF_ASSIGN_OR_RETURN(HeadSegmentation head, SegmentHead(ct, {}, nullptr, {}, unscanned));
   TF_ASSIGN_OR_RETURN(const BoneParts parts, SeparateBoneParts(head));
   TF_ASSIGN_OR_RETURN(const Landmarks landmarks, FindLandmarks(head, parts));
   const OsteotomySegment cut = DefaultSegment(OsteotomyKind::kBssro, "mandible", landmarks);
@@ -79,7 +84,7 @@ absl::StatusOr<Face> FaceOf(const HuGrid& ct) {
   const auto tissue_above_hu = static_cast<double>(head.options.tissue_above_hu);
   TF_ASSIGN_OR_RETURN(PlanningRegions regions,
                       AssignRegions(mesh.mesh, mesh.surface.num_vertices(), tissue, {"mandible"}, 3,
-                                    landmarks, {head.hu, tissue_above_hu}));
+                                    landmarks, {head.hu, tissue_above_hu, &head.cut}));
   return Face{.head = std::move(head),
               .landmarks = landmarks,
               .tissue = std::move(tissue),
@@ -107,6 +112,46 @@ void HollowNose(double wall_mm, HuGrid* ct) {
   });
 }
 
+// A scanner's circle, in the slices up to a height: over the bridge of the nose they may be of
+// another scan.
+struct Circle {
+  Vector3d middle;
+  double radius_mm;
+  double up_to_z_mm;
+
+  // Positive inside.
+  double DepthMm(const Vector3d& p) const {
+    return radius_mm - std::hypot(p.x() - middle.x(), p.y() - middle.y());
+  }
+};
+
+void FillOutside(const Circle& circle, CtVolume* volume) {
+  size_t voxel = 0;
+  for (int k = 0; k < volume->size[2]; ++k) {
+    for (int j = 0; j < volume->size[1]; ++j) {
+      for (int i = 0; i < volume->size[0]; ++i, ++voxel) {
+        const Vector3d place = volume->Place(i, j, k);
+        if (place.z() <= circle.up_to_z_mm && circle.DepthMm(place) < 0) volume->hu[voxel] = -1024;
+      }
+    }
+  }
+}
+
+// Of the front of the circle, what lies in tissue that stays in the region of interest.
+double CutAreaMm2(const Circle& circle, const HuGrid& uncut, const RegionOfInterest& region) {
+  constexpr double kStepMm = 0.5;
+  double area_mm2 = 0;
+  for (double along = -60; along < 60; along += kStepMm) {
+    const double angle = along / circle.radius_mm;
+    for (double z = region.below.point_mm.z(); z < circle.up_to_z_mm; z += kStepMm) {
+      const Vector3d place(circle.middle.x() + circle.radius_mm * std::sin(angle),
+                           circle.middle.y() - circle.radius_mm * std::cos(angle), z);
+      if (Interpolate(uncut, place) > -500) area_mm2 += kStepMm * kStepMm;
+    }
+  }
+  return area_mm2;
+}
+
 bool IsReady(const SkinCoverage& coverage) { return AllPassed(CheckCoverage(coverage)); }
 
 // How far the foremost place of the nose lies before the CT's landmark of it, along the front.
@@ -125,7 +170,9 @@ class WholeFaceTest : public ::testing::Test {
   static void SetUpTestSuite() {
     const absl::StatusOr<HuGrid> ct = BundledCt(1.5);
     ASSERT_TRUE(ct.ok()) << ct.status();
-    absl::StatusOr<Face> face = FaceOf(*ct);
+    const absl::StatusOr<LabelGrid> unscanned = ResampleUnscanned(*BundledVolume(), 1.5, 2);
+    ASSERT_TRUE(unscanned.ok()) << unscanned.status();
+    absl::StatusOr<Face> face = FaceOf(*ct, *unscanned);
     ASSERT_TRUE(face.ok()) << face.status();
     shared_face = new Face(*std::move(face));
   }
@@ -165,6 +212,16 @@ TEST_F(WholeFaceTest, TheBundledHeadIsReadyAndItsNoseWhole) {
       const SkinCoverage coverage,
       shared_face->Coverage(shared_face->mesh.surface, shared_face->regions, kBundledVoxelMm));
   EXPECT_TRUE(IsReady(coverage)) << FailedText(CheckCoverage(coverage));
+  // Its ears reach the CT's sides, and its face nothing.
+  EXPECT_FALSE(coverage.cuts.empty());
+  for (const ScannerCut& cut : coverage.cuts) {
+    EXPECT_GT(std::abs(cut.middle.x() - shared_face->landmarks.nose_tip.x()), 85);
+    EXPECT_EQ(cut.low.x(), cut.high.x());
+  }
+  for (const std::string& caution : CutCautions(coverage)) {
+    EXPECT_THAT(caution, ::testing::Not(::testing::HasSubstr("looked at")));
+  }
+  EXPECT_FALSE(NoseIsCut(coverage));
   EXPECT_NEAR(NoseTipErrorMm(*shared_face), 0, 0.5);
   EXPECT_LT(coverage.mesh_skin_on_bone_mm2, 0.01 * coverage.mesh_skin_mm2);
 }
@@ -223,6 +280,74 @@ TEST(ThinNoseTest, ANoseWithWallsOf2MmIsMeshedWhole) {
   EXPECT_NEAR(NoseTipErrorMm(face), 0, 0.5);
   // The hollow is there: of the nose's tissue much was made.
   EXPECT_GT(face.tissue.filled_mm3, 1000);
+}
+
+// The cut is neither skin, on either side, nor passed over in silence; the rest is judged as ever.
+TEST_F(WholeFaceTest, ANoseThatTheScannersCircleCutsHasNoSkinThereAndThatIsTold) {
+  constexpr double kSpacingMm = 1.5;
+  const Vector3d tip = shared_face->landmarks.nose_tip;
+  const Circle circle{
+      .middle = tip + Vector3d(0, 126, 0), .radius_mm = 120, .up_to_z_mm = tip.z() + 20};
+  ASSERT_OK_AND_ASSIGN(CtVolume volume, BundledVolume());
+  ASSERT_OK_AND_ASSIGN(const HuGrid uncut, ResampleIsotropic(volume, kSpacingMm, {.threads = 2}));
+  FillOutside(circle, &volume);
+  ASSERT_OK_AND_ASSIGN(const HuGrid ct, ResampleIsotropic(volume, kSpacingMm, {.threads = 2}));
+  ASSERT_OK_AND_ASSIGN(const LabelGrid unscanned, ResampleUnscanned(volume, kSpacingMm, 2));
+  ASSERT_OK_AND_ASSIGN(Face face, FaceOf(ct, unscanned));
+  ASSERT_OK_AND_ASSIGN(const SkinCoverage coverage,
+                       face.Coverage(face.mesh.surface, face.regions, kBundledVoxelMm));
+
+  double cut_mm2 = 0;  // the ears are cut by the CT's sides
+  for (const ScannerCut& cut : coverage.cuts) {
+    if (std::abs(cut.middle.x() - tip.x()) < 85) cut_mm2 += cut.area_mm2;
+  }
+  const double expected_mm2 = CutAreaMm2(circle, uncut, face.tissue.region);
+  EXPECT_GT(expected_mm2, 100);
+  EXPECT_NEAR(cut_mm2, expected_mm2, 0.2 * expected_mm2);
+  EXPECT_NEAR(coverage.cuts[0].middle.x(), tip.x(), 4);
+  EXPECT_NEAR(coverage.cuts[0].middle.y(), tip.y() + 6, 4);
+  EXPECT_LE(coverage.cuts[0].low.z(), tip.z());
+  EXPECT_GE(coverage.cuts[0].high.z(), tip.z());
+  EXPECT_TRUE(NoseIsCut(coverage));
+  ASSERT_FALSE(CutCautions(coverage).empty());
+  EXPECT_THAT(CutCautions(coverage)[0], ::testing::HasSubstr("The scanner's circle"));
+  EXPECT_THAT(CutCautions(coverage)[0], ::testing::HasSubstr("the nose ("));
+  EXPECT_TRUE(IsReady(coverage)) << FailedText(CheckCoverage(coverage));
+
+  // What the whole head has as tissue, on the circle: of the CT's skin, and of the mesh's.
+  const auto is_cut = [&](const Vector3d& p) {
+    return p.z() < circle.up_to_z_mm && std::abs(circle.DepthMm(p)) < 2.5 &&
+           Interpolate(uncut, p) > 0;
+  };
+  const auto skin_at_cut = [&](const SkinCoverage& measured) {
+    int64_t count = 0;
+    for (const auto& triangle : measured.triangles.rowwise()) {
+      const Vector3d middle =
+          (measured.positions.row(triangle[0]) + measured.positions.row(triangle[1]) +
+           measured.positions.row(triangle[2])) /
+          3;
+      if (is_cut(middle)) ++count;
+    }
+    return count;
+  };
+  EXPECT_EQ(skin_at_cut(coverage), 0);
+  int64_t at_cut = 0;
+  for (Eigen::Index v = 0; v < face.mesh.surface.num_vertices(); ++v) {
+    if (!is_cut(face.mesh.surface.positions().row(v))) continue;
+    ++at_cut;
+    EXPECT_FALSE(face.regions.on_skin[static_cast<size_t>(v)]);
+    EXPECT_EQ(face.regions.skin_region[static_cast<size_t>(v)], 0);
+    if (face.regions.on_bone[static_cast<size_t>(v)]) continue;
+    EXPECT_EQ(face.regions.anatomy[static_cast<size_t>(v)], 0) << "held at the cut";
+  }
+  EXPECT_GT(at_cut, 10);
+
+  // Not told of the circle, it takes the cut for skin.
+  face.head.cut = {};
+  ASSERT_OK_AND_ASSIGN(const SkinCoverage untold,
+                       face.Coverage(face.mesh.surface, face.regions, kBundledVoxelMm));
+  EXPECT_TRUE(untold.cuts.empty());
+  EXPECT_GT(skin_at_cut(untold), 50);
 }
 
 }  // namespace
