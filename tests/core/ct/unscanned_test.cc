@@ -17,6 +17,7 @@ namespace {
 
 constexpr int kSize = 80;
 constexpr int kSlices = 3;
+constexpr int kMiddle = kSize / 2;
 
 using Painter = std::function<double(double x, double y)>;  // from the middle, in pixels
 
@@ -26,7 +27,7 @@ CtVolume Painted(const Painter& painter) {
   for (int k = 0; k < kSlices; ++k) {
     for (int j = 0; j < kSize; ++j) {
       for (int i = 0; i < kSize; ++i) {
-        const double hu = painter(i - kSize / 2, j - kSize / 2);
+        const double hu = painter(i - kMiddle, j - kMiddle);
         volume.hu.push_back(static_cast<int16_t>(std::lround(std::max(hu, -1024.0))));
       }
     }
@@ -57,8 +58,8 @@ TEST_F(UnscannedTest, OutsideOfTheCircleNothingWasScanned) {
     ASSERT_EQ(unscanned.size(), volume.hu.size());
     for (int j = 0; j < kSize; ++j) {
       for (int i = 0; i < kSize; ++i) {
-        const double x = i - kSize / 2;
-        const double y = j - kSize / 2;
+        const double x = i - kMiddle;
+        const double y = j - kMiddle;
         const bool found = unscanned[static_cast<size_t>(i + kSize * j)] != 0;
         if (!InCircle(x, y)) {
           EXPECT_TRUE(found) << x << " " << y;
@@ -84,9 +85,9 @@ TEST_F(UnscannedTest, TwoFillingsAreOne) {
   });
   const std::vector<uint8_t> unscanned = FindUnscanned(volume, 1);
   ASSERT_FALSE(unscanned.empty());
-  EXPECT_EQ(unscanned[kSize / 2 + kSize * 6], 1);  // between both circles
-  EXPECT_EQ(unscanned[kSize / 2 + kSize * 10], 1);
-  EXPECT_EQ(unscanned[kSize / 2 + kSize * 14], 0);  // tissue behind the inner one
+  EXPECT_EQ(unscanned[kMiddle + kSize * 6], 1);  // between both circles
+  EXPECT_EQ(unscanned[kMiddle + kSize * 10], 1);
+  EXPECT_EQ(unscanned[kMiddle + kSize * 14], 0);  // tissue behind the inner one
 }
 
 TEST_F(UnscannedTest, ACircleThatCutsNoTissueIsNotTold) {
@@ -117,7 +118,7 @@ TEST_F(UnscannedTest, OnTheGridItEndsWhereTheTissueDoes) {
     const GridGeometry& grid = unscanned.geometry;
     for (int y = 0; y < grid.size[1] / 2; ++y) {
       const Eigen::Vector3d place = grid.Centre(grid.size[0] / 2, y, 0);
-      const double from_middle = kSize / 2 - place.y();
+      const double from_middle = kMiddle - place.y();
       if (from_middle > 36 + spacing_mm) {
         EXPECT_EQ(unscanned.At(grid.size[0] / 2, y, 0), 1);
       }

@@ -140,12 +140,16 @@ void FillOutside(const Circle& circle, CtVolume* volume) {
 // Of the front of the circle, what lies in tissue that stays in the region of interest.
 double CutAreaMm2(const Circle& circle, const HuGrid& uncut, const RegionOfInterest& region) {
   constexpr double kStepMm = 0.5;
+  constexpr int kStepsToSide = 120;
+  const double low_mm = region.below.point_mm.z();
+  const auto steps_up = static_cast<int>((circle.up_to_z_mm - low_mm) / kStepMm);
   double area_mm2 = 0;
-  for (double along = -60; along < 60; along += kStepMm) {
-    const double angle = along / circle.radius_mm;
-    for (double z = region.below.point_mm.z(); z < circle.up_to_z_mm; z += kStepMm) {
+  for (int across = -kStepsToSide; across < kStepsToSide; ++across) {
+    const double angle = kStepMm * across / circle.radius_mm;
+    for (int up = 0; up < steps_up; ++up) {
       const Vector3d place(circle.middle.x() + circle.radius_mm * std::sin(angle),
-                           circle.middle.y() - circle.radius_mm * std::cos(angle), z);
+                           circle.middle.y() - circle.radius_mm * std::cos(angle),
+                           low_mm + kStepMm * up);
       if (Interpolate(uncut, place) > -500) area_mm2 += kStepMm * kStepMm;
     }
   }
