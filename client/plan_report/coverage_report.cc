@@ -79,18 +79,21 @@ QualityCheck CheckParts(const std::string& name, const std::string& required,
           largest.area_mm2 <= largest_mm2};
 }
 
+// Says so where what is missing is no skin but hair or cloth.
+std::string LooseText(double hu_behind) {
+  if (hu_behind >= kLooserThanSkinHu) return "";
+  return absl::StrFormat(
+      " The densest that the CT shows up to 3 mm behind it has %.0f HU on average, less than fat: "
+      "hair or cloth rather than skin.",
+      hu_behind);
+}
+
 std::string GapText(const SkinGap& gap, double limit_mm) {
-  std::string text = absl::StrFormat(
+  const std::string text = absl::StrFormat(
       "Skin of the CT is missing in the mesh: %.1f cm2 of %s are farther than %.1f mm from it, up "
       "to %.1f mm at %s.",
       gap.area_mm2 / 100, Words(gap.region), limit_mm, gap.largest_mm, PlaceText(gap.farthest));
-  if (gap.hu_behind < kLooserThanSkinHu) {
-    absl::StrAppendFormat(&text,
-                          " The densest that the CT shows up to 3 mm behind it has %.0f HU on "
-                          "average, less than fat: hair or cloth rather than skin.",
-                          gap.hu_behind);
-  }
-  return text;
+  return absl::StrCat(text, LooseText(gap.hu_behind));
 }
 
 // "the nose (1234 mm2) and the upper lip (56 mm2)"; empty where no named region is cut.
@@ -125,7 +128,8 @@ Json PartJson(const CoveredPart& part) {
   return {{"area_mm2", part.area_mm2},
           {"covered_share", part.share()},
           {"largest_distance_mm", part.largest_mm},
-          {"at_mm", ToJson(part.farthest)}};
+          {"at_mm", ToJson(part.farthest)},
+          {"hu_behind_missing", part.hu_behind_missing}};
 }
 
 Json GapsJson(const std::vector<SkinGap>& gaps) {
@@ -172,12 +176,13 @@ std::vector<std::string> CoverageCautions(const SkinCoverage& coverage) {
   for (size_t r = 0; r < coverage.regions.size(); ++r) {
     const CoveredPart& part = coverage.regions[r];
     if (part.share() >= kLeastCovered) continue;
-    cautions.push_back(absl::StrFormat(
+    const std::string text = absl::StrFormat(
         "The mesh lacks %.1f %% of %s: %.1f of %.1f cm2 of the CT's skin are farther than %.1f mm "
         "from the mesh's, up to %.1f mm at %s.",
         100 * (1 - part.share()), Words(static_cast<SkinRegion>(r)),
         (part.area_mm2 - part.covered_mm2) / 100, part.area_mm2 / 100, coverage.tolerance_mm,
-        part.largest_mm, PlaceText(part.farthest)));
+        part.largest_mm, PlaceText(part.farthest));
+    cautions.push_back(absl::StrCat(text, LooseText(part.hu_behind_missing)));
   }
   size_t told = 0;
   for (const SkinGap& hole : coverage.holes) {

@@ -179,6 +179,20 @@ double HuBehind(const MeasuredSkin& measured, size_t f) {
   return densest;
 }
 
+// The mean of what lies behind the uncovered triangles of a region; of all without one.
+double HuBehindMissing(const MeasuredSkin& measured, double tolerance_mm,
+                       std::optional<SkinRegion> region) {
+  double sum = 0;
+  double area_mm2 = 0;
+  for (size_t f = 0; f < measured.distance_mm.size(); ++f) {
+    if (measured.distance_mm[f] <= tolerance_mm || (region && measured.names[f] != *region))
+      continue;
+    sum += measured.sizes.areas_mm2[f] * HuBehind(measured, f);
+    area_mm2 += measured.sizes.areas_mm2[f];
+  }
+  return area_mm2 > 0 ? sum / area_mm2 : 0;
+}
+
 // The connected parts that are farther than the limit, by falling area.
 std::vector<SkinGap> PartsBeyond(double limit_mm, const MeasuredSkin& measured) {
   std::vector<bool> is_far;
@@ -252,6 +266,11 @@ absl::StatusOr<SkinCoverage> MeasureSkinCoverage(const HeadSegmentation& head,
   }
   coverage.distance_mm.assign(distances.begin(), distances.end());
   const MeasuredSkin measured{head.hu, skin, sizes, names, coverage.distance_mm};
+  coverage.whole.hu_behind_missing = HuBehindMissing(measured, tolerance_mm, std::nullopt);
+  for (size_t r = 0; r < coverage.regions.size(); ++r) {
+    coverage.regions[r].hu_behind_missing =
+        HuBehindMissing(measured, tolerance_mm, static_cast<SkinRegion>(r));
+  }
   coverage.gaps = PartsBeyond(kGapMm, measured);
   coverage.holes = PartsBeyond(coverage.hole_mm, measured);
   coverage.cuts = MeasureCuts(head.cut, head.head, mesh.region.planes(), landmarks);

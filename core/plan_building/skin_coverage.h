@@ -36,6 +36,7 @@ struct CoveredPart {
   double covered_mm2 = 0;  // nearer to the mesh's skin than the tolerance
   double largest_mm = 0;
   Eigen::Vector3d farthest = Eigen::Vector3d::Zero();  // where that is
+  double hu_behind_missing = 0;  // as SkinGap::hu_behind, of what is not covered
 
   double share() const { return area_mm2 > 0 ? covered_mm2 / area_mm2 : 1; }
 };

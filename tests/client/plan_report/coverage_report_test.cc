@@ -41,6 +41,16 @@ TEST(CoverageReportTest, AFaceWithoutGapsPassesWithoutACaution) {
   EXPECT_EQ(CoverageJson(WithNose(1981))["regions"]["nose"]["covered_share"], 1981.0 / 2000);
 }
 
+TEST(CoverageReportTest, WhatARegionLacksIsCalledHairOrClothWhereItIsLooserThanFat) {
+  SkinCoverage coverage = WithNose(1900);
+  EXPECT_THAT(CoverageCautions(coverage), ElementsAre(Not(HasSubstr("cloth"))));
+  coverage.regions[static_cast<size_t>(SkinRegion::kNose)].hu_behind_missing = -446;
+  EXPECT_THAT(CoverageCautions(coverage),
+              ElementsAre(AllOf(HasSubstr("5.0 % of the nose"), HasSubstr("-446 HU"),
+                                HasSubstr("hair or cloth"))));
+  EXPECT_THAT(Passed(coverage), ElementsAre(true, false, true, true));
+}
+
 TEST(CoverageReportTest, ARegionCannotHideInTheWhole) {
   const SkinCoverage coverage = WithNose(1979);
   EXPECT_THAT(Passed(coverage), ElementsAre(true, false, true, true));
