@@ -17,9 +17,9 @@ namespace {
 
 constexpr int16_t kFillBelowHu = -900;
 constexpr int16_t kTissueHu = -500;
-// Between filling and circle one real CT has a pixel that is 1 to 5 HU off the filling.
+// Between filling and circle one real CT has pixels that are 1 to 10 HU off the filling.
 constexpr int kRimPixels = 2;
-constexpr int16_t kRimHu = 5;
+constexpr int16_t kRimHu = 12;
 // Of the edge, as many pixels have air this deep behind them. Where the filling is air that was cut
 // off at the lowest HU, tissue lies there: the blur of a skin is no wider.
 constexpr int kDeepPixels = 4;

@@ -18,9 +18,10 @@ namespace tissueform {
 // there was cut off, and its end is no skin.
 
 // The voxels (1) with such a filling. In every slice: what has one value, to the border of the
-// slice, and beside it up to two pixels that differ by 5 HU at most. Air may have one value, too,
-// where it was cut off at the lowest HU: so it counts only in slices where beside a quarter or more
-// of its edge there is air that was measured. Empty where no tissue (over -500 HU) ends on it.
+// slice, and beside it up to two pixels, each of which differs from the last by 12 HU at most. Air
+// may have one value, too, where it was cut off at the lowest HU: so it counts only in slices where
+// beside a quarter or more of its edge there is air that was measured. Empty where no tissue (over
+// -500 HU) ends on it.
 //
 // The result does not depend on `threads`.
 std::vector<uint8_t> FindUnscanned(const CtVolume& volume, int threads);

@@ -76,17 +76,18 @@ TEST_F(UnscannedTest, OutsideOfTheCircleNothingWasScanned) {
 }
 
 // Two scans that were laid upon each other: a circle filled with -1023 in one with -1024, and an
-// edge of one pixel between.
+// edge of two pixels between, as in one real CT.
 TEST_F(UnscannedTest, TwoFillingsAreOne) {
   const CtVolume volume = Painted([&](double x, double y) {
     const double inner = std::hypot(x, y - 8);
     if (!InCircle(x, y)) return -1024.0;
-    return inner < 36 ? Noisy(Head(x, y)) : inner < 37 ? -1024.0 : -1023.0;
+    return inner < 35 ? Noisy(Head(x, y)) : inner < 36 ? -1014.0 : inner < 37 ? -1024.0 : -1023.0;
   });
   const std::vector<uint8_t> unscanned = FindUnscanned(volume, 1);
   ASSERT_FALSE(unscanned.empty());
   EXPECT_EQ(unscanned[kMiddle + kSize * 6], 1);  // between both circles
   EXPECT_EQ(unscanned[kMiddle + kSize * 10], 1);
+  EXPECT_EQ(unscanned[kMiddle + kSize * 12], 1);  // its edge
   EXPECT_EQ(unscanned[kMiddle + kSize * 14], 0);  // tissue behind the inner one
 }
 
