@@ -17,6 +17,7 @@
 #include "spdlog/spdlog.h"
 #include <arpa/inet.h>
 #include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <sys/eventfd.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -193,6 +194,10 @@ bool ConnectionListener::AcceptOne(int listener_fd) {
     ++refused_;
     return true;
   }
+  // gRPC sets this on connections that it accepts itself. Without it small frames wait until the
+  // client has something to say (Nagle's algorithm and delayed acknowledgements): 33 ms in a drag.
+  const int yes = 1;
+  setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof(yes));
   handle_(fd, listener_fd);
   return true;
 }

@@ -13,6 +13,7 @@
 #include "gtest/gtest.h"
 #include <arpa/inet.h>
 #include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 
@@ -96,6 +97,16 @@ TEST_F(ConnectionListenerTest, TurnsAwayWhatIsTooMuchAndTakesOthersOnceThereIsRo
   CloseAll();
   for (int i = 0; i < 20; ++i) ASSERT_TRUE(IsTaken()) << i;
   EXPECT_FALSE(IsTaken());
+}
+
+TEST_F(ConnectionListenerTest, WhatIsWrittenGoesOutAtOnce) {
+  Start(1, 1);
+  ASSERT_TRUE(IsTaken());
+  MutexLock lock(mutex_);
+  int no_delay = 0;
+  socklen_t size = sizeof(no_delay);
+  ASSERT_EQ(getsockopt(taken_.front(), IPPROTO_TCP, TCP_NODELAY, &no_delay, &size), 0);
+  EXPECT_NE(no_delay, 0);
 }
 
 TEST_F(ConnectionListenerTest, OneAddressDoesNotTakeAllPlaces) {
