@@ -47,6 +47,8 @@ class FrameBenchmark {
   absl::StatusOr<Eigen::MatrixXd> BackSubstitute();
   // What a session does for a frame: asks whether the poses are covered, bounds the error, answers.
   absl::StatusOr<PartSeconds> AnswerFrame();
+  // What int16 adds to a frame.
+  absl::StatusOr<PartSeconds> EncodeFrame();
   void AddWork();
   std::string Name(const std::string& what) const;
 
@@ -61,6 +63,7 @@ class FrameBenchmark {
   FloatPositions frame_;
   int64_t predicted_bytes_ = 0;
   int frames_ = 0;
+  size_t encoded_bytes_ = 0;
   std::vector<TimedWork> work_;
 };
 

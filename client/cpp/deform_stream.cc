@@ -26,6 +26,7 @@ absl::Status DeformStream::Start(v1::DeformService::Stub* stub, const std::strin
   configuration->set_session(session);
   *configuration->mutable_vertices() = ToProto(options.vertices);
   configuration->set_model(options.model);
+  configuration->set_encoding(options.encoding);
   if (options.prepared.has_value()) *configuration->mutable_prepared() = *options.prepared;
   if (options.max_unacked.has_value()) {
     configuration->set_max_unacked(*options.max_unacked);

@@ -32,6 +32,8 @@ class DeformStream {
     std::optional<int> max_unacked;  // the server's default when left out
     v1::DeformationModel model = v1::DEFORMATION_MODEL_UNSPECIFIED;  // the session's own
     std::optional<v1::PreparedAnswers> prepared;  // left out: every frame is solved directly
+    // DecodePositions of geometry_conversion.h reads the frames.
+    v1::PositionEncoding encoding = v1::POSITION_ENCODING_FLOAT32;
   };
 
   // Cancels the stream unless Finish was called.

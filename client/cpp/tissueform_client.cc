@@ -178,12 +178,13 @@ absl::Status TissueformClient::DeleteSession(const std::string& name) {
 
 absl::StatusOr<v1::DeformOnceResponse> TissueformClient::DeformOnce(
     const std::string& session, absl::Span<const NamedPose> poses, const AnswerVertices& vertices,
-    v1::DeformationModel model) {
+    v1::DeformationModel model, v1::PositionEncoding encoding) {
   grpc::ClientContext context;
   SetDeadline(&context);
   AddSessionHeader(session, &context);
   v1::DeformOnceRequest request;
   request.set_model(model);
+  request.set_encoding(encoding);
   request.set_session(session);
   for (const NamedPose& pose : poses) {
     *request.add_poses() = ToProto(pose);

@@ -65,7 +65,8 @@ class TissueformClient {
   absl::StatusOr<v1::DeformOnceResponse> DeformOnce(
       const std::string& session, absl::Span<const NamedPose> poses,
       const AnswerVertices& vertices = {},
-      v1::DeformationModel model = v1::DEFORMATION_MODEL_UNSPECIFIED);
+      v1::DeformationModel model = v1::DEFORMATION_MODEL_UNSPECIFIED,
+      v1::PositionEncoding encoding = v1::POSITION_ENCODING_FLOAT32);
 
   // The stream has no deadline.
   absl::StatusOr<std::unique_ptr<DeformStream>> OpenStream(const std::string& session,

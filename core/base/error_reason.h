@@ -35,6 +35,11 @@ enum class ErrorReason {
   kNoPreparedAnswers,
   kNotPositiveDefinite,
   kStaleEtag,
+  kSessionUpdated,
+  kMeshInUse,
+  kPredictionNotFound,
+  kUploadNotFound,
+  kDiskFull,
   // Of a code, where nothing more was said.
   kInvalidRequest,
   kNotFound,

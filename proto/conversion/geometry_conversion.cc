@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "core/mesh_payload/displacement_codec.h"
 
 namespace tissueform {
 namespace {
@@ -30,6 +31,15 @@ HandlePose ToPose(const v1::HandlePose& pose) {
           .pivot_mm = ToVector(pose.pivot_mm()),
           .translation_mm = ToVector(pose.translation_mm()),
           .scale = pose.has_scale() ? pose.scale() : 1.0};
+}
+
+EncodedPositions Float32(const FloatPositions& positions) {
+  return {{reinterpret_cast<const char*>(positions.data()), positions.size() * sizeof(float)}, 0};
+}
+
+EncodedPositions Pack(const FloatPositions& displacements) {
+  CodedDisplacements coded = EncodeDisplacements(displacements);
+  return {std::move(coded.bytes), coded.step_mm};
 }
 
 absl::Status CheckDistinctAndInRange(const std::vector<int32_t>& vertices, int64_t num_vertices) {
@@ -143,29 +153,33 @@ absl::StatusOr<std::vector<int32_t>> ToVertices(
 }
 
 absl::Status CheckEncoding(v1::PositionEncoding encoding) {
-  if (encoding == v1::POSITION_ENCODING_UNSPECIFIED || encoding == v1::POSITION_ENCODING_FLOAT32) {
+  if (encoding == v1::POSITION_ENCODING_UNSPECIFIED || encoding == v1::POSITION_ENCODING_FLOAT32 ||
+      encoding == v1::POSITION_ENCODING_INT16_ZSTD) {
     return absl::OkStatus();
   }
   return absl::InvalidArgumentError(
       absl::StrCat("encoding ", encoding, " is not known to this server; use float32"));
 }
 
-std::string EncodePositions(const Positions& positions, const VertexChoice& choice) {
-  const Eigen::Index count =
-      choice.all ? positions.rows() : static_cast<Eigen::Index>(choice.vertices.size());
-  FloatPositions encoded(count, 3);
-  if (choice.all) {
-    encoded = positions.cast<float>();
-  } else {
-    for (Eigen::Index i = 0; i < count; ++i) {
-      encoded.row(i) = positions.row(choice.vertices[i]).cast<float>();
-    }
+EncodedPositions EncodePositions(const Positions& positions, const VertexChoice& choice,
+                                 v1::PositionEncoding encoding, const Positions& rest) {
+  if (encoding == v1::POSITION_ENCODING_INT16_ZSTD) {
+    const FloatPositions moved = choice.all
+                                     ? FloatPositions((positions - rest).cast<float>())
+                                     : FloatPositions((positions(choice.vertices, Eigen::all) -
+                                                       rest(choice.vertices, Eigen::all))
+                                                          .cast<float>());
+    return Pack(moved);
   }
-  return EncodePositions(encoded);
+  return Float32(choice.all ? FloatPositions(positions.cast<float>())
+                            : FloatPositions(positions(choice.vertices, Eigen::all).cast<float>()));
 }
 
-std::string EncodePositions(const FloatPositions& positions) {
-  return {reinterpret_cast<const char*>(positions.data()), positions.size() * sizeof(float)};
+EncodedPositions EncodePositions(const FloatPositions& chosen, const VertexChoice& choice,
+                                 v1::PositionEncoding encoding, const Positions& rest) {
+  if (encoding != v1::POSITION_ENCODING_INT16_ZSTD) return Float32(chosen);
+  if (choice.all) return Pack((chosen.cast<double>() - rest).cast<float>());
+  return Pack((chosen.cast<double>() - rest(choice.vertices, Eigen::all)).cast<float>());
 }
 
 absl::StatusOr<Positions> DecodePositions(const std::string& bytes, int64_t num_vertices) {
@@ -176,6 +190,14 @@ absl::StatusOr<Positions> DecodePositions(const std::string& bytes, int64_t num_
   FloatPositions positions(num_vertices, 3);
   std::memcpy(positions.data(), bytes.data(), bytes.size());
   return Positions(positions.cast<double>());
+}
+
+absl::StatusOr<Positions> DecodePositions(const std::string& bytes, v1::PositionEncoding encoding,
+                                          double step_mm, const Positions& rest) {
+  TF_RETURN_IF_ERROR(CheckEncoding(encoding));
+  if (encoding != v1::POSITION_ENCODING_INT16_ZSTD) return DecodePositions(bytes, rest.rows());
+  TF_ASSIGN_OR_RETURN(const Positions moved, DecodeDisplacements(bytes, step_mm, rest.rows()));
+  return Positions(rest + moved);
 }
 
 }  // namespace tissueform

@@ -62,12 +62,26 @@ absl::StatusOr<std::vector<int32_t>> ToVertices(
 // InvalidArgument for an encoding that is not known here.
 absl::Status CheckEncoding(v1::PositionEncoding encoding);
 
-// POSITION_ENCODING_FLOAT32.
-std::string EncodePositions(const Positions& positions, const VertexChoice& choice);
-std::string EncodePositions(const FloatPositions& positions);
+// Positions of an answer as they are sent.
+struct EncodedPositions {
+  std::string bytes;
+  double step_mm = 0;  // of POSITION_ENCODING_INT16_ZSTD
+};
 
-// The positions of an answer, #vertices by 3. Errors: Internal when the bytes are not those of
-// `num_vertices` vertices.
+// REQUIRES: CheckEncoding is OK; `rest` are the positions of the whole mesh.
+EncodedPositions EncodePositions(const Positions& positions, const VertexChoice& choice,
+                                 v1::PositionEncoding encoding, const Positions& rest);
+// The same of an answer that holds the chosen vertices only.
+EncodedPositions EncodePositions(const FloatPositions& chosen, const VertexChoice& choice,
+                                 v1::PositionEncoding encoding, const Positions& rest);
+
+// The positions of an answer in POSITION_ENCODING_FLOAT32, #vertices by 3. Errors: Internal when
+// the bytes are not those of `num_vertices` vertices.
 absl::StatusOr<Positions> DecodePositions(const std::string& bytes, int64_t num_vertices);
+
+// In any encoding; `rest` are the positions of the same vertices in the mesh. Errors: also
+// DataLoss (damaged bytes, a step that is none), InvalidArgument (an unknown encoding).
+absl::StatusOr<Positions> DecodePositions(const std::string& bytes, v1::PositionEncoding encoding,
+                                          double step_mm, const Positions& rest);
 
 }  // namespace tissueform

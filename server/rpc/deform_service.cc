@@ -26,12 +26,14 @@ struct DeformOnceJob {
   DeformationModel model = DeformationModel::kGradientField;
   std::vector<HandlePose> poses;
   VertexChoice choice;
+  v1::PositionEncoding encoding = v1::POSITION_ENCODING_FLOAT32;
 };
 
 absl::StatusOr<DeformOnceJob> ReadRequest(const v1::DeformOnceRequest& request,
                                           std::shared_ptr<Session> session) {
   DeformOnceJob job;
   TF_RETURN_IF_ERROR(CheckEncoding(request.encoding()));
+  job.encoding = request.encoding();
   job.session = std::move(session);
   TF_ASSIGN_OR_RETURN(job.model, ToModel(request.model(), job.session->model()));
   TF_ASSIGN_OR_RETURN(job.poses, ToPoses(request.poses(), job.session->constraints()));
@@ -59,7 +61,10 @@ absl::Status Run(const DeformOnceJob& job, const Cancellation& cancellation,
   *response->mutable_summary() = ToProto(deformation.summary);
   *response->mutable_quality() =
       ToProto(MeasureDeformation(job.session->mesh().mesh, deformation.positions));
-  *response->mutable_positions() = EncodePositions(deformation.positions, job.choice);
+  EncodedPositions encoded = EncodePositions(deformation.positions, job.choice, job.encoding,
+                                             job.session->mesh().mesh.positions());
+  *response->mutable_positions() = std::move(encoded.bytes);
+  response->set_step_mm(encoded.step_mm);
   return absl::OkStatus();
 }
 

@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "server/rpc/mesh_upload_stream.h"
@@ -75,8 +76,10 @@ absl::Status MeshService::RemoveMesh(const v1::DeleteMeshRequest& request) {
   // Without it they could not come back to memory.
   const int users = catalog_->keeps_meshes() ? registry_->CountMadeFrom(sha256) : 0;
   if (users > 0) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        users, users == 1 ? " session is" : " sessions are", " made from it; delete them first"));
+    return WithReason(absl::FailedPreconditionError(
+                          absl::StrCat(users, users == 1 ? " session is" : " sessions are",
+                                       " made from it; delete them first")),
+                      ErrorReason::kMeshInUse, {{"sessions", absl::StrCat(users)}});
   }
   return catalog_->Remove(sha256);
 }

@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/answer_conversion.h"
 #include "proto/conversion/model_conversion.h"
@@ -42,12 +43,22 @@ absl::StatusOr<ResponseRequest> ReadResponse(const v1::PreparedAnswers& settings
   return request;
 }
 
-AnswerFrame FrameOf(const WaitingPose& pose, const Deformation& deformation,
-                    const VertexChoice& choice) {
+// Encoding is work: on a worker, as what it encodes.
+AnswerFrame FrameOf(const WaitingPose& pose, const SolveSummary& summary,
+                    EncodedPositions positions) {
   return {.sequence = pose.sequence,
           .coalesced_count = pose.coalesced_count,
-          .summary = deformation.summary,
-          .positions = EncodePositions(deformation.positions, choice)};
+          .summary = summary,
+          .positions = std::move(positions.bytes),
+          .step_mm = positions.step_mm};
+}
+
+AnswerFrame FrameOf(const StreamConfiguration& configuration, const WaitingPose& pose,
+                    const Deformation& deformation) {
+  return FrameOf(
+      pose, deformation.summary,
+      EncodePositions(deformation.positions, configuration.choice, configuration.encoding,
+                      configuration.session->mesh().mesh.positions()));
 }
 
 }  // namespace
@@ -72,6 +83,7 @@ absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ReadConfiguration(
     const StreamRequest& request, std::shared_ptr<Session> session) {
   auto configuration = std::make_shared<StreamConfiguration>();
   configuration->max_unacked = request.max_unacked;
+  configuration->encoding = request.rest.encoding();
   configuration->session = std::move(session);
   const StoredMesh& mesh = configuration->session->mesh();
   TF_ASSIGN_OR_RETURN(configuration->choice,
@@ -95,7 +107,8 @@ absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ConfigurationFor(
   if (before.session->mesh().sha256 != session->mesh().sha256 ||
       !std::equal(handles.begin(), handles.end(), handles_now.begin(), handles_now.end(),
                   same_name)) {
-    return absl::AbortedError("the session was updated; open the stream again");
+    return WithReason(absl::AbortedError("the session was updated; open the stream again"),
+                      ErrorReason::kSessionUpdated);
   }
   auto configuration = std::make_shared<StreamConfiguration>(before);
   configuration->session = std::move(session);
@@ -134,10 +147,10 @@ absl::StatusOr<std::optional<AnswerFrame>> AnswerFromPrepared(
   TF_ASSIGN_OR_RETURN(const std::optional<PreparedAnswer> answer,
                       configuration.session->Respond(claim, pose.poses));
   if (!answer.has_value()) return std::optional<AnswerFrame>();
-  return std::optional<AnswerFrame>(AnswerFrame{.sequence = pose.sequence,
-                                                .coalesced_count = pose.coalesced_count,
-                                                .summary = answer->summary,
-                                                .positions = EncodePositions(answer->positions)});
+  return std::optional<AnswerFrame>(
+      FrameOf(pose, answer->summary,
+              EncodePositions(answer->positions, configuration.choice, configuration.encoding,
+                              configuration.session->mesh().mesh.positions())));
 }
 
 absl::StatusOr<AnswerFrame> SolvePose(const StreamConfiguration& configuration,
@@ -145,11 +158,11 @@ absl::StatusOr<AnswerFrame> SolvePose(const StreamConfiguration& configuration,
   DeformControl control;
   control.warm_start = true;
   control.on_progress = [&](const Deformation& so_far) {
-    return on_early([&] { return FrameOf(pose, so_far, configuration.choice); });
+    return on_early([&] { return FrameOf(configuration, pose, so_far); });
   };
   TF_ASSIGN_OR_RETURN(const Deformation deformation,
                       configuration.session->Deform(configuration.model, pose.poses, control));
-  return FrameOf(pose, deformation, configuration.choice);
+  return FrameOf(configuration, pose, deformation);
 }
 
 v1::DeformResponse ToProto(AnswerFrame frame) {
@@ -161,6 +174,7 @@ v1::DeformResponse ToProto(AnswerFrame frame) {
   proto->set_refining(frame.refining);
   *proto->mutable_summary() = ToProto(frame.summary);
   *proto->mutable_positions() = std::move(frame.positions);
+  proto->set_step_mm(frame.step_mm);
   return response;
 }
 

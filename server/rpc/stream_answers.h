@@ -25,6 +25,7 @@ namespace tissueform {
 struct StreamConfiguration {
   std::shared_ptr<Session> session;
   VertexChoice choice;
+  v1::PositionEncoding encoding = v1::POSITION_ENCODING_FLOAT32;
   DeformationModel model = DeformationModel::kGradientField;
   std::optional<ResponseRequest> response;  // prepared answers
   int max_unacked = 2;

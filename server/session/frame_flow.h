@@ -32,6 +32,7 @@ struct AnswerFrame {
   bool refining = false;
   SolveSummary summary;
   std::string positions;  // as they are sent
+  double step_mm = 0;     // of their encoding, where it has one
 };
 
 // What may be solved and sent next in a drag: a mailbox for the newest pose, and credits for the

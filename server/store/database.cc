@@ -11,6 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "server/store/durable_file.h"
 
@@ -42,12 +43,14 @@ absl::Status ToStatus(sqlite3* handle, const std::string& path) {
   const int error_number = sqlite3_system_errno(handle);
   switch (sqlite3_errcode(handle) & 0xFF) {
     case SQLITE_FULL:
-      return absl::ResourceExhaustedError(
-          absl::StrCat("database ", path, ": the disk is full; free some space"));
+      return WithReason(absl::ResourceExhaustedError(
+                            absl::StrCat("database ", path, ": the disk is full; free some space")),
+                        ErrorReason::kDiskFull);
     case SQLITE_IOERR:
       if (NoRoom(error_number)) {
-        return absl::ResourceExhaustedError(
-            absl::StrCat("database ", path, ": the disk is full; free some space"));
+        return WithReason(absl::ResourceExhaustedError(absl::StrCat(
+                              "database ", path, ": the disk is full; free some space")),
+                          ErrorReason::kDiskFull);
       }
       return absl::InternalError(absl::StrCat(message, "; look at the disk"));
     case SQLITE_READONLY:

@@ -13,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include <sys/stat.h>
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "server/store/fault_points.h"
 
@@ -40,8 +41,9 @@ absl::Status FileError(int error_number, absl::string_view what, const std::stri
     case ENOSPC:
     case EDQUOT:
     case EFBIG:
-      return absl::ResourceExhaustedError(
-          absl::StrCat(what, " ", path, ": the disk is full; free some space"));
+      return WithReason(absl::ResourceExhaustedError(
+                            absl::StrCat(what, " ", path, ": the disk is full; free some space")),
+                        ErrorReason::kDiskFull);
     case EROFS:
       return absl::FailedPreconditionError(
           absl::StrCat(what, " ", path, ": the disk is read-only; mount it writable"));

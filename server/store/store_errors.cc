@@ -56,7 +56,8 @@ absl::Status NoMesh(absl::string_view sha256) {
 }
 
 absl::Status NoPrediction(absl::string_view id) {
-  return absl::NotFoundError(absl::StrCat("no prediction \"", id, "\""));
+  return WithReason(absl::NotFoundError(absl::StrCat("no prediction \"", id, "\"")),
+                    ErrorReason::kPredictionNotFound);
 }
 
 absl::Status PredictionExists(absl::string_view id) {
@@ -65,7 +66,9 @@ absl::Status PredictionExists(absl::string_view id) {
 }
 
 absl::Status NoUpload(absl::string_view sha256) {
-  return absl::NotFoundError(absl::StrCat("no upload of ", sha256, " is under way; begin it"));
+  return WithReason(
+      absl::NotFoundError(absl::StrCat("no upload of ", sha256, " is under way; begin it")),
+      ErrorReason::kUploadNotFound);
 }
 
 absl::Status BadLimit(int limit) {

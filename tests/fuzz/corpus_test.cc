@@ -53,15 +53,14 @@ TEST_P(CorpusTest, EveryBeginningOfEveryInputIsSurvived) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Targets, CorpusTest,
-                         ::testing::Values(Target{"plan", FuzzPlan},
-                                           Target{"mesh_validation", FuzzMeshValidation},
-                                           Target{"mesh_payload", FuzzMeshPayload},
-                                           Target{"dicom_series", FuzzDicomSeries},
-                                           Target{"volume_header", FuzzVolumeHeader},
-                                           Target{"recipe", FuzzRecipe},
-                                           Target{"medit", FuzzMeditLines}),
-                         [](const auto& test) { return std::string(test.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    Targets, CorpusTest,
+    ::testing::Values(Target{"plan", FuzzPlan}, Target{"mesh_validation", FuzzMeshValidation},
+                      Target{"mesh_payload", FuzzMeshPayload},
+                      Target{"dicom_series", FuzzDicomSeries},
+                      Target{"volume_header", FuzzVolumeHeader}, Target{"recipe", FuzzRecipe},
+                      Target{"medit", FuzzMeditLines}, Target{"displacements", FuzzDisplacements}),
+    [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace
 }  // namespace tissueform::fuzz

@@ -33,6 +33,9 @@ void FuzzVolumeHeader(const uint8_t* data, size_t size);
 // The text of a recipe (ParseRecipe), as FuzzPlan.
 void FuzzRecipe(const uint8_t* data, size_t size);
 
+// A step and packed displacements as a client takes them from the network (DecodeDisplacements).
+void FuzzDisplacements(const uint8_t* data, size_t size);
+
 // A MEDIT text, before Gmsh sees it (CheckMeditLines).
 void FuzzMeditLines(const uint8_t* data, size_t size);
 

@@ -87,6 +87,38 @@ TEST_F(DeformStreamTest, SkinAndListAnswerTheirVertices) {
   }
 }
 
+TEST_F(DeformStreamTest, PackedFramesAreThePositionsWithinHalfOfTheirStep) {
+  const auto packed = v1::POSITION_ENCODING_INT16_ZSTD;
+  const Positions expected = problem_.Solve(SomePose(1));
+  const Positions& rest = problem_.mesh.positions();
+  for (const bool prepared : {false, true}) {
+    DeformStream::Options options;
+    options.vertices.kind = AnswerVertices::Kind::kSkin;
+    options.encoding = packed;
+    if (prepared) options.prepared.emplace();
+    ASSERT_OK_AND_ASSIGN(const auto stream, client_->OpenStream(session_, options));
+    ASSERT_THAT(stream->SendPoses(1, TopPose(SomePose(1))), IsOk());
+    const auto frame = stream->Receive();
+    ASSERT_TRUE(frame.has_value());
+    EXPECT_EQ(frame->summary().prepared(), prepared);
+    const std::vector<int32_t> skin(stream->started().vertices().begin(),
+                                    stream->started().vertices().end());
+    ASSERT_OK_AND_ASSIGN(
+        const Positions positions,
+        DecodePositions(frame->positions(), packed, frame->step_mm(), rest(skin, Eigen::all)));
+    const Positions errors = positions - expected(skin, Eigen::all);
+    const double from_preparing = prepared ? 0.01 : 0;
+    EXPECT_LE(errors.cwiseAbs().maxCoeff(),
+              frame->step_mm() * 0.505 + kFloat32Tolerance + from_preparing);
+    EXPECT_GT(frame->step_mm(), 0);
+  }
+  ASSERT_OK_AND_ASSIGN(const auto once,
+                       client_->DeformOnce(session_, TopPose(SomePose(1)), {}, {}, packed));
+  ASSERT_OK_AND_ASSIGN(const Positions positions,
+                       DecodePositions(once.positions(), packed, once.step_mm(), rest));
+  EXPECT_LE((positions - expected).cwiseAbs().maxCoeff(), once.step_mm() * 0.505);
+}
+
 TEST_F(DeformStreamTest, TheNewestPoseWinsAndTheReplacedOnesAreCounted) {
   const auto stream = Open(1);
   ASSERT_THAT(stream->SendPoses(10, TopPose(SomePose(1))), IsOk());

@@ -31,6 +31,7 @@ struct LoadCommandOptions {
   std::string server;
   std::string plan;
   std::string model = "linear_elastic";
+  std::string encoding = "float32";
   std::string json;
 };
 
@@ -112,6 +113,9 @@ void AddOptions(CLI::App* command, LoadCommandOptions* options) {
   command->add_option("--refining", load.refining, "further drags answered by neo_hookean")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();
+  command->add_option("--encoding", options->encoding, "how frames are sent")
+      ->check(CLI::IsMember({"float32", "int16"}))
+      ->capture_default_str();
   command->add_flag("--in-phase", load.in_phase,
                     "all drags send at the same moments; else they are spread out");
   command->add_option("--json", options->json, "also write the figures to this JSON file");
@@ -133,7 +137,10 @@ void AddLoadCommand(CLI::App& app, CommandWork* work) {
       "  tissueform load --sessions 32 --rate 30 --churn 2 --seconds 60 --json load.json\n"
       "  tissueform load --server localhost:50051 --sessions 1 --churn 0 --seconds 10\n"
       "docs/performance.md tells what was measured so.");
-  command->callback([options, work] { *work = [options] { return Run(*options); }; });
+  command->callback([options, work] {
+    options->load.int16 = options->encoding == "int16";
+    *work = [options] { return Run(*options); };
+  });
 }
 
 }  // namespace tissueform

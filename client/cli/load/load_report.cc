@@ -10,6 +10,7 @@
 #include "absl/strings/str_format.h"
 
 #include "client/cli/shared/circumstances.h"
+#include "core/base/error_reason.h"
 #include "core/base/percentiles.h"
 
 namespace tissueform {
@@ -77,7 +78,8 @@ std::string LoadText(const LoadOptions& options, const LoadResult& result) {
   }
   absl::StrAppendFormat(&text, "errors: %d\n", result.errors.size());
   for (size_t i = 0; i < std::min<size_t>(result.errors.size(), 3); ++i) {
-    absl::StrAppend(&text, "  ", result.errors[i].ToString(), "\n");
+    const absl::Status& error = result.errors[i];
+    absl::StrAppend(&text, "  ", ReasonOf(error), ": ", error.message(), "\n");
   }
   return text;
 }
@@ -93,6 +95,7 @@ Json LoadJson(const LoadOptions& options, const LoadResult& result) {
   json["slow_ms"] = options.slow_ms;
   json["refining"] = options.refining;
   json["in_phase"] = options.in_phase;
+  json["encoding"] = options.int16 ? "int16" : "float32";
   json["preparing_seconds"] = result.preparing_seconds;
   json["drags"] = Json::array();
   for (const DragLoad& load : result.drags) {

@@ -43,6 +43,7 @@ class LoadDrag {
   struct Kind {
     bool neo_hookean = false;
     double slow_ms = 0;  // that the client takes for each frame
+    bool int16 = false;
   };
 
   static absl::StatusOr<std::unique_ptr<LoadDrag>> Open(const std::string& address,
@@ -54,6 +55,7 @@ class LoadDrag {
     TF_ASSIGN_OR_RETURN(drag->session_, PlanSession::Create(drag->client_.get(), problem));
     DeformStream::Options stream;
     stream.vertices.kind = AnswerVertices::Kind::kSkin;
+    if (kind.int16) stream.encoding = v1::POSITION_ENCODING_INT16_ZSTD;
     if (kind.neo_hookean) {
       stream.model = v1::DEFORMATION_MODEL_NEO_HOOKEAN;
     } else if (HasPreparedAnswers(problem.deformer)) {
@@ -173,9 +175,11 @@ struct DragGroup {
 
 std::vector<DragGroup> GroupsOf(const LoadOptions& options) {
   std::vector<DragGroup> groups;
-  groups.push_back({"prepared", {}, options.sessions, {}});
-  groups.push_back({"slow reader", {.slow_ms = options.slow_ms}, options.slow_readers, {}});
-  groups.push_back({"neo_hookean", {.neo_hookean = true}, options.refining, {}});
+  const bool int16 = options.int16;
+  groups.push_back({"prepared", {.int16 = int16}, options.sessions, {}});
+  groups.push_back(
+      {"slow reader", {.slow_ms = options.slow_ms, .int16 = int16}, options.slow_readers, {}});
+  groups.push_back({"neo_hookean", {.neo_hookean = true, .int16 = int16}, options.refining, {}});
   return groups;
 }
 

@@ -23,6 +23,7 @@ struct LoadOptions {
   int slow_readers = 0;  // further drags, whose client takes slow_ms for each frame
   double slow_ms = 50;
   int refining = 0;       // further drags, answered by neo_hookean: solves that iterate
+  bool int16 = false;     // frames as int16 displacements with zstd instead of float32
   bool in_phase = false;  // all drags send at the same moments, instead of spread out
 };
 

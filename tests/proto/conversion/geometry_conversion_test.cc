@@ -141,12 +141,14 @@ TEST(GeometryConversionTest, PositionsAreFloat32VertexAfterVertex) {
   Positions positions(2, 3);
   positions << 1, 2, 3, 4.5, -5, 6;
   std::array<float, 6> values{};
-  const std::string all = EncodePositions(positions, {});
+  const Positions rest = Positions::Zero(2, 3);
+  const std::string all = EncodePositions(positions, {}, v1::POSITION_ENCODING_FLOAT32, rest).bytes;
   ASSERT_EQ(all.size(), sizeof(values));
   std::memcpy(values.data(), all.data(), sizeof(values));
   EXPECT_THAT(values, ElementsAre(1, 2, 3, 4.5F, -5, 6));
-  const std::string second = EncodePositions(positions, {.all = false, .vertices = {1}});
-  EXPECT_EQ(second, all.substr(12));
+  const VertexChoice second{.all = false, .vertices = {1}};
+  EXPECT_EQ(EncodePositions(positions, second, v1::POSITION_ENCODING_UNSPECIFIED, rest).bytes,
+            all.substr(12));
 }
 
 TEST(GeometryConversionTest, PositionsAreDecodedFromFloat32) {
@@ -159,7 +161,34 @@ TEST(GeometryConversionTest, PositionsAreDecodedFromFloat32) {
               StatusIs(absl::StatusCode::kInternal, HasSubstr("24 bytes for 3 vertices")));
 }
 
+TEST(GeometryConversionTest, PackedPositionsAreRestAndSteps) {
+  Positions rest(3, 3);
+  rest << 100, -50, 7, 0, 0, 0, 3, 2, 1;
+  Positions moved = rest;
+  moved.row(0) += Eigen::RowVector3d(0.5, 0, -0.25);
+  moved.row(2) += Eigen::RowVector3d(2, -1, 0);
+  const auto packed = v1::POSITION_ENCODING_INT16_ZSTD;
+  const VertexChoice some{.all = false, .vertices = {2, 0}};
+  const Positions expected = moved({2, 0}, Eigen::all);
+  const FloatPositions chosen = expected.cast<float>();
+  for (const EncodedPositions& encoded :
+       {EncodePositions(moved, some, packed, rest), EncodePositions(chosen, some, packed, rest)}) {
+    EXPECT_DOUBLE_EQ(encoded.step_mm, 2.0 / 32767);
+    ASSERT_OK_AND_ASSIGN(
+        const Positions decoded,
+        DecodePositions(encoded.bytes, packed, encoded.step_mm, rest({2, 0}, Eigen::all)));
+    EXPECT_LE((decoded - expected).cwiseAbs().maxCoeff(), encoded.step_mm * 0.505);
+  }
+  const EncodedPositions all = EncodePositions(moved, {}, packed, rest);
+  EXPECT_TRUE(DecodePositions(all.bytes, packed, all.step_mm, rest).ok());
+  EXPECT_THAT(DecodePositions(all.bytes, packed, all.step_mm, expected),
+              StatusIs(absl::StatusCode::kDataLoss, HasSubstr("in place of 12")));
+  EXPECT_THAT(DecodePositions(all.bytes, static_cast<v1::PositionEncoding>(7), 1, rest),
+              StatusIs(kInvalid, HasSubstr("encoding 7")));
+}
+
 TEST(GeometryConversionTest, AnUnknownEncodingIsRefused) {
+  EXPECT_TRUE(CheckEncoding(v1::POSITION_ENCODING_INT16_ZSTD).ok());
   EXPECT_TRUE(CheckEncoding(v1::POSITION_ENCODING_UNSPECIFIED).ok());
   EXPECT_TRUE(CheckEncoding(v1::POSITION_ENCODING_FLOAT32).ok());
   EXPECT_THAT(CheckEncoding(static_cast<v1::PositionEncoding>(7)),
