@@ -57,7 +57,11 @@ absl::Status Make(const std::string& path) {
   const std::filesystem::path parent = std::filesystem::path(path).parent_path();
   std::filesystem::create_directories(parent, error);
   if (error) return FileError(error.value(), "data folder: cannot make", parent.string());
-  return MakeFolder(path);
+  TF_RETURN_IF_ERROR(MakeFolder(path));
+  // Whoever has made it may have died before this. A folder that we may not read is not ours, and
+  // what lies in it was not made by us.
+  const absl::Status synced = SyncFolder(parent.string());
+  return absl::IsPermissionDenied(synced) ? absl::OkStatus() : synced;
 }
 
 absl::StatusOr<struct stat> LookAt(const std::string& path) {

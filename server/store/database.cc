@@ -5,7 +5,6 @@
 
 #include <cerrno>
 #include <fcntl.h>
-#include <filesystem>
 #include <sqlite3.h>
 #include <utility>
 
@@ -146,12 +145,9 @@ void Database::Query::CopyColumn(int column, Query* other) const {
 }
 
 absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::string& path) {
-  {
-    // Made here, so that nobody else may read it, whatever the umask; SQLite gives its other files
-    // the same rights. SQLite does not sync the name of a new database either.
-    TF_ASSIGN_OR_RETURN(const OpenFile file, OpenFile::Open(path, O_RDWR | O_CREAT));
-    TF_RETURN_IF_ERROR(SyncFolder(std::filesystem::path(path).parent_path().string()));
-  }
+  // Made here, so that nobody else may read it, whatever the umask; SQLite gives its other files
+  // the same rights.
+  TF_RETURN_IF_ERROR(OpenFile::Open(path, O_RDWR | O_CREAT).status());
   sqlite3* handle = nullptr;
   const int result =
       sqlite3_open_v2(path.c_str(), &handle, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, nullptr);

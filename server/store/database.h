@@ -61,7 +61,7 @@ class Database {
     int error_ = 0;
   };
 
-  // Opens the database, or makes an empty one; its name is on the disk then.
+  // Opens the database, or makes an empty one; sync its folder then.
   static absl::StatusOr<std::unique_ptr<Database>> Open(const std::string& path);
   ~Database();
   Database(const Database&) = delete;

@@ -110,9 +110,7 @@ absl::Status OpenFile::Sync() {
 }
 
 absl::Status MakeFolder(const std::string& path) {
-  if (mkdir(path.c_str(), S_IRWXU) == 0) {
-    return SyncFolder(std::filesystem::path(path).parent_path().string());
-  }
+  if (mkdir(path.c_str(), S_IRWXU) == 0) return absl::OkStatus();
   if (errno != EEXIST) return FileError(errno, "cannot make the folder", path);
   std::error_code ignored;
   if (std::filesystem::is_directory(path, ignored)) return absl::OkStatus();

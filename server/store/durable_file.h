@@ -50,7 +50,8 @@ class OpenFile {
   int descriptor_ = -1;
 };
 
-// Makes the folder (0700) unless it is there; its name is on the disk when it returns.
+// Makes the folder (0700) unless it is there. Its name is on the disk when the folder round it has
+// been synced.
 absl::Status MakeFolder(const std::string& path);
 
 // The names in a folder are on the disk when it returns.

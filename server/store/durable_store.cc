@@ -12,6 +12,7 @@
 #include "server/store/blob_store.h"
 #include "server/store/commit_thread.h"
 #include "server/store/durable_blob_stores.h"
+#include "server/store/durable_file.h"
 #include "server/store/durable_session_store.h"
 #include "server/store/store_check.h"
 
@@ -73,6 +74,8 @@ absl::StatusOr<std::unique_ptr<DurableStore>> DurableStore::Open(DataFolder fold
       CheckRowsAndBlobs(opened, *blobs, folder, options.max_checked_bytes, &damaged));
   TF_ASSIGN_OR_RETURN(std::unique_ptr<UploadStore> uploads,
                       UploadStore::Open(folder.uploads(), options.uploads));
+  // The names of the database and of the two folders.
+  TF_RETURN_IF_ERROR(SyncFolder(folder.path()));
   return std::unique_ptr<DurableStore>(new DurableStore(std::make_unique<Parts>(
       std::move(folder), std::move(blobs), std::move(uploads), std::move(opened.database),
       std::move(options.clock), std::move(damaged))));

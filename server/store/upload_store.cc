@@ -71,14 +71,17 @@ struct UploadStore::Part {
         size(its_size),
         synced(its_size) {}
 
-  // Everything received is on the disk, and the mark says so.
-  absl::Status Sync() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) {
+  // Everything received is on the disk, and the mark says so. The names, too, from the first time
+  // on: before it nothing was promised but a beginning at 0.
+  absl::Status Sync(const std::string& folder) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) {
     if (synced == size) return absl::OkStatus();
     TF_RETURN_IF_ERROR(data.Sync());
     TF_FAULT_POINT("upload.part_synced");
     TF_RETURN_IF_ERROR(mark.WriteAt(0, MarkBytes(size)));
     TF_RETURN_IF_ERROR(mark.Sync());
     TF_FAULT_POINT("upload.mark_synced");
+    if (!named) TF_RETURN_IF_ERROR(SyncFolder(folder));
+    named = true;
     synced = size;
     return absl::OkStatus();
   }
@@ -90,6 +93,7 @@ struct UploadStore::Part {
   OpenFile mark ABSL_GUARDED_BY(mutex);
   int64_t size ABSL_GUARDED_BY(mutex);
   int64_t synced ABSL_GUARDED_BY(mutex);
+  bool named ABSL_GUARDED_BY(mutex) = false;    // the folder is synced
   bool dropped ABSL_GUARDED_BY(mutex) = false;  // its files are gone; whoever still has it looks
 };
 
@@ -185,13 +189,15 @@ absl::StatusOr<std::shared_ptr<UploadStore::Part>> UploadStore::Make(
                       OpenFile::Open(absl::StrCat(base, kPartSuffix), O_RDWR | O_CREAT | O_TRUNC));
   TF_FAULT_POINT("upload.part_made");
   const std::string path = absl::StrCat(base, kAnnouncedSuffix);
-  absl::Cleanup remove_part = [&base] { unlink(absl::StrCat(base, kPartSuffix).c_str()); };
-  const std::string mark_bytes = MarkBytes(0);
-  const std::string sealed = Seal(SerializeAnnouncement(announcement));
-  // Its sync of the folder is the part's, too.
-  TF_RETURN_IF_ERROR(WriteDurably(path, {mark_bytes, sealed}));
-  TF_ASSIGN_OR_RETURN(OpenFile mark, OpenFile::Open(path, O_RDWR));
-  std::move(remove_part).Cancel();
+  absl::Cleanup remove_files = [&base, &path] {
+    unlink(absl::StrCat(base, kPartSuffix).c_str());
+    unlink(path.c_str());
+  };
+  TF_ASSIGN_OR_RETURN(OpenFile mark, OpenFile::Open(path, O_RDWR | O_CREAT | O_TRUNC));
+  TF_RETURN_IF_ERROR(
+      mark.WriteAt(0, absl::StrCat(MarkBytes(0), Seal(SerializeAnnouncement(announcement)))));
+  TF_FAULT_POINT("upload.announced");
+  std::move(remove_files).Cancel();
   return std::make_shared<Part>(announcement, std::move(data), std::move(mark), 0);
 }
 
@@ -254,14 +260,15 @@ absl::Status UploadStore::Append(const std::string& sha256, int64_t offset,
   }
   TF_FAULT_POINT("upload.appended");
   part->size += count;
-  return part->size - part->synced >= kSyncEveryBytes && durable_ ? part->Sync() : absl::OkStatus();
+  return part->size - part->synced >= kSyncEveryBytes && durable_ ? part->Sync(folder_)
+                                                                  : absl::OkStatus();
 }
 
 absl::StatusOr<int64_t> UploadStore::Committed(const std::string& sha256) {
   TF_ASSIGN_OR_RETURN(const std::shared_ptr<Part> part, Find(sha256));
   MutexLock lock(part->mutex);
   if (part->dropped) return NoUpload(sha256);
-  if (durable_) TF_RETURN_IF_ERROR(part->Sync());
+  if (durable_) TF_RETURN_IF_ERROR(part->Sync(folder_));
   return part->size;
 }
 
