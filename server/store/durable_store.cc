@@ -74,6 +74,9 @@ absl::StatusOr<std::unique_ptr<DurableStore>> DurableStore::Open(DataFolder fold
       CheckRowsAndBlobs(opened, *blobs, folder, options.max_checked_bytes, &damaged));
   TF_ASSIGN_OR_RETURN(std::unique_ptr<UploadStore> uploads,
                       UploadStore::Open(folder.uploads(), options.uploads));
+  // What the last process left in the log, and a new database's tables: from here on they are in
+  // the database itself. Where a reader is in the way they stay in the log, which does as well.
+  TF_RETURN_IF_ERROR(opened.database->TruncateLog().status());
   // The names of the database and of the two folders.
   TF_RETURN_IF_ERROR(SyncFolder(folder.path()));
   return std::unique_ptr<DurableStore>(new DurableStore(std::make_unique<Parts>(

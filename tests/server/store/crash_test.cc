@@ -59,9 +59,11 @@ Death RunWriter(const std::string& folder, const std::vector<std::string>& how) 
 // Opens what is left and compares it with what was acknowledged.
 void ExpectAllAcknowledged(const std::string& path, const Death& death) {
   StoreModel acknowledged;
-  for (int number = 0; number < death.acknowledged; ++number) ApplyStep(number, &acknowledged);
+  for (int number = 0; number < death.acknowledged; ++number)
+    ApplyStep(number, /*bursts=*/true, &acknowledged);
   StoreModel begun = acknowledged;
-  if (death.opened && death.acknowledged < kSteps) ApplyStep(death.acknowledged, &begun);
+  if (death.opened && death.acknowledged < kSteps)
+    ApplyStep(death.acknowledged, /*bursts=*/true, &begun);
   auto folder = DataFolder::Open(path);
   ASSERT_THAT(folder, IsOk());
   const auto store = DurableStore::Open(*std::move(folder));

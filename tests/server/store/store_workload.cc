@@ -26,13 +26,15 @@ enum Step {
   kCommit,
   kPutMesh,
   kUpload,
+  kUploadDropped,
   kCreateErased,
   kUpdate,
   kDeleteSession,
   kPutErasedMesh,
-  kDeleteMesh,
   kPredict,
+  kDeleteMesh,
   kPredictErased,
+  kCommitAgain,
   kDeletePrediction,
   kDropUpload,
   kBurst,
@@ -190,7 +192,7 @@ absl::Status CheckUploads(const StoreModel& acknowledged, const StoreModel& begu
 
 }  // namespace
 
-void ApplyStep(int number, StoreModel* model) {
+void ApplyStep(int number, bool bursts, StoreModel* model) {
   const int round = number / kStepsOfARound;
   switch (static_cast<Step>(number % kStepsOfARound)) {
     case kCreateKept:
@@ -207,6 +209,8 @@ void ApplyStep(int number, StoreModel* model) {
       break;
     case kUpload:
       model->uploads[UploadMesh(round)] = kUploadBytes;
+      break;
+    case kUploadDropped:
       model->uploads[DroppedMesh(round)] = kUploadBytes;
       break;
     case kCreateErased:
@@ -215,6 +219,12 @@ void ApplyStep(int number, StoreModel* model) {
     case kUpdate:
       model->sessions[Kept(round)] = SerializeRecord(UpdatedSession(round));
       break;
+    case kCommitAgain: {
+      SessionRecord record = UpdatedSession(round);
+      record.last_poses = SamplePoses(round + 200);
+      model->sessions[Kept(round)] = SerializeRecord(record);
+      break;
+    }
     case kDeleteSession:
       model->sessions.erase(Erased(round));
       model->erased.insert(Erased(round));
@@ -243,7 +253,7 @@ void ApplyStep(int number, StoreModel* model) {
       model->erased_blobs.insert(NameOf(DroppedMesh(round)) + ".part");
       break;
     case kBurst:
-      for (int call = 0; call < kBurstCalls; ++call) {
+      for (int call = 0; call < kBurstCalls && bursts; ++call) {
         model->sessions[Burst(round, call)] =
             SerializeRecord(SampleSession(Burst(round, call), call));
       }
@@ -261,12 +271,15 @@ absl::Status RunStep(int number, bool bursts, Stores& stores) {
     case kPutMesh:
       return PutMesh(KeptMesh(round), stores);
     case kUpload:
-      TF_RETURN_IF_ERROR(Upload(UploadMesh(round), stores));
+      return Upload(UploadMesh(round), stores);
+    case kUploadDropped:
       return Upload(DroppedMesh(round), stores);
     case kCreateErased:
       return CreateSession(stores.sessions(), SampleSession(Erased(round), round)).status();
     case kUpdate:
       return Update(round, stores);
+    case kCommitAgain:
+      return CommitPoses(stores.sessions(), Kept(round), SamplePoses(round + 200));
     case kDeleteSession:
       return DeleteSession(stores.sessions(), Erased(round));
     case kPutErasedMesh:

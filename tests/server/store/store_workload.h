@@ -25,14 +25,14 @@ struct StoreModel {
 };
 
 // The writes of a server, one after the other: step `number` is always the same. Every kind of
-// write comes once in kStepsOfARound; what is deleted was written in the same round.
-inline constexpr int kStepsOfARound = 14;
+// write comes once in kStepsOfARound. What is deleted was written in the same round, and something
+// that stays was written between, so that a lost deletion shows.
+inline constexpr int kStepsOfARound = 16;
 
-// Tells the model.
-void ApplyStep(int number, StoreModel* model);
+// Tells the model. `bursts`: steps of several calls at once are made, too.
+void ApplyStep(int number, bool bursts, StoreModel* model);
 
-// Makes the calls of a step and waits for their answers. `bursts`: steps of several calls at once
-// are made, too.
+// Makes the calls of a step and waits for their answers.
 absl::Status RunStep(int number, bool bursts, Stores& stores);
 
 // OK when the store holds what `acknowledged` says, byte for byte; of what `begun` says otherwise,

@@ -35,7 +35,11 @@ class ScratchDurableStore final : public Stores {
 
 }  // namespace
 
-ScratchFolder::ScratchFolder() : path_(::testing::TempDir() + "store-XXXXXX") {
+ScratchFolder::ScratchFolder() : ScratchFolder("") {}
+
+ScratchFolder::ScratchFolder(const std::string& parent)
+    : path_((std::filesystem::is_directory(parent) ? parent + "/" : ::testing::TempDir()) +
+            "store-XXXXXX") {
   if (mkdtemp(path_.data()) == nullptr) std::abort();
 }
 

@@ -28,6 +28,8 @@ std::vector<StoresCase> AllStores();
 class ScratchFolder {
  public:
   ScratchFolder();
+  // Below `parent`, or where the others are when it is not there.
+  explicit ScratchFolder(const std::string& parent);
   ~ScratchFolder();
   ScratchFolder(const ScratchFolder&) = delete;
   ScratchFolder& operator=(const ScratchFolder&) = delete;
