@@ -50,23 +50,11 @@ std::optional<Markers> FindMarkers(const HeadSegmentation& head, const DentalCut
   return std::nullopt;
 }
 
-// From so much on metal may be why: a full set of brackets has 1000 mm3, six large crowns 3000.
-constexpr double kHidingMetalMm3 = 500;
-
-absl::Status NoLowerJaw(double metal_mm3) {
-  if (metal_mm3 > kHidingMetalMm3) {
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "metal (%.1f cm3) hides the teeth, and no lower jaw was found beside it; give "
-        "\"occlusal_plane\" in the recipe, between the upper and the lower teeth, and the planes "
-        "of "
-        "the segments",
-        metal_mm3 / 1000));
-  }
+absl::Status NoLowerJaw() {
   return absl::InvalidArgumentError(absl::StrFormat(
       "no lower jaw in view: above none of the thresholds %d to %d HU is there a piece of bone "
-      "shaped "
-      "like one (an arch 70 to 150 mm wide, open behind); the CT must reach from under the chin to "
-      "above the jaw joints",
+      "shaped like one (an arch 70 to 150 mm wide, open behind); the CT must reach from under the "
+      "chin to above the jaw joints",
       kLowestMarkerHu, kHighestMarkerHu));
 }
 
@@ -260,10 +248,7 @@ absl::StatusOr<BoneParts> SeparateBoneParts(const HeadSegmentation& head,
     TellStage(tell, "cutting between the teeth", 0.3);
     found = FindMarkers(head, &*cut);
   }
-  if (!found.has_value()) {
-    const auto metal = static_cast<double>(CountVoxels(head.metal));
-    return NoLowerJaw(metal * VoxelVolumeMm3(head.hu.geometry));
-  }
+  if (!found.has_value()) return NoLowerJaw();
   const Markers& markers = *found;
   TellStage(tell, "growing the parts of the bone", 0.5);
   result.marker_hu = markers.threshold_hu;

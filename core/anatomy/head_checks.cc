@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_format.h"
+#include "absl/strings/string_view.h"
 
 #include "core/anatomy/bone_pieces.h"
 #include "core/base/status_macros.h"
@@ -170,6 +172,24 @@ double WidthOfBoneMm(const HeadSegmentation& head) {
   return (box.last[0] - box.first[0] + 1) * head.bone.geometry.spacing_mm;
 }
 
+// From so much on metal may be why: a full set of brackets has 1000 mm3, six large crowns 3000.
+constexpr double kHidingMetalMm3 = 500;
+
+// What is missing, and that metal hides the teeth, where there is so much of it.
+std::string WithMetal(const HeadSegmentation& head, bool occlusal_plane_given,
+                      absl::string_view missing) {
+  const double metal_mm3 =
+      static_cast<double>(CountVoxels(head.metal)) * VoxelVolumeMm3(head.metal.geometry);
+  if (metal_mm3 < kHidingMetalMm3) return std::string(missing);
+  return absl::StrFormat(
+      "metal (%.1f cm3) hides the teeth: %s; %s", metal_mm3 / 1000, missing,
+      occlusal_plane_given
+          ? "check that the \"occlusal_plane\" of the recipe lies between the upper and lower teeth"
+          : "give \"occlusal_plane\" in the recipe, between the upper and the lower teeth, and "
+            "look "
+            "at the planes of the segments");
+}
+
 }  // namespace
 
 absl::Status CheckOneHead(const HuGrid& ct, const HeadSegmentation& head, const BoneParts& parts) {
@@ -205,7 +225,8 @@ absl::Status CheckLandmarks(const Landmarks& landmarks) {
       chin_mm, kThinnestChinMm, joints_mm, kLowestJointMm, nose_mm));
 }
 
-absl::Status ExplainMissingAnatomy(const HeadSegmentation& head, const absl::Status& error) {
+absl::Status ExplainMissingAnatomy(const HeadSegmentation& head, bool occlusal_plane_given,
+                                   const absl::Status& error) {
   if (!absl::IsInvalidArgument(error)) return error;
   const double width_mm = WidthOfBoneMm(head);
   if (width_mm < kNarrowestHeadMm) {
@@ -215,14 +236,15 @@ absl::Status ExplainMissingAnatomy(const HeadSegmentation& head, const absl::Sta
         width_mm, kNarrowestHeadMm));
   }
   const std::optional<Orientation> turn = FindTurn(head);
-  if (!turn.has_value()) return error;
+  const std::string missing = WithMetal(head, occlusal_plane_given, error.message());
+  if (!turn.has_value()) return absl::InvalidArgumentError(missing);
   // Beside the error, not in its place: in a head without a jaw a turned arch of the skull's base
   // passes for one, and nobody should turn a head that lies right.
   return absl::InvalidArgumentError(absl::StrFormat(
       "%s; or the head does not lie as the CT says: its crown points to what is called the %s, its "
       "face to what is called the %s; correct `axes` of the recipe then, or what the file says of "
       "how it lies",
-      error.message(), CalledBy(*turn, 2, false), CalledBy(*turn, 1, true)));
+      missing, CalledBy(*turn, 2, false), CalledBy(*turn, 1, true)));
 }
 
 }  // namespace tissueform

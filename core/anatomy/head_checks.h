@@ -27,8 +27,10 @@ absl::Status CheckLandmarks(const Landmarks& landmarks);
 
 // `error` is of a stage that has not found what a head has. Looks for the reason: whether a lower
 // jaw is there when the head is turned by quarters (then it does not lie as the CT says), whether
-// only half a head is in view. InvalidArgument with that reason (a turn beside `error`, as it may
-// be a wrong guess), or `error` itself.
-absl::Status ExplainMissingAnatomy(const HeadSegmentation& head, const absl::Status& error);
+// only half a head is in view, whether there is metal enough to hide the teeth (which the plane of
+// the recipe helps with). InvalidArgument with that reason (a turn and metal beside `error`, as
+// they may be wrong guesses), or `error` itself.
+absl::Status ExplainMissingAnatomy(const HeadSegmentation& head, bool occlusal_plane_given,
+                                   const absl::Status& error);
 
 }  // namespace tissueform

@@ -105,11 +105,12 @@ absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unsc
   progress->Begin("telling the bones apart", 0.3, 0.42);
   absl::StatusOr<BoneParts> parts =
       SeparateBoneParts(head, recipe.occlusal_plane, progress->Parts());
-  if (!parts.ok()) return ExplainMissingAnatomy(head, parts.status());
+  const bool plane_given = recipe.occlusal_plane.has_value();
+  if (!parts.ok()) return ExplainMissingAnatomy(head, plane_given, parts.status());
   progress->Begin("finding landmarks", 0.42, 0.46);
   const absl::StatusOr<Landmarks> landmarks = FindLandmarks(head, *parts);
   const absl::Status found = landmarks.ok() ? CheckLandmarks(*landmarks) : landmarks.status();
-  if (!found.ok()) return ExplainMissingAnatomy(head, found);
+  if (!found.ok()) return ExplainMissingAnatomy(head, plane_given, found);
   TF_RETURN_IF_ERROR(CheckOneHead(ct.hu, head, *parts));
   return Anatomy{.head = std::move(head), .parts = *std::move(parts), .landmarks = *landmarks};
 }

@@ -77,6 +77,8 @@ void RoughenSurface(uint32_t seed, LabelGrid* labels) {
 }
 
 // The place of a tooth once jumped by 10 mm, because a crown on the other side ended a voxel later.
+// The mean of what lies within a millimetre of the farthest, which it was, moves by up to 7 mm here
+// and beyond these bounds with four seeds of five.
 TEST(LandmarksTest, WhereACrownsVoxelsEndDoesNotMoveIt) {
   ASSERT_OK_AND_ASSIGN(const HeadSegmentation head, SegmentHead(HeadPhantom()));
   ASSERT_OK_AND_ASSIGN(const BoneParts parts, SeparateBoneParts(head));
@@ -87,13 +89,14 @@ TEST(LandmarksTest, WhereACrownsVoxelsEndDoesNotMoveIt) {
     BoneParts rough = parts;
     RoughenSurface(seed, &rough.labels);
     ASSERT_OK_AND_ASSIGN(const Landmarks l, FindLandmarks(head, rough));
-    constexpr double kMostMm = 3;  // one and a half voxels
+    constexpr double kVoxelMm = 2;
+    constexpr double kMostMm = 1.5 * kVoxelMm;
     ExpectNear(l.lower_incisor, smooth.lower_incisor, kMostMm, "lower incisor");
     ExpectNear(l.upper_incisor, smooth.upper_incisor, kMostMm, "upper incisor");
     for (const auto member : {&LeftAndRight::left, &LeftAndRight::right}) {
-      ExpectNear(l.lower_molar.*member, smooth.lower_molar.*member, kMostMm, "lower molar");
+      ExpectNear(l.lower_molar.*member, smooth.lower_molar.*member, kVoxelMm, "lower molar");
       ExpectNear(l.upper_molar.*member, smooth.upper_molar.*member, kMostMm, "upper molar");
-      ExpectNear(l.last_upper_tooth.*member, smooth.last_upper_tooth.*member, kMostMm,
+      ExpectNear(l.last_upper_tooth.*member, smooth.last_upper_tooth.*member, kVoxelMm,
                  "last upper tooth");
     }
   }

@@ -104,7 +104,7 @@ RawVolume Turned(const RawVolume& volume, const std::array<size_t, 3>& from,
   return result;
 }
 
-absl::StatusOr<PlanBuild> Build(const RawVolume& volume) {
+absl::StatusOr<PlanBuild> Build(const RawVolume& volume, const Recipe& recipe = CoarseRecipe()) {
   const std::string path = absl::StrCat(::testing::TempDir(), "bad_head_", getpid(), ".nrrd");
   std::ofstream file(path, std::ios::binary);
   file << "NRRD0004\ntype: int16\ndimension: 3\nsizes: "
@@ -115,7 +115,7 @@ absl::StatusOr<PlanBuild> Build(const RawVolume& volume) {
   file.write(reinterpret_cast<const char*>(volume.hu.data()),
              static_cast<std::streamsize>(volume.hu.size() * sizeof(int16_t)));
   file.close();
-  absl::StatusOr<PlanBuild> build = BuildPlan(path, CoarseRecipe());
+  absl::StatusOr<PlanBuild> build = BuildPlan(path, recipe);
   std::filesystem::remove(path);
   return build;
 }
@@ -162,6 +162,40 @@ TEST(BadHeadsTest, ADentureAloneIsRefused) {
   EXPECT_THAT(Build(teeth), StatusIs(absl::StatusCode::kInvalidArgument,
                                      AllOf(HasSubstr("has 21 cm3, a head more than 200"),
                                            HasSubstr("of a denture"))));
+}
+
+// Crowns and bridges of both jaws, molten into one: what is denser than bone among the teeth, and 3
+// mm about it, 6 mm up and down.
+RawVolume WithTeethHiddenByMetal(const RawVolume& head) {
+  RawVolume hidden = head;
+  for (int z = 48; z < 75; ++z) {
+    for (int y = 11; y < 27; ++y) {
+      for (int x = 20; x < 41; ++x) {
+        int16_t densest = -1000;
+        for (int i = -4; i <= 4; ++i) {
+          for (int j = -1; j <= 1; ++j) {
+            for (int k = -1; k <= 1; ++k) densest = std::max(densest, head.At(x + k, y + j, z + i));
+          }
+        }
+        if (densest > 1300 && head.At(x, y, z) > -300) hidden.At(x, y, z) = 3071;
+      }
+    }
+  }
+  return hidden;
+}
+
+TEST(BadHeadsTest, TeethThatMetalHidesWhollyNeedThePlaneOfTheRecipe) {
+  const RawVolume hidden = WithTeethHiddenByMetal(BundledHead());
+  EXPECT_THAT(Build(hidden), StatusIs(absl::StatusCode::kInvalidArgument,
+                                      AllOf(HasSubstr("cm3) hides the teeth"),
+                                            HasSubstr("give \"occlusal_plane\" in the recipe"))));
+  Recipe recipe = CoarseRecipe();
+  ASSERT_OK_AND_ASSIGN(const PlanBuild with_teeth, Build(BundledHead()));
+  recipe.occlusal_plane = with_teeth.parts.occlusal_plane;
+  ASSERT_OK_AND_ASSIGN(const PlanBuild build, Build(hidden, recipe));
+  EXPECT_EQ(build.parts.separation, JawSeparation::kGivenCut);
+  EXPECT_LT((build.landmarks.menton - with_teeth.landmarks.menton).norm(), 5);
+  EXPECT_LT((build.landmarks.condyle.left - with_teeth.landmarks.condyle.left).norm(), 5);
 }
 
 TEST(BadHeadsTest, HalfAHeadIsRefusedWhereverItIsCut) {
