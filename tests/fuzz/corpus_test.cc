@@ -59,7 +59,8 @@ INSTANTIATE_TEST_SUITE_P(
                       Target{"mesh_payload", FuzzMeshPayload},
                       Target{"dicom_series", FuzzDicomSeries},
                       Target{"volume_header", FuzzVolumeHeader}, Target{"recipe", FuzzRecipe},
-                      Target{"medit", FuzzMeditLines}, Target{"displacements", FuzzDisplacements}),
+                      Target{"medit", FuzzMeditLines}, Target{"displacements", FuzzDisplacements},
+                      Target{"store_record", FuzzStoreRecord}),
     [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

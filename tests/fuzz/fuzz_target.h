@@ -39,4 +39,9 @@ void FuzzDisplacements(const uint8_t* data, size_t size);
 // A MEDIT text, before Gmsh sees it (CheckMeditLines).
 void FuzzMeditLines(const uint8_t* data, size_t size);
 
+// Rows of a store's database and announcements of uploads, the first byte says of what
+// (ParseRecord, ParsePoses, ParseMesh, ParseAnnouncement, ParsePrediction, Unseal): what is
+// accepted comes back from its own bytes.
+void FuzzStoreRecord(const uint8_t* data, size_t size);
+
 }  // namespace tissueform::fuzz

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "absl/strings/str_cat.h"
+
 #include "tests/server/store/disk_recorder.h"
 
 namespace tissueform {
@@ -94,13 +96,13 @@ bool DiskImage::HasWorkFor(const DiskOp& sync) const {
 void DiskImage::WriteAfterCut(const std::string& folder, Kept kept) const {
   // In order: a folder before what lies in it.
   for (const std::string& path : durable_.folders) {
-    const std::filesystem::path made = folder + "/" + path;
+    const std::filesystem::path made = absl::StrCat(folder, "/", path);
     if (!std::filesystem::exists(made.parent_path())) continue;  // that was lost
     std::filesystem::create_directory(made);
     std::filesystem::permissions(made, std::filesystem::perms::owner_all);
   }
   for (const auto& [path, number] : durable_.files) {
-    const std::filesystem::path made = folder + "/" + path;
+    const std::filesystem::path made = absl::StrCat(folder, "/", path);
     if (!std::filesystem::exists(made.parent_path())) continue;
     const File& file = files_.at(number);
     std::string bytes = file.durable;

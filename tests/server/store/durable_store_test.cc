@@ -177,6 +177,33 @@ TEST_F(DurableStoreTest, ABackupReaderDoesNotStopADeleteAndTheLogIsEmptiedAfterI
   EXPECT_EQ(std::filesystem::file_size(log), 0U);
 }
 
+// As docs/operations.md tells it: the database first, then the files.
+TEST_F(DurableStoreTest, ABackupThatWasMadeWhileItServesOpens) {
+  ASSERT_THAT(Open(), IsOk());
+  Fill(3);
+  const std::string backup = scratch_ / "backup";
+  std::filesystem::create_directory(backup);
+  std::filesystem::permissions(backup, std::filesystem::perms::owner_all);
+  {
+    ASSERT_OK_AND_ASSIGN(const auto reader, Database::Open(path_ + "/tissueform.db"));
+    ASSERT_THAT(reader->Execute("VACUUM INTO '" + backup + "/tissueform.db'"), IsOk());
+  }
+  ASSERT_THAT(store_->predictions().Create(SamplePrediction("later"), SamplePositions(8)), IsOk());
+  std::filesystem::copy(path_ + "/blobs", backup + "/blobs");
+  auto folder = DataFolder::Open(backup);
+  ASSERT_THAT(folder, IsOk());
+  auto restored = DurableStore::Open(*std::move(folder));
+  ASSERT_THAT(restored.status(), IsOk());
+  EXPECT_THAT((*restored)->damaged(), IsEmpty());
+  store_ = *std::move(restored);
+  for (int number = 0; number < 3; ++number) {
+    ExpectSession(number);
+    ExpectMesh(number);
+    ExpectPrediction(number);
+  }
+  EXPECT_THAT(store_->predictions().Get("later"), StatusIs(absl::StatusCode::kNotFound));
+}
+
 TEST_F(DurableStoreTest, ADamagedRowIsSetAsideAndTheRestServes) {
   ASSERT_THAT(Open(), IsOk());
   Fill(3);

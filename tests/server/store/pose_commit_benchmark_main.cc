@@ -1,0 +1,104 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/base/percentiles.h"
+#include "core/base/stopwatch.h"
+#include "server/store/database.h"
+#include "server/store/durable_store.h"
+#include "tests/server/store/store_samples.h"
+#include "tests/server/store/waiting_calls.h"
+
+// What the commit of a pose costs beside a bare commit of SQLite, in one run and in turns. Prints
+// the medians and their ratio.
+//
+//   tissueform-store-benchmark FOLDER [COMMITS]     in a new folder below FOLDER, on the disk to
+//   ask
+namespace tissueform {
+namespace {
+
+constexpr int kSessions = 32;
+
+// As large as the record of the bundled head: a commit of poses must not write it.
+SessionRecord HeadSession(int number) {
+  SessionRecord record = SampleSession(absl::StrCat("s", number), number);
+  record.node_order.resize(22'000);
+  std::iota(record.node_order.begin(), record.node_order.end(), 0);
+  record.fixed = record.node_order;
+  return record;
+}
+
+int Fail(const absl::Status& status) {
+  std::fprintf(stderr, "tissueform-store-benchmark: %s\n", status.ToString().c_str());
+  return EXIT_FAILURE;
+}
+
+// One row of one table, changed by every commit.
+absl::StatusOr<std::unique_ptr<Database>> OpenBare(const std::string& path) {
+  auto bare = Database::Open(path);
+  if (!bare.ok()) return bare;
+  const absl::Status status = (*bare)->Execute(
+      "CREATE TABLE numbers (key INTEGER PRIMARY KEY, value INTEGER) STRICT; INSERT INTO numbers "
+      "VALUES (1, 0)");
+  if (!status.ok()) return status;
+  return bare;
+}
+
+int Run(const std::string& folder, int commits) {
+  const auto bare = OpenBare(folder + "/bare.db");
+  if (!bare.ok()) return Fail(bare.status());
+  auto data = DataFolder::Open(folder + "/data");
+  if (!data.ok()) return Fail(data.status());
+  const auto store = DurableStore::Open(*std::move(data));
+  if (!store.ok()) return Fail(store.status());
+  SessionStore& sessions = (*store)->sessions();
+  for (int number = 0; number < kSessions; ++number) {
+    const auto created = CreateSession(sessions, HeadSession(number));
+    if (!created.ok()) return Fail(created.status());
+  }
+  std::vector<double> bare_ms;
+  std::vector<double> pose_ms;
+  for (int commit = 0; commit < commits; ++commit) {
+    Stopwatch watch;
+    absl::Status status =
+        (*bare)->Prepare("UPDATE numbers SET value = ? WHERE key = 1").Bind(int64_t{commit}).Run();
+    bare_ms.push_back(watch.Restart() * 1e3);
+    if (!status.ok()) return Fail(status);
+    status = CommitPoses(sessions, absl::StrCat("s", commit % kSessions), SamplePoses(commit));
+    pose_ms.push_back(watch.Restart() * 1e3);
+    if (!status.ok()) return Fail(status);
+  }
+  std::printf("bare commit   p50 %.3f ms  p99 %.3f ms\n", Median(bare_ms), Percentile(bare_ms, 99));
+  std::printf("pose commit   p50 %.3f ms  p99 %.3f ms\n", Median(pose_ms), Percentile(pose_ms, 99));
+  std::printf("ratio of p50  %.2f\n", Median(pose_ms) / Median(bare_ms));
+  return EXIT_SUCCESS;
+}
+
+}  // namespace
+}  // namespace tissueform
+
+int main(int argc, char** argv) {
+  int commits = 2000;
+  if (argc < 2 || (argc > 2 && (!absl::SimpleAtoi(argv[2], &commits) || commits < 1))) {
+    std::fprintf(stderr, "usage: tissueform-store-benchmark FOLDER [COMMITS]\n");
+    return EXIT_FAILURE;
+  }
+  std::string folder = std::string(argv[1]) + "/store-benchmark-XXXXXX";
+  if (mkdtemp(folder.data()) == nullptr) {
+    std::perror("tissueform-store-benchmark");
+    return EXIT_FAILURE;
+  }
+  const int result = tissueform::Run(folder, commits);
+  std::filesystem::remove_all(folder);
+  return result;
+}
