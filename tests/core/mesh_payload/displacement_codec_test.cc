@@ -54,7 +54,9 @@ TEST(DisplacementCodecTest, AnAnswerIsOffByAtMostHalfOfTheStep) {
 
 TEST(DisplacementCodecTest, ADragOfTheBundledHeadTakesAboutAThirdOfFloat32) {
   ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(SourcePath("tests/data/plans/head/plan.json")));
-  ASSERT_OK_AND_ASSIGN(const PlanProblem problem, ResolvePlan(plan));
+  ASSERT_OK_AND_ASSIGN(PlanProblem problem, ResolvePlan(plan));
+  // Of the models that streams prepare it moves most of the skin.
+  problem.deformer.model = DeformationModel::kLinearElastic;
   ASSERT_OK_AND_ASSIGN(const auto deformer, CreateDeformer(*problem.mesh, problem.stiffness,
                                                            problem.constraints, problem.deformer));
   const std::vector<int32_t> skin = BoundaryVertices(*problem.mesh);
@@ -71,7 +73,6 @@ TEST(DisplacementCodecTest, ADragOfTheBundledHeadTakesAboutAThirdOfFloat32) {
     const double share =
         static_cast<double>(coded.bytes.size()) / static_cast<double>(moved.rows() * 12);
     EXPECT_LT(share, 0.35) << amount;
-    RecordProperty("share_of_float32", std::to_string(share));
   }
 }
 
