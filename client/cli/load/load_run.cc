@@ -62,6 +62,9 @@ class LoadDrag {
       stream.prepared.emplace();
     }
     TF_ASSIGN_OR_RETURN(drag->stream_, drag->client_->OpenStream(drag->session_->name(), stream));
+    const auto& skin = drag->stream_->started().vertices();
+    drag->rest_ =
+        problem.mesh->positions()(std::vector<int32_t>(skin.begin(), skin.end()), Eigen::all);
     return drag;
   }
 
@@ -82,6 +85,7 @@ class LoadDrag {
     stream_->CloseSending();
     receiver.join();
     status_ = stream_->Finish();
+    if (status_.ok()) status_ = decoded_;
   }
 
   const absl::Status& status() const { return status_; }
@@ -106,6 +110,12 @@ class LoadDrag {
 
   void Receive(SteadyClock::time_point origin) {
     while (std::optional<v1::DeformFrame> frame = stream_->Receive()) {
+      // What is shown must be read first; float32 is shown as it is.
+      if (kind_.int16 && decoded_.ok()) {
+        decoded_ = DecodePositions(frame->positions(), v1::POSITION_ENCODING_INT16_ZSTD,
+                                   frame->step_mm(), rest_)
+                       .status();
+      }
       frames_.push_back(
           {send_times_.Get(frame->sequence()), Milliseconds(SteadyClock::now() - origin)});
       solves_ms_.push_back(frame->summary().solve_seconds() * 1e3);
@@ -120,6 +130,7 @@ class LoadDrag {
   std::unique_ptr<TissueformClient> client_;
   std::unique_ptr<PlanSession> session_;
   std::unique_ptr<DeformStream> stream_;
+  Positions rest_;  // of what the stream answers
 
   // Self-synchronised.
   SendTimes send_times_;
@@ -129,6 +140,7 @@ class LoadDrag {
   std::vector<double> solves_ms_;
   int64_t bytes_ = 0;
   double end_ms_ = 0;
+  absl::Status decoded_;
   absl::Status status_;
 };
 

@@ -53,6 +53,7 @@ struct DemoOptions {
   std::string out = "out/demo";
   std::string plan;
   int port = 0;
+  std::string encoding = "float32";
   bool no_browser = false;
   DragOptions drag;
 
@@ -132,6 +133,7 @@ absl::StatusOr<TwoDrags> DragTwice(const DemoOptions& options, const PlanProblem
   solved.seconds /= 3;
   DragOptions skin = options.drag;
   skin.stream.vertices.kind = AnswerVertices::Kind::kSkin;
+  if (options.encoding == "int16") skin.stream.encoding = v1::POSITION_ENCODING_INT16_ZSTD;
   if (HasPreparedAnswers(problem.deformer)) skin.stream.prepared.emplace();
   absl::PrintF("dragging: %s, over %g s at %g poses a second ...\n", MovesInWords(problem),
                options.drag.seconds, options.drag.poses_per_second);
@@ -146,8 +148,9 @@ absl::StatusOr<DemoDrags> Summarize(const PlanProblem& problem, const TwoDrags& 
                                     const Positions& deformed, TissueformClient* client,
                                     const std::string& session) {
   DemoDrags summary;
-  TF_ASSIGN_OR_RETURN(summary.solved, SummarizeDrag(drags.solved, deformed));
-  TF_ASSIGN_OR_RETURN(summary.skin, SummarizeDrag(drags.skin, deformed));
+  TF_ASSIGN_OR_RETURN(summary.solved,
+                      SummarizeDrag(drags.solved, problem.mesh->positions(), deformed));
+  TF_ASSIGN_OR_RETURN(summary.skin, SummarizeDrag(drags.skin, problem.mesh->positions(), deformed));
   TF_ASSIGN_OR_RETURN(const v1::DeformOnceResponse answer,
                       client->DeformOnce(session, PartOfPoses(NamedPoses(problem), 0)));
   TF_ASSIGN_OR_RETURN(const Positions rest,
@@ -259,6 +262,9 @@ void AddDemoCommand(CLI::App& app, CommandWork* work) {
       ->capture_default_str();
   command->add_option("--port", options->port, "port of the server; 0 takes a free one")
       ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
+  command->add_option("--encoding", options->encoding, "how the frames of the skin are sent")
+      ->check(CLI::IsMember({"float32", "int16"}))
       ->capture_default_str();
   command->add_flag("--no-browser", options->no_browser,
                     "for scripts: never open a browser (this version opens none)");

@@ -99,7 +99,8 @@ void PrintDrag(const DragSummary& drag) {
 
 }  // namespace
 
-absl::StatusOr<DragSummary> SummarizeDrag(const DragResult& drag, const Positions& deformed) {
+absl::StatusOr<DragSummary> SummarizeDrag(const DragResult& drag, const Positions& rest,
+                                          const Positions& deformed) {
   std::vector<double> latencies;
   std::vector<double> overheads;
   std::vector<double> solves;
@@ -121,10 +122,12 @@ absl::StatusOr<DragSummary> SummarizeDrag(const DragResult& drag, const Position
   summary.latency_p99_ms = Percentile(latencies, 99);
   summary.overhead_p50_ms = Percentile(overheads, 50);
   summary.solve_p50_ms = Percentile(solves, 50);
-  TF_ASSIGN_OR_RETURN(const Positions last,
-                      DecodePositions(drag.last_positions, drag.vertex_count));
-  const Positions expected =
-      drag.vertices.empty() ? deformed : Positions(deformed(drag.vertices, Eigen::all));
+  const auto dragged = [&drag](const Positions& all) {
+    return drag.vertices.empty() ? all : Positions(all(drag.vertices, Eigen::all));
+  };
+  TF_ASSIGN_OR_RETURN(const Positions last, DecodePositions(drag.last_positions, drag.encoding,
+                                                            drag.last_step_mm, dragged(rest)));
+  const Positions expected = dragged(deformed);
   summary.end_error_mm = (last - expected).rowwise().norm().maxCoeff();
   return summary;
 }

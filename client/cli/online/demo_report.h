@@ -37,9 +37,10 @@ struct DemoDrags {
   double rest_error_mm = 0;  // how far an answer to the rest pose is from the rest shape
 };
 
-// `deformed` are the positions of all vertices after the last pose, by a single answer.
-// REQUIRES: at least one frame. Errors: a frame of the wrong size.
-absl::StatusOr<DragSummary> SummarizeDrag(const DragResult& drag, const Positions& deformed);
+// `rest` and `deformed` are the positions of all vertices, before and after the last pose, by a
+// single answer. REQUIRES: at least one frame. Errors: those of DecodePositions.
+absl::StatusOr<DragSummary> SummarizeDrag(const DragResult& drag, const Positions& rest,
+                                          const Positions& deformed);
 
 // frames.csv: one line a frame of the drag of the skin. summary.json: both drags and the
 // prediction; what is not within "every_frame_solved" is of the drag of the skin. All or nothing

@@ -36,6 +36,7 @@ void Receive(DeformStream* stream, Clock::time_point start, const SendTimes& sen
                               .prepared = frame->summary().prepared()});
     result->coalesced += frame->coalesced_count();
     result->last_positions = std::move(*frame->mutable_positions());
+    result->last_step_mm = frame->step_mm();
   }
 }
 
@@ -60,6 +61,7 @@ absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& 
   result.vertex_count = stream->started().vertex_count();
   result.vertices = {stream->started().vertices().begin(), stream->started().vertices().end()};
   result.prepared_bytes = stream->started().prepared_bytes();
+  result.encoding = options.stream.encoding;
   const auto count =
       std::max<int64_t>(1, static_cast<int64_t>(options.seconds * options.poses_per_second));
   const std::chrono::duration<double> interval(1 / options.poses_per_second);

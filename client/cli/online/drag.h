@@ -45,7 +45,10 @@ struct DragResult {
   int64_t poses_sent = 0;
   int64_t coalesced = 0;
   std::vector<DragFrame> frames;  // in the order of arrival
-  std::string last_positions;     // of the last frame, as they came
+  // Of the last frame, as they came; DecodePositions reads them.
+  std::string last_positions;
+  double last_step_mm = 0;
+  v1::PositionEncoding encoding = v1::POSITION_ENCODING_FLOAT32;
 };
 
 // When each pose of a drag was sent, by its sequence (0, 1, ...): written by the sender, read by
