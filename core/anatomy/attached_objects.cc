@@ -114,12 +114,11 @@ std::optional<ObjectKind> KindOf(const LabelGrid& piece, const VoxelBox& box,
 }
 
 // The ridges on the thick part, and what stands out of it.
-LabelGrid RidgesOf(const ThinPieces& pieces, const FloatGrid& to_core,
-                   const FloatGrid& to_outside) {
+LabelGrid RidgesOf(const ThinPieces& pieces, const FloatGrid& to_outside) {
   LabelGrid ridges(pieces.tissue.geometry);
   for (size_t i = 0; i < ridges.values.size(); ++i) {
     const bool stands_out =
-        to_core.values[i] > pieces.radius_mm && pieces.beyond_hull.values[i] > 0;
+        pieces.to_core.values[i] > pieces.radius_mm && pieces.beyond_hull.values[i] > 0;
     const bool is_outermost = to_outside.values[i] < kOutermostMm;
     ridges.values[i] = pieces.tissue.values[i] != 0 && stands_out && is_outermost ? 1 : 0;
   }
@@ -150,11 +149,11 @@ Eigen::Vector3d MiddleOf(const LabelGrid& piece) {
 }
 
 // The layer of the wall that the opening's margin of a voxel has left beside objects.
-void TakeStumps(const ThinPieces& pieces, const FloatGrid& to_core, LabelGrid* removed) {
+void TakeStumps(const ThinPieces& pieces, LabelGrid* removed) {
   const double near_mm = 2 * removed->geometry.spacing_mm;
   const FloatGrid to_removed = DistanceMm(*removed);
   for (size_t i = 0; i < removed->values.size(); ++i) {
-    if (pieces.tissue.values[i] != 0 && to_core.values[i] > pieces.radius_mm &&
+    if (pieces.tissue.values[i] != 0 && pieces.to_core.values[i] > pieces.radius_mm &&
         to_removed.values[i] <= near_mm) {
       removed->values[i] = 1;
     }
@@ -233,8 +232,7 @@ HeadWithoutObjects PartObjects(const ThinPieces& pieces) {
   AddObjects(
       thin, [&](const LabelGrid& piece, const VoxelBox& box) { return KindOf(piece, box, pieces); },
       &found);
-  const FloatGrid to_core = DistanceMm(pieces.core);
-  LabelGrid ridges = RidgesOf(pieces, to_core, to_outside);
+  LabelGrid ridges = RidgesOf(pieces, to_outside);
   for (size_t i = 0; i < ridges.values.size(); ++i) {
     if (found.removed.values[i] != 0) ridges.values[i] = 0;
   }
@@ -242,7 +240,7 @@ HeadWithoutObjects PartObjects(const ThinPieces& pieces) {
       ridges,
       [&](const LabelGrid& ridge, const VoxelBox& box) { return KindOfRidge(ridge, box, pieces); },
       &found);
-  if (!found.objects.empty()) TakeStumps(pieces, to_core, &found.removed);
+  if (!found.objects.empty()) TakeStumps(pieces, &found.removed);
   for (size_t i = 0; i < found.removed.values.size(); ++i) {
     if (found.removed.values[i] != 0) result.head.values[i] = 0;
   }

@@ -35,9 +35,9 @@ struct AttachedObject {
 struct ThinPieces {
   const HuGrid& hu;
   const LabelGrid& tissue;
-  // The head's thick part, eroded, and the radius of that erosion. What lies farther from it than
-  // this, or hardly so, is thin: noses, ears, lids, and what is no head.
-  const LabelGrid& core;
+  // Distance from the head's thick part, eroded, and the radius of that erosion. What lies farther
+  // from it than this, or hardly so, is thin: noses, ears, lids, and what is no head.
+  const FloatGrid& to_core;
   double radius_mm = 0;
   const LabelGrid& thick;  // what of the tissue lies near the core
   const LabelGrid&

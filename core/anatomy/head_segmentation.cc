@@ -36,14 +36,15 @@ constexpr double kHollowPartMm = 10;
 // opening: a head rest that touches the skin falls off with what is thinner than the ball. A plain
 // opening would also round off what is thin on the head itself.
 struct ThickPart {
-  LabelGrid core;
+  FloatGrid to_core;
   LabelGrid near;
 };
 
 ThickPart ThickPartOf(const LabelGrid& tissue, double radius_mm) {
   ThickPart part;
-  part.core = LargestComponent(Erode(tissue, radius_mm), Neighbours::kFaces);
-  const LabelGrid near = Dilate(part.core, radius_mm + tissue.geometry.spacing_mm);
+  part.to_core = DistanceMm(LargestComponent(Erode(tissue, radius_mm), Neighbours::kFaces));
+  const double near_mm = radius_mm + tissue.geometry.spacing_mm;
+  const LabelGrid near = MaskWhere(part.to_core, [=](float mm) { return mm <= near_mm; });
   part.near = LargestComponent(Both(near, tissue), Neighbours::kFaces);
   return part;
 }
@@ -150,7 +151,7 @@ absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
   const LabelGrid outside = AirReachedByBall(air, kNostrilMm);
   HeadWithoutObjects parted = PartObjects({.hu = ct,
                                            .tissue = tissue,
-                                           .core = thick.core,
+                                           .to_core = thick.to_core,
                                            .radius_mm = options.opening_radius_mm,
                                            .thick = thick.near,
                                            .outside = outside,
