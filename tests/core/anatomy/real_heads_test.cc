@@ -14,10 +14,12 @@
 
 #include "core/anatomy/bone_parts.h"
 #include "core/anatomy/osteotomy.h"
+#include "core/anatomy/scanner_cut.h"
 #include "core/anatomy/soft_tissue.h"
 #include "core/base/status_macros.h"
 #include "core/ct/ct_volume_reader.h"
 #include "core/ct/isotropic_resample.h"
+#include "core/ct/unscanned.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 
@@ -257,6 +259,14 @@ TEST(RealHeadsTest, ACadaverWithTeethInOcclusionIsTakenApart) {
   EXPECT_NEAR((a.landmarks.condyle.left - a.landmarks.condyle.right).norm(), 98, 8);
   EXPECT_LT(a.landmarks.nose_prominence_mm, 2);  // the CT's circle has cut the nose off
   ExpectBonesWhereTheyBelong(a, 0.35);           // teeth are missing on the left
+
+  ASSERT_OK_AND_ASSIGN(const LabelGrid unscanned, ResampleUnscanned(volume, 2.5, 2));
+  ASSERT_OK_AND_ASSIGN(const HeadSegmentation head, SegmentHead(ct, {}, nullptr, {}, unscanned));
+  const std::vector<Plane> planes = DefaultRegion(a.landmarks, head.head.geometry).planes();
+  const std::vector<ScannerCut> cuts = MeasureCuts(head.cut, head.head, planes, a.landmarks);
+  ASSERT_FALSE(cuts.empty());
+  EXPECT_NEAR(cuts[0].middle.y(), 145, 4);  // the row that the circle reaches, in pixels of 1 mm
+  EXPECT_GT(cuts[0].region_mm2[static_cast<size_t>(SkinRegion::kNose)], 200);
 }
 
 // Tilted slices of two distances, from the upper jaw up.
