@@ -75,6 +75,10 @@ struct UploadStore::Part {
   // on: before it nothing was promised but a beginning at 0.
   absl::Status Sync(const std::string& folder) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) {
     if (synced == size) return absl::OkStatus();
+    if (broken) return Damaged(announcement.sha256, "it could not be synced; begin it anew");
+    // After a sync that failed the kernel may have thrown the bytes away, and the next sync would
+    // say OK all the same: such a part cannot be mended.
+    broken = true;
     TF_RETURN_IF_ERROR(data.Sync());
     TF_FAULT_POINT("upload.part_synced");
     TF_RETURN_IF_ERROR(mark.WriteAt(0, MarkBytes(size)));
@@ -83,6 +87,7 @@ struct UploadStore::Part {
     if (!named) TF_RETURN_IF_ERROR(SyncFolder(folder));
     named = true;
     synced = size;
+    broken = false;
     return absl::OkStatus();
   }
 
@@ -93,6 +98,7 @@ struct UploadStore::Part {
   OpenFile mark ABSL_GUARDED_BY(mutex);
   int64_t size ABSL_GUARDED_BY(mutex);
   int64_t synced ABSL_GUARDED_BY(mutex);
+  bool broken ABSL_GUARDED_BY(mutex) = false;   // a sync has failed
   bool named ABSL_GUARDED_BY(mutex) = false;    // the folder is synced
   bool dropped ABSL_GUARDED_BY(mutex) = false;  // its files are gone; whoever still has it looks
 };
@@ -206,7 +212,8 @@ absl::StatusOr<int64_t> UploadStore::Begin(const UploadAnnouncement& announcemen
   MutexLock begin_lock(begin_mutex_);
   if (const auto known = Find(announcement.sha256); known.ok()) {
     if (SameAnnouncement((*known)->announcement, announcement)) {
-      return Committed(announcement.sha256);
+      const absl::StatusOr<int64_t> committed = Committed(announcement.sha256);
+      if (!absl::IsDataLoss(committed.status())) return committed;
     }
     TF_RETURN_IF_ERROR(Remove(*known));
   }

@@ -67,7 +67,8 @@ class UploadStore {
   // the disk is full). After an error the part is as it was.
   absl::Status Append(const std::string& sha256, int64_t offset, absl::string_view bytes);
 
-  // How many bytes are there, after they were synced. Errors: NotFound, or what the disk says.
+  // How many bytes are there, after they were synced. Errors: NotFound, or what the disk says;
+  // DataLoss from then on, until it is begun anew.
   absl::StatusOr<int64_t> Committed(const std::string& sha256);
 
   // What was announced. Errors: NotFound.

@@ -40,6 +40,7 @@ struct Recorder {
   std::string limited;
   int64_t bytes_left = -1;
   std::string read_only;
+  std::string broken;
 };
 
 // Never destroyed: files are closed until the end of the process.
@@ -154,7 +155,16 @@ int TruncateRecorded(const char* name, int descriptor, off_t size) {
   return result;
 }
 
+bool MaySync(int descriptor) {
+  Recorder& recorder = TheRecorder();
+  const std::lock_guard lock(recorder.mutex);
+  if (!IsBelow(PathOf(descriptor) + "/", recorder.broken)) return true;
+  errno = EIO;
+  return false;
+}
+
 int SyncRecorded(const char* name, int descriptor) {
+  if (!MaySync(descriptor)) return -1;
   const int result = Next<int(int)>(name)(descriptor);
   if (result == 0) Note(descriptor, {.kind = DiskOp::Kind::kSyncFile});
   return result;
@@ -201,6 +211,12 @@ void LimitDisk(const std::string& folder, int64_t bytes) {
   const std::lock_guard lock(recorder.mutex);
   recorder.limited = folder + "/";
   recorder.bytes_left = bytes;
+}
+
+void BreakSyncs(const std::string& folder, bool broken) {
+  Recorder& recorder = TheRecorder();
+  const std::lock_guard lock(recorder.mutex);
+  recorder.broken = broken ? folder + "/" : "";
 }
 
 void MakeDiskReadOnly(const std::string& folder, bool read_only) {

@@ -47,6 +47,8 @@ std::vector<DiskOp> StopRecording();
 // From now on the files below the folder may grow by so many bytes; then they are refused with
 // ENOSPC. Negative: no limit.
 void LimitDisk(const std::string& folder, int64_t bytes);
+// Syncs of files and folders below the folder fail with EIO, or no longer.
+void BreakSyncs(const std::string& folder, bool broken);
 // Refuses every change below the folder with EROFS, or no longer.
 void MakeDiskReadOnly(const std::string& folder, bool read_only);
 

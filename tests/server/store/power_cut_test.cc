@@ -240,6 +240,34 @@ TEST(FullDiskTest, AStoreThatDoesNotFitAtAllSaysSo) {
   EXPECT_THAT(store.status(), IsOk()) << "nothing half-made is in the way";
 }
 
+TEST(BrokenDiskTest, NothingIsAcknowledgedThatCouldNotBeSynced) {
+  const ScratchFolder scratch;
+  const std::string path = scratch / "data";
+  const auto store = DurableStore::Open(*DataFolder::Open(path));
+  ASSERT_THAT(store.status(), IsOk());
+  StoreModel model;
+  ApplyStep(0, /*bursts=*/true, &model);
+  ASSERT_THAT(RunStep(0, /*bursts=*/true, **store), IsOk());
+  const MeshPayload mesh = SampleMesh(1);
+  UploadStore& uploads = (*store)->uploads();
+  const UploadAnnouncement announcement = AnnouncementOf(mesh);
+  ASSERT_THAT(uploads.Begin(announcement), IsOk());
+  ASSERT_THAT(uploads.Append(announcement.sha256, 0, "0123"), IsOk());
+  BreakSyncs(path, true);
+  EXPECT_FALSE(CreateSession((*store)->sessions(), SampleSession("lost", 1)).ok());
+  EXPECT_FALSE((*store)->meshes().Put(RecordOf(mesh), mesh.View()).ok());
+  EXPECT_FALSE((*store)->predictions().Create(SamplePrediction("p"), SamplePositions(1)).ok());
+  EXPECT_FALSE(uploads.Committed(announcement.sha256).ok());
+  BreakSyncs(path, false);
+  EXPECT_THAT(uploads.Committed(announcement.sha256),
+              StatusIs(absl::StatusCode::kDataLoss, HasSubstr("begin it anew")))
+      << "a later sync says nothing of what the first has lost";
+  ASSERT_OK_AND_ASSIGN(const int64_t committed, uploads.Begin(announcement));
+  EXPECT_EQ(committed, 0);
+  EXPECT_THAT(CheckAgainst(model, model, **store), IsOk()) << "nothing of it is there";
+  EXPECT_THAT((*store)->meshes().Put(RecordOf(mesh), mesh.View()), IsOk());
+}
+
 TEST(ReadOnlyDiskTest, AFolderThatCannotBeWrittenIsRefused) {
   const ScratchFolder scratch;
   MakeDiskReadOnly(scratch.path(), true);
