@@ -19,6 +19,7 @@ DeformStream::~DeformStream() {
 
 absl::Status DeformStream::Start(v1::DeformService::Stub* stub, const std::string& session,
                                  const Options& options) {
+  on_notice_ = options.on_notice;
   AddSessionHeader(session, &context_);
   call_ = stub->Deform(&context_);
   v1::DeformRequest request;
@@ -43,9 +44,11 @@ absl::Status DeformStream::Start(v1::DeformService::Stub* stub, const std::strin
   return absl::OkStatus();
 }
 
-absl::Status DeformStream::SendPoses(uint64_t sequence, absl::Span<const NamedPose> poses) {
+absl::Status DeformStream::SendPoses(uint64_t sequence, absl::Span<const NamedPose> poses,
+                                     bool commit) {
   v1::DeformRequest request;
   request.mutable_pose()->set_sequence(sequence);
+  request.mutable_pose()->set_commit(commit);
   for (const NamedPose& pose : poses) {
     *request.mutable_pose()->add_poses() = ToProto(pose);
   }
@@ -78,11 +81,14 @@ std::optional<v1::DeformFrame> DeformStream::Receive() {
     if (response.has_frame()) {
       return std::move(*response.mutable_frame());
     }
-    if (response.has_notice() && response.notice().has_draining()) {
-      server_is_draining_ = true;
-    }
+    if (response.has_notice()) Tell(response.notice());
   }
   return std::nullopt;
+}
+
+void DeformStream::Tell(const v1::DeformNotice& notice) {
+  if (notice.has_draining()) server_is_draining_ = true;
+  if (on_notice_) on_notice_(notice);
 }
 
 void DeformStream::Cancel() { context_.TryCancel(); }
@@ -91,6 +97,7 @@ absl::Status DeformStream::Finish() {
   // gRPC tells the status of a call only after everything before it was read.
   v1::DeformResponse dropped;
   while (call_->Read(&dropped)) {
+    if (dropped.has_notice()) Tell(dropped.notice());
   }
   finished_ = true;
   return FromGrpcStatus(call_->Finish());

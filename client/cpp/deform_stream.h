@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -34,6 +35,8 @@ class DeformStream {
     std::optional<v1::PreparedAnswers> prepared;  // left out: every frame is solved directly
     // DecodePositions of geometry_conversion.h reads the frames.
     v1::PositionEncoding encoding = v1::POSITION_ENCODING_FLOAT32;
+    // Called by Receive and Finish with what the server says besides frames.
+    std::function<void(const v1::DeformNotice&)> on_notice;
   };
 
   // Cancels the stream unless Finish was called.
@@ -42,9 +45,9 @@ class DeformStream {
   // What the server said when the stream began: number of vertices a frame, and which.
   const v1::DeformStarted& started() const { return started_; }
 
-  // `sequence` must rise from call to call. An error means that the stream has ended; Finish says
-  // why.
-  absl::Status SendPoses(uint64_t sequence, absl::Span<const NamedPose> poses);
+  // `sequence` must rise from call to call. With `commit` the server keeps the poses, and a notice
+  // says when it has. An error means that the stream has ended; Finish says why.
+  absl::Status SendPoses(uint64_t sequence, absl::Span<const NamedPose> poses, bool commit = false);
   absl::Status Ack(const v1::DeformFrame& frame);
   // All frames of that sequence.
   absl::Status Ack(uint64_t sequence);
@@ -80,7 +83,10 @@ class DeformStream {
   grpc::ClientContext context_;
   std::atomic<bool> server_is_draining_ = false;
 
+  void Tell(const v1::DeformNotice& notice);
+
   // Constant after Start.
+  std::function<void(const v1::DeformNotice&)> on_notice_;
   v1::DeformStarted started_;
   std::unique_ptr<Call> call_;
 

@@ -23,12 +23,18 @@ constexpr size_t kChunkBytes = 512 << 10;
 // A drag may rest for minutes. Routers forget connections on which nothing goes, and a server that
 // lost its power says nothing: this finds out within a minute.
 constexpr int kKeepaliveMilliseconds = 30'000;
+constexpr int kReconnectMilliseconds = 100;
+constexpr int kMaxReconnectMilliseconds = 2'000;
 
 std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address, bool own_connection) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMilliseconds);
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  // Where the server is away gRPC asks again after 1 s, then ever more rarely, up to two minutes: a
+  // drag is not to wait so long for a server that is back.
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kReconnectMilliseconds);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kMaxReconnectMilliseconds);
   if (own_connection) arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
 }
