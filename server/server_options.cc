@@ -96,6 +96,15 @@ void AddServerOptions(CLI::App& app, ServerOptions* options) {
                  "threads that compute, in each lane (default: one a core); sessions share them")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
+  options->in_memory = false;
+  CLI::Option* in_memory = app.add_flag("--in-memory", options->in_memory,
+                                        "keep nothing: meshes and sessions end with the server");
+  app.add_option(
+         "--data-dir", options->data_dir,
+         "folder of its own in which the server keeps what it has acknowledged, on a disk of "
+         "this machine (default: $XDG_STATE_HOME/tissueform, or ~/.local/state/tissueform)")
+      ->type_name("DIR")
+      ->excludes(in_memory);
   AddLimits(app, options);
   AddNumber(app, "--drain-seconds", options->drain_deadline.count(), 0, 3600,
             "after SIGTERM or SIGINT, how long open calls may go on",

@@ -24,6 +24,10 @@ struct ServerOptions {
   int max_connections = 1024;
   int max_connections_per_address = 512;
   std::chrono::seconds drain_deadline{20};
+  // Nothing outlives the process. A server in a test; the program keeps what it acknowledges unless
+  // it is told otherwise.
+  bool in_memory = true;
+  std::string data_dir;  // empty: DefaultDataFolder
   std::string log_level = "info";
 
   // Half of the machine's memory, one worker a core.

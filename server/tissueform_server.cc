@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <mutex>
+#include <string>
+#include <utility>
 
 #include "grpc/health/v1/health.pb.h"
 #include "grpcpp/ext/proto_server_reflection_plugin.h"
@@ -17,6 +19,9 @@
 #include "core/base/status_macros.h"
 #include "core/linear_solvers/blas_threads.h"
 #include "server/library_logs.h"
+#include "server/store/data_folder.h"
+#include "server/store/durable_store.h"
+#include "server/store/in_memory_stores.h"
 
 namespace tissueform {
 namespace {
@@ -85,21 +90,40 @@ NamedLimits LimitsOf(const ServerOptions& options) {
   return limits;
 }
 
+absl::StatusOr<std::unique_ptr<Stores>> OpenStores(const ServerOptions& options) {
+  if (options.in_memory) return OpenInMemoryStores();
+  std::string path = options.data_dir;
+  if (path.empty()) {
+    TF_ASSIGN_OR_RETURN(path, DefaultDataFolder());
+  }
+  TF_ASSIGN_OR_RETURN(DataFolder folder, DataFolder::Open(path));
+  TF_ASSIGN_OR_RETURN(std::unique_ptr<DurableStore> store, DurableStore::Open(std::move(folder)));
+  for (const DamagedItem& item : store->damaged()) {
+    spdlog::error(
+        "damaged: {}: {}; {}", item.what, item.why,
+        item.set_aside.empty() ? "nothing of it is left" : "set aside as " + item.set_aside);
+  }
+  return store;
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
     const ServerOptions& options) {
-  std::unique_ptr<TissueformServer> server(new TissueformServer(options));
+  TF_ASSIGN_OR_RETURN(std::unique_ptr<Stores> stores, OpenStores(options));
+  std::unique_ptr<TissueformServer> server(new TissueformServer(options, std::move(stores)));
+  TF_RETURN_IF_ERROR(server->registry_.LearnKnown());
   TF_RETURN_IF_ERROR(server->Listen());
   return server;
 }
 
-TissueformServer::TissueformServer(const ServerOptions& options)
+TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores)
     : options_(options),
       budget_(options.memory_budget_bytes),
-      catalog_(options.limits, &budget_),
+      stores_(std::move(stores)),
+      catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),
       pool_(std::make_unique<WorkerPool>(options.workers)),
-      registry_(options.limits, &budget_, pool_.get(), &store_, &catalog_),
+      registry_(options.limits, &budget_, pool_.get(), &stores_->sessions(), &catalog_),
       streams_(options.limits.max_streams),
       mesh_service_(&gate_, options.limits, &catalog_, &registry_, pool_.get(), &timer_),
       session_service_(&gate_, options.limits, &catalog_, &registry_),

@@ -22,7 +22,7 @@
 #include "server/session/mesh_catalog.h"
 #include "server/session/session_registry.h"
 #include "server/session/worker_pool.h"
-#include "server/store/in_memory_session_store.h"
+#include "server/store/stores.h"
 #include "server/transport/connection_listener.h"
 
 namespace tissueform {
@@ -32,7 +32,8 @@ class TissueformServer {
  public:
   // Listens when it returns. Several servers may live in one process.
   //
-  // Errors: Unavailable, naming the address, when it cannot be listened on.
+  // Errors: Unavailable, naming the address, when it cannot be listened on; those of
+  // DataFolder::Open and DurableStore::Open.
   static absl::StatusOr<std::unique_ptr<TissueformServer>> Start(const ServerOptions& options);
 
   // Cancels open calls, waits for them and ends.
@@ -47,12 +48,12 @@ class TissueformServer {
   void Drain();
 
   const MemoryBudget& memory_budget() const { return budget_; }
-  SessionStore& store() { return store_; }
+  Stores& stores() { return *stores_; }
   const SessionRegistry& sessions() const { return registry_; }
   const DeformStreams& streams() const { return streams_; }
 
  private:
-  explicit TissueformServer(const ServerOptions& options);
+  TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores);
 
   absl::Status Listen();
   void Reclaim(int64_t bytes);
@@ -64,9 +65,9 @@ class TissueformServer {
   // end, then jobs, then what they used.
   ServiceGate gate_;
   MemoryBudget budget_;
+  std::unique_ptr<Stores> stores_;
   MeshCatalog catalog_;
   std::unique_ptr<WorkerPool> pool_;
-  InMemorySessionStore store_;
   SessionRegistry registry_;
   DeformStreams streams_;
   DeadlineTimer timer_;

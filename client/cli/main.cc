@@ -25,6 +25,8 @@ int main(int argc, char** argv) {
     tissueform::AddCompanionCommand(app, tissueform::kExperimentsCommand, words, work);
     tissueform::AddBenchCommand(app, work);
     tissueform::AddCompanionCommand(app, tissueform::kLoadCommand, words, work);
+    tissueform::AddCompanionCommand(app, tissueform::kDragCommand, words, work);
+    tissueform::AddCompanionCommand(app, tissueform::kSessionCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kServerInfoCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kDemoCommand, words, work);
   });

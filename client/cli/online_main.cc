@@ -5,14 +5,18 @@
 
 #include "client/cli/load/load_command.h"
 #include "client/cli/online/demo_command.h"
+#include "client/cli/online/drag_command.h"
 #include "client/cli/online/run_command.h"
 #include "client/cli/online/server_info_command.h"
+#include "client/cli/online/session_command.h"
 #include "client/cli/shared/command_line.h"
 
 int main(int argc, char** argv) {
   return tissueform::RunCommandLine(argc, argv, [](CLI::App& app, tissueform::CommandWork* work) {
     tissueform::AddRunCommand(app, work);
     tissueform::AddLoadCommand(app, work);
+    tissueform::AddDragCommand(app, work);
+    tissueform::AddSessionCommand(app, work);
     tissueform::AddServerInfoCommand(app, work);
     tissueform::AddDemoCommand(app, work);
   });

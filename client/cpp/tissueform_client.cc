@@ -35,6 +35,8 @@ std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address, bool own_
   // drag is not to wait so long for a server that is back.
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kReconnectMilliseconds);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kMaxReconnectMilliseconds);
+  // After a failure it looks the name up again before it tries, and that 30 s apart.
+  arguments.SetInt(GRPC_ARG_DNS_MIN_TIME_BETWEEN_RESOLUTIONS_MS, kReconnectMilliseconds);
   if (own_connection) arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
 }
@@ -170,6 +172,20 @@ absl::StatusOr<v1::Session> TissueformClient::GetSession(const std::string& name
   v1::Session session;
   TF_RETURN_IF_ERROR(FromGrpcStatus(sessions_->GetSession(&context, request, &session)));
   return session;
+}
+
+absl::StatusOr<std::vector<v1::Session>> TissueformClient::ListSessions() {
+  std::vector<v1::Session> sessions;
+  v1::ListSessionsRequest request;
+  do {
+    grpc::ClientContext context;
+    SetDeadline(&context);
+    v1::ListSessionsResponse response;
+    TF_RETURN_IF_ERROR(FromGrpcStatus(sessions_->ListSessions(&context, request, &response)));
+    sessions.insert(sessions.end(), response.sessions().begin(), response.sessions().end());
+    request.set_page_token(response.next_page_token());
+  } while (!request.page_token().empty());
+  return sessions;
 }
 
 absl::Status TissueformClient::DeleteSession(const std::string& name) {

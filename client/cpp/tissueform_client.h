@@ -59,6 +59,8 @@ class TissueformClient {
 
   absl::StatusOr<v1::Session> CreateSession(const SessionRequest& request);
   absl::StatusOr<v1::Session> GetSession(const std::string& name);
+  // All of them, page after page.
+  absl::StatusOr<std::vector<v1::Session>> ListSessions();
   absl::Status DeleteSession(const std::string& name);
 
   // `model` is the session's own when unspecified.

@@ -113,6 +113,8 @@ v1::Session ToProto(const SessionRegistry::View& view) {
   }
   proto.set_state(view.session == nullptr ? v1::SESSION_STATE_STORED : v1::SESSION_STATE_READY);
   proto.set_etag(record.etag);
+  proto.mutable_create_time()->set_seconds(record.created_s);
+  proto.mutable_last_use_time()->set_seconds(record.last_used_s);
   if (view.session != nullptr) AddPreparation(*view.session, &proto);
   return proto;
 }

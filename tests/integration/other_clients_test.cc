@@ -30,9 +30,10 @@ class OtherClientsTest : public CliTest {
  protected:
   void SetUp() override {
     CliTest::SetUp();
-    ASSERT_OK_AND_ASSIGN(server_, ServerProcess::Start(ProgramPath("tissueform-server"),
-                                                       {"--port", "0", "--log-level", "warn"},
-                                                       std::chrono::seconds(60)));
+    ASSERT_OK_AND_ASSIGN(server_,
+                         ServerProcess::Start(ProgramPath("tissueform-server"),
+                                              {"--in-memory", "--port", "0", "--log-level", "warn"},
+                                              std::chrono::seconds(60)));
   }
 
   // Exit code; what it said is in out.txt.

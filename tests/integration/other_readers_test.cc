@@ -157,10 +157,10 @@ TEST_F(OtherReadersTest, DeformAndCompare) {
 
 TEST_F(OtherReadersTest, RunAndDemo) {
   const std::string plan = TestDataPath("plans/tongue/plan.json");
-  ASSERT_OK_AND_ASSIGN(
-      const std::unique_ptr<ServerProcess> server,
-      ServerProcess::Start(ProgramPath("tissueform-server"), {"--port", "0", "--log-level", "warn"},
-                           std::chrono::seconds(60)));
+  ASSERT_OK_AND_ASSIGN(const std::unique_ptr<ServerProcess> server,
+                       ServerProcess::Start(ProgramPath("tissueform-server"),
+                                            {"--in-memory", "--port", "0", "--log-level", "warn"},
+                                            std::chrono::seconds(60)));
   ASSERT_THAT(Run({"run", plan, "--server", server->address(), "--out", "run.vtu"}), Succeeds());
   ExpectOthersReadTheSame(Path("run.vtu"));
   ASSERT_EQ(ExitCodeOf(absl::StrCat("env -u DISPLAY PATH=/nonexistent ", ProgramPath("tissueform"),

@@ -97,9 +97,10 @@ class ServedCommandTest : public ::testing::Test {
 };
 
 TEST_F(ServedCommandTest, RunEqualsDeformUpToFloat32) {
-  ASSERT_OK_AND_ASSIGN(const std::unique_ptr<ServerProcess> server,
-                       ServerProcess::Start(ProgramPath("tissueform-server"),
-                                            {"--port", "0", "--log-level", "warn"}, kPatience));
+  ASSERT_OK_AND_ASSIGN(
+      const std::unique_ptr<ServerProcess> server,
+      ServerProcess::Start(ProgramPath("tissueform-server"),
+                           {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
   const std::string program = ProgramPath("tissueform");
   ASSERT_EQ(ExitCodeOf(program + " run " + kTonguePlan + " --server " + server->address() +
                        " --out " + PathOf("run.vtu") + " --stats " + PathOf("run.json")),
@@ -121,11 +122,11 @@ TEST_F(ServedCommandTest, RunWithoutServerFailsAndWritesNothing) {
 }
 
 TEST_F(ServedCommandTest, ServerInfoAsTableAndAsJson) {
-  ASSERT_OK_AND_ASSIGN(
-      const std::unique_ptr<ServerProcess> server,
-      ServerProcess::Start(ProgramPath("tissueform-server"),
-                           {"--port", "0", "--log-level", "warn", "--max-sessions", "17"},
-                           kPatience));
+  ASSERT_OK_AND_ASSIGN(const std::unique_ptr<ServerProcess> server,
+                       ServerProcess::Start(ProgramPath("tissueform-server"),
+                                            {"--in-memory", "--port", "0", "--log-level", "warn",
+                                             "--max-sessions", "17"},
+                                            kPatience));
   const std::string command =
       ProgramPath("tissueform") + " server-info --server " + server->address();
   ASSERT_EQ(ExitCodeOf(command + " > " + PathOf("table.txt")), 0);

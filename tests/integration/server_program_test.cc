@@ -35,7 +35,7 @@ using ::testing::HasSubstr;
 constexpr std::chrono::seconds kPatience{60};
 
 std::unique_ptr<ServerProcess> StartProgram(std::vector<std::string> arguments = {}) {
-  arguments.insert(arguments.end(), {"--port", "0", "--log-level", "warn"});
+  arguments.insert(arguments.end(), {"--in-memory", "--port", "0", "--log-level", "warn"});
   auto process = ServerProcess::Start(ProgramPath("tissueform-server"), arguments, kPatience);
   EXPECT_THAT(process, IsOk());
   return process.ok() ? *std::move(process) : nullptr;
@@ -126,7 +126,7 @@ TEST_F(ServerProgramTest, AnOpenStreamFinishesItsFramesWhileTheServerDrains) {
 TEST(ServerSignalsTest, ASecondSignalDoesNotCutTheDrainOff) {
   ChildOptions options;
   options.program = ProgramPath("tissueform-server");
-  options.arguments = {"--port", "0", "--log-level", "warn"};
+  options.arguments = {"--in-memory", "--port", "0", "--log-level", "warn"};
   options.output = ChildStream::Pipe();
   auto child = ChildProcess::Start(options);
   ASSERT_THAT(child, IsOk());
@@ -219,10 +219,10 @@ TEST(ServerProgramStartTest, WrongUseEndsWithTwo) {
 
 // gRPC 1.51 by itself is deaf for ever after this (CVE-2023-4785).
 TEST(ServerFloodTest, AFloodOfConnectionsLeavesAServerThatAnswersAndADragThatGoesOn) {
-  auto process = ServerProcess::Start(
-      "/usr/bin/prlimit",
-      {"--nofile=256:256", ProgramPath("tissueform-server"), "--port", "0", "--log-level", "error"},
-      kPatience);
+  auto process = ServerProcess::Start("/usr/bin/prlimit",
+                                      {"--nofile=256:256", ProgramPath("tissueform-server"),
+                                       "--in-memory", "--port", "0", "--log-level", "error"},
+                                      kPatience);
   ASSERT_THAT(process, IsOk());
   const std::string& address = (*process)->address();
   ASSERT_OK_AND_ASSIGN(const auto client, TissueformClient::Connect(address, {}));

@@ -86,7 +86,7 @@ def check_example(prefix, scratch):
     source, build = prefix / "share/doc/tissueform/examples/drag", scratch / "example"
     run("cmake", "-S", source, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}", "-DCMAKE_BUILD_TYPE=Release")
     run("cmake", "--build", build)
-    server = subprocess.Popen([prefix / "bin/tissueform-server", "--port", "0"], stdout=subprocess.PIPE,
+    server = subprocess.Popen([prefix / "bin/tissueform-server", "--in-memory", "--port", "0"], stdout=subprocess.PIPE,
                               stderr=subprocess.DEVNULL, text=True)
     try:
         line = server.stdout.readline()

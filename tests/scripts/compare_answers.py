@@ -27,6 +27,7 @@ as they are now. Needs Debian's python3-vtk9. Exit code 0: the same, 1: not, 2: 
 import argparse
 import concurrent.futures
 import json
+import os
 import pathlib
 import re
 import shutil
@@ -194,8 +195,9 @@ def deform(side, plan, name, other_data):
 
 def run_plans(side, plans, other_data):
     """All plans through one server of this side."""
+    state = tempfile.TemporaryDirectory()  # where servers of today keep what they have; those before kept nothing
     server = subprocess.Popen([side.bin / "tissueform-server", "--port", "0"], stdout=subprocess.PIPE,
-                              stderr=subprocess.DEVNULL, text=True)
+                              stderr=subprocess.DEVNULL, text=True, env={**os.environ, "XDG_STATE_HOME": state.name})
     try:
         lines = iter(server.stdout.readline, "")
         port = next((m.group(1) for m in (re.search(r"listening on \S+:(\d+)", line) for line in lines) if m), None)

@@ -57,10 +57,11 @@ absl::Status Run(const LoadCommandOptions& options) {
   if (address.empty()) {
     TF_ASSIGN_OR_RETURN(const std::string program, FindProgram("tissueform-server"));
     TF_ASSIGN_OR_RETURN(
-        server, ServerProcess::Start(program,
-                                     {"--host", "127.0.0.1", "--port", "0", "--max-sessions",
-                                      "4096", "--max-streams", "4096", "--log-level", "warn"},
-                                     kServerStartDeadline));
+        server,
+        ServerProcess::Start(program,
+                             {"--in-memory", "--host", "127.0.0.1", "--port", "0", "--max-sessions",
+                              "4096", "--max-streams", "4096", "--log-level", "warn"},
+                             kServerStartDeadline));
     address = server->address();
   }
   absl::FPrintF(stderr, "plan %s: %d vertices, %d tets, %s; preparing %d drags on %s ...\n", path,

@@ -232,7 +232,7 @@ absl::Status RunDemo(const DemoOptions& options) {
   TF_ASSIGN_OR_RETURN(const std::string server_program, FindProgram("tissueform-server"));
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<ServerProcess> server,
                       ServerProcess::Start(server_program,
-                                           {"--host", "127.0.0.1", "--port",
+                                           {"--in-memory", "--host", "127.0.0.1", "--port",
                                             std::to_string(options.port), "--log-level", "warn"},
                                            kServerStartDeadline));
   absl::PrintF("tissueform-server listens on %s\n", server->address());

@@ -26,6 +26,11 @@ inline constexpr CompanionCommand kDemoCommand = {
 inline constexpr CompanionCommand kLoadCommand = {
     "load", "drag on a server many times at once, and tell how old the pictures were",
     "tissueform-online"};
+inline constexpr CompanionCommand kDragCommand = {
+    "drag", "drag on a server, to and fro; goes on when the server is started again",
+    "tissueform-online"};
+inline constexpr CompanionCommand kSessionCommand = {
+    "session", "list, show and delete the sessions of a server", "tissueform-online"};
 inline constexpr CompanionCommand kServerInfoCommand = {
     "server-info", "tell what a server is: version, models, limits", "tissueform-online"};
 inline constexpr CompanionCommand kExperimentsCommand = {

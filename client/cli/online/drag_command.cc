@@ -1,0 +1,186 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/online/drag_command.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_format.h"
+
+#include "client/cli/online/drag.h"
+#include "client/cli/shared/companion.h"
+#include "client/cli/shared/stage_progress.h"
+#include "client/cpp/plan_session.h"
+#include "client/cpp/reattaching_stream.h"
+#include "core/base/percentiles.h"
+#include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
+#include "core/planning/plan_io.h"
+
+namespace tissueform {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct DragCommandOptions {
+  std::string plan;
+  std::string server;
+  double seconds = 20;
+  double poses_per_second = 30;
+  double give_up_seconds = 60;
+};
+
+// To the planned pose and back: the hand lifts at both ends, and what it has reached is committed.
+constexpr double kSecondsThere = 2;
+
+std::atomic<bool> interrupted = false;  // NOLINT: a signal has nowhere else to write
+
+struct DragTotals {
+  std::vector<double> latencies_ms;
+  Clock::time_point detached_at;
+  double longest_away_seconds = 0;
+};
+
+// Tells what happens to the connection, on the receiving thread.
+ReattachingStream::Options StreamOptions(const PlanProblem& problem,
+                                         const DragCommandOptions& options, DragTotals* totals) {
+  ReattachingStream::Options stream;
+  stream.stream.vertices.kind = AnswerVertices::Kind::kSkin;
+  if (HasPreparedAnswers(problem.deformer)) stream.stream.prepared.emplace();
+  stream.give_up_after =
+      std::chrono::milliseconds(static_cast<int64_t>(1e3 * options.give_up_seconds));
+  stream.stream.on_notice = [](const v1::DeformNotice& notice) {
+    if (notice.has_draining()) absl::PrintF("the server is about to end\n");
+    if (notice.has_evicted()) absl::PrintF("the session had left the server's memory ...\n");
+    if (notice.has_restored()) absl::PrintF("... and is back\n");
+    if (notice.has_committed() && !notice.committed().failure().empty()) {
+      absl::PrintF("pose %d was not kept: %s\n", notice.committed().sequence(),
+                   notice.committed().failure());
+    }
+  };
+  stream.on_detached = [totals](const absl::Status& why) {
+    totals->detached_at = Clock::now();
+    absl::PrintF("the connection is lost (%s); trying again\n", why.message());
+  };
+  stream.on_reattached = [totals] {
+    const double away = std::chrono::duration<double>(Clock::now() - totals->detached_at).count();
+    totals->longest_away_seconds = std::max(totals->longest_away_seconds, away);
+    absl::PrintF("attached again after %.1f s\n", away);
+  };
+  return stream;
+}
+
+void Send(ReattachingStream* drag, const std::vector<NamedPose>& poses,
+          const DragCommandOptions& options, const Stopwatch& since_start, SendTimes* send_times,
+          const std::atomic<bool>& ended) {
+  const auto count = static_cast<uint64_t>(options.seconds * options.poses_per_second);
+  const auto poses_there =
+      std::max<uint64_t>(1, static_cast<uint64_t>(kSecondsThere * options.poses_per_second));
+  const Clock::time_point start = Clock::now();
+  for (uint64_t i = 0; i <= count && !ended && !interrupted; ++i) {
+    std::this_thread::sleep_until(
+        start + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
+                    static_cast<double>(i) / options.poses_per_second)));
+    const double phase = M_PI * static_cast<double>(i) / static_cast<double>(poses_there);
+    send_times->Append(1e3 * since_start.Seconds());
+    drag->SendPoses(i, PartOfPoses(poses, (1 - std::cos(phase)) / 2),
+                    /*commit=*/i % poses_there == 0 || i == count);
+  }
+  drag->CloseSending();
+}
+
+void PrintTotals(const ReattachingStream& drag, const SendTimes& send_times,
+                 const DragTotals& totals) {
+  absl::PrintF("%d poses, %d frames", send_times.size(), totals.latencies_ms.size());
+  if (!totals.latencies_ms.empty()) {
+    absl::PrintF("; from a pose to its frame %.1f ms (p50), %.1f ms (p99)",
+                 Percentile(totals.latencies_ms, 50), Percentile(totals.latencies_ms, 99));
+  }
+  absl::PrintF("; attached again %d times, away for %.1f s at most", drag.reattachments(),
+               totals.longest_away_seconds);
+  if (const auto committed = drag.last_committed(); committed.has_value()) {
+    absl::PrintF("; committed up to pose %d", *committed);
+  }
+  absl::PrintF("\n");
+}
+
+absl::Status Drag(TissueformClient* client, const PlanProblem& problem, const std::string& session,
+                  const DragCommandOptions& options) {
+  DragTotals totals;
+  TF_ASSIGN_OR_RETURN(
+      const std::unique_ptr<ReattachingStream> drag,
+      ReattachingStream::Open(client, session, StreamOptions(problem, options, &totals)));
+  absl::PrintF(
+      "dragging %s, %d vertices a frame; kill the server and start it again to see the "
+      "drag go on\n",
+      session, drag->started().vertex_count());
+  const Stopwatch since_start;
+  SendTimes send_times;
+  std::atomic<bool> ended = false;
+  std::thread sender(
+      [&] { Send(drag.get(), NamedPoses(problem), options, since_start, &send_times, ended); });
+  while (std::optional<v1::DeformFrame> frame = drag->Receive()) {
+    drag->Ack(*frame);
+    totals.latencies_ms.push_back(1e3 * since_start.Seconds() - send_times.Get(frame->sequence()));
+    if (interrupted) drag->Cancel();
+  }
+  ended = true;
+  sender.join();
+  PrintTotals(*drag, send_times, totals);
+  const absl::Status end = drag->Finish();
+  return interrupted ? absl::CancelledError("interrupted") : end;
+}
+
+absl::Status Run(const DragCommandOptions& options) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);  // seen at once, also through a pipe
+  TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan));
+  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client,
+                      TissueformClient::Connect(options.server, {}));
+  std::unique_ptr<PlanSession> session;
+  {
+    const StageProgress progress("uploading and preparing the session");
+    TF_ASSIGN_OR_RETURN(session, PlanSession::Create(client.get(), problem));
+  }
+  struct sigaction action = {};
+  action.sa_handler = [](int) { interrupted = true; };
+  sigaction(SIGINT, &action, nullptr);
+  return Drag(client.get(), problem, session->name(), options);
+}
+
+}  // namespace
+
+void AddDragCommand(CLI::App& app, CommandWork* work) {
+  auto options = std::make_shared<DragCommandOptions>();
+  CLI::App* command = app.add_subcommand(kDragCommand.name, kDragCommand.description);
+  command->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
+  command->add_option("--server", options->server, "where the server listens")
+      ->required()
+      ->type_name("HOST:PORT");
+  command->add_option("--seconds", options->seconds, "how long")
+      ->check(CLI::Range(0.1, 86400.0))
+      ->capture_default_str();
+  command->add_option("--rate", options->poses_per_second, "poses a second")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->capture_default_str();
+  command
+      ->add_option("--give-up-seconds", options->give_up_seconds,
+                   "how long to wait for a server that is away")
+      ->check(CLI::Range(0.0, 86400.0))
+      ->capture_default_str();
+  command->footer(
+      "Example:\n"
+      "  tissueform-server --port 50051 &\n"
+      "  tissueform drag tests/data/plans/head/plan.json --server localhost:50051");
+  command->callback([options, work] { *work = [options] { return Run(*options); }; });
+}
+
+}  // namespace tissueform

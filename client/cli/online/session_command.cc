@@ -1,0 +1,99 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/online/session_command.h"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "absl/strings/strip.h"
+#include "absl/time/time.h"
+
+#include "client/cli/shared/companion.h"
+#include "client/cpp/tissueform_client.h"
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+struct SessionOptions {
+  std::string server;
+  std::string name;
+};
+
+// With the collection's name or without.
+std::string FullName(const std::string& name) {
+  return name.rfind("sessions/", 0) == 0 ? name : SessionName(name);
+}
+
+std::string TimeText(const google::protobuf::Timestamp& time) {
+  return absl::FormatTime("%Y-%m-%d %H:%M:%S", absl::FromUnixSeconds(time.seconds()),
+                          absl::LocalTimeZone());
+}
+
+std::string StateText(const v1::Session& session) {
+  if (session.state() == v1::SESSION_STATE_STORED) return "stored";
+  return absl::StrFormat("ready, %.0f MiB", static_cast<double>(session.bytes_held()) / (1 << 20));
+}
+
+std::string ModelText(v1::DeformationModel model) {
+  return absl::AsciiStrToLower(
+      absl::StripPrefix(v1::DeformationModel_Name(model), "DEFORMATION_MODEL_"));
+}
+
+absl::Status List(const SessionOptions& options) {
+  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const std::vector<v1::Session> sessions, client->ListSessions());
+  absl::PrintF("%-44s %-16s %-16s %-20s %s\n", "session", "state", "model", "last used", "handles");
+  for (const v1::Session& session : sessions) {
+    absl::PrintF("%-44s %-16s %-16s %-20s %s\n", session.name(), StateText(session),
+                 ModelText(session.model()), TimeText(session.last_use_time()),
+                 absl::StrJoin(session.handles(), ", "));
+  }
+  absl::PrintF("%d sessions\n", sessions.size());
+  return absl::OkStatus();
+}
+
+absl::Status Show(const SessionOptions& options) {
+  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const v1::Session session, client->GetSession(FullName(options.name)));
+  absl::PrintF("%s\n", session.DebugString());
+  return absl::OkStatus();
+}
+
+absl::Status Delete(const SessionOptions& options) {
+  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_RETURN_IF_ERROR(client->DeleteSession(FullName(options.name)));
+  absl::PrintF("%s is deleted\n", FullName(options.name));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddSessionCommand(CLI::App& app, CommandWork* work) {
+  auto options = std::make_shared<SessionOptions>();
+  CLI::App* command = app.add_subcommand(kSessionCommand.name, kSessionCommand.description);
+  command->require_subcommand(1);
+  const auto add = [&](const char* name, const char* what, bool needs_name,
+                       absl::Status (*run)(const SessionOptions&)) {
+    CLI::App* sub = command->add_subcommand(name, what);
+    if (needs_name) {
+      sub->add_option("SESSION", options->name, "its name, with \"sessions/\" or without")
+          ->required();
+    }
+    sub->add_option("--server", options->server, "where the server listens")
+        ->required()
+        ->type_name("HOST:PORT");
+    sub->callback([options, work, run] { *work = [options, run] { return run(*options); }; });
+  };
+  add("list", "all sessions, in memory or not", false, List);
+  add("show", "what is known of one", true, Show);
+  add("delete", "end one, and what is kept of it", true, Delete);
+  command->footer("Example:\n  tissueform session list --server localhost:50051");
+}
+
+}  // namespace tissueform

@@ -1,0 +1,174 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// What the real program has acknowledged is there when it is killed and started again, and a drag
+// goes on.
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <unistd.h>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "client/cli/online/server_process.h"
+#include "client/cpp/reattaching_stream.h"
+#include "client/cpp/tissueform_client.h"
+#include "proto/conversion/answer_conversion.h"
+#include "tests/integration/service_test.h"
+#include "tests/testing/status_matchers.h"
+#include "tests/testing/test_paths.h"
+
+namespace tissueform::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::chrono::seconds kPatience{60};
+
+class RestartTest : public ::testing::Test {
+ protected:
+  RestartTest() { std::filesystem::remove_all(folder_); }
+  ~RestartTest() override {
+    server_.reset();
+    std::filesystem::remove_all(folder_);
+  }
+
+  // At the port of the server before, where there was one.
+  void Start() {
+    const std::string port = address_.empty() ? "0" : address_.substr(address_.rfind(':') + 1);
+    absl::StatusOr<std::unique_ptr<ServerProcess>> server = ServerProcess::Start(
+        ProgramPath("tissueform-server"),
+        {"--data-dir", folder_.string(), "--port", port, "--log-level", "warn"}, kPatience);
+    ASSERT_THAT(server, IsOk());
+    server_ = *std::move(server);
+    address_ = server_->address();
+  }
+
+  // As the power switch would, but for what the kernel still holds.
+  void Kill() {
+    std::ifstream lock(folder_ / "lock");
+    pid_t pid = 0;
+    lock >> pid;
+    ASSERT_GT(pid, 1);
+    ASSERT_EQ(kill(pid, SIGKILL), 0);
+    EXPECT_TRUE(server_->WaitForExit(kPatience).has_value());
+    server_.reset();
+  }
+
+  std::unique_ptr<TissueformClient> Connect() const {
+    absl::StatusOr<std::unique_ptr<TissueformClient>> client =
+        TissueformClient::Connect(address_, {.own_connection = true});
+    EXPECT_THAT(client, IsOk());
+    return client.ok() ? *std::move(client) : nullptr;
+  }
+
+  v1::Session MakeSession(TissueformClient* client, const std::string& id) const {
+    const absl::StatusOr<v1::Mesh> mesh = client->UploadMesh(bar_.mesh, bar_.CellArrays());
+    EXPECT_THAT(mesh, IsOk());
+    SessionRequest request = bar_.Request(mesh->name());
+    request.session_id = id;
+    const absl::StatusOr<v1::Session> session = client->CreateSession(request);
+    EXPECT_THAT(session, IsOk());
+    return *session;
+  }
+
+  const std::filesystem::path folder_ =
+      std::filesystem::path(::testing::TempDir()) / absl::StrCat("tissueform_restart_", getpid());
+  const BarProblem bar_{1};
+  std::unique_ptr<ServerProcess> server_;
+  std::string address_;
+};
+
+TEST_F(RestartTest, ADragGoesOnThroughKillAndRestart) {
+  ASSERT_NO_FATAL_FAILURE(Start());
+  const std::unique_ptr<TissueformClient> client = Connect();
+  const v1::Session session = MakeSession(client.get(), "a-session-of-this-test");
+  ReattachingStream::Options options;
+  std::vector<std::string> told;
+  options.on_detached = [&told](const absl::Status& /*why*/) { told.emplace_back("detached"); };
+  options.on_reattached = [&told] { told.emplace_back("reattached"); };
+  ASSERT_OK_AND_ASSIGN(const std::unique_ptr<ReattachingStream> drag,
+                       ReattachingStream::Open(client.get(), session.name(), options));
+  drag->SendPoses(1, TopPose(SomePose(1)), /*commit=*/true);
+  std::optional<v1::DeformFrame> frame = drag->Receive();
+  ASSERT_TRUE(frame.has_value());
+  drag->Ack(*frame);
+  const std::string before = frame->positions();
+  drag->SendPoses(2, TopPose(SomePose(2)));
+  frame = drag->Receive();  // what was committed has been told by then or is sent again
+  ASSERT_TRUE(frame.has_value());
+  drag->Ack(*frame);
+
+  ASSERT_NO_FATAL_FAILURE(Kill());
+  std::thread restart([this] { Start(); });
+  drag->SendPoses(3, TopPose(SomePose(1)));  // nobody is there
+  frame = drag->Receive();
+  restart.join();
+  ASSERT_TRUE(frame.has_value()) << drag->Finish();
+  drag->Ack(*frame);
+  // The drag begins anew with what was not known to be committed, then comes the newest pose.
+  while (frame.has_value() && frame->sequence() != 3) {
+    frame = drag->Receive();
+    if (frame.has_value()) drag->Ack(*frame);
+  }
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_EQ(frame->positions(), before) << "the same pose, to the last bit";
+  EXPECT_EQ(drag->reattachments(), 1);
+  EXPECT_EQ(told, (std::vector<std::string>{"detached", "reattached"}));
+  drag->CloseSending();
+  while (drag->Receive().has_value()) {
+  }
+  EXPECT_THAT(drag->Finish(), IsOk());
+
+  ASSERT_OK_AND_ASSIGN(const v1::Session after, client->GetSession(session.name()));
+  EXPECT_EQ(after.state(), v1::SESSION_STATE_READY);
+  EXPECT_EQ(after.etag(), session.etag());
+  ASSERT_EQ(after.committed_poses_size(), 1);
+  EXPECT_EQ(after.committed_poses(0).translation_mm().x(), SomePose(1).translation_mm.x());
+}
+
+TEST_F(RestartTest, WhatWasAcknowledgedIsThereAndWhatWasDeletedIsNot) {
+  ASSERT_NO_FATAL_FAILURE(Start());
+  {
+    const std::unique_ptr<TissueformClient> client = Connect();
+    MakeSession(client.get(), "the-first-session");
+    MakeSession(client.get(), "the-second-session");
+    EXPECT_THAT(client->DeleteSession("sessions/the-first-session"), IsOk());
+  }
+  ASSERT_NO_FATAL_FAILURE(Kill());
+  ASSERT_NO_FATAL_FAILURE(Start());
+  const std::unique_ptr<TissueformClient> client = Connect();
+  ASSERT_OK_AND_ASSIGN(const std::vector<v1::Session> sessions, client->ListSessions());
+  ASSERT_EQ(sessions.size(), 1U);
+  EXPECT_EQ(sessions[0].name(), "sessions/the-second-session");
+  EXPECT_EQ(sessions[0].state(), v1::SESSION_STATE_STORED);
+  ASSERT_OK_AND_ASSIGN(const v1::DeformOnceResponse answer,
+                       client->DeformOnce(sessions[0].name(), TopPose(SomePose(3)), {}));
+  ASSERT_OK_AND_ASSIGN(const Positions positions,
+                       DecodePositions(answer.positions(), bar_.mesh.num_vertices()));
+  EXPECT_LT((positions - bar_.Solve(SomePose(3))).cwiseAbs().maxCoeff(), kFloat32Tolerance);
+  // The mesh is needed as long as the session may come back.
+  EXPECT_THAT(client->DeleteMesh(sessions[0].mesh()),
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("1 session")));
+  EXPECT_THAT(client->DeleteSession(sessions[0].name()), IsOk());
+  EXPECT_THAT(client->DeleteMesh(sessions[0].mesh()), IsOk());
+}
+
+TEST_F(RestartTest, ASecondServerIsRefusedTheFolder) {
+  ASSERT_NO_FATAL_FAILURE(Start());
+  EXPECT_THAT(ServerProcess::Start(ProgramPath("tissueform-server"),
+                                   {"--data-dir", folder_.string(), "--port", "0"}, kPatience),
+              StatusIs(absl::StatusCode::kUnavailable));
+  EXPECT_NE(Connect(), nullptr) << "the first one serves";
+}
+
+}  // namespace
+}  // namespace tissueform::testing
