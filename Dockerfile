@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
 #   docker build -t tissueform .
-#   docker run --rm -p 127.0.0.1:50051:50051 tissueform --host 0.0.0.0
+#   docker run --rm -p 127.0.0.1:50051:50051 -v tissueform:/var/lib/tissueform tissueform --host 0.0.0.0
+#
+# The volume holds what the server has acknowledged; --in-memory does without.
 #
 # There is no login and no encryption yet: publish the port on loopback only, as above.
 
@@ -17,9 +19,12 @@ FROM debian:12-slim
 COPY deploy/install_packages.sh deploy/packages.txt /tmp/tissueform/deploy/
 RUN /tmp/tissueform/deploy/install_packages.sh run \
     && rm -rf /tmp/tissueform /var/lib/apt/lists/* \
-    && useradd --system --no-create-home --shell /usr/sbin/nologin tissueform
+    && useradd --system --no-create-home --shell /usr/sbin/nologin tissueform \
+    && install -d -m 0700 -o tissueform -g tissueform /var/lib/tissueform
 COPY --from=builder /opt/tissueform/ /usr/local/
 USER tissueform
+ENV XDG_STATE_HOME=/var/lib
+VOLUME /var/lib/tissueform
 EXPOSE 50051
 STOPSIGNAL SIGTERM
 # Whether the port answers; orchestrators ask the standard gRPC health service instead.

@@ -3,6 +3,8 @@
 
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -38,5 +40,9 @@ struct ScannerCut {
 // is a part of a circle.
 std::vector<ScannerCut> MeasureCuts(const LabelGrid& cut, const LabelGrid& head,
                                     const std::vector<Plane>& planes, const Landmarks& landmarks);
+
+// How much of a part of the bone lies below the grid, in mm, estimated from how its cross-sections
+// grow over the border; infinite where they do not. None where the part does not touch the border.
+std::optional<double> CutOffBelowMm(const LabelGrid& labels, uint8_t label);
 
 }  // namespace tissueform

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/anatomy/border_cut.h"
+#include "core/anatomy/scanner_cut.h"
 
 #include <cmath>
 #include <limits>
