@@ -12,9 +12,9 @@
 #include "absl/strings/str_format.h"
 
 #include "core/anatomy/bone_pieces.h"
-#include "core/anatomy/scanner_cut.h"
 #include "core/anatomy/itk_filters.h"
 #include "core/anatomy/metal_in_bone.h"
+#include "core/anatomy/scanner_cut.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {

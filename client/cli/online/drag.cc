@@ -17,16 +17,16 @@
 namespace tissueform {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using SteadyClock = std::chrono::steady_clock;
 
-double Milliseconds(Clock::duration duration) {
+double Milliseconds(SteadyClock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
 }
 
-void Receive(DeformStream* stream, Clock::time_point start, const SendTimes& send_times,
+void Receive(DeformStream* stream, SteadyClock::time_point start, const SendTimes& send_times,
              DragResult* result) {
   while (std::optional<v1::DeformFrame> frame = stream->Receive()) {
-    const Clock::time_point now = Clock::now();
+    const SteadyClock::time_point now = SteadyClock::now();
     stream->Ack(*frame).IgnoreError();  // not needed once the sender has closed
     result->frames.push_back({.sequence = frame->sequence(),
                               .sent_ms = send_times.Get(frame->sequence()),
@@ -66,17 +66,17 @@ absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& 
       std::max<int64_t>(1, static_cast<int64_t>(options.seconds * options.poses_per_second));
   const std::chrono::duration<double> interval(1 / options.poses_per_second);
   SendTimes send_times;
-  const Clock::time_point start = Clock::now();
+  const SteadyClock::time_point start = SteadyClock::now();
   std::thread receiver([&] { Receive(stream.get(), start, send_times, &result); });
   absl::Status sent;
   for (int64_t i = 0; i < count && sent.ok() && !interrupted; ++i) {
     // Deadlines of their own: a late pose does not delay the ones after it.
     std::this_thread::sleep_until(start +
-                                  std::chrono::duration_cast<Clock::duration>(interval * i));
+                                  std::chrono::duration_cast<SteadyClock::duration>(interval * i));
     // From rest to the end and at rest at both: as a hand moves, not at one speed.
     const double amount =
         (1 - std::cos(M_PI * static_cast<double>(i + 1) / static_cast<double>(count))) / 2;
-    send_times.Append(Milliseconds(Clock::now() - start));
+    send_times.Append(Milliseconds(SteadyClock::now() - start));
     sent = stream->SendPoses(i, PartOfPoses(poses, amount));
     ++result.poses_sent;
   }

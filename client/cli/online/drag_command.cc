@@ -28,7 +28,7 @@
 namespace tissueform {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using SteadyClock = std::chrono::steady_clock;
 
 struct DragCommandOptions {
   std::string plan;
@@ -45,7 +45,7 @@ std::atomic<bool> interrupted = false;  // NOLINT: a signal has nowhere else to 
 
 struct DragTotals {
   std::vector<double> latencies_ms;
-  Clock::time_point detached_at;
+  SteadyClock::time_point detached_at;
   double longest_away_seconds = 0;
 };
 
@@ -67,11 +67,12 @@ ReattachingStream::Options StreamOptions(const PlanProblem& problem,
     }
   };
   stream.on_detached = [totals](const absl::Status& why) {
-    totals->detached_at = Clock::now();
+    totals->detached_at = SteadyClock::now();
     absl::PrintF("the connection is lost (%s); trying again\n", why.message());
   };
   stream.on_reattached = [totals] {
-    const double away = std::chrono::duration<double>(Clock::now() - totals->detached_at).count();
+    const double away =
+        std::chrono::duration<double>(SteadyClock::now() - totals->detached_at).count();
     totals->longest_away_seconds = std::max(totals->longest_away_seconds, away);
     absl::PrintF("attached again after %.1f s\n", away);
   };
@@ -84,10 +85,10 @@ void Send(ReattachingStream* drag, const std::vector<NamedPose>& poses,
   const auto count = static_cast<uint64_t>(options.seconds * options.poses_per_second);
   const auto poses_there =
       std::max<uint64_t>(1, static_cast<uint64_t>(kSecondsThere * options.poses_per_second));
-  const Clock::time_point start = Clock::now();
+  const SteadyClock::time_point start = SteadyClock::now();
   for (uint64_t i = 0; i <= count && !ended && !interrupted; ++i) {
     std::this_thread::sleep_until(
-        start + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
+        start + std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(
                     static_cast<double>(i) / options.poses_per_second)));
     const double phase = M_PI * static_cast<double>(i) / static_cast<double>(poses_there);
     send_times->Append(1e3 * since_start.Seconds());

@@ -37,7 +37,7 @@ std::vector<std::string> EncodingNames(const v1::ServerInfo& info) {
   return names;
 }
 
-nlohmann::ordered_json ToJson(const v1::ServerInfo& info) {
+nlohmann::ordered_json InfoJson(const v1::ServerInfo& info) {
   nlohmann::ordered_json json = {{"version", info.version()},
                                  {"commit", info.commit()},
                                  {"api_version", info.api_version()},
@@ -76,7 +76,7 @@ absl::Status Run(const ServerInfoOptions& options) {
   TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
   TF_ASSIGN_OR_RETURN(const v1::ServerInfo info, client->GetServerInfo());
   if (options.json) {
-    absl::PrintF("%s\n", ToJson(info).dump(2));
+    absl::PrintF("%s\n", InfoJson(info).dump(2));
   } else {
     PrintTable(info);
   }

@@ -18,7 +18,7 @@
 namespace tissueform {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using SteadyClock = std::chrono::steady_clock;
 
 constexpr char kListening[] = "listening on ";
 // More than a server may take that drains without being told how long.
@@ -52,10 +52,11 @@ std::optional<int> ServerProcess::WaitForExit(std::chrono::milliseconds deadline
 }
 
 absl::Status ServerProcess::WaitUntilListening(std::chrono::milliseconds deadline) {
-  const auto end = Clock::now() + deadline;
+  const auto end = SteadyClock::now() + deadline;
   std::string text;
   while (!absl::StrContains(text, "\n")) {
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(end - SteadyClock::now());
     pollfd readable{.fd = program_->answer(), .events = POLLIN, .revents = 0};
     const int ready = left.count() <= 0 ? 0 : poll(&readable, 1, static_cast<int>(left.count()));
     if (ready == 0) return absl::UnavailableError("the server did not listen in time");

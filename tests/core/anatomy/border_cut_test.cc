@@ -1,8 +1,6 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/anatomy/scanner_cut.h"
-
 #include <cmath>
 #include <limits>
 
@@ -10,6 +8,7 @@
 #include "gtest/gtest.h"
 
 #include "core/anatomy/bone_parts.h"
+#include "core/anatomy/scanner_cut.h"
 #include "core/base/status_macros.h"
 #include "core/ct/ct_volume_reader.h"
 #include "core/ct/isotropic_resample.h"

@@ -59,7 +59,7 @@ class DurableStoreTest : public ::testing::Test {
       const std::string id = absl::StrCat("s", number);
       ASSERT_THAT(CreateSession(store_->sessions(), SampleSession(id, number)), IsOk());
       ASSERT_THAT(CommitPoses(store_->sessions(), id, SamplePoses(number)), IsOk());
-      const MeshPayload mesh = SampleMesh(number);
+      const MeshPayload mesh = SamplePayload(number);
       ASSERT_THAT(store_->meshes().Put(RecordOf(mesh), mesh.View()), IsOk());
       const std::string p = absl::StrCat("p", number);
       ASSERT_THAT(store_->predictions().Create(SamplePrediction(p), SamplePositions(number)),
@@ -73,7 +73,7 @@ class DurableStoreTest : public ::testing::Test {
     EXPECT_EQ(SerializeRecord(found), SerializeRecord(expected));
   }
   void ExpectMesh(int number) {
-    const MeshPayload mesh = SampleMesh(number);
+    const MeshPayload mesh = SamplePayload(number);
     ASSERT_OK_AND_ASSIGN(const MeshPayload read, store_->meshes().Read(RecordOf(mesh).sha256));
     EXPECT_EQ(read.View().segments, mesh.View().segments);
   }
@@ -102,7 +102,7 @@ class DurableStoreTest : public ::testing::Test {
 TEST_F(DurableStoreTest, EverythingIsThereAfterARestart) {
   ASSERT_THAT(Open(), IsOk());
   Fill(3);
-  const MeshPayload upload = SampleMesh(9);
+  const MeshPayload upload = SamplePayload(9);
   ASSERT_THAT(store_->uploads().Begin(AnnouncementOf(upload)), IsOk());
   ASSERT_THAT(store_->uploads().Append(RecordOf(upload).sha256, 0, "0123"), IsOk());
   ASSERT_THAT(store_->uploads().Committed(RecordOf(upload).sha256), IsOk());
@@ -236,8 +236,8 @@ TEST_F(DurableStoreTest, ADamagedBlobIsSetAsideAndMayBeUploadedAgain) {
   ASSERT_THAT(Open(), IsOk());
   Fill(3);
   store_.reset();
-  const std::string flipped = RecordOf(SampleMesh(0)).sha256;
-  const std::string gone = RecordOf(SampleMesh(1)).sha256;
+  const std::string flipped = RecordOf(SamplePayload(0)).sha256;
+  const std::string gone = RecordOf(SamplePayload(1)).sha256;
   const std::string cut = Sha256Hex({SamplePositions(2)});
   std::fstream(Blob(flipped), std::ios::in | std::ios::out).seekp(500).put('!');
   std::filesystem::remove(Blob(gone));
@@ -253,7 +253,7 @@ TEST_F(DurableStoreTest, ADamagedBlobIsSetAsideAndMayBeUploadedAgain) {
   ExpectMesh(2);
   ExpectPrediction(1);
   for (const int number : {0, 1}) {
-    const MeshPayload mesh = SampleMesh(number);
+    const MeshPayload mesh = SamplePayload(number);
     ASSERT_THAT(store_->meshes().Put(RecordOf(mesh), mesh.View()), IsOk());
     ExpectMesh(number);
   }
@@ -262,8 +262,8 @@ TEST_F(DurableStoreTest, ADamagedBlobIsSetAsideAndMayBeUploadedAgain) {
 TEST_F(DurableStoreTest, ABlobThatIsDamagedWhileItServesIsFoundWhenItIsRead) {
   ASSERT_THAT(Open(), IsOk());
   Fill(3);
-  const std::string flipped = RecordOf(SampleMesh(0)).sha256;
-  const std::string gone = RecordOf(SampleMesh(1)).sha256;
+  const std::string flipped = RecordOf(SamplePayload(0)).sha256;
+  const std::string gone = RecordOf(SamplePayload(1)).sha256;
   std::fstream(Blob(flipped), std::ios::in | std::ios::out).seekp(3).put('!');
   std::filesystem::remove(Blob(gone));
   std::fstream(Blob(Sha256Hex({SamplePositions(2)})), std::ios::in | std::ios::out).put('!');
@@ -298,7 +298,7 @@ TEST_F(DurableStoreTest, BlobsOfALostDatabaseAreKeptAside) {
   ASSERT_THAT(Open(), IsOk());
   EXPECT_THAT(store_->damaged(), SizeIs(4));
   EXPECT_EQ(Blobs(), 0U);
-  EXPECT_TRUE(std::filesystem::exists(path_ + "/damaged/" + RecordOf(SampleMesh(1)).sha256));
+  EXPECT_TRUE(std::filesystem::exists(path_ + "/damaged/" + RecordOf(SamplePayload(1)).sha256));
 }
 
 TEST_F(DurableStoreTest, ADamagedPageCostsItsRowsOnly) {
@@ -364,7 +364,7 @@ TEST_F(DurableStoreTest, AStoreOfTheVersionBeforeIsBroughtUpToDate) {
   std::filesystem::create_directory(path_ + "/blobs");
   std::filesystem::copy_file(testing::SourcePath("tests/data/store/version1.db"),
                              path_ + "/tissueform.db");
-  const MeshPayload mesh = SampleMesh(0);
+  const MeshPayload mesh = SamplePayload(0);
   std::ofstream(Blob(RecordOf(mesh).sha256)) << mesh.View().shape.Text() << BytesOf(mesh);
   ASSERT_THAT(Open({.clock = [] { return 4711; }}), IsOk());
   EXPECT_THAT(store_->damaged(), IsEmpty());
@@ -395,7 +395,7 @@ TEST_F(DurableStoreTest, NothingIsAcknowledgedInAFolderThatIsGone) {
               StatusIs(absl::StatusCode::kUnavailable, HasSubstr("removed or replaced")));
   EXPECT_THAT(CommitPoses(store_->sessions(), "s0", SamplePoses(3)),
               StatusIs(absl::StatusCode::kUnavailable));
-  const MeshPayload mesh = SampleMesh(5);
+  const MeshPayload mesh = SamplePayload(5);
   EXPECT_FALSE(store_->meshes().Put(RecordOf(mesh), mesh.View()).ok());
   EXPECT_FALSE(store_->predictions().Create(SamplePrediction("p9"), SamplePositions(9)).ok());
   EXPECT_FALSE(store_->uploads().Begin(AnnouncementOf(mesh)).ok());

@@ -28,7 +28,7 @@ class MeshStoreContractTest : public ::testing::TestWithParam<StoresCase> {
  protected:
   // Puts a mesh and returns its name.
   std::string Put(int number, int64_t last_used_s = 1000) {
-    const MeshPayload payload = SampleMesh(number);
+    const MeshPayload payload = SamplePayload(number);
     MeshRecord record = RecordOf(payload);
     record.last_used_s = last_used_s;
     EXPECT_THAT(store_->Put(record, payload.View()), IsOk());
@@ -46,7 +46,7 @@ class MeshStoreContractTest : public ::testing::TestWithParam<StoresCase> {
 };
 
 TEST_P(MeshStoreContractTest, AMeshIsFoundAndReadAsItWas) {
-  const MeshPayload payload = SampleMesh(1);
+  const MeshPayload payload = SamplePayload(1);
   MeshRecord record = RecordOf(payload);
   record.created_s = 17;
   record.last_used_s = 18;
@@ -90,7 +90,7 @@ TEST_P(MeshStoreContractTest, TheSameMeshAgainIsKeptOnce) {
 }
 
 TEST_P(MeshStoreContractTest, ARecordThatIsNotOfThePayloadIsRefused) {
-  const MeshPayload payload = SampleMesh(1);
+  const MeshPayload payload = SamplePayload(1);
   const auto refused = [&](auto change) {
     MeshRecord record = RecordOf(payload);
     change(record);
@@ -135,7 +135,7 @@ TEST_P(MeshStoreContractTest, WhatIsLongUnusedIsListedOldestFirst) {
 }
 
 TEST_P(MeshStoreContractTest, PutsAndDeletesOfOneMeshAtOnceLeaveItWholeOrGone) {
-  const MeshPayload payload = SampleMesh(1);
+  const MeshPayload payload = SamplePayload(1);
   const MeshRecord record = RecordOf(payload);
   std::vector<std::thread> threads;
   threads.reserve(4);

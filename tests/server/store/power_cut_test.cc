@@ -248,7 +248,7 @@ TEST(BrokenDiskTest, NothingIsAcknowledgedThatCouldNotBeSynced) {
   StoreModel model;
   ApplyStep(0, /*bursts=*/true, &model);
   ASSERT_THAT(RunStep(0, /*bursts=*/true, **store), IsOk());
-  const MeshPayload mesh = SampleMesh(1);
+  const MeshPayload mesh = SamplePayload(1);
   UploadStore& uploads = (*store)->uploads();
   const UploadAnnouncement announcement = AnnouncementOf(mesh);
   ASSERT_THAT(uploads.Begin(announcement), IsOk());

@@ -21,7 +21,7 @@ std::string SampleBytes(int number, size_t size) {
 
 }  // namespace
 
-MeshPayload SampleMesh(int number, int num_vertices) {
+MeshPayload SamplePayload(int number, int num_vertices) {
   MeshPayloadShape shape;
   shape.num_vertices = num_vertices;
   shape.num_tets = num_vertices;
@@ -54,7 +54,7 @@ SessionRecord SampleSession(const std::string& id, int number) {
   record.id = id;
   record.owner = "planner";
   record.project = absl::StrCat("project ", number);
-  record.mesh_sha256 = RecordOf(SampleMesh(1)).sha256;
+  record.mesh_sha256 = RecordOf(SamplePayload(1)).sha256;
   record.stiffness = 1000.0 + number;
   record.fixed = {0, 1, number};
   record.handles = {{"chin", {2, 3}}, {"maxilla", {5}}};

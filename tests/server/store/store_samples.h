@@ -17,7 +17,7 @@ namespace tissueform {
 // Numbers choose the content: equal for equal numbers, different for others.
 
 // Arrays of a mesh; no solid need be in them.
-MeshPayload SampleMesh(int number, int num_vertices = 50);
+MeshPayload SamplePayload(int number, int num_vertices = 50);
 MeshRecord RecordOf(const MeshPayload& payload);
 UploadAnnouncement AnnouncementOf(const MeshPayload& payload);
 // The payload as it is sent.

@@ -65,16 +65,16 @@ SessionRecord UpdatedSession(int round) {
   return record;
 }
 
-std::string NameOf(int mesh) { return RecordOf(SampleMesh(mesh)).sha256; }
+std::string NameOf(int mesh) { return RecordOf(SamplePayload(mesh)).sha256; }
 
 absl::Status PutMesh(int number, Stores& stores) {
-  const MeshPayload mesh = SampleMesh(number);
+  const MeshPayload mesh = SamplePayload(number);
   return stores.meshes().Put(RecordOf(mesh), mesh.View());
 }
 
 // Begins an upload and sends its first bytes.
 absl::Status Upload(int number, Stores& stores) {
-  const MeshPayload mesh = SampleMesh(number);
+  const MeshPayload mesh = SamplePayload(number);
   const UploadAnnouncement announcement = AnnouncementOf(mesh);
   TF_ASSIGN_OR_RETURN(const int64_t offset, stores.uploads().Begin(announcement));
   if (offset < kUploadBytes) {
@@ -141,7 +141,7 @@ absl::Status CheckMeshes(const StoreModel& acknowledged, const StoreModel& begun
     const absl::StatusOr<MeshPayload> read = store.meshes().Read(NameOf(number));
     if (absl::IsNotFound(read.status()) && begun.meshes.count(number) == 0) continue;
     TF_RETURN_IF_ERROR(read.status());
-    if (BytesOf(*read) != BytesOf(SampleMesh(number))) return Differs("a mesh");
+    if (BytesOf(*read) != BytesOf(SamplePayload(number))) return Differs("a mesh");
   }
   TF_ASSIGN_OR_RETURN(const MeshStore::Page page, store.meshes().List("", 10000));
   std::set<std::string> allowed;
@@ -178,7 +178,7 @@ absl::Status CheckPredictions(const StoreModel& acknowledged, const StoreModel& 
 absl::Status CheckUploads(const StoreModel& acknowledged, const StoreModel& begun,
                           DurableStore& store) {
   for (const auto& [number, committed] : acknowledged.uploads) {
-    const MeshPayload mesh = SampleMesh(number);
+    const MeshPayload mesh = SamplePayload(number);
     const UploadAnnouncement announcement = AnnouncementOf(mesh);
     TF_ASSIGN_OR_RETURN(const int64_t offset, store.uploads().Begin(announcement));
     if (offset < committed && begun.uploads.count(number) > 0) return Differs("an upload");

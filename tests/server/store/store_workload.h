@@ -17,9 +17,9 @@ namespace tissueform {
 // What a store has been told, as plain maps: what a test compares it with.
 struct StoreModel {
   std::map<std::string, std::string> sessions;  // id -> SerializeRecord
-  std::set<int> meshes;                         // numbers of SampleMesh
+  std::set<int> meshes;                         // numbers of SamplePayload
   std::map<std::string, int> predictions;       // id -> number of SamplePositions
-  std::map<int, int64_t> uploads;               // number of SampleMesh -> bytes committed
+  std::map<int, int64_t> uploads;               // number of SamplePayload -> bytes committed
   std::set<std::string> erased;                 // texts that nobody may find any longer
   std::set<std::string> erased_blobs;           // names of their files
 };

@@ -44,7 +44,7 @@ class UploadStoreTest : public ::testing::Test {
 
   const ScratchFolder folder_;
   std::unique_ptr<UploadStore> store_;
-  const MeshPayload mesh_ = SampleMesh(1, 2000);
+  const MeshPayload mesh_ = SamplePayload(1, 2000);
   const UploadAnnouncement announcement_ = AnnouncementOf(mesh_);
   const std::string& name_ = announcement_.sha256;
   const std::string bytes_ = BytesOf(mesh_);
@@ -96,7 +96,7 @@ TEST_F(UploadStoreTest, AfterARestartNothingStandsBehindTheLastSync) {
 TEST_F(UploadStoreTest, AnotherAnnouncementOfTheSameNameBeginsAnew) {
   ASSERT_THAT(store_->Begin(announcement_), IsOk());
   ASSERT_THAT(store_->Append(name_, 0, bytes_.substr(0, 5000)), IsOk());
-  UploadAnnouncement other = AnnouncementOf(SampleMesh(1, 100));
+  UploadAnnouncement other = AnnouncementOf(SamplePayload(1, 100));
   other.sha256 = name_;
   ASSERT_OK_AND_ASSIGN(const int64_t committed, store_->Begin(other));
   EXPECT_EQ(committed, 0);
@@ -136,10 +136,10 @@ TEST_F(UploadStoreTest, NamesAndSizesThatCannotBeAreRefused) {
 
 TEST_F(UploadStoreTest, AllPartsTogetherHaveALimit) {
   Reopen({.max_bytes = 10, .max_parts = 2});
-  const UploadAnnouncement second = AnnouncementOf(SampleMesh(2));
+  const UploadAnnouncement second = AnnouncementOf(SamplePayload(2));
   ASSERT_THAT(store_->Begin(announcement_), IsOk());
   ASSERT_THAT(store_->Begin(second), IsOk());
-  EXPECT_THAT(store_->Begin(AnnouncementOf(SampleMesh(3))),
+  EXPECT_THAT(store_->Begin(AnnouncementOf(SamplePayload(3))),
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("2 meshes")));
   ASSERT_THAT(store_->Append(name_, 0, "012345"), IsOk());
   EXPECT_THAT(store_->Append(second.sha256, 0, "01234"),
@@ -151,14 +151,14 @@ TEST_F(UploadStoreTest, AllPartsTogetherHaveALimit) {
 
 TEST_F(UploadStoreTest, WhatCannotBeTakenUpIsRemovedAndTheRestServes) {
   for (int number = 1; number <= 4; ++number) {
-    const MeshPayload mesh = SampleMesh(number, 2000);
+    const MeshPayload mesh = SamplePayload(number, 2000);
     ASSERT_THAT(store_->Begin(AnnouncementOf(mesh)), IsOk());
     ASSERT_THAT(store_->Append(RecordOf(mesh).sha256, 0, BytesOf(mesh).substr(0, 100)), IsOk());
     ASSERT_THAT(store_->Committed(RecordOf(mesh).sha256), IsOk());
   }
   store_.reset();
   const auto path = [&](int number, const char* suffix) {
-    return folder_ / "uploads/" + RecordOf(SampleMesh(number, 2000)).sha256 + suffix;
+    return folder_ / "uploads/" + RecordOf(SamplePayload(number, 2000)).sha256 + suffix;
   };
   std::filesystem::remove(path(2, ".part"));
   std::filesystem::resize_file(path(3, ".announced"), 90);
@@ -166,17 +166,18 @@ TEST_F(UploadStoreTest, WhatCannotBeTakenUpIsRemovedAndTheRestServes) {
   std::ofstream(folder_ / "uploads/stray.7.new") << "left by a crash";
   Reopen();
   EXPECT_THAT(store_->Committed(name_), IsOk());
-  EXPECT_THAT(store_->Committed(RecordOf(SampleMesh(2, 2000)).sha256),
+  EXPECT_THAT(store_->Committed(RecordOf(SamplePayload(2, 2000)).sha256),
               StatusIs(absl::StatusCode::kNotFound));
-  EXPECT_THAT(store_->Committed(RecordOf(SampleMesh(3, 2000)).sha256),
+  EXPECT_THAT(store_->Committed(RecordOf(SamplePayload(3, 2000)).sha256),
               StatusIs(absl::StatusCode::kNotFound));
-  ASSERT_OK_AND_ASSIGN(const int64_t cut, store_->Committed(RecordOf(SampleMesh(4, 2000)).sha256));
+  ASSERT_OK_AND_ASSIGN(const int64_t cut,
+                       store_->Committed(RecordOf(SamplePayload(4, 2000)).sha256));
   EXPECT_EQ(cut, 60);
   EXPECT_EQ(Files(), 4) << "two parts with their announcements";
 }
 
 TEST_F(UploadStoreTest, OldPartsAreRemovedAndFreshOnesStay) {
-  const MeshPayload fresh = SampleMesh(2);
+  const MeshPayload fresh = SamplePayload(2);
   ASSERT_THAT(store_->Begin(announcement_), IsOk());
   ASSERT_THAT(store_->Begin(AnnouncementOf(fresh)), IsOk());
   const timespec old[2] = {{1000, 0}, {1000, 0}};
@@ -208,7 +209,7 @@ TEST(TemporaryUploadStoreTest, ItsFolderGoesWithIt) {
   std::string mine;
   {
     ASSERT_OK_AND_ASSIGN(const auto store, UploadStore::OpenTemporary());
-    const MeshPayload mesh = SampleMesh(1);
+    const MeshPayload mesh = SamplePayload(1);
     ASSERT_THAT(store->Begin(AnnouncementOf(mesh)), IsOk());
     ASSERT_THAT(store->Append(RecordOf(mesh).sha256, 0, BytesOf(mesh)), IsOk());
     for (const auto& entry :
