@@ -58,7 +58,7 @@ bool IsChosen(const ExperimentsOptions& options, const Experiment& experiment) {
   return std::find(options.only.begin(), options.only.end(), experiment.name) != options.only.end();
 }
 
-absl::Status MakeFolder(const std::string& folder) {
+absl::Status MakeOutFolder(const std::string& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) {
@@ -83,7 +83,7 @@ ExperimentOptions OptionsFor(const ExperimentsOptions& options) {
 }
 
 absl::Status RunExperiments(const ExperimentsOptions& options) {
-  TF_RETURN_IF_ERROR(MakeFolder(options.out));
+  TF_RETURN_IF_ERROR(MakeOutFolder(options.out));
   // Before any thread: it changes the environment.
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<VirtualDisplay> display, VirtualDisplay::Open());
   const ExperimentOptions experiment_options = OptionsFor(options);

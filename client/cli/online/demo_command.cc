@@ -79,7 +79,7 @@ absl::Status CheckNotInterrupted() {
   return interrupted ? absl::CancelledError("interrupted") : absl::OkStatus();
 }
 
-absl::Status MakeFolder(const DemoOptions& options) {
+absl::Status MakeOutFolder(const DemoOptions& options) {
   std::error_code error;
   std::filesystem::create_directories(options.out, error);
   if (error) {
@@ -226,7 +226,7 @@ absl::Status DragAndPredict(const DemoOptions& options, const DemoCase& demo,
 absl::Status RunDemo(const DemoOptions& options) {
   CatchInterrupts();
   std::setvbuf(stdout, nullptr, _IOLBF, 0);  // progress is seen at once, also through a pipe
-  TF_RETURN_IF_ERROR(MakeFolder(options));
+  TF_RETURN_IF_ERROR(MakeOutFolder(options));
   TF_ASSIGN_OR_RETURN(const DemoCase demo, ReadCase(options));
 
   TF_ASSIGN_OR_RETURN(const std::string server_program, FindProgram("tissueform-server"));
