@@ -140,7 +140,9 @@ TissueformServer::~TissueformServer() {
     server_->Wait();
     server_.reset();
   }
-  pool_.reset();  // its last jobs may still use the registry
+  registry_.Stop();
+  pool_.reset();    // its last jobs may still use the registry and the store
+  stores_.reset();  // its last answers may still use the registry
 }
 
 absl::Status TissueformServer::Listen() {

@@ -232,7 +232,7 @@ void SessionRegistry::StartRestore(const MakingPtr& making) {
       return;
     }
     // Reading a mesh takes its time.
-    pool_->Post(Lane::kStore, [this, making, record = *std::move(record)]() mutable {
+    const bool posted = PostUnlessStopped([this, making, record = *std::move(record)]() mutable {
       absl::StatusOr<std::shared_ptr<const StoredMesh>> mesh = catalog_->Load(record.mesh_sha256);
       if (mesh.ok()) {
         PostMake(making, std::move(record), *std::move(mesh));
@@ -240,7 +240,19 @@ void SessionRegistry::StartRestore(const MakingPtr& making) {
         FinishRestore(making, mesh.status());
       }
     });
+    if (!posted) FinishRestore(making, absl::UnavailableError("the server is ending"));
   });
+}
+
+bool SessionRegistry::PostUnlessStopped(WorkerPool::Job job) {
+  MutexLock lock(mutex_);
+  if (!stopped_) pool_->Post(Lane::kStore, std::move(job));
+  return !stopped_;
+}
+
+void SessionRegistry::Stop() {
+  MutexLock lock(mutex_);
+  stopped_ = true;
 }
 
 void SessionRegistry::PostMake(const MakingPtr& making, SessionRecord record,

@@ -111,6 +111,10 @@ class SessionRegistry {
   // memory, whose meshes nobody else keeps. Returns how many.
   int RemoveIdle();
 
+  // Nothing is posted to the pool any longer: what the store answers from now on finds nobody who
+  // waits. Call it before the pool ends, and end the store's calls before the registry.
+  void Stop();
+
   // In memory.
   int size() const;
   // In memory or not.
@@ -143,6 +147,8 @@ class SessionRegistry {
 
   // Reads what a session is made of, and makes it.
   void StartRestore(const MakingPtr& making);
+  // False when the pool may have ended.
+  bool PostUnlessStopped(WorkerPool::Job job) ABSL_LOCKS_EXCLUDED(mutex_);
   void PostMake(const MakingPtr& making, SessionRecord record,
                 std::shared_ptr<const StoredMesh> mesh);
   // On the preparation's strand.
@@ -174,6 +180,7 @@ class SessionRegistry {
   SharedPreparations preparations_;
 
   mutable Mutex mutex_;
+  bool stopped_ ABSL_GUARDED_BY(mutex_) = false;
   SessionTable table_ ABSL_GUARDED_BY(mutex_);
   std::set<std::string> ending_ ABSL_GUARDED_BY(mutex_);  // taken out, but still in the store
 };

@@ -205,6 +205,14 @@ TEST_F(SessionEvictionTest, WhatIsDeletedWhileItComesBackDoesNotComeBack) {
   EXPECT_THAT(Open("a").get(), StatusIs(absl::StatusCode::kNotFound));
 }
 
+TEST_F(SessionEvictionTest, AStoreThatAnswersAtTheEndFindsNoPool) {
+  ASSERT_THAT(Create("a").get(), IsOk());
+  Restart();
+  registry_->Stop();
+  pool_.reset();
+  EXPECT_THAT(Open("a").get(), StatusIs(absl::StatusCode::kUnavailable));
+}
+
 TEST_F(SessionEvictionTest, CommittedPosesAreInTheRecord) {
   ASSERT_THAT(Create("a").get(), IsOk());
   HandlePose pose;
