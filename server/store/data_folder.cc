@@ -76,7 +76,9 @@ absl::Status CheckPrivate(const std::string& path, const struct stat& status) {
     return Refused(path, "it belongs to another user; name one of your own by --data-dir");
   }
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
-    return Refused(path, absl::StrCat("others may enter it; chmod 700 ", path));
+    return Refused(path, absl::StrCat("others may enter it; name a folder that is the server's "
+                                      "alone, or if this one is: chmod 700 ",
+                                      path));
   }
   return absl::OkStatus();
 }
