@@ -4,6 +4,7 @@
 #include "server/rpc/call_scope.h"
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -97,6 +98,19 @@ grpc::Status CallScope::End(const absl::Status& outcome) {
               absl::StatusCodeToString(outcome.code()), elapsed.count(), request_id_);
   std::exchange(gate_, nullptr)->Leave();
   return ToGrpcStatus(outcome);
+}
+
+grpc::ServerUnaryReactor* RunUpkeep(
+    grpc::CallbackServerContext* context, std::string_view method, ServiceGate* gate,
+    const std::function<absl::Status(const CallScope& scope, const EndCall& end)>& start) {
+  auto scope = std::make_shared<CallScope>(context, method, CallKind::kUpkeep, gate);
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const EndCall end = [scope, reactor](const absl::Status& outcome) {
+    reactor->Finish(scope->End(outcome));
+  };
+  const absl::Status started = scope->admission().ok() ? start(*scope, end) : scope->admission();
+  if (!started.ok()) end(started);
+  return reactor;
 }
 
 }  // namespace tissueform

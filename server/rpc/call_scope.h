@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -85,5 +86,12 @@ class CallScope {
   std::string request_id_;
   absl::Status admission_;
 };
+
+// A unary call of CallKind::kUpkeep. `start` gets its scope, which lives until the end, and what
+// ends it; it returns why the call fails, or OK and ends it once, now or later, on any thread.
+using EndCall = std::function<void(const absl::Status& outcome)>;
+grpc::ServerUnaryReactor* RunUpkeep(
+    grpc::CallbackServerContext* context, std::string_view method, ServiceGate* gate,
+    const std::function<absl::Status(const CallScope& scope, const EndCall& end)>& start);
 
 }  // namespace tissueform

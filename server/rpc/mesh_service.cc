@@ -25,15 +25,10 @@ grpc::ServerReadReactor<v1::UploadMeshRequest>* MeshService::UploadMesh(
 grpc::ServerUnaryReactor* MeshService::Run(grpc::CallbackServerContext* context,
                                            std::string_view method,
                                            std::function<absl::Status()> work) {
-  auto scope = std::make_shared<CallScope>(context, method, CallKind::kUpkeep, gate_);
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  if (!scope->admission().ok()) {
-    reactor->Finish(scope->End(scope->admission()));
-    return reactor;
-  }
-  pool_->Post(Lane::kStore,
-              [reactor, scope, work = std::move(work)] { reactor->Finish(scope->End(work())); });
-  return reactor;
+  return RunUpkeep(context, method, gate_, [&](const CallScope& /*scope*/, const EndCall& end) {
+    pool_->Post(Lane::kStore, [end, work = std::move(work)] { end(work()); });
+    return absl::OkStatus();
+  });
 }
 
 grpc::ServerUnaryReactor* MeshService::GetMesh(grpc::CallbackServerContext* context,

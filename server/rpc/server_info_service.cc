@@ -48,6 +48,7 @@ NamedLimits ToNamedLimits(const ServiceLimits& limits) {
           {"max_tets", limits.max_tets},
           {"max_mesh_bytes", limits.max_mesh_bytes},
           {"max_sessions", limits.max_sessions},
+          {"max_stored_sessions", limits.max_stored_sessions},
           {"max_streams", limits.max_streams},
           {"session_idle_ttl_ms", Milliseconds(limits.session_idle_ttl)},
           {"configuration_deadline_ms", Milliseconds(limits.configuration_deadline)},

@@ -116,67 +116,49 @@ grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerCont
 grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext* context,
                                                      const v1::GetSessionRequest* request,
                                                      v1::Session* response) {
-  auto scope =
-      std::make_shared<CallScope>(context, "SessionService.GetSession", CallKind::kUpkeep, gate_);
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<std::string> id = scope->admission().ok()
-                                             ? ParseSessionName(request->name())
-                                             : absl::StatusOr<std::string>(scope->admission());
-  if (!id.ok()) {
-    reactor->Finish(scope->End(id.status()));
-    return reactor;
-  }
-  registry_->Look(*id,
-                  [reactor, scope, response](const absl::StatusOr<SessionRegistry::View>& view) {
-                    if (view.ok()) *response = ToProto(*view);
-                    reactor->Finish(scope->End(view.status()));
-                  });
-  return reactor;
+  return RunUpkeep(context, "SessionService.GetSession", gate_,
+                   [=, this](const CallScope& /*scope*/, const EndCall& end) -> absl::Status {
+                     TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(request->name()));
+                     registry_->Look(
+                         id, [end, response](const absl::StatusOr<SessionRegistry::View>& view) {
+                           if (view.ok()) *response = ToProto(*view);
+                           end(view.status());
+                         });
+                     return absl::OkStatus();
+                   });
 }
 
 grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerContext* context,
                                                        const v1::ListSessionsRequest* request,
                                                        v1::ListSessionsResponse* response) {
-  auto scope =
-      std::make_shared<CallScope>(context, "SessionService.ListSessions", CallKind::kUpkeep, gate_);
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<PageRequest> page =
-      scope->admission().ok() ? ReadPageRequest(request->page_size(), request->page_token())
-                              : absl::StatusOr<PageRequest>(scope->admission());
-  if (!page.ok()) {
-    reactor->Finish(scope->End(page.status()));
-    return reactor;
-  }
-  registry_->List(
-      {.owner = scope->principal().name, .after = page->after, .limit = page->size},
-      [reactor, scope, response](const absl::StatusOr<SessionRegistry::ViewPage>& views) {
-        if (views.ok()) {
-          for (const SessionRegistry::View& view : views->views) {
-            *response->add_sessions() = ToProto(view);
-          }
-          response->set_next_page_token(views->next);
-        }
-        reactor->Finish(scope->End(views.status()));
+  return RunUpkeep(
+      context, "SessionService.ListSessions", gate_,
+      [=, this](const CallScope& scope, const EndCall& end) -> absl::Status {
+        TF_ASSIGN_OR_RETURN(const PageRequest page,
+                            ReadPageRequest(request->page_size(), request->page_token()));
+        registry_->List({.owner = scope.principal().name, .after = page.after, .limit = page.size},
+                        [end, response](const absl::StatusOr<SessionRegistry::ViewPage>& views) {
+                          if (views.ok()) {
+                            for (const SessionRegistry::View& view : views->views) {
+                              *response->add_sessions() = ToProto(view);
+                            }
+                            response->set_next_page_token(views->next);
+                          }
+                          end(views.status());
+                        });
+        return absl::OkStatus();
       });
-  return reactor;
 }
 
 grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerContext* context,
                                                         const v1::DeleteSessionRequest* request,
                                                         google::protobuf::Empty* /*response*/) {
-  auto scope = std::make_shared<CallScope>(context, "SessionService.DeleteSession",
-                                           CallKind::kUpkeep, gate_);
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<std::string> id = scope->admission().ok()
-                                             ? ParseSessionName(request->name())
-                                             : absl::StatusOr<std::string>(scope->admission());
-  if (!id.ok()) {
-    reactor->Finish(scope->End(id.status()));
-    return reactor;
-  }
-  registry_->Delete(
-      *id, [reactor, scope](const absl::Status& status) { reactor->Finish(scope->End(status)); });
-  return reactor;
+  return RunUpkeep(context, "SessionService.DeleteSession", gate_,
+                   [=, this](const CallScope& /*scope*/, const EndCall& end) -> absl::Status {
+                     TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(request->name()));
+                     registry_->Delete(id, end);
+                     return absl::OkStatus();
+                   });
 }
 
 }  // namespace tissueform
