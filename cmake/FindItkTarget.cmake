@@ -12,3 +12,6 @@ add_library(tissueform_itk INTERFACE)
 add_library(tissueform::itk ALIAS tissueform_itk)
 target_include_directories(tissueform_itk SYSTEM INTERFACE ${ITK_INCLUDE_DIRS})
 target_link_libraries(tissueform_itk INTERFACE ${ITK_LIBRARIES})
+# Debian's headers refuse every compiler but GCC.
+target_compile_options(tissueform_itk INTERFACE
+  "$<$<COMPILE_LANG_AND_ID:CXX,Clang>:SHELL:-include ${CMAKE_CURRENT_LIST_DIR}/precompiled/itk_with_clang.h>")

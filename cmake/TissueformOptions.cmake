@@ -31,6 +31,11 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
                       -Wno-stringop-overread -Wno-restrict)
 endif()
 
+if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+  # A precompiled header made anew from the same text stays the same for ccache.
+  add_compile_options("SHELL:-Xclang -fno-pch-timestamp")
+endif()
+
 if(TISSUEFORM_SANITIZE)
   add_compile_options(-fsanitize=${TISSUEFORM_SANITIZE} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${TISSUEFORM_SANITIZE})

@@ -38,18 +38,20 @@ function(_tissueform_use_precompiled target name)
   endif()
 endfunction()
 
-# Unity builds (CMAKE_UNITY_BUILD, which the sanitizers' presets set) put some files together, so that what they include is
-# read once. Which files may be together, source_names.py says. The release build does without: there a missing include
-# shall be seen.
+# Unity builds put some files together, so that what they include is read once. Which files may be together, source_names.py
+# says. The sanitizers' presets put all files together (CMAKE_UNITY_BUILD), the others only those of tests, which are half
+# of the time; what users run is built without: there a missing include shall be seen.
+option(TISSUEFORM_TESTS_TOGETHER "Compile up to eight files of a test program at once" ON)
 set(_tissueform_most_together 8)
-if(CMAKE_UNITY_BUILD)
+if(CMAKE_UNITY_BUILD OR TISSUEFORM_TESTS_TOGETHER)
   find_package(Python3 3.11 REQUIRED COMPONENTS Interpreter)
   # GCC takes the file that is compiled for the one that a class belongs to.
-  add_compile_options(-Wno-subobject-linkage)
+  add_compile_options($<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
 endif()
 
 function(_tissueform_put_together target)
-  if(NOT CMAKE_UNITY_BUILD)
+  get_target_property(together ${target} UNITY_BUILD)
+  if(NOT together)
     return()
   endif()
   execute_process(
@@ -139,6 +141,9 @@ function(tissueform_test name)
   endif()
   set(target ${name}_test)
   add_executable(${target} ${ARG_SOURCES})
+  if(TISSUEFORM_TESTS_TOGETHER)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON)
+  endif()
   _tissueform_put_together(${target} ${ARG_SOURCES})
   _tissueform_use_precompiled(${target} ${ARG_PRECOMPILED})
   _tissueform_resolve(deps ${ARG_DEPS})
