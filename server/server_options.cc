@@ -15,6 +15,7 @@ namespace {
 constexpr int64_t kMebibyte = 1 << 20;
 constexpr int64_t kMaxMebibytes = int64_t{1} << 30;
 constexpr int64_t kMaxCount = std::numeric_limits<int32_t>::max();
+constexpr int64_t kMaxDays = 36'500;
 constexpr int64_t kMaxSeconds = int64_t{366} * 24 * 3600;
 
 // An option in a unit of its own (MiB, seconds) that ends up somewhere else.
@@ -61,6 +62,11 @@ void AddLimits(CLI::App& app, ServerOptions* options) {
   AddNumber(app, "--session-idle-ttl", limits.session_idle_ttl.count(), 0, kMaxSeconds,
             "seconds after which an unused session or mesh may be removed when room is needed",
             SecondsInto(&limits.session_idle_ttl));
+  AddNumber(
+      app, "--retention-days", limits.retention_days, 0, kMaxDays,
+      "days after which sessions, predictions and meshes that nobody used are deleted; 0 keeps "
+      "them for ever",
+      Into(&limits.retention_days));
   AddNumber(app, "--max-calls-per-connection", options->max_calls_per_connection, 1, kMaxCount,
             "calls open at the same time on one connection; more wait at the client",
             Into(&options->max_calls_per_connection));

@@ -113,6 +113,7 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
   TF_ASSIGN_OR_RETURN(std::unique_ptr<Stores> stores, OpenStores(options));
   std::unique_ptr<TissueformServer> server(new TissueformServer(options, std::move(stores)));
   TF_RETURN_IF_ERROR(server->registry_.LearnKnown());
+  server->housekeeping_.Start();
   TF_RETURN_IF_ERROR(server->Listen());
   return server;
 }
@@ -124,6 +125,8 @@ TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr
       catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),
       pool_(std::make_unique<WorkerPool>(options.workers)),
       registry_(options.limits, &budget_, pool_.get(), &stores_->sessions(), &catalog_),
+      housekeeping_({.retention_days = options.limits.retention_days}, stores_.get(), &registry_,
+                    &catalog_),
       streams_(options.limits.max_streams),
       mesh_service_(&gate_, options.limits, &catalog_, &registry_, pool_.get(), &timer_),
       session_service_(&gate_, options.limits, &catalog_, &registry_),
@@ -140,6 +143,7 @@ TissueformServer::~TissueformServer() {
     server_->Wait();
     server_.reset();
   }
+  housekeeping_.Stop();
   registry_.Stop();
   pool_.reset();    // its last jobs may still use the registry and the store
   stores_.reset();  // its last answers may still use the registry
@@ -198,6 +202,7 @@ void TissueformServer::Drain() {
   if (!gate_.WaitUntilIdle(deadline)) {
     spdlog::warn("draining: cancelling the calls that are still open");
   }
+  housekeeping_.Stop();
   listener_->Stop();
   // Only now: a server that shuts down answers CANCELLED instead of UNAVAILABLE, and waits for idle
   // connections to be closed by their clients.

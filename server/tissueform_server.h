@@ -18,6 +18,7 @@
 #include "server/rpc/session_service.h"
 #include "server/server_options.h"
 #include "server/session/deadline_timer.h"
+#include "server/session/housekeeping.h"
 #include "server/session/memory_budget.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session_registry.h"
@@ -69,6 +70,7 @@ class TissueformServer {
   MeshCatalog catalog_;
   std::unique_ptr<WorkerPool> pool_;
   SessionRegistry registry_;
+  Housekeeping housekeeping_;
   DeformStreams streams_;
   DeadlineTimer timer_;
   MeshService mesh_service_;

@@ -1,8 +1,9 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
-// Included before all else where clang compiles what uses ITK. Debian's two generated headers that look at the compiler know
-// GCC alone and end with an error for others; all that they learn from it is which parts of C++11 there are.
+// Included before all else where clang compiles what uses ITK. Debian's two generated headers that
+// look at the compiler know GCC alone and end with an error for others; all that they learn from it
+// is which parts of C++11 there are.
 
 #pragma once
 

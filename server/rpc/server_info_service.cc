@@ -51,6 +51,7 @@ NamedLimits ToNamedLimits(const ServiceLimits& limits) {
           {"max_stored_sessions", limits.max_stored_sessions},
           {"max_streams", limits.max_streams},
           {"session_idle_ttl_ms", Milliseconds(limits.session_idle_ttl)},
+          {"retention_days", limits.retention_days},
           {"configuration_deadline_ms", Milliseconds(limits.configuration_deadline)},
           {"upload_silence_ms", Milliseconds(limits.upload_silence)},
           {"max_handles", limits.max_handles},

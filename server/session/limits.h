@@ -18,6 +18,7 @@ struct ServiceLimits {
   int max_stored_sessions = 10'000;  // in memory or not
   int max_streams = 64;
   std::chrono::seconds session_idle_ttl{1800};
+  int retention_days = 30;  // what nobody used for so long is deleted; 0: nothing is
   // A client that says nothing for so long is given up.
   std::chrono::milliseconds configuration_deadline{10'000};  // of a stream, from its opening on
   std::chrono::milliseconds upload_silence{30'000};          // between two chunks

@@ -165,8 +165,32 @@ absl::Status MeshUpload::Write(int64_t offset, absl::string_view data, bool fini
 }
 
 MeshCatalog::MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget, MeshStore* store,
-                         const Clock* clock)
-    : limits_(limits), budget_(budget), store_(store), clock_(clock) {}
+                         const Clock* clock, UnixClock unix_clock)
+    : limits_(limits),
+      budget_(budget),
+      store_(store),
+      clock_(clock),
+      unix_clock_(std::move(unix_clock)) {}
+
+class MeshCatalog::Arrival {
+ public:
+  Arrival(MeshCatalog* catalog, std::string sha256)
+      : catalog_(catalog), sha256_(std::move(sha256)) {
+    MutexLock lock(catalog_->mutex_);
+    while (catalog_->removing_ == sha256_) catalog_->removed_.Wait(catalog_->mutex_);
+    catalog_->arriving_.insert(sha256_);
+  }
+  ~Arrival() {
+    MutexLock lock(catalog_->mutex_);
+    catalog_->arriving_.erase(catalog_->arriving_.find(sha256_));
+  }
+  Arrival(const Arrival&) = delete;
+  Arrival& operator=(const Arrival&) = delete;
+
+ private:
+  MeshCatalog* const catalog_;
+  const std::string sha256_;
+};
 
 absl::StatusOr<std::unique_ptr<MeshUpload>> MeshCatalog::StartUpload(
     MeshAnnouncement announcement) {
@@ -199,9 +223,12 @@ absl::StatusOr<std::shared_ptr<const StoredMesh>> MeshCatalog::Finish(
       StoredMesh{std::move(upload->reservation_), sha256, std::move(mesh),
                  std::move(upload->payload_.cell_arrays()), std::move(skin)});
 
+  const Arrival arrival(this, sha256);
   if (store_ != nullptr) {
+    MeshRecord record = RecordOf(*stored);
+    record.created_s = record.last_used_s = unix_clock_();
     TF_RETURN_IF_ERROR(store_->Put(
-        RecordOf(*stored),
+        record,
         ViewMeshPayload(stored->mesh.positions(), stored->mesh.tets(), stored->cell_arrays)));
   }
   return Add(std::move(stored));
@@ -220,6 +247,7 @@ std::shared_ptr<const StoredMesh> MeshCatalog::Add(std::shared_ptr<const StoredM
 absl::StatusOr<std::shared_ptr<const StoredMesh>> MeshCatalog::Load(const std::string& sha256) {
   if (std::shared_ptr<const StoredMesh> known = Find(sha256); known != nullptr) return known;
   if (store_ == nullptr) return NoSuchMesh();
+  const Arrival arrival(this, sha256);
   absl::StatusOr<MeshRecord> record = store_->Find(sha256);
   if (absl::IsNotFound(record.status())) return NoSuchMesh();
   TF_RETURN_IF_ERROR(record.status());
@@ -312,6 +340,35 @@ int MeshCatalog::RemoveIdle(Clock::Duration idle) {
     }
   }
   return static_cast<int>(removed.size());
+}
+
+std::vector<std::string> MeshCatalog::UsedSince(Clock::TimePoint since) {
+  std::vector<std::string> used;
+  MutexLock lock(mutex_);
+  for (const auto& [sha256, entry] : meshes_) {
+    if (entry.mesh.use_count() > 1 || entry.last_used > since) used.push_back(sha256);
+  }
+  return used;
+}
+
+absl::StatusOr<bool> MeshCatalog::RemoveUnused(const std::string& sha256, Clock::TimePoint since) {
+  std::shared_ptr<const StoredMesh> removed;  // destroyed after the lock is released
+  {
+    MutexLock lock(mutex_);
+    if (arriving_.contains(sha256)) return false;
+    if (const auto found = meshes_.find(sha256); found != meshes_.end()) {
+      if (found->second.mesh.use_count() > 1 || found->second.last_used > since) return false;
+      removed = std::move(found->second.mesh);
+      meshes_.erase(found);
+    }
+    removing_ = sha256;
+  }
+  const absl::Status status = store_->Delete(sha256);
+  MutexLock lock(mutex_);
+  removing_.clear();
+  removed_.NotifyAll();
+  if (!status.ok() && !absl::IsNotFound(status)) return status;
+  return status.ok();
 }
 
 }  // namespace tissueform

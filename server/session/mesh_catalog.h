@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,7 @@
 #include "server/session/limits.h"
 #include "server/session/memory_budget.h"
 #include "server/store/mesh_store.h"
+#include "server/store/session_store.h"
 
 namespace tissueform {
 
@@ -86,7 +88,7 @@ class MeshCatalog {
   // `budget` must outlive the catalog and all its meshes, `store` (null: nothing is kept) and
   // `clock` the catalog.
   MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget, MeshStore* store = nullptr,
-              const Clock* clock = Clock::System());
+              const Clock* clock = Clock::System(), UnixClock unix_clock = SystemUnixSeconds);
 
   // What is not in memory can be had again.
   bool keeps_meshes() const { return store_ != nullptr; }
@@ -124,11 +126,22 @@ class MeshCatalog {
   // Returns how many.
   int RemoveIdle(Clock::Duration idle);
 
+  // Those in memory that somebody holds, or has asked for after `since`.
+  std::vector<std::string> UsedSince(Clock::TimePoint since);
+  // Takes a mesh out of memory and store unless it is one of these, or is on its way here. The
+  // caller knows that no session is made from it. Blocks on the disk. False when it stays.
+  //
+  // Errors: those of MeshStore::Delete. REQUIRES: keeps_meshes().
+  absl::StatusOr<bool> RemoveUnused(const std::string& sha256, Clock::TimePoint since);
+
  private:
   struct Entry {
     std::shared_ptr<const StoredMesh> mesh;
     Clock::TimePoint last_used;
   };
+
+  // While it lives RemoveUnused leaves the mesh alone; the beginning waits for one under way.
+  class Arrival;
 
   std::shared_ptr<const StoredMesh> Add(std::shared_ptr<const StoredMesh> mesh);
 
@@ -137,9 +150,13 @@ class MeshCatalog {
   MemoryBudget* const budget_;
   MeshStore* const store_;
   const Clock* const clock_;
+  const UnixClock unix_clock_;
 
   Mutex mutex_;
   std::map<std::string, Entry, std::less<>> meshes_ ABSL_GUARDED_BY(mutex_);
+  std::multiset<std::string> arriving_ ABSL_GUARDED_BY(mutex_);
+  std::string removing_ ABSL_GUARDED_BY(mutex_);  // empty: none
+  ConditionVariable removed_;
 };
 
 }  // namespace tissueform

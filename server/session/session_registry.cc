@@ -478,6 +478,8 @@ int SessionRegistry::Evict(const std::function<bool()>& enough) {
       KnownSession* known = table_.Find(id);
       evicted = std::move(known->session);
       known->last_used = evicted->last_used();
+      std::erase_if(known->evicted, [](const auto& earlier) { return earlier.expired(); });
+      known->evicted.push_back(evicted);
       if (!catalog_->keeps_meshes()) known->mesh = evicted->shared_mesh();
     }
     // Here and now, whoever still holds it: nothing is being solved in a session not in use.
@@ -501,11 +503,45 @@ int SessionRegistry::RemoveIdle() {
     spdlog::info("removed {} sessions that were idle for more than {} s", count,
                  limits_.session_idle_ttl.count());
   }
-  for (auto& [id, known] : removed) {
+  EndUnused(removed);
+  return count;
+}
+
+int SessionRegistry::RemoveUnused(const std::vector<std::string>& ids, Clock::TimePoint since) {
+  std::vector<std::pair<std::string, KnownSession>> removed;
+  {
+    MutexLock lock(mutex_);
+    for (const std::string& id : ids) {
+      if (table_.Find(id) != nullptr && !table_.IsInUse(id, since)) {
+        removed.emplace_back(id, *Take(id));
+      }
+    }
+  }
+  const int count = static_cast<int>(removed.size());
+  EndUnused(removed);
+  return count;
+}
+
+void SessionRegistry::EndUnused(const std::vector<std::pair<std::string, KnownSession>>& removed) {
+  for (const auto& [id, known] : removed) {
     if (known.session != nullptr) known.session->Close(Session::CloseReason::kDeleted);
     Forget(id, WarnIfLeftBehind);
   }
-  return count;
+}
+
+SessionRegistry::Use SessionRegistry::UsedSince(Clock::TimePoint since) const {
+  Use use;
+  std::set<std::string> meshes;
+  MutexLock lock(mutex_);
+  use.sessions = table_.InUse(since);
+  for (const std::string& id : use.sessions) meshes.insert(table_.Find(id)->mesh_sha256);
+  use.meshes.assign(meshes.begin(), meshes.end());
+  return use;
+}
+
+bool SessionRegistry::Knows(const std::string& id) const {
+  MutexLock lock(mutex_);
+  return table_.Find(id) != nullptr;
 }
 
 int SessionRegistry::size() const {

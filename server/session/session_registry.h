@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -111,6 +112,18 @@ class SessionRegistry {
   // memory, whose meshes nobody else keeps. Returns how many.
   int RemoveIdle();
 
+  // What was used after `since`, or is held by an open stream: sessions, and what they are made of.
+  struct Use {
+    std::vector<std::string> sessions;
+    std::vector<std::string> meshes;
+  };
+  Use UsedSince(Clock::TimePoint since) const;
+  // Ends those of the sessions that were not used since, and that no stream holds, records and all.
+  // Returns how many.
+  int RemoveUnused(const std::vector<std::string>& ids, Clock::TimePoint since);
+  // In memory or not.
+  bool Knows(const std::string& id) const;
+
   // Nothing is posted to the pool any longer: what the store answers from now on finds nobody who
   // waits. Call it before the pool ends, and end the store's calls before the registry.
   void Stop();
@@ -158,6 +171,8 @@ class SessionRegistry {
   void FinishCreation(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
       ABSL_LOCKS_EXCLUDED(mutex_);
   void FinishRestore(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  void EndUnused(const std::vector<std::pair<std::string, KnownSession>>& removed)
       ABSL_LOCKS_EXCLUDED(mutex_);
   // Ends a session that was taken out, and its record.
   void End(const std::shared_ptr<Session>& session, const StatusCallback& done)

@@ -14,6 +14,11 @@ KnownSession* SessionTable::Find(const std::string& id) {
   return found == known_.end() ? nullptr : &found->second;
 }
 
+const KnownSession* SessionTable::Find(const std::string& id) const {
+  const auto found = known_.find(id);
+  return found == known_.end() ? nullptr : &found->second;
+}
+
 std::string SessionTable::IdOfRequest(const std::string& request_id) const {
   const auto found = session_of_request_.find(request_id);
   return found == session_of_request_.end() ? "" : found->second;
@@ -93,6 +98,30 @@ std::vector<std::string> SessionTable::UnusedSince(Clock::TimePoint until) const
     if (used <= until && FindMaking(id) == nullptr) unused.push_back(id);
   }
   return unused;
+}
+
+bool SessionTable::IsInUse(const std::string& id, const KnownSession& known,
+                           Clock::TimePoint since) const {
+  const std::shared_ptr<Session>& session = known.session;
+  // The table's own reference is one.
+  if (session != nullptr && session.use_count() > 1) return true;
+  return (session != nullptr ? session->last_used() : known.last_used) > since ||
+         FindMaking(id) != nullptr ||
+         std::any_of(known.evicted.begin(), known.evicted.end(),
+                     [](const auto& evicted) { return !evicted.expired(); });
+}
+
+bool SessionTable::IsInUse(const std::string& id, Clock::TimePoint since) const {
+  const KnownSession* known = Find(id);
+  return known != nullptr && IsInUse(id, *known, since);
+}
+
+std::vector<std::string> SessionTable::InUse(Clock::TimePoint since) const {
+  std::vector<std::string> in_use;
+  for (const auto& [id, known] : known_) {
+    if (IsInUse(id, known, since)) in_use.push_back(id);
+  }
+  return in_use;
 }
 
 int SessionTable::CountMadeFrom(const std::string& mesh_sha256) const {

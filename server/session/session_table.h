@@ -46,9 +46,10 @@ struct KnownSession {
   std::shared_ptr<Session> session;  // null: it is in the store only
   RequestKey key;
   std::string mesh_sha256;
-  int claims = 1;                          // who has seen its name
-  Clock::TimePoint last_used;              // while there is no session
-  std::shared_ptr<const StoredMesh> mesh;  // while there is none: what could not be read again
+  int claims = 1;                               // who has seen its name
+  Clock::TimePoint last_used;                   // while there is no session
+  std::vector<std::weak_ptr<Session>> evicted;  // what it was before; whoever holds one comes back
+  std::shared_ptr<const StoredMesh> mesh;       // while there is none: what could not be read again
 };
 
 // Which sessions there are, which are being made, and who waits for them. No threads, no store:
@@ -59,6 +60,7 @@ class SessionTable {
 
   // Null where there is none.
   KnownSession* Find(const std::string& id);
+  const KnownSession* Find(const std::string& id) const;
   KnownSession* FindRequest(const std::string& request_id);
   // Empty where there is none.
   std::string IdOfRequest(const std::string& request_id) const;
@@ -82,6 +84,12 @@ class SessionTable {
   // Of all: those used last at `until` or before.
   std::vector<std::string> UnusedSince(Clock::TimePoint until) const;
 
+  // Of all: those that were used after `since`, and those that a stream holds or somebody waits
+  // for.
+  std::vector<std::string> InUse(Clock::TimePoint since) const;
+  // False of one that is not known.
+  bool IsInUse(const std::string& id, Clock::TimePoint since) const;
+
   int CountMadeFrom(const std::string& mesh_sha256) const;
 
   // In memory, or on the way there.
@@ -90,6 +98,8 @@ class SessionTable {
   size_t num_loaded_in_table() const;
 
  private:
+  bool IsInUse(const std::string& id, const KnownSession& known, Clock::TimePoint since) const;
+
   std::map<std::string, KnownSession> known_;              // by id
   std::map<std::string, std::string> session_of_request_;  // request id: id
   std::vector<MakingPtr> makings_;

@@ -41,6 +41,7 @@ TEST_F(ServerInfoTest, VersionAndLimitsAreThoseOfTheServer) {
   options.limits.max_sessions = 7;
   options.limits.upload_silence = std::chrono::milliseconds(1234);
   options.limits.session_idle_ttl = std::chrono::seconds(5);
+  options.limits.retention_days = 3;
   options.memory_budget_bytes = int64_t{5} << 30;
   StartServer(options);
   const v1::ServerInfo info = Info();
@@ -49,6 +50,7 @@ TEST_F(ServerInfoTest, VersionAndLimitsAreThoseOfTheServer) {
   EXPECT_THAT(info.commit(), Not(IsEmpty()));
   const auto limits = Limits();
   EXPECT_EQ(limits.at("max_sessions"), 7);
+  EXPECT_EQ(limits.at("retention_days"), 3);
   EXPECT_EQ(limits.at("upload_silence_ms"), 1234);
   EXPECT_EQ(limits.at("session_idle_ttl_ms"), 5000);
   EXPECT_EQ(limits.at("memory_budget_bytes"), int64_t{5} << 30);

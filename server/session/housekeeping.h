@@ -1,0 +1,92 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <set>
+#include <string>
+#include <thread>
+
+#include "core/base/mutex.h"
+#include "server/session/clock.h"
+#include "server/session/mesh_catalog.h"
+#include "server/session/session_registry.h"
+#include "server/store/stores.h"
+
+namespace tissueform {
+
+// What is done for the store from time to time, on a thread of its own: writes down what was used,
+// deletes what nobody has used for too long, and uploads that were broken off.
+//
+// Unused means: a session that nobody opened and no stream holds; a mesh of no session and no
+// prediction; a prediction that was made so long ago and whose session is gone. What was used while
+// the server ran is known by a clock that never goes back. The machine's clock only decides about
+// the rest, and only as far as it went on with that one: set back or forward while the server runs,
+// it deletes nothing early.
+//
+// RunOnce and WriteUse: one thread at a time, and not between Start and Stop.
+class Housekeeping {
+ public:
+  struct Options {
+    int retention_days = 30;  // 0: nothing is deleted for its age
+    std::chrono::seconds partial_uploads{24 * 3600};
+    std::chrono::seconds interval{300};
+    UnixClock unix_clock = SystemUnixSeconds;
+    const Clock* clock = Clock::System();
+  };
+  struct Removed {
+    int sessions = 0;
+    int predictions = 0;
+    int meshes = 0;
+    int uploads = 0;
+  };
+
+  // All must outlive it.
+  Housekeeping(Options options, Stores* stores, SessionRegistry* registry, MeshCatalog* catalog);
+  ~Housekeeping() { Stop(); }
+  Housekeeping(const Housekeeping&) = delete;
+  Housekeeping& operator=(const Housekeeping&) = delete;
+
+  // A round every interval, the first one after one: by then a machine that has just started has
+  // set its clock. REQUIRES: the registry has learnt what is known.
+  void Start();
+  // Waits for the round that is under way, and writes once more what was used. Blocks on the disk.
+  void Stop();
+
+  // One round. Blocks on the disk; what fails is logged and left to the next round. At most
+  // kMostOfARound of each kind go at once, so that nobody's commit waits long behind them.
+  Removed RunOnce();
+  // Only the first part of a round. False when it failed.
+  bool WriteUse();
+
+  static constexpr int kMostOfARound = 100;
+
+ private:
+  void Work();
+  int RemoveUploads(int64_t before_s);
+  int RemoveSessions(int64_t before_s);
+  // Puts the meshes of those that stay into `meshes`; false when they are not all known.
+  bool RemovePredictions(int64_t before_s, std::set<std::string>* meshes, int* removed);
+  int RemoveMeshes(int64_t before_s, const std::set<std::string>& of_predictions);
+
+  // Constant.
+  const Options options_;
+  Stores* const stores_;
+  SessionRegistry* const registry_;
+  MeshCatalog* const catalog_;
+
+  // Of whoever runs a round.
+  Clock::TimePoint started_;
+  int64_t started_s_ = 0;
+  Clock::TimePoint written_until_;  // what was used until then is in the store
+  int64_t offset_s_ = 0;            // of the machine's clock against the other one, when last read
+
+  Mutex mutex_;
+  ConditionVariable changed_;
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
+  std::thread thread_;
+};
+
+}  // namespace tissueform
