@@ -181,10 +181,8 @@ bool ConnectionListener::AcceptOne(int listener_fd) {
   const int fd = accept4(listener_fd, reinterpret_cast<sockaddr*>(&address), &size,
                          SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (fd < 0) {
-    if (errno == EMFILE || errno == ENFILE) {
-      TurnOneAway(listener_fd);
-      return true;
-    }
+    // Said even when nobody waits.
+    if (errno == EMFILE || errno == ENFILE) return TurnOneAway(listener_fd);
     // Gone before it was accepted, or a signal: there may be more. No memory: later.
     if (errno == ENOBUFS || errno == ENOMEM) poll(nullptr, 0, kPauseMilliseconds);
     return errno == ECONNABORTED || errno == EINTR;
@@ -202,14 +200,17 @@ bool ConnectionListener::AcceptOne(int listener_fd) {
   return true;
 }
 
-void ConnectionListener::TurnOneAway(int listener_fd) {
+bool ConnectionListener::TurnOneAway(int listener_fd) {
   if (spare_fd_ >= 0) close(spare_fd_);
   const int fd = accept4(listener_fd, nullptr, nullptr, SOCK_CLOEXEC);
-  if (fd >= 0) close(fd);
-  ++refused_;
+  if (fd >= 0) {
+    close(fd);
+    ++refused_;
+  }
   spare_fd_ = OpenSpare();
   // Somebody else was quicker: wait until one is free, else this would spin.
   if (spare_fd_ < 0) poll(nullptr, 0, kPauseMilliseconds);
+  return fd >= 0;
 }
 
 void ConnectionListener::TellOfRefusals() {

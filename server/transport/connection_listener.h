@@ -58,8 +58,8 @@ class ConnectionListener {
   // False when nothing waits.
   bool AcceptOne(int listener_fd);
   // Out of descriptors: gives the spare one up for a moment, so that who waits is turned away
-  // instead of waiting for ever.
-  void TurnOneAway(int listener_fd);
+  // instead of waiting for ever. False: nobody waits.
+  bool TurnOneAway(int listener_fd);
   void TellOfRefusals();
 
   // Constant after Listen.
