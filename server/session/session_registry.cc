@@ -59,9 +59,6 @@ void WarnIfLeftBehind(const absl::Status& status) {
   if (!status.ok()) spdlog::warn("a session's record stays behind: {}", status.ToString());
 }
 
-// This process is the only one that writes to its store: a store on disk is locked by it.
-constexpr int64_t kEpoch = 1;
-
 absl::StatusOr<SessionStore::Page> ListAndWait(SessionStore* store,
                                                const SessionStore::ListRequest& request) {
   std::promise<absl::StatusOr<SessionStore::Page>> answer;
@@ -77,12 +74,11 @@ SessionRegistry::SessionRegistry(const ServiceLimits& limits, MemoryBudget* budg
                                  WorkerPool* pool, SessionStore* store, MeshCatalog* catalog,
                                  const Clock* clock)
     : limits_(limits),
-      budget_(budget),
       pool_(pool),
       store_(store),
       catalog_(catalog),
       clock_(clock),
-      preparations_(budget, pool) {}
+      maker_(budget, pool, store, catalog, clock) {}
 
 absl::Status SessionRegistry::LearnKnown() {
   SessionStore::ListRequest request{.owner = std::nullopt, .after = "", .limit = kPageSize};
@@ -120,7 +116,11 @@ void SessionRegistry::Create(SessionRecord record, std::shared_ptr<const StoredM
   } else if (admission.started != nullptr && admission.started->restores) {
     StartRestore(admission.started);
   } else if (admission.started != nullptr) {
-    PostMake(admission.started, std::move(record), std::move(mesh));
+    maker_.Create(
+        std::move(record), std::move(mesh), CancellationOf(admission.started),
+        [this, making = admission.started](absl::StatusOr<std::shared_ptr<Session>> made) {
+          FinishCreation(making, std::move(made));
+        });
   }
 }
 
@@ -203,8 +203,10 @@ bool SessionRegistry::JoinEarlierRequest(const RequestKey& key, const SessionWai
   if ((known != nullptr ? known->key : making->key).fingerprint != key.fingerprint) {
     admission->refusal = OtherRequest(key.request_id);
   } else if (known != nullptr) {
-    *admission = AdmitOpen(table_.IdOfRequest(key.request_id), waiter);
-    if (admission->refusal.ok()) ++known->claims;
+    SessionWaiter claimant = waiter;
+    claimant.claims = true;
+    *admission = AdmitOpen(table_.IdOfRequest(key.request_id), claimant);
+    if (admission->existing != nullptr) ++known->claims;
   } else if (making->waiters.empty()) {
     // It is being given up, perhaps past the last moment at which somebody could join.
     admission->refusal = EndingId(making->id);
@@ -226,77 +228,18 @@ bool SessionRegistry::Full() const {
 }
 
 void SessionRegistry::StartRestore(const MakingPtr& making) {
-  store_->Get(making->id, [this, making](absl::StatusOr<SessionRecord> record) {
-    if (!record.ok()) {
-      FinishRestore(making, record.status());
-      return;
-    }
-    // Reading a mesh takes its time.
-    const bool posted = PostUnlessStopped([this, making, record = *std::move(record)]() mutable {
-      absl::StatusOr<std::shared_ptr<const StoredMesh>> mesh = catalog_->Load(record.mesh_sha256);
-      if (mesh.ok()) {
-        PostMake(making, std::move(record), *std::move(mesh));
-      } else {
-        FinishRestore(making, mesh.status());
-      }
-    });
-    if (!posted) FinishRestore(making, absl::UnavailableError("the server is ending"));
-  });
-}
-
-bool SessionRegistry::PostUnlessStopped(WorkerPool::Job job) {
-  MutexLock lock(mutex_);
-  if (!stopped_) pool_->Post(Lane::kStore, std::move(job));
-  return !stopped_;
-}
-
-void SessionRegistry::Stop() {
-  MutexLock lock(mutex_);
-  stopped_ = true;
-}
-
-void SessionRegistry::PostMake(const MakingPtr& making, SessionRecord record,
-                               std::shared_ptr<const StoredMesh> mesh) {
-  std::shared_ptr<SharedPreparation> preparation = preparations_.Find(record);
-  Strand& strand = preparation->strand();
-  strand.Post(Lane::kBatch, [this, making, record = std::move(record), mesh = std::move(mesh),
-                             preparation = std::move(preparation)]() mutable {
-    Make(making, std::move(record), std::move(mesh), std::move(preparation));
-  });
-}
-
-void SessionRegistry::Make(const MakingPtr& making, SessionRecord record,
-                           std::shared_ptr<const StoredMesh> mesh,
-                           std::shared_ptr<SharedPreparation> preparation) {
-  const Cancellation cancellation([this, &making] { return AllCancelled(*making); });
-  absl::StatusOr<std::shared_ptr<Session>> session = Session::Create(
-      record, std::move(mesh), std::move(preparation), budget_, pool_, clock_, cancellation);
-  if (making->restores) {
-    FinishRestore(making, std::move(session));
-    return;
-  }
-  if (!session.ok()) {
-    FinishCreation(making, session.status());
-    return;
-  }
-  // After the session, so that no record tells of one that could not be made.
-  store_->Create(std::move(record), kEpoch,
-                 [this, making, session = *std::move(session)](
-                     const absl::StatusOr<SessionRecord>& stored) mutable {
-                   if (stored.ok()) {
-                     FinishCreation(making, std::move(session));
-                   } else {
-                     // Its memory is free before anybody hears of the failure and tries again.
-                     session.reset();
-                     FinishCreation(making, stored.status());
-                   }
+  maker_.Restore(making->id, CancellationOf(making),
+                 [this, making](absl::StatusOr<std::shared_ptr<Session>> session) {
+                   FinishRestore(making, std::move(session));
                  });
 }
 
-bool SessionRegistry::AllCancelled(const SessionMaking& making) const {
-  MutexLock lock(mutex_);
-  return std::all_of(making.waiters.begin(), making.waiters.end(),
-                     [](const SessionWaiter& waiter) { return waiter.cancelled->load(); });
+Cancellation SessionRegistry::CancellationOf(const MakingPtr& making) const {
+  return Cancellation([this, making] {
+    MutexLock lock(mutex_);
+    return std::all_of(making->waiters.begin(), making->waiters.end(),
+                       [](const SessionWaiter& waiter) { return waiter.cancelled->load(); });
+  });
 }
 
 void SessionRegistry::FinishCreation(const MakingPtr& making,
@@ -342,6 +285,10 @@ void SessionRegistry::FinishRestore(const MakingPtr& making,
     if (result.ok() && known != nullptr) {
       known->session = *result;
       known->mesh.reset();
+      // Only now, and only of those who are answered: who cancelled while it was made has none.
+      known->claims += static_cast<int>(
+          std::count_if(waiters.begin(), waiters.end(),
+                        [](const SessionWaiter& waiter) { return waiter.claims; }));
     } else if (result.ok()) {
       unwanted = *std::move(result);
       result = NoSuchSession(making->id);  // deleted meanwhile
@@ -393,13 +340,14 @@ void SessionRegistry::End(const std::shared_ptr<Session>& session, const StatusC
 }
 
 void SessionRegistry::Forget(const std::string& id, StatusCallback done) {
-  store_->Delete(id, "", kEpoch, [this, id, done = std::move(done)](const absl::Status& status) {
-    {
-      MutexLock lock(mutex_);
-      ending_.erase(id);
-    }
-    done(status);
-  });
+  store_->Delete(id, "", kStoreEpoch,
+                 [this, id, done = std::move(done)](const absl::Status& status) {
+                   {
+                     MutexLock lock(mutex_);
+                     ending_.erase(id);
+                   }
+                   done(status);
+                 });
 }
 
 std::shared_ptr<Session> SessionRegistry::Loaded(const std::string& id) {
@@ -449,7 +397,7 @@ void SessionRegistry::List(const SessionStore::ListRequest& request,
 
 void SessionRegistry::CommitPoses(const std::string& id, std::vector<HandlePose> poses,
                                   StatusCallback done) {
-  store_->CommitPoses(id, std::move(poses), kEpoch, std::move(done));
+  store_->CommitPoses(id, std::move(poses), kStoreEpoch, std::move(done));
 }
 
 void SessionRegistry::Delete(const std::string& id, const StatusCallback& done) {

@@ -15,14 +15,15 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/base/cancellation.h"
 #include "core/base/mutex.h"
 #include "server/session/clock.h"
 #include "server/session/limits.h"
 #include "server/session/memory_budget.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session.h"
+#include "server/session/session_maker.h"
 #include "server/session/session_table.h"
-#include "server/session/shared_preparation.h"
 #include "server/session/worker_pool.h"
 #include "server/store/session_store.h"
 
@@ -126,7 +127,7 @@ class SessionRegistry {
 
   // Nothing is posted to the pool any longer: what the store answers from now on finds nobody who
   // waits. Call it before the pool ends, and end the store's calls before the registry.
-  void Stop();
+  void Stop() { maker_.Stop(); }
 
   // In memory.
   int size() const;
@@ -158,16 +159,9 @@ class SessionRegistry {
   // Tries to have room for one more session in memory.
   void MakeRoom() ABSL_LOCKS_EXCLUDED(mutex_);
 
-  // Reads what a session is made of, and makes it.
   void StartRestore(const MakingPtr& making);
-  // False when the pool may have ended.
-  bool PostUnlessStopped(WorkerPool::Job job) ABSL_LOCKS_EXCLUDED(mutex_);
-  void PostMake(const MakingPtr& making, SessionRecord record,
-                std::shared_ptr<const StoredMesh> mesh);
-  // On the preparation's strand.
-  void Make(const MakingPtr& making, SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
-            std::shared_ptr<SharedPreparation> preparation) ABSL_LOCKS_EXCLUDED(mutex_);
-  bool AllCancelled(const SessionMaking& making) const ABSL_LOCKS_EXCLUDED(mutex_);
+  // Whether all who wait for it have cancelled.
+  Cancellation CancellationOf(const MakingPtr& making) const;
   void FinishCreation(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
       ABSL_LOCKS_EXCLUDED(mutex_);
   void FinishRestore(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
@@ -185,17 +179,15 @@ class SessionRegistry {
 
   // Constant.
   const ServiceLimits limits_;
-  MemoryBudget* const budget_;
   WorkerPool* const pool_;
   SessionStore* const store_;
   MeshCatalog* const catalog_;
   const Clock* const clock_;
 
   // Self-synchronised.
-  SharedPreparations preparations_;
+  SessionMaker maker_;
 
   mutable Mutex mutex_;
-  bool stopped_ ABSL_GUARDED_BY(mutex_) = false;
   SessionTable table_ ABSL_GUARDED_BY(mutex_);
   std::set<std::string> ending_ ABSL_GUARDED_BY(mutex_);  // taken out, but still in the store
 };

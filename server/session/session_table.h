@@ -31,6 +31,7 @@ struct SessionWaiter {
 
   CancelFlag cancelled;
   std::function<void(absl::StatusOr<std::shared_ptr<Session>>)> done;
+  bool claims = false;  // a successful answer is one more claim on a session that is known
 };
 
 // A session that is being made, or made again from its record.

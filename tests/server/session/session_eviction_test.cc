@@ -53,12 +53,14 @@ class SessionEvictionTest : public ::testing::Test {
   }
 
   // A session of that id; empty: the store's choice.
-  std::future<Opened> Create(const std::string& id, const std::string& request_id = "") {
+  std::future<Opened> Create(
+      const std::string& id, const std::string& request_id = "",
+      SessionRegistry::CancelFlag cancelled = std::make_shared<std::atomic<bool>>()) {
     SessionRecord record = BarRecord(*bar_);
     record.id = id;
     record.request_id = request_id;
     auto promise = std::make_shared<std::promise<Opened>>();
-    registry_->Create(std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
+    registry_->Create(std::move(record), bar_, std::move(cancelled),
                       [promise](Opened session) { promise->set_value(std::move(session)); });
     return promise->get_future();
   }
@@ -191,6 +193,33 @@ TEST_F(SessionEvictionTest, ACancelledOpenerIsAnsweredAtOnceAndTheOthersGetTheSe
   std::future<Opened> patient = Open("a");  // joins what nobody waits for any longer
   release.set_value();
   EXPECT_THAT(patient.get(), IsOk());
+}
+
+TEST_F(SessionEvictionTest, ACreationThatJoinedARestoreAndWasCancelledLeavesNoClaim) {
+  ASSERT_THAT(Create("a", "request").get(), IsOk());
+  Restart();
+  std::promise<void> release = HoldWorker();
+  std::future<Opened> patient = Open("a");
+  const auto cancelled = std::make_shared<std::atomic<bool>>();
+  std::future<Opened> again = Create("other", "request", cancelled);
+  *cancelled = true;
+  registry_->CancelWait(cancelled);
+  EXPECT_THAT(again.get(), StatusIs(absl::StatusCode::kCancelled));
+  release.set_value();
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, patient.get());
+  // The one claim that is left is that of the first creation.
+  registry_->Abandon(session);
+  EXPECT_THAT(Open("a").get(), StatusIs(absl::StatusCode::kNotFound));
+}
+
+TEST_F(SessionEvictionTest, ACreationThatJoinedARestoreAndWasAnsweredHasAClaim) {
+  ASSERT_THAT(Create("a", "request").get(), IsOk());
+  Restart();
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create("other", "request").get());
+  registry_->Abandon(session);
+  EXPECT_THAT(registry_->Find("a"), IsOk());
+  registry_->Abandon(session);
+  EXPECT_THAT(Open("a").get(), StatusIs(absl::StatusCode::kNotFound));
 }
 
 TEST_F(SessionEvictionTest, WhatIsDeletedWhileItComesBackDoesNotComeBack) {

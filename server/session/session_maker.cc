@@ -1,0 +1,87 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/session/session_maker.h"
+
+#include <utility>
+
+namespace tissueform {
+
+SessionMaker::SessionMaker(MemoryBudget* budget, WorkerPool* pool, SessionStore* store,
+                           MeshCatalog* catalog, const Clock* clock)
+    : budget_(budget),
+      pool_(pool),
+      store_(store),
+      catalog_(catalog),
+      clock_(clock),
+      preparations_(budget, pool) {}
+
+void SessionMaker::Make(SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
+                        Cancellation cancellation, Callback done) {
+  std::shared_ptr<SharedPreparation> preparation = preparations_.Find(record);
+  Strand& strand = preparation->strand();
+  strand.Post(Lane::kBatch,
+              [this, record = std::move(record), mesh = std::move(mesh),
+               preparation = std::move(preparation), cancellation = std::move(cancellation),
+               done = std::move(done)]() mutable {
+                done(Session::Create(std::move(record), std::move(mesh), std::move(preparation),
+                                     budget_, pool_, clock_, cancellation));
+              });
+}
+
+void SessionMaker::Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
+                          Cancellation cancellation, Callback done) {
+  auto keep = [this, record, done = std::move(done)](
+                  absl::StatusOr<std::shared_ptr<Session>> session) mutable {
+    if (!session.ok()) {
+      done(std::move(session));
+      return;
+    }
+    store_->Create(std::move(record), kStoreEpoch,
+                   [session = *std::move(session), done = std::move(done)](
+                       const absl::StatusOr<SessionRecord>& stored) mutable {
+                     if (stored.ok()) {
+                       done(std::move(session));
+                     } else {
+                       // Its memory is free before anybody hears of the failure and tries again.
+                       session.reset();
+                       done(stored.status());
+                     }
+                   });
+  };
+  Make(std::move(record), std::move(mesh), std::move(cancellation), std::move(keep));
+}
+
+void SessionMaker::Restore(const std::string& id, Cancellation cancellation, Callback done) {
+  store_->Get(id, [this, cancellation = std::move(cancellation),
+                   done = std::move(done)](absl::StatusOr<SessionRecord> record) mutable {
+    if (!record.ok()) {
+      done(record.status());
+      return;
+    }
+    // Reading a mesh takes its time.
+    auto read = [this, record = *std::move(record), cancellation = std::move(cancellation),
+                 done]() mutable {
+      absl::StatusOr<std::shared_ptr<const StoredMesh>> mesh = catalog_->Load(record.mesh_sha256);
+      if (mesh.ok()) {
+        Make(std::move(record), *std::move(mesh), std::move(cancellation), std::move(done));
+      } else {
+        done(mesh.status());
+      }
+    };
+    if (!PostUnlessStopped(std::move(read))) done(absl::UnavailableError("the server is ending"));
+  });
+}
+
+bool SessionMaker::PostUnlessStopped(WorkerPool::Job job) {
+  MutexLock lock(mutex_);
+  if (!stopped_) pool_->Post(Lane::kStore, std::move(job));
+  return !stopped_;
+}
+
+void SessionMaker::Stop() {
+  MutexLock lock(mutex_);
+  stopped_ = true;
+}
+
+}  // namespace tissueform

@@ -1,0 +1,77 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+
+#include "core/base/cancellation.h"
+#include "core/base/mutex.h"
+#include "server/session/clock.h"
+#include "server/session/memory_budget.h"
+#include "server/session/mesh_catalog.h"
+#include "server/session/session.h"
+#include "server/session/shared_preparation.h"
+#include "server/session/worker_pool.h"
+#include "server/store/session_store.h"
+
+namespace tissueform {
+
+// This process is the only one that writes to its store: a store on disk is locked by it.
+inline constexpr int64_t kStoreEpoch = 1;
+
+// Makes sessions on the workers, new ones and those that come back from their records, and shares
+// preparations between them. Who knows them and who waits for them is the registry's.
+//
+// Thread-safe. A callback comes once, from a worker or a thread of the store. What is
+// made for nobody any longer stops at its next stage with Cancelled.
+class SessionMaker {
+ public:
+  using Callback = std::function<void(absl::StatusOr<std::shared_ptr<Session>>)>;
+
+  // All must outlive it and its sessions.
+  SessionMaker(MemoryBudget* budget, WorkerPool* pool, SessionStore* store, MeshCatalog* catalog,
+               const Clock* clock);
+
+  // Makes a session of `record` and keeps nothing. `mesh` is the one that the record names. Errors:
+  // those of Session::Create.
+  void Make(SessionRecord record, std::shared_ptr<const StoredMesh> mesh, Cancellation cancellation,
+            Callback done);
+
+  // Make, then the record is kept: no record tells of a session that could not be made. Errors: and
+  // those of SessionStore::Create.
+  void Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
+              Cancellation cancellation, Callback done);
+
+  // Makes the session of a record in the store. Errors: those of SessionStore::Get,
+  // MeshCatalog::Load and Session::Create.
+  void Restore(const std::string& id, Cancellation cancellation, Callback done);
+
+  // Nothing is posted to the pool any longer by what the store answers. Call it before the pool
+  // ends.
+  void Stop();
+
+ private:
+  // False when the pool may have ended.
+  bool PostUnlessStopped(WorkerPool::Job job) ABSL_LOCKS_EXCLUDED(mutex_);
+
+  // Constant.
+  MemoryBudget* const budget_;
+  WorkerPool* const pool_;
+  SessionStore* const store_;
+  MeshCatalog* const catalog_;
+  const Clock* const clock_;
+
+  // Self-synchronised.
+  SharedPreparations preparations_;
+
+  Mutex mutex_;
+  bool stopped_ ABSL_GUARDED_BY(mutex_) = false;
+};
+
+}  // namespace tissueform
