@@ -59,6 +59,10 @@ void AddLimits(CLI::App& app, ServerOptions* options) {
             "sessions kept, in memory or not", Into(&limits.max_stored_sessions));
   AddNumber(app, "--max-streams", limits.max_streams, 1, kMaxCount,
             "drags (Deform streams) open at the same time", Into(&limits.max_streams));
+  AddNumber(app, "--max-watches", limits.max_watches, 1, kMaxCount,
+            "watches (those who follow drags) open at the same time", Into(&limits.max_watches));
+  AddNumber(app, "--max-watches-per-session", limits.max_watches_per_session, 1, kMaxCount,
+            "of these of one session", Into(&limits.max_watches_per_session));
   AddNumber(app, "--session-idle-ttl", limits.session_idle_ttl.count(), 0, kMaxSeconds,
             "seconds after which an unused session or mesh may be removed when room is needed",
             SecondsInto(&limits.session_idle_ttl));

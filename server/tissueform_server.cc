@@ -128,11 +128,15 @@ TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr
       housekeeping_({.retention_days = options.limits.retention_days}, stores_.get(), &registry_,
                     &catalog_),
       streams_(options.limits.max_streams),
+      watches_(options.limits, pool_.get()),
       mesh_service_(&gate_, options.limits, &catalog_, &registry_, pool_.get(), &timer_),
       session_service_(&gate_, options.limits, &catalog_, &registry_),
-      deform_service_(&gate_, options.limits, &registry_, &streams_, &timer_),
+      deform_service_(&gate_, options.limits, &registry_, &streams_, &watches_, &timer_),
       server_info_service_(&gate_, LimitsOf(options)) {
   SetBlasThreads(1);  // the pool's workers share the cores already
+  registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
+    watches_.OnSessionEvent(id, event);
+  });
   budget_.set_reclaimer([this](int64_t bytes) { Reclaim(bytes); });
 }
 
@@ -198,7 +202,9 @@ void TissueformServer::Drain() {
                options_.drain_deadline.count());
   server_->GetHealthCheckService()->SetServingStatus(false);
   gate_.StartDraining();
-  streams_.NotifyDraining();
+  const auto end = std::chrono::system_clock::now() + options_.drain_deadline;
+  streams_.NotifyDraining(end);
+  watches_.NotifyDraining(end);
   if (!gate_.WaitUntilIdle(deadline)) {
     spdlog::warn("draining: cancelling the calls that are still open");
   }

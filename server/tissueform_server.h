@@ -16,6 +16,7 @@
 #include "server/rpc/mesh_service.h"
 #include "server/rpc/server_info_service.h"
 #include "server/rpc/session_service.h"
+#include "server/rpc/session_watches.h"
 #include "server/server_options.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/housekeeping.h"
@@ -43,7 +44,8 @@ class TissueformServer {
   // The port that is listened on, also when the options said 0.
   int port() const { return listener_->port(); }
 
-  // Ends in good order: health turns to NOT_SERVING, streams are told, new work is refused with
+  // Ends in good order: health turns to NOT_SERVING, streams are told (with the time of the drain
+  // deadline), new work is refused with
   // UNAVAILABLE; open calls may go on until the drain deadline and are then cancelled; the listener
   // closes. Blocks until all calls have ended. One thread, once.
   void Drain();
@@ -52,6 +54,7 @@ class TissueformServer {
   Stores& stores() { return *stores_; }
   const SessionRegistry& sessions() const { return registry_; }
   const DeformStreams& streams() const { return streams_; }
+  const SessionWatches& watches() const { return watches_; }
 
  private:
   TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores);
@@ -72,6 +75,7 @@ class TissueformServer {
   SessionRegistry registry_;
   Housekeeping housekeeping_;
   DeformStreams streams_;
+  SessionWatches watches_;
   DeadlineTimer timer_;
   MeshService mesh_service_;
   SessionService session_service_;

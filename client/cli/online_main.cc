@@ -9,6 +9,7 @@
 #include "client/cli/online/run_command.h"
 #include "client/cli/online/server_info_command.h"
 #include "client/cli/online/session_command.h"
+#include "client/cli/online/watch_command.h"
 #include "client/cli/shared/command_line.h"
 
 int main(int argc, char** argv) {
@@ -17,6 +18,7 @@ int main(int argc, char** argv) {
     tissueform::AddLoadCommand(app, work);
     tissueform::AddDragCommand(app, work);
     tissueform::AddSessionCommand(app, work);
+    tissueform::AddWatchCommand(app, work);
     tissueform::AddServerInfoCommand(app, work);
     tissueform::AddDemoCommand(app, work);
   });

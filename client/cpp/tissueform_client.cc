@@ -224,4 +224,11 @@ absl::StatusOr<std::unique_ptr<DeformStream>> TissueformClient::OpenStream(
   return stream;
 }
 
+absl::StatusOr<std::unique_ptr<WatchStream>> TissueformClient::Watch(
+    const std::string& session, const WatchStream::Options& options) {
+  std::unique_ptr<WatchStream> watch(new WatchStream(deform_.get(), options));
+  TF_RETURN_IF_ERROR(watch->Start(session));
+  return watch;
+}
+
 }  // namespace tissueform

@@ -14,6 +14,7 @@
 #include "grpcpp/channel.h"
 
 #include "client/cpp/deform_stream.h"
+#include "client/cpp/watch_stream.h"
 #include "core/mesh/tet_mesh.h"
 #include "core/mesh_payload/mesh_payload.h"
 #include "proto/conversion/geometry_conversion.h"
@@ -73,6 +74,10 @@ class TissueformClient {
   // The stream has no deadline.
   absl::StatusOr<std::unique_ptr<DeformStream>> OpenStream(const std::string& session,
                                                            const DeformStream::Options& options);
+
+  // Follows what others drag. The watch has no deadline.
+  absl::StatusOr<std::unique_ptr<WatchStream>> Watch(const std::string& session,
+                                                     const WatchStream::Options& options);
 
  private:
   TissueformClient(const std::shared_ptr<grpc::Channel>& channel, const Options& options);

@@ -16,6 +16,7 @@
 #include "proto/conversion/model_conversion.h"
 #include "proto/conversion/session_conversion.h"
 #include "server/rpc/deform_stream.h"
+#include "server/rpc/watch_stream.h"
 
 namespace tissueform {
 namespace {
@@ -149,7 +150,26 @@ grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* DeformService::D
     grpc::CallbackServerContext* context) {
   return new DeformStreamReactor(
       CallScope(context, "DeformService.Deform", CallKind::kNewWork, gate_), limits_, registry_,
-      streams_, timer_);
+      streams_, watches_, timer_);
+}
+
+grpc::ServerWriteReactor<grpc::ByteBuffer>* DeformService::Watch(
+    grpc::CallbackServerContext* context, const grpc::ByteBuffer* request) {
+  return new WatchStreamReactor(
+      CallScope(context, "DeformService.Watch", CallKind::kNewWork, gate_), *request, limits_,
+      registry_, watches_);
+}
+
+grpc::ServerUnaryReactor* DeformService::AcknowledgeWatch(
+    grpc::CallbackServerContext* context, const v1::AcknowledgeWatchRequest* request,
+    google::protobuf::Empty* /*response*/) {
+  return RunUpkeep(context, "DeformService.AcknowledgeWatch", gate_,
+                   [&](const CallScope& /*scope*/, const EndCall& end) -> absl::Status {
+                     TF_ASSIGN_OR_RETURN(const std::string watch, ParseWatchName(request->watch()));
+                     TF_RETURN_IF_ERROR(watches_->Acknowledge(watch, request->number()));
+                     end(absl::OkStatus());
+                     return absl::OkStatus();
+                   });
 }
 
 }  // namespace tissueform

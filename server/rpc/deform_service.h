@@ -5,6 +5,7 @@
 
 #include "server/rpc/call_scope.h"
 #include "server/rpc/deform_streams.h"
+#include "server/rpc/session_watches.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
 #include "server/session/session_registry.h"
@@ -12,25 +13,41 @@
 
 namespace tissueform {
 
+// The callback service, but Watch sends bytes: its frames are encoded once for all who watch.
+using DeformServiceBase = v1::DeformService::WithCallbackMethod_DeformOnce<
+    v1::DeformService::WithCallbackMethod_Deform<v1::DeformService::WithRawCallbackMethod_Watch<
+        v1::DeformService::WithCallbackMethod_AcknowledgeWatch<v1::DeformService::Service>>>>;
+
 // tissueform.v1.DeformService over the sessions of a registry. Stateless; all pointers must outlive
 // it.
-class DeformService final : public v1::DeformService::CallbackService {
+class DeformService final : public DeformServiceBase {
  public:
   DeformService(ServiceGate* gate, const ServiceLimits& limits, SessionRegistry* registry,
-                DeformStreams* streams, DeadlineTimer* timer)
-      : gate_(gate), limits_(limits), registry_(registry), streams_(streams), timer_(timer) {}
+                DeformStreams* streams, SessionWatches* watches, DeadlineTimer* timer)
+      : gate_(gate),
+        limits_(limits),
+        registry_(registry),
+        streams_(streams),
+        watches_(watches),
+        timer_(timer) {}
 
   grpc::ServerUnaryReactor* DeformOnce(grpc::CallbackServerContext* context,
                                        const v1::DeformOnceRequest* request,
                                        v1::DeformOnceResponse* response) override;
   grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* Deform(
       grpc::CallbackServerContext* context) override;
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* Watch(grpc::CallbackServerContext* context,
+                                                    const grpc::ByteBuffer* request) override;
+  grpc::ServerUnaryReactor* AcknowledgeWatch(grpc::CallbackServerContext* context,
+                                             const v1::AcknowledgeWatchRequest* request,
+                                             google::protobuf::Empty* response) override;
 
  private:
   ServiceGate* const gate_;
   const ServiceLimits limits_;
   SessionRegistry* const registry_;
   DeformStreams* const streams_;
+  SessionWatches* const watches_;
   DeadlineTimer* const timer_;
 };
 

@@ -16,11 +16,12 @@ namespace tissueform {
 
 DeformStreamReactor::DeformStreamReactor(CallScope scope, const ServiceLimits& limits,
                                          SessionRegistry* registry, DeformStreams* streams,
-                                         DeadlineTimer* timer)
+                                         SessionWatches* watches, DeadlineTimer* timer)
     : scope_(std::move(scope)),
       limits_(limits),
       registry_(registry),
       streams_(streams),
+      watches_(watches),
       timer_(timer) {
   absl::Status admission = scope_.admission();
   if (admission.ok()) {
@@ -96,9 +97,9 @@ void DeformStreamReactor::OnDone() {
   delete this;
 }
 
-void DeformStreamReactor::NotifyDraining() {
+void DeformStreamReactor::NotifyDraining(std::chrono::system_clock::time_point end) {
   MutexLock lock(mutex_);
-  notices_.emplace_back().mutable_draining();
+  notices_.push_back(DrainingAt(end));
   Advance();
 }
 
@@ -171,7 +172,11 @@ absl::Status DeformStreamReactor::Configure(std::shared_ptr<Session> session) {
 void DeformStreamReactor::Begin(StreamBegin begin) {
   flow_->FinishPreparation();
   claim_ = std::move(begin.claim);
-  if (!started_.has_value() && !has_started_) started_ = std::move(begin.started);
+  if (!started_.has_value() && !has_started_) {
+    publisher_.emplace(watches_->ChannelOf(stream_request_.session_id),
+                       FormOf(*configuration_, begin.started.started()));
+    started_ = std::move(begin.started);
+  }
   if (std::exchange(restoring_, false)) notices_.emplace_back().mutable_restored();
 }
 
@@ -235,9 +240,10 @@ void DeformStreamReactor::WriteNext() {
     return;
   }
   if (std::optional<v1::DeformResponse> next = NextMessage(); next.has_value()) {
-    writing_ = *std::move(next);
+    writing_ = std::make_shared<const v1::DeformResponse>(*std::move(next));
     write_in_flight_ = true;
-    StartWrite(&writing_);
+    StartWrite(writing_.get());
+    if (writing_->has_frame()) publisher_->Publish(writing_);
   }
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <deque>
 #include <memory>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "core/base/mutex.h"
 #include "server/rpc/call_scope.h"
 #include "server/rpc/deform_streams.h"
+#include "server/rpc/session_watches.h"
 #include "server/rpc/stream_answers.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/frame_flow.h"
@@ -38,15 +40,15 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
  public:
   // All pointers must outlive the stream.
   DeformStreamReactor(CallScope scope, const ServiceLimits& limits, SessionRegistry* registry,
-                      DeformStreams* streams, DeadlineTimer* timer);
+                      DeformStreams* streams, SessionWatches* watches, DeadlineTimer* timer);
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
   void OnCancel() override;
   void OnDone() override;
 
-  // Tells the client that the server drains. Any thread.
-  void NotifyDraining();
+  // Tells the client that the server drains, and when it ends. Any thread.
+  void NotifyDraining(std::chrono::system_clock::time_point end);
 
  private:
   using Configuration = std::shared_ptr<const StreamConfiguration>;
@@ -100,6 +102,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   const ServiceLimits limits_;
   SessionRegistry* const registry_;
   DeformStreams* const streams_;
+  SessionWatches* const watches_;
   DeadlineTimer* const timer_;
   bool registered_ = false;
   DeadlineTimer::Id deadline_;  // of the configuration
@@ -107,13 +110,14 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
 
   // gRPC's while an operation is under way.
   v1::DeformRequest request_;
-  v1::DeformResponse writing_;
+  std::shared_ptr<const v1::DeformResponse> writing_;  // those who watch hold it as well
 
   Mutex mutex_;
   StreamRequest stream_request_ ABSL_GUARDED_BY(mutex_);
   std::optional<FrameFlow> flow_ ABSL_GUARDED_BY(mutex_);         // empty before the first message
   Configuration configuration_ ABSL_GUARDED_BY(mutex_);           // null before there is a session
   std::shared_ptr<ResponseClaim> claim_ ABSL_GUARDED_BY(mutex_);  // null: none are prepared
+  std::optional<DragPublisher> publisher_ ABSL_GUARDED_BY(mutex_);     // empty before `started`
   std::optional<v1::DeformResponse> started_ ABSL_GUARDED_BY(mutex_);  // waits for its write
   bool has_started_ ABSL_GUARDED_BY(mutex_) = false;                   // it was written
   bool restoring_ ABSL_GUARDED_BY(mutex_) = false;  // the session is coming back to memory

@@ -27,10 +27,10 @@ void DeformStreams::Remove(DeformStreamReactor* stream) {
   streams_.erase(stream);
 }
 
-void DeformStreams::NotifyDraining() {
+void DeformStreams::NotifyDraining(std::chrono::system_clock::time_point end) {
   MutexLock lock(mutex_);
   for (DeformStreamReactor* stream : streams_) {
-    stream->NotifyDraining();
+    stream->NotifyDraining(end);
   }
 }
 

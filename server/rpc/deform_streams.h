@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <chrono>
 #include <set>
 
 #include "absl/status/status.h"
@@ -25,7 +26,7 @@ class DeformStreams {
   // REQUIRES: added.
   void Remove(DeformStreamReactor* stream);
 
-  void NotifyDraining();
+  void NotifyDraining(std::chrono::system_clock::time_point end);
   int size() const;
 
  private:

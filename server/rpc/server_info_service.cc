@@ -50,6 +50,8 @@ NamedLimits ToNamedLimits(const ServiceLimits& limits) {
           {"max_sessions", limits.max_sessions},
           {"max_stored_sessions", limits.max_stored_sessions},
           {"max_streams", limits.max_streams},
+          {"max_watches", limits.max_watches},
+          {"max_watches_per_session", limits.max_watches_per_session},
           {"session_idle_ttl_ms", Milliseconds(limits.session_idle_ttl)},
           {"retention_days", limits.retention_days},
           {"configuration_deadline_ms", Milliseconds(limits.configuration_deadline)},

@@ -178,4 +178,14 @@ v1::DeformResponse ToProto(AnswerFrame frame) {
   return response;
 }
 
+v1::WatchForm FormOf(const StreamConfiguration& configuration, const v1::DeformStarted& started) {
+  v1::WatchForm form;
+  form.set_vertex_count(started.vertex_count());
+  *form.mutable_vertices() = started.vertices();
+  form.set_encoding(configuration.encoding == v1::POSITION_ENCODING_UNSPECIFIED
+                        ? v1::POSITION_ENCODING_FLOAT32
+                        : configuration.encoding);
+  return form;
+}
+
 }  // namespace tissueform

@@ -76,4 +76,7 @@ absl::StatusOr<AnswerFrame> SolvePose(const StreamConfiguration& configuration,
 
 v1::DeformResponse ToProto(AnswerFrame frame);
 
+// What those who watch the stream are told of its frames.
+v1::WatchForm FormOf(const StreamConfiguration& configuration, const v1::DeformStarted& started);
+
 }  // namespace tissueform

@@ -17,6 +17,8 @@ struct ServiceLimits {
   int max_sessions = 64;
   int max_stored_sessions = 10'000;  // in memory or not
   int max_streams = 64;
+  int max_watches = 256;
+  int max_watches_per_session = 16;
   std::chrono::seconds session_idle_ttl{1800};
   int retention_days = 30;  // what nobody used for so long is deleted; 0: nothing is
   // A client that says nothing for so long is given up.

@@ -299,6 +299,7 @@ void SessionRegistry::FinishRestore(const MakingPtr& making,
     return;
   }
   if (unwanted != nullptr) unwanted->Close(Session::CloseReason::kDeleted);
+  if (result.ok()) observer_(making->id, Event::kRestored);
   for (const SessionWaiter& waiter : waiters) {
     waiter.done(result);
   }
@@ -340,6 +341,7 @@ void SessionRegistry::End(const std::shared_ptr<Session>& session, const StatusC
 }
 
 void SessionRegistry::Forget(const std::string& id, StatusCallback done) {
+  observer_(id, Event::kDeleted);
   store_->Delete(id, "", kStoreEpoch,
                  [this, id, done = std::move(done)](const absl::Status& status) {
                    {
@@ -430,6 +432,7 @@ int SessionRegistry::Evict(const std::function<bool()>& enough) {
       known->evicted.push_back(evicted);
       if (!catalog_->keeps_meshes()) known->mesh = evicted->shared_mesh();
     }
+    observer_(evicted->id(), Event::kEvicted);
     // Here and now, whoever still holds it: nothing is being solved in a session not in use.
     evicted->Close(Session::CloseReason::kEvicted);
     ++count;

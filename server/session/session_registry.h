@@ -40,6 +40,10 @@ class SessionRegistry {
   using SessionCallback = std::function<void(absl::StatusOr<std::shared_ptr<Session>>)>;
   using StatusCallback = std::function<void(absl::Status)>;
 
+  // What happens to a session, for those who follow it without using it.
+  enum class Event { kEvicted, kRestored, kDeleted };
+  using Observer = std::function<void(const std::string& id, Event event)>;
+
   // What was used within this time is not evicted: a server that would take sessions from those who
   // work with them refuses instead.
   static constexpr std::chrono::seconds kInUse{10};
@@ -57,6 +61,9 @@ class SessionRegistry {
   // All pointers must outlive the registry and all its sessions.
   SessionRegistry(const ServiceLimits& limits, MemoryBudget* budget, WorkerPool* pool,
                   SessionStore* store, MeshCatalog* catalog, const Clock* clock = Clock::System());
+
+  // Told of every event, from any thread, without a lock held. Call it before anything else.
+  void set_observer(Observer observer) { observer_ = std::move(observer); }
 
   // Learns which sessions the store has. Call it before anything else; blocks. Errors: those of
   // SessionStore::List.
@@ -183,6 +190,7 @@ class SessionRegistry {
   SessionStore* const store_;
   MeshCatalog* const catalog_;
   const Clock* const clock_;
+  Observer observer_ = [](const std::string& /*id*/, Event /*event*/) {};
 
   // Self-synchronised.
   SessionMaker maker_;

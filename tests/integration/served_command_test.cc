@@ -18,12 +18,14 @@
 #include <sys/wait.h>
 
 #include "client/cli/online/server_process.h"
+#include "client/cpp/plan_session.h"
 #include "client/cpp/tissueform_client.h"
 #include "client/rendering/virtual_display.h"
 #include "core/mesh/skin_region.h"
 #include "core/mesh/tet_topology.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "core/mesh_io/triangle_mesh_io.h"
+#include "core/planning/plan_io.h"
 #include "tests/testing/scoped_environment.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
@@ -119,6 +121,22 @@ TEST_F(ServedCommandTest, RunWithoutServerFailsAndWritesNothing) {
                        " --server 127.0.0.1:1 --out " + PathOf("run.vtu") + " 2>" + PathOf("err")),
             1);
   EXPECT_FALSE(fs::exists(PathOf("run.vtu")));
+}
+
+TEST_F(ServedCommandTest, WatchTellsOfASessionThatNobodyDrags) {
+  ASSERT_OK_AND_ASSIGN(
+      const std::unique_ptr<ServerProcess> server,
+      ServerProcess::Start(ProgramPath("tissueform-server"),
+                           {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
+  const std::string watch = ProgramPath("tissueform") + " watch --server " + server->address();
+  EXPECT_EQ(ExitCodeOf(watch + " 0123456789abcdef 2> " + PathOf("err")), 1);
+  EXPECT_THAT(Read("err"), HasSubstr("no session"));
+  ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(kTonguePlan));
+  ASSERT_OK_AND_ASSIGN(const PlanProblem problem, ResolvePlan(plan));
+  ASSERT_OK_AND_ASSIGN(const auto client, TissueformClient::Connect(server->address(), {}));
+  ASSERT_OK_AND_ASSIGN(const auto session, PlanSession::Create(client.get(), problem));
+  ASSERT_EQ(ExitCodeOf(watch + " " + session->name() + " --seconds 1 > " + PathOf("out")), 0);
+  EXPECT_THAT(Read("out"), ContainsRegex("1 frames/s, age .* nobody drags: at rest\n"));
 }
 
 TEST_F(ServedCommandTest, ServerInfoAsTableAndAsJson) {

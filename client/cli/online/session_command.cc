@@ -25,11 +25,6 @@ struct SessionOptions {
   std::string name;
 };
 
-// With the collection's name or without.
-std::string FullName(const std::string& name) {
-  return name.rfind("sessions/", 0) == 0 ? name : SessionName(name);
-}
-
 std::string TimeText(const google::protobuf::Timestamp& time) {
   return absl::FormatTime("%Y-%m-%d %H:%M:%S", absl::FromUnixSeconds(time.seconds()),
                           absl::LocalTimeZone());
@@ -60,19 +55,23 @@ absl::Status List(const SessionOptions& options) {
 
 absl::Status Show(const SessionOptions& options) {
   TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
-  TF_ASSIGN_OR_RETURN(const v1::Session session, client->GetSession(FullName(options.name)));
+  TF_ASSIGN_OR_RETURN(const v1::Session session, client->GetSession(FullSessionName(options.name)));
   absl::PrintF("%s\n", session.DebugString());
   return absl::OkStatus();
 }
 
 absl::Status Delete(const SessionOptions& options) {
   TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
-  TF_RETURN_IF_ERROR(client->DeleteSession(FullName(options.name)));
-  absl::PrintF("%s is deleted\n", FullName(options.name));
+  TF_RETURN_IF_ERROR(client->DeleteSession(FullSessionName(options.name)));
+  absl::PrintF("%s is deleted\n", FullSessionName(options.name));
   return absl::OkStatus();
 }
 
 }  // namespace
+
+std::string FullSessionName(const std::string& name) {
+  return name.rfind("sessions/", 0) == 0 ? name : SessionName(name);
+}
 
 void AddSessionCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<SessionOptions>();

@@ -31,6 +31,8 @@ inline constexpr CompanionCommand kDragCommand = {
     "tissueform-online"};
 inline constexpr CompanionCommand kSessionCommand = {
     "session", "list, show and delete the sessions of a server", "tissueform-online"};
+inline constexpr CompanionCommand kWatchCommand = {
+    "watch", "follow a session that somebody drags, a line a second", "tissueform-online"};
 inline constexpr CompanionCommand kServerInfoCommand = {
     "server-info", "tell what a server is: version, models, limits", "tissueform-online"};
 inline constexpr CompanionCommand kExperimentsCommand = {

@@ -155,6 +155,70 @@ class FakeReaderCall : public grpc::ServerCallbackReader<Request> {
   FakeReads<Request> reads_;
 };
 
+// A call whose server alone speaks. Every write is read at once.
+template <typename Response>
+class FakeWriterCall : public grpc::ServerCallbackWriter<Response> {
+ public:
+  explicit FakeWriterCall(WorkerPool* pool) : state_(pool) {}
+
+  void Bind(grpc::ServerWriteReactor<Response>* reactor) {
+    reactor_ = reactor;
+    this->BindReactor(reactor);
+    state_.Bind(reactor);
+  }
+  void Cancel() { state_.Cancel(); }
+  // The next message of the server; empty when the call has ended, or after 30 s.
+  std::optional<Response> Receive() {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    MutexLock lock(mutex_);
+    while (responses_.empty() && !ended_) {
+      if (!changed_.WaitUntil(mutex_, deadline)) return std::nullopt;
+    }
+    if (responses_.empty()) return std::nullopt;
+    Response response = std::move(responses_.front());
+    responses_.pop_front();
+    return response;
+  }
+  bool HasUnread() const {
+    MutexLock lock(mutex_);
+    return !responses_.empty();
+  }
+  std::optional<grpc::Status> WaitUntilDone() { return state_.WaitUntilDone(); }
+
+  void Finish(grpc::Status status) override {
+    {
+      MutexLock lock(mutex_);
+      ended_ = true;
+      changed_.NotifyAll();
+    }
+    state_.Finish(std::move(status));  // last: the test may destroy this object afterwards
+  }
+  void SendInitialMetadata() override {}
+  void Write(const Response* message, grpc::WriteOptions) override {
+    state_.React([this, message] {
+      const bool ok = !state_.cancelled();
+      if (ok) {
+        MutexLock lock(mutex_);
+        responses_.push_back(*message);
+        changed_.NotifyAll();
+      }
+      reactor_->OnWriteDone(ok);
+    });
+  }
+  void WriteAndFinish(const Response*, grpc::WriteOptions, grpc::Status) override {}
+
+ private:
+  grpc::internal::ServerReactor* reactor() override { return nullptr; }
+  void CallOnDone() override {}
+
+  grpc::ServerWriteReactor<Response>* reactor_ = nullptr;  // constant after Bind
+  FakeCallState state_;
+  mutable Mutex mutex_;
+  ConditionVariable changed_;
+  std::deque<Response> responses_ ABSL_GUARDED_BY(mutex_);
+  bool ended_ ABSL_GUARDED_BY(mutex_) = false;
+};
+
 template <typename Request, typename Response>
 class FakeBidiCall : public grpc::ServerCallbackReaderWriter<Request, Response> {
  public:

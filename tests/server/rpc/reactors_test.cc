@@ -1,138 +1,23 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include <cstring>
 #include <future>
 #include <memory>
 #include <random>
 #include <string>
 #include <vector>
 
-#include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "proto/conversion/session_conversion.h"
-#include "server/rpc/deform_service.h"
-#include "server/rpc/mesh_service.h"
 #include "server/rpc/resource_conversion.h"
-#include "server/rpc/session_service.h"
-#include "server/store/in_memory_session_store.h"
-#include "tests/server/rpc/fake_calls.h"
-#include "tests/testing/fake_clock.h"
-#include "tests/testing/meshes.h"
-#include "tests/testing/session_samples.h"
+#include "tests/server/rpc/reactors_fixture.h"
 #include "tests/testing/status_matchers.h"
 
 // The services without sockets: reactions come from a pool of threads that ThreadSanitizer sees
 // through.
 namespace tissueform::testing {
 namespace {
-
-using FakeStream = FakeBidiCall<v1::DeformRequest, v1::DeformResponse>;
-
-v1::DeformRequest Configuration(const std::string& session) {
-  v1::DeformRequest request;
-  request.mutable_configuration()->set_session(session);
-  return request;
-}
-
-// The pose number `sequence`: its z shift tells which one was answered.
-v1::DeformRequest Pose(uint64_t sequence) {
-  v1::DeformRequest request;
-  request.mutable_pose()->set_sequence(sequence);
-  v1::HandlePose* pose = request.mutable_pose()->add_poses();
-  pose->set_handle("top");
-  pose->mutable_translation_mm()->set_z(static_cast<double>(sequence) / 64);
-  return request;
-}
-
-v1::DeformRequest Ack(uint64_t sequence) {
-  v1::DeformRequest request;
-  request.mutable_ack()->set_sequence(sequence);
-  return request;
-}
-
-v1::UploadMeshRequest HeaderOf(const MeshAnnouncement& announcement) {
-  v1::UploadMeshRequest request;
-  request.mutable_header()->set_vertex_count(announcement.shape.num_vertices);
-  request.mutable_header()->set_tet_count(announcement.shape.num_tets);
-  request.mutable_header()->add_cell_arrays("youngs_modulus_pa");
-  request.mutable_header()->set_total_bytes(announcement.total_bytes);
-  request.mutable_header()->set_sha256(announcement.sha256);
-  return request;
-}
-
-constexpr int kWorkers = 2;
-
-class ReactorsTest : public ::testing::Test {
- protected:
-  ~ReactorsTest() override {
-    reactions_.reset();
-    workers_.reset();
-  }
-
-  std::string MakeSession() {
-    v1::CreateSessionRequest request = SessionRequestOf(*Store(sample_, &catalog_));
-    v1::Session session;
-    FakeUnaryCall call(reactions_.get());
-    BindCreateSession(&call, request, &session);
-    EXPECT_TRUE(call.WaitUntilDone()->ok());
-    return session.name();
-  }
-
-  // Workers wait until the call is bound: what happens before that meets at a lock inside gRPC,
-  // which ThreadSanitizer does not see.
-  void BindCreateSession(FakeUnaryCall* call, const v1::CreateSessionRequest& request,
-                         v1::Session* session) {
-    std::promise<void> bound;
-    const std::shared_future<void> is_bound = bound.get_future().share();
-    for (int worker = 0; worker < kWorkers; ++worker) {
-      workers_->Post(Lane::kBatch, [is_bound] { is_bound.wait(); });
-    }
-    call->Bind(session_service_.CreateSession(nullptr, &request, session));
-    bound.set_value();
-  }
-
-  static v1::CreateSessionRequest SessionRequestOf(const StoredMesh& mesh) {
-    const ConstraintSet ends = BarEnds(mesh.mesh);
-    v1::CreateSessionRequest request;
-    request.set_mesh(absl::StrCat("meshes/", mesh.sha256));
-    request.mutable_stiffness()->set_uniform_pa(1000);
-    request.mutable_fixed_vertices()->Add(ends.fixed().begin(), ends.fixed().end());
-    v1::Handle* handle = request.add_handles();
-    handle->set_name("top");
-    const std::vector<int32_t>& top = ends.handles()[0].vertices;
-    handle->mutable_vertices()->Add(top.begin(), top.end());
-    return request;
-  }
-
-  // The z coordinate of the last vertex, which belongs to the handle, says which pose was answered.
-  void ExpectAnswers(const v1::DeformFrame& frame) const {
-    const std::string& bytes = frame.positions();
-    ASSERT_EQ(bytes.size(), sample_.mesh.num_vertices() * 12);
-    float z = 0;
-    std::memcpy(&z, bytes.data() + bytes.size() - sizeof(z), sizeof(z));
-    const double rest = sample_.mesh.positions()(sample_.mesh.num_vertices() - 1, 2);
-    EXPECT_NEAR(z, rest + static_cast<double>(frame.sequence()) / 64, 1e-5);
-  }
-
-  const SampleMesh sample_{Bar({2, 2, 3})};
-  ServiceLimits limits_;
-  ServiceGate gate_;
-  MemoryBudget budget_{64 << 20};
-  MeshCatalog catalog_{limits_, &budget_};
-  std::unique_ptr<WorkerPool> workers_ = std::make_unique<WorkerPool>(kWorkers);
-  InMemorySessionStore store_;
-  FakeClock clock_;
-  SessionRegistry registry_{limits_, &budget_, workers_.get(), &store_, &catalog_, &clock_};
-  DeformStreams streams_{limits_.max_streams};
-  DeadlineTimer timer_;
-  MeshService mesh_service_{&gate_, limits_, &catalog_, &registry_, workers_.get(), &timer_};
-  SessionService session_service_{&gate_, limits_, &catalog_, &registry_};
-  DeformService deform_service_{&gate_, limits_, &registry_, &streams_, &timer_};
-  std::unique_ptr<WorkerPool> reactions_ = std::make_unique<WorkerPool>(4);
-};
 
 TEST_F(ReactorsTest, AStreamAnswersAndEnds) {
   FakeStream stream(reactions_.get());
@@ -236,7 +121,7 @@ TEST_F(ReactorsTest, StreamsSurviveWhateverTheClientDoes) {
           registry_.Evict([] { return false; });
           break;
         case 1:
-          streams_.NotifyDraining();
+          streams_.NotifyDraining(std::chrono::system_clock::now());
           break;
         default:
           stream.Send(Pose(++last));
@@ -319,7 +204,7 @@ TEST_F(ReactorsTest, UploadsSurviveCancellationAtAnyChunk) {
 TEST_F(ReactorsTest, AStreamWithoutConfigurationIsGivenUpAndLeavesItsPlace) {
   ServiceLimits impatient = limits_;
   impatient.configuration_deadline = std::chrono::milliseconds(20);
-  DeformService service(&gate_, impatient, &registry_, &streams_, &timer_);
+  DeformService service(&gate_, impatient, &registry_, &streams_, &watches_, &timer_);
   FakeStream silent(reactions_.get());
   silent.Bind(service.Deform(nullptr));
   const auto status = silent.WaitUntilDone();
@@ -332,7 +217,7 @@ TEST_F(ReactorsTest, AStreamWithoutConfigurationIsGivenUpAndLeavesItsPlace) {
 TEST_F(ReactorsTest, AConfiguredStreamMayRest) {
   ServiceLimits impatient = limits_;
   impatient.configuration_deadline = std::chrono::milliseconds(200);
-  DeformService service(&gate_, impatient, &registry_, &streams_, &timer_);
+  DeformService service(&gate_, impatient, &registry_, &streams_, &watches_, &timer_);
   FakeStream stream(reactions_.get());
   stream.Bind(service.Deform(nullptr));
   stream.Send(Configuration(MakeSession()));

@@ -1,0 +1,340 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <chrono>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "grpcpp/impl/codegen/proto_utils.h"
+#include "gtest/gtest.h"
+
+#include "core/base/error_reason.h"
+#include "proto/conversion/geometry_conversion.h"
+#include "server/rpc/watch_stream.h"
+#include "tests/server/rpc/reactors_fixture.h"
+#include "tests/testing/status_matchers.h"
+
+// Watching without sockets.
+namespace tissueform::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+v1::WatchResponse Parse(const grpc::ByteBuffer& bytes) {
+  grpc::ByteBuffer copy = bytes;
+  v1::WatchResponse response;
+  EXPECT_TRUE(grpc::SerializationTraits<v1::WatchResponse>::Deserialize(&copy, &response).ok());
+  return response;
+}
+
+grpc::ByteBuffer Request(const std::string& session, std::optional<int> max_unacked = {}) {
+  v1::WatchRequest request;
+  request.set_session(session);
+  if (max_unacked.has_value()) request.set_max_unacked(*max_unacked);
+  const grpc::Slice slice(request.SerializeAsString());
+  return {&slice, 1};
+}
+
+// One Watch call and what it has said.
+class WatchCall {
+ public:
+  WatchCall(WorkerPool* reactions, DeformService* service, const std::string& session,
+            std::optional<int> max_unacked = {})
+      : request_(Request(session, max_unacked)), call_(reactions) {
+    call_.Bind(service->Watch(nullptr, &request_));
+  }
+
+  // Empty when the watch has ended.
+  std::optional<v1::WatchResponse> Receive() {
+    std::optional<grpc::ByteBuffer> bytes = call_.Receive();
+    if (!bytes.has_value()) return std::nullopt;
+    last_ = *bytes;
+    return Parse(last_);
+  }
+  // Where the last message lies.
+  std::uintptr_t LastBytes() const {
+    grpc::Slice slice;
+    EXPECT_TRUE(last_.TrySingleSlice(&slice).ok());
+    return reinterpret_cast<std::uintptr_t>(slice.begin());
+  }
+  // The name without its collection. Reads `started` and the first frame.
+  std::string Begin(v1::WatchOrigin origin) {
+    const auto started = Receive();
+    EXPECT_TRUE(started.has_value() && started->has_started());
+    if (!started.has_value()) return "";
+    const auto frame = Receive();
+    EXPECT_TRUE(frame.has_value() && frame->frame().origin() == origin);
+    first_ = frame.value_or(v1::WatchResponse()).frame();
+    const auto id = ParseWatchName(started->started().watch());
+    EXPECT_THAT(id, IsOk());
+    return id.value_or("");
+  }
+  const v1::WatchFrame& first() const { return first_; }
+  bool HasUnread() const { return call_.HasUnread(); }
+  void Cancel() { call_.Cancel(); }
+  std::optional<grpc::Status> WaitUntilDone() { return call_.WaitUntilDone(); }
+
+ private:
+  const grpc::ByteBuffer request_;
+  FakeWriterCall<grpc::ByteBuffer> call_;
+  grpc::ByteBuffer last_;
+  v1::WatchFrame first_;
+};
+
+class WatchTest : public ReactorsTest {
+ protected:
+  WatchTest() {
+    registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
+      watches_.OnSessionEvent(id, event);
+    });
+  }
+
+  std::unique_ptr<WatchCall> Watch(const std::string& session,
+                                   std::optional<int> max_unacked = {}) {
+    return std::make_unique<WatchCall>(reactions_.get(), &deform_service_, session, max_unacked);
+  }
+  std::unique_ptr<FakeStream> Drag(const std::string& session) {
+    auto stream = std::make_unique<FakeStream>(reactions_.get());
+    stream->Bind(deform_service_.Deform(nullptr));
+    stream->Send(Configuration(session));
+    EXPECT_TRUE(stream->Receive()->has_started());
+    return stream;
+  }
+  // Sends a pose and returns what the drag is shown.
+  static v1::DeformFrame Move(FakeStream* stream, uint64_t sequence) {
+    stream->Send(Pose(sequence));
+    const auto response = stream->Receive();
+    EXPECT_TRUE(response.has_value() && response->has_frame());
+    stream->Send(Ack(sequence));
+    return response.value_or(v1::DeformResponse()).frame();
+  }
+  static void EndDrag(std::unique_ptr<FakeStream> stream) {
+    stream->CloseSending();
+    EXPECT_FALSE(stream->Receive().has_value());
+    EXPECT_TRUE(stream->WaitUntilDone()->ok());
+  }
+};
+
+TEST_F(WatchTest, EveryFrameOfADragIsSeenAsItWasSentByTwoWhoShareIt) {
+  const std::string session = MakeSession();
+  auto one = Watch(session);
+  auto other = Watch(session);
+  const std::string id = one->Begin(v1::WATCH_ORIGIN_REST);
+  const std::string other_id = other->Begin(v1::WATCH_ORIGIN_REST);
+  auto drag = Drag(session);
+  for (uint64_t sequence = 1; sequence <= 20; ++sequence) {
+    const v1::DeformFrame sent = Move(drag.get(), sequence);
+    if (sequence == 1) {
+      EXPECT_EQ(one->Receive()->form().vertex_count(), sample_.mesh.num_vertices());
+      EXPECT_TRUE(other->Receive()->has_form());
+    }
+    const auto seen = one->Receive();
+    ASSERT_TRUE(seen.has_value() && seen->has_frame());
+    EXPECT_EQ(seen->frame().origin(), v1::WATCH_ORIGIN_DRAG);
+    EXPECT_EQ(seen->frame().frame().SerializeAsString(), sent.SerializeAsString());
+    ASSERT_TRUE(other->Receive().has_value());
+    EXPECT_EQ(one->LastBytes(), other->LastBytes()) << "encoded once";
+    EXPECT_THAT(watches_.Acknowledge(id, seen->frame().number()), IsOk());
+    EXPECT_THAT(watches_.Acknowledge(other_id, seen->frame().number()), IsOk());
+  }
+  EndDrag(std::move(drag));
+  one->Cancel();
+  other->Cancel();
+  EXPECT_EQ(one->WaitUntilDone()->error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_EQ(other->WaitUntilDone()->error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_EQ(watches_.size(), 0);
+}
+
+TEST_F(WatchTest, WithoutADragTheFirstFrameIsTheSkinAtRestOrAsItWasCommitted) {
+  const std::string session = MakeSession();
+  auto at_rest = Watch(session);
+  at_rest->Begin(v1::WATCH_ORIGIN_REST);
+  const std::vector<int32_t> skin = catalog_.Find(sample_.Announcement().sha256)->skin;
+  const VertexChoice choice{.all = false, .vertices = skin};
+  const Positions& rest = sample_.mesh.positions();
+  EXPECT_EQ(at_rest->first().frame().positions(),
+            EncodePositions(rest, choice, v1::POSITION_ENCODING_FLOAT32, rest).bytes);
+  at_rest->Cancel();
+  at_rest->WaitUntilDone();
+
+  auto drag = Drag(session);
+  v1::DeformRequest pose = Pose(64);
+  pose.mutable_pose()->set_commit(true);
+  drag->Send(pose);
+  drag->CloseSending();
+  while (drag->Receive().has_value()) {
+  }
+  EXPECT_TRUE(drag->WaitUntilDone()->ok());
+  auto committed = Watch(session);
+  committed->Begin(v1::WATCH_ORIGIN_COMMITTED);
+  const std::string& bytes = committed->first().frame().positions();
+  ASSERT_EQ(bytes.size(), skin.size() * 12);
+  float z = 0;
+  std::memcpy(&z, bytes.data() + bytes.size() - sizeof(z), sizeof(z));
+  EXPECT_NEAR(z, rest(skin.back(), 2) + 1, 1e-5);
+  committed->Cancel();
+  EXPECT_TRUE(committed->WaitUntilDone().has_value());
+}
+
+TEST_F(WatchTest, WhoComesLateIsShownTheNewestFrame) {
+  const std::string session = MakeSession();
+  auto drag = Drag(session);
+  v1::DeformFrame sent;
+  for (uint64_t sequence = 1; sequence <= 3; ++sequence) sent = Move(drag.get(), sequence);
+  auto watch = Watch(session);
+  watch->Begin(v1::WATCH_ORIGIN_DRAG);
+  EXPECT_EQ(watch->first().frame().SerializeAsString(), sent.SerializeAsString());
+  watch->Cancel();
+  EXPECT_TRUE(watch->WaitUntilDone().has_value());
+  EndDrag(std::move(drag));
+}
+
+TEST_F(WatchTest, ASlowWatchIsSentTheNewestFrameOnlyAndSlowsNobody) {
+  const std::string session = MakeSession();
+  auto slow = Watch(session, 1);
+  const std::string id = slow->Begin(v1::WATCH_ORIGIN_REST);
+  auto quick = Watch(session);
+  const std::string quick_id = quick->Begin(v1::WATCH_ORIGIN_REST);
+  auto drag = Drag(session);
+  constexpr uint64_t kLast = 50;
+  for (uint64_t sequence = 1; sequence <= kLast; ++sequence) {
+    const v1::DeformFrame sent = Move(drag.get(), sequence);
+    if (sequence == 1) {
+      EXPECT_TRUE(quick->Receive()->has_form());
+    }
+    const auto seen = quick->Receive();
+    ASSERT_TRUE(seen.has_value());
+    EXPECT_EQ(seen->frame().frame().sequence(), sequence);
+    EXPECT_THAT(watches_.Acknowledge(quick_id, seen->frame().number()), IsOk());
+  }
+  EXPECT_FALSE(slow->HasUnread()) << "its one credit is used";
+  EXPECT_THAT(watches_.Acknowledge(id, slow->first().number()), IsOk());
+  EXPECT_TRUE(slow->Receive()->has_form());
+  EXPECT_EQ(slow->Receive()->frame().frame().sequence(), kLast);
+  EXPECT_THAT(
+      watches_.Acknowledge(id, 1'000'000),
+      StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("the last one that was sent")));
+  EndDrag(std::move(drag));
+  slow->Cancel();
+  quick->Cancel();
+  slow->WaitUntilDone();
+  quick->WaitUntilDone();
+  const absl::Status gone = watches_.Acknowledge(id, 1);
+  EXPECT_TRUE(absl::IsNotFound(gone));
+  EXPECT_TRUE(HasReason(gone, ErrorReason::kWatchNotFound));
+}
+
+TEST_F(WatchTest, AWatchIsToldThatItsSessionLeavesMemoryComesBackAndIsDeleted) {
+  const std::string session = MakeSession();
+  auto watch = Watch(session);
+  watch->Begin(v1::WATCH_ORIGIN_REST);
+  clock_.Advance(2 * SessionRegistry::kInUse);
+  EXPECT_EQ(registry_.Evict([] { return false; }), 1) << "watching is no use";
+  EXPECT_TRUE(watch->Receive()->notice().has_evicted());
+  EndDrag(Drag(session));
+  EXPECT_TRUE(watch->Receive()->notice().has_restored());
+  registry_.Delete(session.substr(session.find('/') + 1),
+                   [](const absl::Status& status) { EXPECT_THAT(status, IsOk()); });
+  EXPECT_FALSE(watch->Receive().has_value());
+  EXPECT_EQ(watch->WaitUntilDone()->error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(watches_.size(), 0);
+}
+
+TEST_F(WatchTest, InADrainAWatchEndsWithTheLastDrag) {
+  const std::string session = MakeSession();
+  auto watch = Watch(session);
+  watch->Begin(v1::WATCH_ORIGIN_REST);
+  auto drag = Drag(session);
+  const auto end = std::chrono::system_clock::time_point(std::chrono::seconds(1'800'000'000));
+  watches_.NotifyDraining(end);
+  EXPECT_EQ(watch->Receive()->notice().draining().end_time().seconds(), 1'800'000'000);
+  Move(drag.get(), 1);
+  EXPECT_TRUE(watch->Receive()->has_form());
+  EXPECT_EQ(watch->Receive()->frame().frame().sequence(), 1);
+  EndDrag(std::move(drag));
+  EXPECT_FALSE(watch->Receive().has_value());
+  EXPECT_EQ(watch->WaitUntilDone()->error_code(), grpc::StatusCode::UNAVAILABLE);
+}
+
+TEST_F(WatchTest, WhatCannotBeWatchedIsRefused) {
+  const auto refused = [this](const std::string& session, std::optional<int> max_unacked,
+                              grpc::StatusCode code, const char* text) {
+    SCOPED_TRACE(text);
+    auto watch = Watch(session, max_unacked);
+    const auto status = watch->WaitUntilDone();
+    ASSERT_TRUE(status.has_value());
+    EXPECT_EQ(status->error_code(), code);
+    EXPECT_THAT(status->error_message(), HasSubstr(text));
+  };
+  const std::string session = MakeSession();
+  using Code = grpc::StatusCode;
+  refused("meshes/1", {}, Code::INVALID_ARGUMENT, "sessions/");
+  refused("sessions/none-of-that-name", {}, Code::NOT_FOUND, "none-of-that-name");
+  refused(session, 0, Code::INVALID_ARGUMENT, "max_unacked");
+  refused(session, limits_.max_unacked + 1, Code::INVALID_ARGUMENT, "max_unacked");
+  std::vector<std::unique_ptr<WatchCall>> all;
+  for (int i = 0; i < limits_.max_watches_per_session; ++i) {
+    all.push_back(Watch(session));
+    all.back()->Begin(v1::WATCH_ORIGIN_REST);
+  }
+  refused(session, {}, Code::RESOURCE_EXHAUSTED, "--max-watches-per-session");
+  for (const auto& watch : all) {
+    watch->Cancel();
+    watch->WaitUntilDone();
+  }
+  auto again = Watch(session);
+  again->Begin(v1::WATCH_ORIGIN_REST);
+  gate_.StartDraining();
+  refused(session, {}, Code::UNAVAILABLE, "draining");
+  again->Cancel();
+  again->WaitUntilDone();
+}
+
+TEST_F(WatchTest, WatchesSurviveWhateverHappens) {
+  for (uint32_t seed = 1; seed <= 40; ++seed) {
+    SCOPED_TRACE(seed);
+    const std::string session = MakeSession();
+    std::mt19937 random(seed);
+    auto drag = Drag(session);
+    std::vector<std::unique_ptr<WatchCall>> watches;
+    for (uint64_t sequence = 1; sequence <= 30; ++sequence) {
+      switch (random() % 8) {
+        case 0:
+          watches.push_back(Watch(session, 1 + static_cast<int>(random() % 3)));
+          break;
+        case 1:
+          if (!watches.empty()) watches[random() % watches.size()]->Cancel();
+          break;
+        case 2:
+          clock_.Advance(2 * SessionRegistry::kInUse);
+          registry_.Evict([] { return false; });
+          break;
+        default:
+          drag->Send(Pose(sequence));
+          drag->Send(Ack(sequence - 1));
+      }
+    }
+    drag->Cancel();
+    drag->WaitUntilDone();
+    registry_.Delete(session.substr(session.find('/') + 1), [](const absl::Status& /*status*/) {});
+    for (const auto& watch : watches) {
+      uint64_t last = 0;
+      while (const auto response = watch->Receive()) {
+        if (!response->has_frame()) continue;
+        EXPECT_GT(response->frame().number(), last);
+        last = response->frame().number();
+      }
+      EXPECT_TRUE(watch->WaitUntilDone().has_value()) << "the watch does not end";
+    }
+    EXPECT_EQ(watches_.size(), 0);
+  }
+}
+
+}  // namespace
+}  // namespace tissueform::testing
