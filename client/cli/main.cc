@@ -16,7 +16,11 @@
 int main(int argc, char** argv) {
   const std::vector<std::string> words(argv + 1, argv + argc);
   return tissueform::RunCommandLine(argc, argv, [&](CLI::App& app, tissueform::CommandWork* work) {
-    tissueform::AddMeshCommand(app, work);
+    CLI::App* mesh = tissueform::AddMeshCommand(app, work);
+    for (const auto& command : {tissueform::kMeshUploadCommand, tissueform::kMeshListCommand,
+                                tissueform::kMeshDeleteCommand}) {
+      tissueform::AddCompanionCommand(*mesh, command, words, work);
+    }
     CLI::App* plan = tissueform::AddPlanCommand(app, work);
     tissueform::AddPlanBuildCommand(*plan, work);
     tissueform::AddDeformCommand(app, work);

@@ -8,6 +8,7 @@
 #include "client/cli/online/drag_command.h"
 #include "client/cli/online/run_command.h"
 #include "client/cli/online/server_info_command.h"
+#include "client/cli/online/server_mesh_command.h"
 #include "client/cli/online/session_command.h"
 #include "client/cli/online/watch_command.h"
 #include "client/cli/shared/command_line.h"
@@ -18,6 +19,7 @@ int main(int argc, char** argv) {
     tissueform::AddLoadCommand(app, work);
     tissueform::AddDragCommand(app, work);
     tissueform::AddSessionCommand(app, work);
+    tissueform::AddServerMeshCommand(app, work);
     tissueform::AddWatchCommand(app, work);
     tissueform::AddServerInfoCommand(app, work);
     tissueform::AddDemoCommand(app, work);

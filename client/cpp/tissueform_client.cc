@@ -144,6 +144,20 @@ absl::StatusOr<v1::Mesh> TissueformClient::SendMesh(const MeshPayloadView& paylo
   return std::move(*response.mutable_mesh());
 }
 
+absl::StatusOr<std::vector<v1::Mesh>> TissueformClient::ListMeshes() {
+  std::vector<v1::Mesh> meshes;
+  v1::ListMeshesRequest request;
+  do {
+    grpc::ClientContext context;
+    SetDeadline(&context);
+    v1::ListMeshesResponse response;
+    TF_RETURN_IF_ERROR(FromGrpcStatus(meshes_->ListMeshes(&context, request, &response)));
+    meshes.insert(meshes.end(), response.meshes().begin(), response.meshes().end());
+    request.set_page_token(response.next_page_token());
+  } while (!request.page_token().empty());
+  return meshes;
+}
+
 absl::Status TissueformClient::DeleteMesh(const std::string& name) {
   grpc::ClientContext context;
   SetDeadline(&context);

@@ -56,6 +56,8 @@ class TissueformClient {
   // Errors: InvalidArgument also when an array has not one value per tet.
   absl::StatusOr<v1::Mesh> UploadMesh(const TetMesh& mesh,
                                       const std::vector<CellArray>& cell_arrays);
+  // All of them, page after page.
+  absl::StatusOr<std::vector<v1::Mesh>> ListMeshes();
   absl::Status DeleteMesh(const std::string& name);
 
   absl::StatusOr<v1::Session> CreateSession(const SessionRequest& request);

@@ -123,6 +123,33 @@ TEST_F(ServedCommandTest, RunWithoutServerFailsAndWritesNothing) {
   EXPECT_FALSE(fs::exists(PathOf("run.vtu")));
 }
 
+TEST_F(ServedCommandTest, MeshesAreUploadedListedAndDeleted) {
+  ASSERT_OK_AND_ASSIGN(
+      const std::unique_ptr<ServerProcess> server,
+      ServerProcess::Start(ProgramPath("tissueform-server"),
+                           {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
+  const auto mesh = [&](const std::string& words, const std::string& out) {
+    return ExitCodeOf(ProgramPath("tissueform") + " mesh " + words + " --server " +
+                      server->address() + " > " + PathOf(out) + " 2>&1");
+  };
+  ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(kTonguePlan));
+  ASSERT_OK_AND_ASSIGN(const PlanProblem problem, ResolvePlan(plan));
+  TetMeshFile file{.mesh = *problem.mesh, .point_data = {}, .cell_data = {}};
+  file.cell_data.push_back(
+      {"density", 1, std::vector<double>(static_cast<size_t>(file.mesh.num_tets()), 2.0)});
+  ASSERT_THAT(WriteTetMesh(PathOf("mesh.vtu"), file), IsOk());
+  ASSERT_EQ(mesh("upload " + PathOf("mesh.vtu"), "upload"), 0) << Read("upload");
+  EXPECT_THAT(Read("upload"), HasSubstr("density"));
+  ASSERT_EQ(mesh("list", "list"), 0);
+  EXPECT_THAT(Read("list"), HasSubstr("1 meshes"));
+  const std::string said = Read("list");
+  const std::string name = said.substr(said.find("meshes/"), 71);
+  EXPECT_EQ(mesh("delete " + name, "delete"), 0) << Read("delete");
+  EXPECT_EQ(mesh("delete " + name, "again"), 1);
+  EXPECT_THAT(Read("again"), HasSubstr("does not have this mesh"));
+  EXPECT_NE(mesh("upload " + PathOf("none.vtu"), "none"), 0);
+}
+
 TEST_F(ServedCommandTest, WatchTellsOfASessionThatNobodyDrags) {
   ASSERT_OK_AND_ASSIGN(
       const std::unique_ptr<ServerProcess> server,

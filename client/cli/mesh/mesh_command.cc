@@ -55,12 +55,13 @@ absl::Status RunMeshCheck(const MeshCheckOptions& options) {
 
 }  // namespace
 
-void AddMeshCommand(CLI::App& app, CommandWork* work) {
+CLI::App* AddMeshCommand(CLI::App& app, CommandWork* work) {
   CLI::App* mesh = app.add_subcommand("mesh", "work on meshes");
   mesh->footer(
       "Examples:\n"
       "  tissueform mesh check face.vtu\n"
-      "  tissueform mesh generate face.stl --out face.vtu");
+      "  tissueform mesh generate face.stl --out face.vtu\n"
+      "  tissueform mesh list --server localhost:50051");
 
   auto options = std::make_shared<MeshCheckOptions>();
   CLI::App* check = mesh->add_subcommand("check", "validate a mesh of tets or a surface");
@@ -78,6 +79,7 @@ void AddMeshCommand(CLI::App& app, CommandWork* work) {
       "Exit code 0: usable, perhaps with warnings. 1: not usable or not readable.");
   check->callback([options, work] { *work = [options] { return RunMeshCheck(*options); }; });
   AddMeshGenerateCommand(*mesh, work);
+  return mesh;
 }
 
 }  // namespace tissueform

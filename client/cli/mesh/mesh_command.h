@@ -9,6 +9,7 @@ namespace tissueform {
 
 // `mesh check MESH [--json]`: validation and quality report; fails when a deformer could not use
 // the mesh. `mesh generate`: see mesh_generate_command.h.
-void AddMeshCommand(CLI::App& app, CommandWork* work);
+// Returns `mesh`, for what others add to it.
+CLI::App* AddMeshCommand(CLI::App& app, CommandWork* work);
 
 }  // namespace tissueform

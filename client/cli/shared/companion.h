@@ -31,6 +31,13 @@ inline constexpr CompanionCommand kDragCommand = {
     "tissueform-online"};
 inline constexpr CompanionCommand kSessionCommand = {
     "session", "list, show and delete the sessions of a server", "tissueform-online"};
+// Of `mesh`.
+inline constexpr CompanionCommand kMeshUploadCommand = {
+    "upload", "give a mesh of tets to a server, which tells its name", "tissueform-online"};
+inline constexpr CompanionCommand kMeshListCommand = {"list", "the meshes that a server has",
+                                                      "tissueform-online"};
+inline constexpr CompanionCommand kMeshDeleteCommand = {
+    "delete", "delete a mesh of a server from which no session is made", "tissueform-online"};
 inline constexpr CompanionCommand kWatchCommand = {
     "watch", "follow a session that somebody drags, a line a second", "tissueform-online"};
 inline constexpr CompanionCommand kServerInfoCommand = {

@@ -1,0 +1,15 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "CLI/CLI.hpp"
+
+#include "client/cli/shared/command_line.h"
+
+namespace tissueform {
+
+// `tissueform mesh upload|list|delete`: the meshes of a server.
+void AddServerMeshCommand(CLI::App& app, CommandWork* work);
+
+}  // namespace tissueform
