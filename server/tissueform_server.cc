@@ -132,6 +132,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr
       mesh_service_(&gate_, options.limits, &catalog_, &registry_, pool_.get(), &timer_),
       session_service_(&gate_, options.limits, &catalog_, &registry_),
       deform_service_(&gate_, options.limits, &registry_, &streams_, &watches_, &timer_),
+      prediction_service_(&gate_, options.limits, &registry_, &stores_->predictions(), &timer_),
       server_info_service_(&gate_, LimitsOf(options)) {
   SetBlasThreads(1);  // the pool's workers share the cores already
   registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
@@ -164,6 +165,7 @@ absl::Status TissueformServer::Listen() {
   builder.RegisterService(&mesh_service_);
   builder.RegisterService(&session_service_);
   builder.RegisterService(&deform_service_);
+  builder.RegisterService(&prediction_service_);
   builder.RegisterService(&server_info_service_);
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) return absl::InternalError("gRPC does not start");

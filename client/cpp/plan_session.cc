@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "core/mesh_payload/mesh_payload.h"
+#include "proto/conversion/mesh_conversion.h"
 
 namespace tissueform {
 namespace {
@@ -18,6 +20,12 @@ constexpr char kStiffnessArray[] = "youngs_modulus_pa";
 
 absl::StatusOr<v1::Mesh> UploadMeshOf(TissueformClient* client, const PlanProblem& problem) {
   return client->UploadMesh(*problem.mesh, {{kStiffnessArray, problem.stiffness}});
+}
+
+std::string MeshNameOf(const PlanProblem& problem) {
+  return MeshName(ViewMeshPayload(problem.mesh->positions(), problem.mesh->tets(),
+                                  {{kStiffnessArray, problem.stiffness}})
+                      .Sha256());
 }
 
 SessionRequest SessionRequestOf(const PlanProblem& problem, const std::string& mesh) {

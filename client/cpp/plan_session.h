@@ -42,6 +42,8 @@ class PlanSession {
 
 // What PlanSession::Create does, step by step: for those who want more than one session of a plan.
 absl::StatusOr<v1::Mesh> UploadMeshOf(TissueformClient* client, const PlanProblem& problem);
+// The name of the mesh that UploadMeshOf uploads, without a server.
+std::string MeshNameOf(const PlanProblem& problem);
 SessionRequest SessionRequestOf(const PlanProblem& problem, const std::string& mesh);
 
 // The poses of the plan with the names of their handles.

@@ -14,6 +14,7 @@
 #include "grpcpp/channel.h"
 
 #include "client/cpp/deform_stream.h"
+#include "client/cpp/prediction_calls.h"
 #include "client/cpp/watch_stream.h"
 #include "core/mesh/tet_mesh.h"
 #include "core/mesh_payload/mesh_payload.h"
@@ -81,6 +82,9 @@ class TissueformClient {
   absl::StatusOr<std::unique_ptr<WatchStream>> Watch(const std::string& session,
                                                      const WatchStream::Options& options);
 
+  // Answers that the server keeps.
+  PredictionCalls& predictions() { return predictions_; }
+
  private:
   TissueformClient(const std::shared_ptr<grpc::Channel>& channel, const Options& options);
 
@@ -92,6 +96,7 @@ class TissueformClient {
   const std::unique_ptr<v1::SessionService::Stub> sessions_;
   const std::unique_ptr<v1::DeformService::Stub> deform_;
   const std::unique_ptr<v1::ServerInfoService::Stub> server_info_;
+  PredictionCalls predictions_;
 };
 
 }  // namespace tissueform

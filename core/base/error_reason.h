@@ -40,6 +40,7 @@ enum class ErrorReason {
   kSessionUpdated,
   kMeshInUse,
   kPredictionNotFound,
+  kNotComparable,
   kUploadNotFound,
   kDiskFull,
   // Of a code, where nothing more was said.

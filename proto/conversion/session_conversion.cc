@@ -134,12 +134,16 @@ absl::StatusOr<SessionRequest> ToSessionRequest(const v1::CreateSessionRequest& 
 std::string RequestFingerprint(const v1::CreateSessionRequest& request) {
   v1::CreateSessionRequest without_id = request;
   without_id.clear_request_id();
+  return MessageFingerprint(without_id);
+}
+
+std::string MessageFingerprint(const google::protobuf::MessageLite& message) {
   std::string bytes;
   {
     google::protobuf::io::StringOutputStream stream(&bytes);
     google::protobuf::io::CodedOutputStream output(&stream);
     output.SetSerializationDeterministic(true);
-    without_id.SerializeToCodedStream(&output);
+    message.SerializeToCodedStream(&output);
   }
   return Sha256Hex({bytes});
 }

@@ -56,4 +56,7 @@ absl::StatusOr<SessionRequest> ToSessionRequest(const v1::CreateSessionRequest& 
 // Equal for equal requests, the request_id apart.
 std::string RequestFingerprint(const v1::CreateSessionRequest& request);
 
+// SHA-256 of a message, in 64 hexadecimal digits; equal for equal messages.
+std::string MessageFingerprint(const google::protobuf::MessageLite& message);
+
 }  // namespace tissueform

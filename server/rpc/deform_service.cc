@@ -5,69 +5,18 @@
 
 #include <atomic>
 #include <memory>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "core/base/status_macros.h"
 #include "core/deformation/deformation_quality.h"
 #include "proto/conversion/answer_conversion.h"
 #include "proto/conversion/geometry_conversion.h"
-#include "proto/conversion/model_conversion.h"
-#include "proto/conversion/session_conversion.h"
 #include "server/rpc/deform_stream.h"
+#include "server/rpc/single_answer.h"
 #include "server/rpc/watch_stream.h"
 
 namespace tissueform {
 namespace {
-
-// A DeformOnceRequest that has been checked.
-struct DeformOnceJob {
-  std::shared_ptr<Session> session;
-  DeformationModel model = DeformationModel::kGradientField;
-  std::vector<HandlePose> poses;
-  VertexChoice choice;
-  v1::PositionEncoding encoding = v1::POSITION_ENCODING_FLOAT32;
-};
-
-absl::StatusOr<DeformOnceJob> ReadRequest(const v1::DeformOnceRequest& request,
-                                          std::shared_ptr<Session> session) {
-  DeformOnceJob job;
-  TF_RETURN_IF_ERROR(CheckEncoding(request.encoding()));
-  job.encoding = request.encoding();
-  job.session = std::move(session);
-  TF_ASSIGN_OR_RETURN(job.model, ToModel(request.model(), job.session->model()));
-  TF_ASSIGN_OR_RETURN(job.poses, ToPoses(request.poses(), job.session->constraints()));
-  TF_ASSIGN_OR_RETURN(job.choice,
-                      ToVertexChoice(request.vertices(), job.session->mesh().mesh.num_vertices(),
-                                     job.session->mesh().skin));
-  return job;
-}
-
-absl::Status ClientHasCancelled() {
-  return absl::CancelledError("the client has cancelled the call");
-}
-
-// On the session's strand.
-absl::Status Run(const DeformOnceJob& job, const Cancellation& cancellation,
-                 v1::DeformOnceResponse* response) {
-  if (cancellation.requested()) return ClientHasCancelled();
-  DeformControl control;
-  control.on_progress = [&cancellation](const Deformation& /*so_far*/) {
-    return !cancellation.requested();
-  };
-  TF_ASSIGN_OR_RETURN(const Deformation deformation,
-                      job.session->Deform(job.model, job.poses, control));
-  if (deformation.summary.cancelled) return ClientHasCancelled();
-  *response->mutable_summary() = ToProto(deformation.summary);
-  *response->mutable_quality() =
-      ToProto(MeasureDeformation(job.session->mesh().mesh, deformation.positions));
-  EncodedPositions encoded = EncodePositions(deformation.positions, job.choice, job.encoding,
-                                             job.session->mesh().mesh.positions());
-  *response->mutable_positions() = std::move(encoded.bytes);
-  response->set_step_mm(encoded.step_mm);
-  return absl::OkStatus();
-}
 
 // One DeformOnce call. Deletes itself when gRPC is done with it.
 class DeformOnceCall : public grpc::ServerUnaryReactor {
@@ -77,18 +26,19 @@ class DeformOnceCall : public grpc::ServerUnaryReactor {
       : scope_(std::move(scope)), registry_(registry), request_(*request), response_(*response) {}
 
   void Start() {
-    const absl::StatusOr<std::string> id = scope_.admission().ok()
-                                               ? ParseSessionName(request_.session())
-                                               : absl::StatusOr<std::string>(scope_.admission());
-    if (!id.ok()) {
-      End(id.status());
+    absl::Status status = scope_.admission();
+    if (status.ok()) status = CheckEncoding(request_.encoding());
+    if (!status.ok()) {
+      End(status);
       return;
     }
-    registry_->Open(*id, cancelled_, [this](absl::StatusOr<std::shared_ptr<Session>> session) {
-      const absl::Status status =
-          session.ok() ? TakeSession(*std::move(session)) : session.status();
-      if (!status.ok()) End(status);
-    });
+    FindSingleAnswer(
+        registry_, {request_.session(), request_.poses(), request_.model()}, cancelled_,
+        [this](const Session& session) { return ChooseVertices(session); },
+        [this](const absl::StatusOr<SingleAnswer>& answer) {
+          if (answer.ok()) Describe(*answer);
+          End(answer.status());
+        });
   }
 
   void OnCancel() override {
@@ -99,28 +49,22 @@ class DeformOnceCall : public grpc::ServerUnaryReactor {
   void OnDone() override { delete this; }
 
  private:
-  absl::Status TakeSession(std::shared_ptr<Session> session) {
-    TF_ASSIGN_OR_RETURN(job_, ReadRequest(request_, std::move(session)));
-    if (job_.session->HasModel(job_.model)) {
-      Solve();
-    } else {
-      job_.session->making_strand().Post(Lane::kBatch, [this] { MakeModel(); });
-    }
+  absl::Status ChooseVertices(const Session& session) {
+    TF_ASSIGN_OR_RETURN(choice_,
+                        ToVertexChoice(request_.vertices(), session.mesh().mesh.num_vertices(),
+                                       session.mesh().skin));
     return absl::OkStatus();
   }
 
-  void MakeModel() {
-    const absl::Status made = job_.session->PrepareModel(job_.model, cancellation_);
-    if (made.ok()) {
-      Solve();
-    } else {
-      End(made);
-    }
-  }
-
-  void Solve() {
-    job_.session->strand().Post(job_.session->LaneOf(job_.model),
-                                [this] { End(Run(job_, cancellation_, &response_)); });
+  // On the session's strand.
+  void Describe(const SingleAnswer& answer) {
+    const TetMesh& mesh = answer.session->mesh().mesh;
+    *response_.mutable_summary() = ToProto(answer.deformation.summary);
+    *response_.mutable_quality() = ToProto(MeasureDeformation(mesh, answer.deformation.positions));
+    EncodedPositions encoded = EncodePositions(answer.deformation.positions, choice_,
+                                               request_.encoding(), mesh.positions());
+    *response_.mutable_positions() = std::move(encoded.bytes);
+    response_.set_step_mm(encoded.step_mm);
   }
 
   void End(const absl::Status& outcome) { Finish(scope_.End(outcome)); }
@@ -130,8 +74,7 @@ class DeformOnceCall : public grpc::ServerUnaryReactor {
   const v1::DeformOnceRequest& request_;
   v1::DeformOnceResponse& response_;
   const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
-  const Cancellation cancellation_{[flag = cancelled_] { return flag->load(); }};
-  DeformOnceJob job_;
+  VertexChoice choice_;
 };
 
 }  // namespace

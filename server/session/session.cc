@@ -53,6 +53,7 @@ Session::Session(const SessionRecord& record, std::shared_ptr<const StoredMesh> 
       id_(record.id),
       mesh_(std::move(mesh)),
       constraints_(std::move(constraints)),
+      stiffness_(record.stiffness),
       options_(OptionsOf(record)),
       strand_(pool),
       making_strand_(making_strand),

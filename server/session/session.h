@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -81,6 +82,8 @@ class Session {
   const std::shared_ptr<const StoredMesh>& shared_mesh() const { return mesh_; }
   const ConstraintSet& constraints() const { return constraints_; }
   DeformationModel model() const { return options_.model; }
+  // Pa for every tet, or the name of a cell array of the mesh.
+  const std::variant<double, std::string>& stiffness() const { return stiffness_; }
   double poisson_ratio() const { return options_.preparation.poisson_ratio; }
   const GradientFieldOptions& gradient_field() const { return options_.gradient_field; }
   const PreparationSummary& preparation() const { return summary_; }  // of its own model
@@ -169,6 +172,7 @@ class Session {
   const std::string id_;
   const std::shared_ptr<const StoredMesh> mesh_;
   const ConstraintSet constraints_;
+  const std::variant<double, std::string> stiffness_;
   DeformerOptions options_;
   PreparationSummary summary_;
 

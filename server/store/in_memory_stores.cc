@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 
 #include "core/base/status_macros.h"
@@ -116,8 +117,16 @@ absl::Status InMemoryPredictionStore::Create(const PredictionRecord& record,
                                              const std::string& positions) {
   TF_RETURN_IF_ERROR(CheckPrediction(record, positions));
   MutexLock lock(mutex_);
-  const bool is_new = predictions_.try_emplace(record.id, Prediction{record, positions}).second;
-  return is_new ? absl::OkStatus() : PredictionExists(record.id);
+  if (predictions_.contains(record.id)) return PredictionExists(record.id);
+  Prediction prediction{record, positions};
+  if (bytes_ + prediction.Bytes() > most_bytes_) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "predictions of a server that keeps them in memory may take ", most_bytes_ >> 20,
+        " MiB together, and that is full; delete some, or run it with --data-dir"));
+  }
+  bytes_ += prediction.Bytes();
+  predictions_.emplace(record.id, std::move(prediction));
+  return absl::OkStatus();
 }
 
 absl::StatusOr<PredictionRecord> InMemoryPredictionStore::Get(const std::string& id) {
@@ -153,7 +162,11 @@ absl::StatusOr<PredictionStore::Page> InMemoryPredictionStore::List(const ListRe
 
 absl::Status InMemoryPredictionStore::Delete(const std::string& id) {
   MutexLock lock(mutex_);
-  return predictions_.erase(id) > 0 ? absl::OkStatus() : NoPrediction(id);
+  const auto found = predictions_.find(id);
+  if (found == predictions_.end()) return NoPrediction(id);
+  bytes_ -= found->second.Bytes();
+  predictions_.erase(found);
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::unique_ptr<Stores>> OpenInMemoryStores(UnixClock clock, UploadLimits limits) {

@@ -43,6 +43,13 @@ class InMemoryMeshStore final : public MeshStore {
 
 class InMemoryPredictionStore final : public PredictionStore {
  public:
+  // Where the disk bounds a store on a disk, this bounds one that takes memory from sessions.
+  static constexpr int64_t kMostBytes = int64_t{1} << 30;
+
+  // Refuses (ResourceExhausted) what would make it hold more than `most_bytes` of positions and
+  // metadata.
+  explicit InMemoryPredictionStore(int64_t most_bytes = kMostBytes) : most_bytes_(most_bytes) {}
+
   absl::Status Create(const PredictionRecord& record, const std::string& positions) override;
   absl::StatusOr<PredictionRecord> Get(const std::string& id) override;
   absl::StatusOr<std::string> Positions(const std::string& id) override;
@@ -53,9 +60,15 @@ class InMemoryPredictionStore final : public PredictionStore {
   struct Prediction {
     PredictionRecord record;
     std::string positions;
+
+    int64_t Bytes() const {
+      return static_cast<int64_t>(record.metadata.size() + positions.size());
+    }
   };
 
+  const int64_t most_bytes_;
   Mutex mutex_;
+  int64_t bytes_ ABSL_GUARDED_BY(mutex_) = 0;
   std::map<std::string, Prediction> predictions_ ABSL_GUARDED_BY(mutex_);
 };
 

@@ -7,6 +7,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "server/store/in_memory_stores.h"
 #include "server/store/prediction_store.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/stores_case.h"
@@ -104,6 +105,18 @@ TEST_P(PredictionStoreContractTest, ListsByOwnerAndSessionInOrderPageAfterPage) 
   ASSERT_OK_AND_ASSIGN(page, store_->List({.session = "nothing"}));
   EXPECT_THAT(page.records, IsEmpty());
   EXPECT_THAT(store_->List({.limit = 0}), StatusIs(absl::StatusCode::kInvalidArgument));
+}
+
+TEST(InMemoryPredictionStoreTest, HoldsSoManyBytesAndAgainWhenSomeAreDeleted) {
+  const auto bytes =
+      static_cast<int64_t>(SamplePositions(1).size() + SamplePrediction("a").metadata.size());
+  InMemoryPredictionStore store(2 * bytes);
+  ASSERT_THAT(store.Create(SamplePrediction("a"), SamplePositions(1)), IsOk());
+  ASSERT_THAT(store.Create(SamplePrediction("b"), SamplePositions(1)), IsOk());
+  EXPECT_THAT(store.Create(SamplePrediction("c"), SamplePositions(1)),
+              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("--data-dir")));
+  ASSERT_THAT(store.Delete("a"), IsOk());
+  EXPECT_THAT(store.Create(SamplePrediction("c"), SamplePositions(1)), IsOk());
 }
 
 INSTANTIATE_TEST_SUITE_P(Stores, PredictionStoreContractTest, ::testing::ValuesIn(AllStores()),

@@ -1,0 +1,188 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/rpc/compare_predictions.h"
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/error_reason.h"
+#include "core/base/status_macros.h"
+#include "core/deformation/comparison.h"
+#include "core/deformation/deformation_quality.h"
+#include "proto/conversion/answer_conversion.h"
+#include "proto/conversion/geometry_conversion.h"
+#include "proto/conversion/model_conversion.h"
+#include "proto/conversion/prediction_conversion.h"
+#include "server/rpc/message_stream.h"
+#include "server/rpc/prediction_record.h"
+#include "server/rpc/single_answer.h"
+
+namespace tissueform {
+namespace {
+
+struct ReadPrediction {
+  v1::Prediction prediction;
+  Positions positions;
+};
+
+// Blocks on the disk.
+absl::StatusOr<ReadPrediction> Read(const std::string& name, PredictionStore* store) {
+  TF_ASSIGN_OR_RETURN(const std::string id, ParsePredictionName(name));
+  TF_ASSIGN_OR_RETURN(const PredictionRecord record, store->Get(id));
+  TF_ASSIGN_OR_RETURN(KeptPrediction kept, FromRecord(record));
+  TF_ASSIGN_OR_RETURN(const std::string bytes, store->Positions(id));
+  TF_ASSIGN_OR_RETURN(Positions positions, DecodePositions(bytes, record.vertex_count));
+  return ReadPrediction{std::move(kept.prediction), std::move(positions)};
+}
+
+absl::Status NotComparable(absl::string_view why) {
+  return WithReason(absl::FailedPreconditionError(why), ErrorReason::kNotComparable);
+}
+
+// Float32 of every number, as in what is kept: a model that answers the same has no difference.
+Positions Rounded(const Positions& positions) { return positions.cast<float>().cast<double>(); }
+
+std::string Encode(const Positions& positions) {
+  return EncodePositions(positions, {}, v1::POSITION_ENCODING_FLOAT32, positions).bytes;
+}
+
+class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
+ public:
+  Comparison(CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
+             std::chrono::milliseconds patience, SessionRegistry* registry, PredictionStore* store,
+             const v1::ComparePredictionsRequest* request)
+      : MessageStream(std::move(scope), context, timer, patience),
+        registry_(registry),
+        store_(store),
+        request_(*request) {}
+
+  void Start() {
+    if (!scope().admission().ok()) {
+      End(scope().admission());
+      return;
+    }
+    registry_->pool().Post(Lane::kStore, [this] {
+      const absl::Status status = ReadBoth();
+      if (!status.ok()) End(status);
+    });
+  }
+
+  void OnCancel() override {
+    *cancelled_ = true;
+    registry_->CancelWait(cancelled_);
+  }
+
+ private:
+  absl::Status ReadBoth() {
+    TF_ASSIGN_OR_RETURN(one_, Read(request_.prediction(), store_));
+    v1::PredictionComparison& told = comparison_;
+    told.set_prediction(one_.prediction.name());
+    told.set_model(one_.prediction.model());
+    if (request_.has_other_model()) {
+      AskModel();
+      return absl::OkStatus();
+    }
+    if (!request_.has_other_prediction()) {
+      return absl::InvalidArgumentError(
+          "nothing to compare with; set other_prediction or other_model");
+    }
+    TF_ASSIGN_OR_RETURN(ReadPrediction other, Read(request_.other_prediction(), store_));
+    if (other.prediction.mesh() != one_.prediction.mesh()) {
+      return NotComparable(
+          "the predictions are of different meshes, whose vertices do not correspond; compare two "
+          "of one mesh");
+    }
+    told.set_other_prediction(other.prediction.name());
+    told.set_other_model(other.prediction.model());
+    *told.mutable_other_summary() = other.prediction.summary();
+    *told.mutable_other_quality() = other.prediction.quality();
+    PostCompare(std::move(other.positions));
+    return absl::OkStatus();
+  }
+
+  void AskModel() {
+    FindSingleAnswer(
+        registry_, {one_.prediction.session(), one_.prediction.poses(), request_.other_model()},
+        cancelled_, [this](const Session& session) { return CheckSame(session); },
+        [this](const absl::StatusOr<SingleAnswer>& answer) {
+          if (!answer.ok()) {
+            End(answer.status());
+            return;
+          }
+          comparison_.set_other_model(ToProto(answer->model));
+          *comparison_.mutable_other_summary() = ToProto(answer->deformation.summary);
+          *comparison_.mutable_other_quality() = ToProto(
+              MeasureDeformation(answer->session->mesh().mesh, answer->deformation.positions));
+          PostCompare(Rounded(answer->deformation.positions));
+        });
+  }
+
+  absl::Status CheckSame(const Session& session) const {
+    if (session.mesh().mesh.num_vertices() == one_.prediction.vertex_count() &&
+        RecipeSha256(session) == one_.prediction.recipe_sha256()) {
+      return absl::OkStatus();
+    }
+    return NotComparable(
+        "the session has other regions or another stiffness than when the prediction was made; "
+        "make the prediction again");
+  }
+
+  // Sorting a million distances takes its time.
+  void PostCompare(Positions other) {
+    registry_->pool().Post(Lane::kBatch, [this, other = std::move(other)] { Compare(other); });
+  }
+
+  void Compare(const Positions& other) {
+    const absl::StatusOr<Eigen::VectorXd> distances = VertexDistances(one_.positions, other);
+    if (!distances.ok()) {
+      End(distances.status());
+      return;
+    }
+    if (distances->size() > 0) {
+      Eigen::Index worst = 0;
+      distances->maxCoeff(&worst);
+      *comparison_.mutable_distances() =
+          ToProto(SummarizeDistances({distances->begin(), distances->end()}));
+      comparison_.mutable_distances()->set_worst_vertex(worst);
+    }
+    if (request_.differences()) differences_ = Encode(other - one_.positions);
+    one_.positions.resize(0, 3);
+    Send([this](v1::ComparePredictionsResponse* message) { return NextMessage(message); });
+  }
+
+  bool NextMessage(v1::ComparePredictionsResponse* message) {
+    if (!told_) {
+      told_ = true;
+      *message->mutable_comparison() = std::move(comparison_);
+      return true;
+    }
+    return NextChunk(differences_, &offset_, message->mutable_differences());
+  }
+
+  SessionRegistry* const registry_;
+  PredictionStore* const store_;
+  const v1::ComparePredictionsRequest& request_;
+  const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
+  ReadPrediction one_;
+  v1::PredictionComparison comparison_;
+  std::string differences_;
+  size_t offset_ = 0;
+  bool told_ = false;
+};
+
+}  // namespace
+
+grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* StartComparison(
+    CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
+    std::chrono::milliseconds patience, SessionRegistry* registry, PredictionStore* store,
+    const v1::ComparePredictionsRequest* request) {
+  auto* call = new Comparison(std::move(scope), context, timer, patience, registry, store, request);
+  call->Start();
+  return call;
+}
+
+}  // namespace tissueform

@@ -1,0 +1,26 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+
+#include "grpcpp/support/server_callback.h"
+
+#include "server/rpc/call_scope.h"
+#include "server/session/deadline_timer.h"
+#include "server/session/session_registry.h"
+#include "server/store/prediction_store.h"
+#include "tissueform/v1/prediction_service.pb.h"
+
+namespace tissueform {
+
+// Begins one ComparePredictions call: reads what is kept, asks the session where a model is
+// compared, and tells how far the two lie apart. It deletes itself. `context` may be null (see
+// CallScope); all other pointers must outlive the call.
+grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* StartComparison(
+    CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
+    std::chrono::milliseconds patience, SessionRegistry* registry, PredictionStore* store,
+    const v1::ComparePredictionsRequest* request);
+
+}  // namespace tissueform

@@ -1,0 +1,81 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "grpcpp/server_context.h"
+#include "grpcpp/support/server_callback.h"
+
+#include "server/rpc/call_scope.h"
+#include "server/session/deadline_timer.h"
+
+namespace tissueform {
+
+// A call that answers with messages, each made when the client has taken the one before. Deletes
+// itself when gRPC is done with it.
+//
+// One thing at a time is under way: work before the first message, a write, or the end. Beside
+// them runs the timer, which cancels the call of a client that takes nothing.
+template <typename Response>
+class MessageStream : public grpc::ServerWriteReactor<Response> {
+ public:
+  // Makes the next message; false when there is none. Called from threads of gRPC: not long.
+  using Next = std::function<bool(Response* message)>;
+
+  // `context` (null where there is no network) and `timer` must outlive the call.
+  MessageStream(CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
+                std::chrono::milliseconds patience)
+      : scope_(std::move(scope)), context_(context), timer_(timer), patience_(patience) {}
+
+  const CallScope& scope() const { return scope_; }
+
+  // One of the two, once, from any thread.
+  void Send(Next next) {
+    next_ = std::move(next);
+    WriteNext();
+  }
+  void End(const absl::Status& outcome) { this->Finish(scope_.End(outcome)); }
+
+  void OnWriteDone(bool ok) override {
+    timer_->Cancel(deadline_);
+    if (ok) {
+      WriteNext();
+    } else {
+      End(absl::CancelledError("the client has cancelled the call, or took no message in time"));
+    }
+  }
+
+  void OnDone() override { delete this; }
+
+ protected:
+  ~MessageStream() override = default;
+
+ private:
+  void WriteNext() {
+    message_.Clear();
+    if (!next_(&message_)) {
+      End(absl::OkStatus());
+      return;
+    }
+    // Before the write, which may be done at once.
+    deadline_ = timer_->Start(std::chrono::steady_clock::now() + patience_, [this] {
+      if (context_ != nullptr) context_->TryCancel();
+    });
+    this->StartWrite(&message_);
+  }
+
+  CallScope scope_;
+  grpc::CallbackServerContext* const context_;
+  DeadlineTimer* const timer_;
+  const std::chrono::milliseconds patience_;
+  Next next_;
+  Response message_;  // gRPC's while a write is under way
+  DeadlineTimer::Id deadline_;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,252 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/rpc/prediction_service.h"
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/error_reason.h"
+#include "core/base/status_macros.h"
+#include "proto/conversion/prediction_conversion.h"
+#include "proto/conversion/session_conversion.h"
+#include "server/rpc/compare_predictions.h"
+#include "server/rpc/message_stream.h"
+#include "server/rpc/prediction_record.h"
+#include "server/rpc/resource_conversion.h"
+#include "server/rpc/single_answer.h"
+#include "server/store/session_store.h"
+
+namespace tissueform {
+namespace {
+
+// A page fits into the 4 MiB that clients take by default, however much each prediction tells.
+constexpr size_t kPageBytes = size_t{2} << 20;
+
+// One CreatePrediction call. Deletes itself when gRPC is done with it.
+class CreatePredictionCall : public grpc::ServerUnaryReactor {
+ public:
+  CreatePredictionCall(CallScope scope, SessionRegistry* registry, PredictionStore* store,
+                       const v1::CreatePredictionRequest* request, v1::Prediction* response)
+      : scope_(std::move(scope)),
+        registry_(registry),
+        store_(store),
+        request_(*request),
+        response_(*response),
+        key_(KeyOf(scope_.principal(), request->request_id(), RequestFingerprint(*request))) {}
+
+  void Start(const ServiceLimits& limits) {
+    const absl::Status status = scope_.admission().ok() ? Check(limits) : scope_.admission();
+    if (!status.ok()) {
+      End(status);
+    } else if (request_.request_id().empty()) {
+      Solve();
+    } else {
+      PostToStore([this] {
+        const absl::Status earlier = TakeEarlier();
+        if (absl::IsNotFound(earlier)) {
+          Solve();
+        } else {
+          End(earlier);
+        }
+      });
+    }
+  }
+
+  void OnCancel() override {
+    *cancelled_ = true;
+    registry_->CancelWait(cancelled_);
+  }
+
+  void OnDone() override { delete this; }
+
+ private:
+  absl::Status Check(const ServiceLimits& limits) const {
+    const size_t bytes = request_.request_id().size();
+    if (bytes > static_cast<size_t>(limits.max_request_id_bytes)) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "request_id has ", bytes, " bytes; it may have ", limits.max_request_id_bytes));
+    }
+    return ParseSessionName(request_.session()).status();
+  }
+
+  void PostToStore(WorkerPool::Job job) { registry_->pool().Post(Lane::kStore, std::move(job)); }
+
+  // What this request has made before, into the response. NotFound: nothing.
+  absl::Status TakeEarlier() {
+    TF_ASSIGN_OR_RETURN(const PredictionRecord record, store_->Get(key_.id));
+    TF_ASSIGN_OR_RETURN(KeptPrediction kept, FromRecord(record));
+    if (kept.fingerprint != key_.fingerprint) {
+      return WithReason(
+          absl::InvalidArgumentError("request_id was used for another request; choose a new one"),
+          ErrorReason::kRequestIdReused);
+    }
+    response_ = std::move(kept.prediction);
+    return absl::OkStatus();
+  }
+
+  void Solve() {
+    FindSingleAnswer(registry_, {request_.session(), request_.poses(), request_.model()},
+                     cancelled_, {}, [this](const absl::StatusOr<SingleAnswer>& answer) {
+                       if (!answer.ok()) {
+                         End(answer.status());
+                         return;
+                       }
+                       keep_ = ToKeep(key_, scope_.principal(), SystemUnixSeconds(), *answer);
+                       PostToStore([this] { End(Keep()); });
+                     });
+  }
+
+  absl::Status Keep() {
+    const absl::Status kept = store_->Create(keep_.record, keep_.positions);
+    // The same request twice at once: the other one was first.
+    if (absl::IsAlreadyExists(kept) && !key_.fingerprint.empty()) return TakeEarlier();
+    TF_RETURN_IF_ERROR(kept);
+    TF_ASSIGN_OR_RETURN(KeptPrediction made, FromRecord(keep_.record));
+    response_ = std::move(made.prediction);
+    return absl::OkStatus();
+  }
+
+  void End(const absl::Status& outcome) { Finish(scope_.End(outcome)); }
+
+  CallScope scope_;
+  SessionRegistry* const registry_;
+  PredictionStore* const store_;
+  const v1::CreatePredictionRequest& request_;
+  v1::Prediction& response_;
+  const PredictionRequestKey key_;
+  const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
+  PredictionToKeep keep_;
+};
+
+// The positions from the request's offset on. Blocks on the disk.
+absl::StatusOr<std::string> ReadFrom(const v1::ReadPositionsRequest& request,
+                                     PredictionStore* store) {
+  TF_ASSIGN_OR_RETURN(const std::string id, ParsePredictionName(request.name()));
+  TF_ASSIGN_OR_RETURN(std::string positions, store->Positions(id));
+  const auto size = static_cast<int64_t>(positions.size());
+  if (request.read_offset() < 0 || request.read_offset() > size) {
+    return absl::InvalidArgumentError(absl::StrCat("read_offset is ", request.read_offset(),
+                                                   "; the positions have ", size, " bytes"));
+  }
+  return positions;
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* PredictionService::CreatePrediction(
+    grpc::CallbackServerContext* context, const v1::CreatePredictionRequest* request,
+    v1::Prediction* response) {
+  auto* call = new CreatePredictionCall(
+      CallScope(context, "PredictionService.CreatePrediction", CallKind::kNewWork, gate_),
+      registry_, store_, request, response);
+  call->Start(limits_);
+  return call;
+}
+
+grpc::ServerWriteReactor<v1::ReadPositionsResponse>* PredictionService::ReadPositions(
+    grpc::CallbackServerContext* context, const v1::ReadPositionsRequest* request) {
+  auto* call = new MessageStream<v1::ReadPositionsResponse>(
+      CallScope(context, "PredictionService.ReadPositions", CallKind::kUpkeep, gate_), context,
+      timer_, limits_.upload_silence);
+  registry_->pool().Post(Lane::kStore, [call, request, store = store_] {
+    absl::StatusOr<std::string> positions = ReadFrom(*request, store);
+    if (!positions.ok()) {
+      call->End(positions.status());
+      return;
+    }
+    call->Send(
+        [positions = *std::move(positions), offset = static_cast<size_t>(request->read_offset())](
+            v1::ReadPositionsResponse* message) mutable {
+          return NextChunk(positions, &offset, message->mutable_chunk());
+        });
+  });
+  return call;
+}
+
+grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* PredictionService::ComparePredictions(
+    grpc::CallbackServerContext* context, const v1::ComparePredictionsRequest* request) {
+  return StartComparison(
+      CallScope(context, "PredictionService.ComparePredictions", CallKind::kNewWork, gate_),
+      context, timer_, limits_.upload_silence, registry_, store_, request);
+}
+
+grpc::ServerUnaryReactor* PredictionService::Run(
+    grpc::CallbackServerContext* context, std::string_view method,
+    std::function<absl::Status(const Principal& caller)> work) {
+  return RunUpkeep(context, method, gate_, [&, this](const CallScope& scope, const EndCall& end) {
+    registry_->pool().Post(Lane::kStore, [end, caller = scope.principal(), work = std::move(work)] {
+      end(work(caller));
+    });
+    return absl::OkStatus();
+  });
+}
+
+grpc::ServerUnaryReactor* PredictionService::GetPrediction(grpc::CallbackServerContext* context,
+                                                           const v1::GetPredictionRequest* request,
+                                                           v1::Prediction* response) {
+  return Run(context, "PredictionService.GetPrediction",
+             [=, this](const Principal& /*caller*/) { return Find(*request, response); });
+}
+
+grpc::ServerUnaryReactor* PredictionService::ListPredictions(
+    grpc::CallbackServerContext* context, const v1::ListPredictionsRequest* request,
+    v1::ListPredictionsResponse* response) {
+  return Run(context, "PredictionService.ListPredictions",
+             [=, this](const Principal& caller) { return List(*request, caller, response); });
+}
+
+grpc::ServerUnaryReactor* PredictionService::DeletePrediction(
+    grpc::CallbackServerContext* context, const v1::DeletePredictionRequest* request,
+    google::protobuf::Empty* /*response*/) {
+  return Run(context, "PredictionService.DeletePrediction",
+             [=, this](const Principal& /*caller*/) { return Remove(*request); });
+}
+
+absl::Status PredictionService::Find(const v1::GetPredictionRequest& request,
+                                     v1::Prediction* response) {
+  TF_ASSIGN_OR_RETURN(const std::string id, ParsePredictionName(request.name()));
+  TF_ASSIGN_OR_RETURN(const PredictionRecord record, store_->Get(id));
+  TF_ASSIGN_OR_RETURN(KeptPrediction kept, FromRecord(record));
+  *response = std::move(kept.prediction);
+  return absl::OkStatus();
+}
+
+absl::Status PredictionService::List(const v1::ListPredictionsRequest& request,
+                                     const Principal& caller,
+                                     v1::ListPredictionsResponse* response) {
+  TF_ASSIGN_OR_RETURN(const PageRequest page,
+                      ReadPageRequest(request.page_size(), request.page_token()));
+  PredictionStore::ListRequest wanted{
+      .owner = caller.name, .after = page.after, .limit = page.size};
+  if (!request.session().empty()) {
+    TF_ASSIGN_OR_RETURN(wanted.session, ParseSessionName(request.session()));
+  }
+  TF_ASSIGN_OR_RETURN(const PredictionStore::Page records, store_->List(wanted));
+  response->set_next_page_token(records.next);
+  size_t bytes = 0;
+  for (const PredictionRecord& record : records.records) {
+    bytes += record.metadata.size();
+    if (bytes > kPageBytes && response->predictions_size() > 0) {
+      TF_ASSIGN_OR_RETURN(const std::string last,
+                          ParsePredictionName(response->predictions().rbegin()->name()));
+      response->set_next_page_token(last);
+      break;
+    }
+    absl::StatusOr<KeptPrediction> kept = FromRecord(record);
+    if (!kept.ok()) continue;  // whoever asks for it hears so
+    *response->add_predictions() = std::move(kept->prediction);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status PredictionService::Remove(const v1::DeletePredictionRequest& request) {
+  TF_ASSIGN_OR_RETURN(const std::string id, ParsePredictionName(request.name()));
+  return store_->Delete(id);
+}
+
+}  // namespace tissueform

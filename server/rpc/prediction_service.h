@@ -1,0 +1,61 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <functional>
+#include <string_view>
+
+#include "absl/status/status.h"
+
+#include "server/rpc/call_scope.h"
+#include "server/session/deadline_timer.h"
+#include "server/session/limits.h"
+#include "server/session/session_registry.h"
+#include "server/store/prediction_store.h"
+#include "tissueform/v1/prediction_service.grpc.pb.h"
+
+namespace tissueform {
+
+// tissueform.v1.PredictionService over a store. Stateless; all pointers must outlive it.
+class PredictionService final : public v1::PredictionService::CallbackService {
+ public:
+  PredictionService(ServiceGate* gate, const ServiceLimits& limits, SessionRegistry* registry,
+                    PredictionStore* store, DeadlineTimer* timer)
+      : gate_(gate), limits_(limits), registry_(registry), store_(store), timer_(timer) {}
+
+  grpc::ServerUnaryReactor* CreatePrediction(grpc::CallbackServerContext* context,
+                                             const v1::CreatePredictionRequest* request,
+                                             v1::Prediction* response) override;
+  grpc::ServerUnaryReactor* GetPrediction(grpc::CallbackServerContext* context,
+                                          const v1::GetPredictionRequest* request,
+                                          v1::Prediction* response) override;
+  grpc::ServerWriteReactor<v1::ReadPositionsResponse>* ReadPositions(
+      grpc::CallbackServerContext* context, const v1::ReadPositionsRequest* request) override;
+  grpc::ServerUnaryReactor* ListPredictions(grpc::CallbackServerContext* context,
+                                            const v1::ListPredictionsRequest* request,
+                                            v1::ListPredictionsResponse* response) override;
+  grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* ComparePredictions(
+      grpc::CallbackServerContext* context, const v1::ComparePredictionsRequest* request) override;
+  grpc::ServerUnaryReactor* DeletePrediction(grpc::CallbackServerContext* context,
+                                             const v1::DeletePredictionRequest* request,
+                                             google::protobuf::Empty* response) override;
+
+ private:
+  // Finishes a call with what `work` says, which may block on the disk.
+  grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::string_view method,
+                                std::function<absl::Status(const Principal& caller)> work);
+
+  absl::Status Find(const v1::GetPredictionRequest& request, v1::Prediction* response);
+  absl::Status List(const v1::ListPredictionsRequest& request, const Principal& caller,
+                    v1::ListPredictionsResponse* response);
+  absl::Status Remove(const v1::DeletePredictionRequest& request);
+
+  ServiceGate* const gate_;
+  const ServiceLimits limits_;
+  SessionRegistry* const registry_;
+  PredictionStore* const store_;
+  DeadlineTimer* const timer_;
+};
+
+}  // namespace tissueform

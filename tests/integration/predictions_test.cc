@@ -1,0 +1,276 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "core/base/error_reason.h"
+#include "core/base/software_version.h"
+#include "tests/integration/service_test.h"
+#include "tests/testing/status_matchers.h"
+
+// Answers that the server keeps, over the network.
+namespace tissueform::testing {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+MATCHER_P(Because, reason, std::string(ReasonName(reason))) {
+  *result_listener << GetStatus(arg).ToString();
+  return HasReason(GetStatus(arg), reason);
+}
+
+class PredictionsTest : public ServiceTest {
+ protected:
+  PredictionsTest() : client_(Connect()), session_(MakeSession(client_.get(), problem_)) {}
+
+  PredictionCalls& calls() { return client_->predictions(); }
+  absl::StatusOr<v1::Prediction> Predict(int pose, v1::DeformationModel model = {}) {
+    return calls().Create(session_.name(), TopPose(SomePose(pose)), model);
+  }
+  // What the other problems' sessions answer.
+  absl::StatusOr<v1::Prediction> PredictOf(const BarProblem& problem) {
+    return calls().Create(MakeSession(client_.get(), problem).name(), TopPose(SomePose(1)));
+  }
+
+  const BarProblem problem_{7};
+  const std::unique_ptr<TissueformClient> client_;
+  const v1::Session session_;
+};
+
+TEST_F(PredictionsTest, APredictionIsTheAnswerWithAllThatWasAsked) {
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction made, Predict(2, v1::DEFORMATION_MODEL_NEO_HOOKEAN));
+  ASSERT_OK_AND_ASSIGN(const v1::DeformOnceResponse answer,
+                       client_->DeformOnce(session_.name(), TopPose(SomePose(2)), {},
+                                           v1::DEFORMATION_MODEL_NEO_HOOKEAN));
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction kept, calls().Get(made.name()));
+  EXPECT_EQ(kept.DebugString(), made.DebugString());
+  ASSERT_OK_AND_ASSIGN(const Positions positions, calls().ReadPositions(made.name()));
+  ASSERT_OK_AND_ASSIGN(const Positions expected,
+                       DecodePositions(answer.positions(), problem_.mesh.num_vertices()));
+  EXPECT_EQ(positions, expected);
+  EXPECT_EQ(kept.session(), session_.name());
+  EXPECT_EQ(kept.mesh(), session_.mesh());
+  EXPECT_EQ(kept.vertex_count(), problem_.mesh.num_vertices());
+  EXPECT_EQ(kept.model(), v1::DEFORMATION_MODEL_NEO_HOOKEAN);
+  EXPECT_EQ(kept.stiffness().cell_array(), "youngs_modulus_pa");
+  EXPECT_EQ(kept.poisson_ratio(), session_.poisson_ratio());
+  EXPECT_EQ(kept.summary().iterations(), answer.summary().iterations());
+  EXPECT_EQ(kept.quality().DebugString(), answer.quality().DebugString());
+  EXPECT_EQ(kept.software_version(), SoftwareVersion());
+  ASSERT_EQ(kept.poses_size(), 1);
+  EXPECT_EQ(kept.poses(0).handle(), "top");
+  EXPECT_EQ(kept.poses(0).translation_mm().x(), SomePose(2).translation_mm.x());
+  EXPECT_GE(kept.create_time().seconds(), session_.create_time().seconds());
+}
+
+TEST_F(PredictionsTest, ItOutlivesItsSessionAndItsMeshUntilItIsDeleted) {
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction made, Predict(1));
+  ASSERT_THAT(client_->DeleteSession(session_.name()), IsOk());
+  ASSERT_THAT(client_->DeleteMesh(session_.mesh()), IsOk());
+  ASSERT_OK_AND_ASSIGN(const Positions positions, calls().ReadPositions(made.name()));
+  EXPECT_LT((positions - problem_.Solve(SomePose(1))).cwiseAbs().maxCoeff(), kFloat32Tolerance);
+  EXPECT_THAT(calls().Delete(made.name()), IsOk());
+  EXPECT_THAT(calls().Get(made.name()), Because(ErrorReason::kPredictionNotFound));
+  EXPECT_THAT(calls().ReadPositions(made.name()), Because(ErrorReason::kPredictionNotFound));
+  EXPECT_THAT(calls().Delete(made.name()), Because(ErrorReason::kPredictionNotFound));
+}
+
+TEST_F(PredictionsTest, ARepeatedRequestIdGivesTheSamePrediction) {
+  const auto create = [&](int pose, const std::string& request_id) {
+    return calls().Create(session_.name(), TopPose(SomePose(pose)), {}, request_id);
+  };
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction first, create(1, "8d2c"));
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction again, create(1, "8d2c"));
+  EXPECT_EQ(again.DebugString(), first.DebugString());
+  EXPECT_THAT(create(2, "8d2c"), Because(ErrorReason::kRequestIdReused));
+  EXPECT_THAT(create(1, std::string(65, 'x')),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("request_id")));
+  ASSERT_OK_AND_ASSIGN(const auto all, calls().List());
+  EXPECT_EQ(all.size(), 1U);
+  ASSERT_THAT(calls().Delete(first.name()), IsOk());
+  EXPECT_THAT(create(2, "8d2c"), IsOk());
+}
+
+TEST_F(PredictionsTest, TheSameRequestFromManyAtOnceIsOnePrediction) {
+  std::vector<std::string> names(4);
+  std::vector<std::thread> threads;
+  for (std::string& name : names) {
+    threads.emplace_back([&] {
+      const auto made = calls().Create(session_.name(), TopPose(SomePose(1)), {}, "one");
+      if (made.ok()) name = made->name();
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_NE(names[0], "");
+  EXPECT_THAT(names, ::testing::Each(names[0]));
+  ASSERT_OK_AND_ASSIGN(const auto all, calls().List());
+  EXPECT_EQ(all.size(), 1U);
+}
+
+TEST_F(PredictionsTest, ListsAllOrThoseOfASession) {
+  const BarProblem other(8);
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction theirs, PredictOf(other));
+  std::vector<std::string> ours;
+  for (int pose = 0; pose < 3; ++pose) {
+    ASSERT_OK_AND_ASSIGN(const v1::Prediction made, Predict(pose));
+    ours.push_back(made.name());
+  }
+  ASSERT_OK_AND_ASSIGN(std::vector<v1::Prediction> listed, calls().List(session_.name()));
+  std::vector<std::string> names;
+  for (const v1::Prediction& prediction : listed) names.push_back(prediction.name());
+  EXPECT_THAT(names, ::testing::UnorderedElementsAreArray(ours));
+  EXPECT_TRUE(std::is_sorted(names.begin(), names.end()));
+  ASSERT_OK_AND_ASSIGN(listed, calls().List(theirs.session()));
+  ASSERT_EQ(listed.size(), 1U);
+  EXPECT_EQ(listed[0].DebugString(), theirs.DebugString());
+  ASSERT_OK_AND_ASSIGN(listed, calls().List());
+  EXPECT_EQ(listed.size(), 4U);
+
+  const auto stub = v1::PredictionService::NewStub(OwnChannel());
+  v1::ListPredictionsRequest request;
+  request.set_page_size(3);
+  std::vector<int> sizes;
+  do {
+    grpc::ClientContext context;
+    v1::ListPredictionsResponse page;
+    ASSERT_TRUE(stub->ListPredictions(&context, request, &page).ok());
+    sizes.push_back(page.predictions_size());
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty());
+  EXPECT_THAT(sizes, ElementsAre(3, 1));
+}
+
+TEST_F(PredictionsTest, ComparesTwoByTheDistancesOfTheirVertices) {
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction one, Predict(1));
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction other, Predict(4));
+  ASSERT_OK_AND_ASSIGN(const ComparedPredictions compared,
+                       calls().Compare(one.name(), other.name(), true));
+  ASSERT_OK_AND_ASSIGN(const Positions from, calls().ReadPositions(one.name()));
+  ASSERT_OK_AND_ASSIGN(const Positions to, calls().ReadPositions(other.name()));
+  EXPECT_LT((compared.differences - (to - from)).cwiseAbs().maxCoeff(), 1e-6);
+  const Eigen::VectorXd distances = (to - from).rowwise().norm();
+  const v1::DistanceStatistics& told = compared.comparison.distances();
+  EXPECT_EQ(told.vertex_count(), problem_.mesh.num_vertices());
+  EXPECT_NEAR(told.mean_mm(), distances.mean(), 1e-12);
+  EXPECT_EQ(told.max_mm(), distances.maxCoeff());
+  EXPECT_EQ(distances[told.worst_vertex()], told.max_mm());
+  EXPECT_LE(told.p50_mm(), told.p95_mm());
+  EXPECT_LE(told.p95_mm(), told.max_mm());
+  EXPECT_EQ(compared.comparison.other_prediction(), other.name());
+  EXPECT_EQ(compared.comparison.other_quality().DebugString(), other.quality().DebugString());
+  EXPECT_EQ(one.recipe_sha256(), other.recipe_sha256());
+
+  ASSERT_OK_AND_ASSIGN(const ComparedPredictions same, calls().Compare(one.name(), one.name()));
+  EXPECT_EQ(same.comparison.distances().max_mm(), 0);
+  EXPECT_EQ(same.differences.size(), 0);
+}
+
+TEST_F(PredictionsTest, ComparesWithAnotherModelAsWithItsPrediction) {
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction one, Predict(3));
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction elastic,
+                       Predict(3, v1::DEFORMATION_MODEL_LINEAR_ELASTIC));
+  ASSERT_OK_AND_ASSIGN(const ComparedPredictions by_name,
+                       calls().Compare(one.name(), elastic.name(), true));
+  ASSERT_OK_AND_ASSIGN(const ComparedPredictions by_model,
+                       calls().Compare(one.name(), v1::DEFORMATION_MODEL_LINEAR_ELASTIC, true));
+  EXPECT_GT(by_name.comparison.distances().max_mm(), 0.01);
+  EXPECT_EQ(by_model.differences, by_name.differences);
+  EXPECT_EQ(by_model.comparison.distances().DebugString(),
+            by_name.comparison.distances().DebugString());
+  EXPECT_EQ(by_model.comparison.other_model(), v1::DEFORMATION_MODEL_LINEAR_ELASTIC);
+  EXPECT_EQ(by_model.comparison.other_prediction(), "");
+  // The own model has nothing to add.
+  ASSERT_OK_AND_ASSIGN(const ComparedPredictions same,
+                       calls().Compare(one.name(), v1::DEFORMATION_MODEL_GRADIENT_FIELD));
+  EXPECT_EQ(same.comparison.distances().max_mm(), 0);
+}
+
+TEST_F(PredictionsTest, WhatCannotBeComparedIsRefused) {
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction one, Predict(1));
+  const BarProblem other_mesh(8);
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction other, PredictOf(other_mesh));
+  const auto of_other_mesh = calls().Compare(one.name(), other.name());
+  EXPECT_THAT(of_other_mesh, StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("meshes")));
+  EXPECT_THAT(of_other_mesh, Because(ErrorReason::kNotComparable));
+  EXPECT_THAT(calls().Compare(one.name(), "predictions/none"),
+              Because(ErrorReason::kPredictionNotFound));
+  EXPECT_THAT(calls().Compare(one.name(), static_cast<v1::DeformationModel>(99)),
+              StatusIs(absl::StatusCode::kInvalidArgument));
+
+  // A session of that name with other regions, as after an update.
+  SessionRequest request = problem_.Request(session_.mesh());
+  request.session_id = "a-session-that-changes";
+  ASSERT_OK_AND_ASSIGN(const v1::Session before, client_->CreateSession(request));
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction of_before,
+                       calls().Create(before.name(), TopPose(SomePose(1))));
+  ASSERT_THAT(client_->DeleteSession(before.name()), IsOk());
+  EXPECT_THAT(calls().Compare(of_before.name(), v1::DEFORMATION_MODEL_ARAP),
+              Because(ErrorReason::kSessionNotFound));
+  request.fixed.pop_back();
+  ASSERT_THAT(client_->CreateSession(request), IsOk());
+  EXPECT_THAT(calls().Compare(of_before.name(), v1::DEFORMATION_MODEL_ARAP),
+              Because(ErrorReason::kNotComparable));
+}
+
+TEST_F(PredictionsTest, BadRequestsAreRefusedAndLeaveNothing) {
+  EXPECT_THAT(calls().Create("sessions/none", TopPose(SomePose(1))),
+              Because(ErrorReason::kSessionNotFound));
+  EXPECT_THAT(calls().Create("none", TopPose(SomePose(1))),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("session")));
+  EXPECT_THAT(calls().Create(session_.name(), {}), StatusIs(absl::StatusCode::kInvalidArgument));
+  EXPECT_THAT(Predict(1, static_cast<v1::DeformationModel>(99)),
+              StatusIs(absl::StatusCode::kInvalidArgument));
+  for (const std::string name : {"", "predictions/", "predictions/a b", "sessions/none"}) {
+    EXPECT_THAT(calls().Get(name),
+                StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("prediction")));
+    EXPECT_THAT(calls().Delete(name), StatusIs(absl::StatusCode::kInvalidArgument));
+    EXPECT_THAT(calls().ReadPositions(name), StatusIs(absl::StatusCode::kInvalidArgument));
+  }
+  ASSERT_OK_AND_ASSIGN(const auto all, calls().List());
+  EXPECT_THAT(all, IsEmpty());
+}
+
+TEST_F(PredictionsTest, PositionsComeFromAnyOffset) {
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction made, Predict(1));
+  ASSERT_OK_AND_ASSIGN(const Positions positions, calls().ReadPositions(made.name()));
+  const std::string whole =
+      EncodePositions(positions, {}, v1::POSITION_ENCODING_FLOAT32, positions).bytes;
+  const auto stub = v1::PredictionService::NewStub(OwnChannel());
+  const auto read = [&](int64_t offset, std::string* bytes) {
+    grpc::ClientContext context;
+    v1::ReadPositionsRequest request;
+    request.set_name(made.name());
+    request.set_read_offset(offset);
+    const auto reader = stub->ReadPositions(&context, request);
+    v1::ReadPositionsResponse response;
+    while (reader->Read(&response)) {
+      EXPECT_EQ(response.chunk().offset(), offset + static_cast<int64_t>(bytes->size()));
+      EXPECT_EQ(response.chunk().total_bytes(), static_cast<int64_t>(whole.size()));
+      *bytes += response.chunk().data();
+    }
+    return reader->Finish().error_code();
+  };
+  const auto size = static_cast<int64_t>(whole.size());
+  for (const int64_t offset : {int64_t{0}, int64_t{1001}, size - 1, size}) {
+    std::string bytes;
+    EXPECT_EQ(read(offset, &bytes), grpc::StatusCode::OK);
+    EXPECT_TRUE(bytes == whole.substr(offset)) << offset;
+  }
+  for (const int64_t offset : {int64_t{-1}, size + 1}) {
+    std::string bytes;
+    EXPECT_EQ(read(offset, &bytes), grpc::StatusCode::INVALID_ARGUMENT);
+    EXPECT_EQ(bytes, "");
+  }
+}
+
+}  // namespace
+}  // namespace tissueform::testing
