@@ -22,7 +22,11 @@ DECLARATIONS = [
     re.compile(r"^(?:struct|class|enum class|enum|union)\s+(\w+)"),
     re.compile(r"^using\s+(\w+)\s*="),
     re.compile(r"^#define\s+(\w+)"),
-    re.compile(r"^(?!#|//|\s|TEST|TYPED_TEST|INSTANTIATE|using|namespace|template)[\w:<>,&*\s\[\]]*?\b(\w+)\s*(?:\(|=|\{|\[|;)"),
+    # With the class that it is a member of.
+    re.compile(
+        r"^(?!#|//|\s|TEST|TYPED_TEST|INSTANTIATE|using|namespace|template|static_assert)"
+        r"[\w:<>,&*\s\[\]]*?\b((?:\w+::)*\w+)\s*(?:\(|=|\{|\[|;)"
+    ),
 ]
 
 

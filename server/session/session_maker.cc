@@ -31,15 +31,15 @@ void SessionMaker::Make(SessionRecord record, std::shared_ptr<const StoredMesh> 
 
 void SessionMaker::Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
                           Cancellation cancellation, Callback done) {
-  auto keep = [this, record, done = std::move(done)](
-                  absl::StatusOr<std::shared_ptr<Session>> session) mutable {
+  auto keep = [this, record,
+               done = std::move(done)](absl::StatusOr<std::shared_ptr<Session>> session) mutable {
     if (!session.ok()) {
       done(std::move(session));
       return;
     }
     store_->Create(std::move(record), kStoreEpoch,
-                   [session = *std::move(session), done = std::move(done)](
-                       const absl::StatusOr<SessionRecord>& stored) mutable {
+                   [session = *std::move(session),
+                    done = std::move(done)](const absl::StatusOr<SessionRecord>& stored) mutable {
                      if (stored.ok()) {
                        done(std::move(session));
                      } else {

@@ -24,6 +24,9 @@ from source_names import LONERS, declared_names, imported_names  # noqa: E402
 
 MOST_FILES = 24
 
+# The one name that all programs share: in a batch each is another function.
+MAIN = re.compile(r"^int main\(", re.MULTILINE)
+
 KNOWS_GCC_ONLY = re.compile(r"^#include <itk", re.MULTILINE)
 
 
@@ -90,7 +93,7 @@ def put_together(files):
     """Batches; `files` are (path, command) pairs."""
     batches = []
     for path, command in files:
-        names = declared_names(path)
+        names = declared_names(path) - {"main"}
         imports = imported_names(path)
         if LONERS.search(path.read_text(encoding="utf-8")):
             batch = Batch(alone=True)
@@ -100,6 +103,14 @@ def put_together(files):
             batches.append(batch)
         batch.add(path, names, imports, command)
     return batches
+
+
+def included(number, path):
+    """The line of a batch that includes its file with this number."""
+    line = f'#include "{path}"\n'
+    if MAIN.search(path.read_text(encoding="utf-8")):
+        return f"#define main Main{number}\n{line}#undef main\n"
+    return line
 
 
 def main():
@@ -127,7 +138,7 @@ def main():
     files = sorted((path, commands[path]) for path in chosen)
     for number, batch in enumerate(put_together(files)):
         path = folder / f"batch_{number}.cc"
-        path.write_text("".join(f'#include "{file}"\n' for file in batch.files), encoding="utf-8")
+        path.write_text("".join(included(*numbered) for numbered in enumerate(batch.files)), encoding="utf-8")
         add(path, batch.arguments())
         print(path, " ".join(str(file) for file in batch.files), sep="\t")
     (folder / "compile_commands.json").write_text(json.dumps(database), encoding="utf-8")

@@ -33,6 +33,9 @@ MATCHER_P2(StatusIs, code, message_matcher, "") {
                                        result_listener);
 }
 
+// What most refusals are.
+inline constexpr absl::StatusCode kInvalid = absl::StatusCode::kInvalidArgument;
+
 // Whatever the message.
 inline auto StatusIs(absl::StatusCode code) { return StatusIs(code, ::testing::_); }
 

@@ -19,7 +19,7 @@ using testing::HeadPhantomOptions;
 using testing::HeadPhantomParts;
 using testing::StatusIs;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 absl::StatusOr<BoneParts> PartsOf(const HeadPhantomOptions& options,
                                   const std::optional<Plane>& cut = std::nullopt) {

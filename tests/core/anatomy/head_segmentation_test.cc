@@ -19,7 +19,7 @@ using testing::HeadPhantomOptions;
 using testing::HeadPhantomParts;
 using testing::StatusIs;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 TEST(HeadSegmentationTest, HeadAndBoneOfThePhantomAreFound) {
   ASSERT_OK_AND_ASSIGN(const HeadSegmentation head, SegmentHead(HeadPhantom()));

@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 using testing::HeadPhantom;
 using testing::StatusIs;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 class OsteotomyTest : public ::testing::Test {
  protected:

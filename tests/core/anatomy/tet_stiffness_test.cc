@@ -26,7 +26,7 @@ using ::testing::Each;
 using ::testing::HasSubstr;
 using tissueform::testing::StatusIs;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 constexpr double kMuscleHu = 50;
 
 GridGeometry Grid(int size, double spacing_mm) {

@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 using testing::IsOk;
 using testing::StatusIs;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 TEST(ConstraintSetTest, MergesRegionsInRisingOrderAndDropsRepetitions) {
   const TetMesh bar = testing::Bar({1, 1, 3});

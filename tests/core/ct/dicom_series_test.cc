@@ -12,6 +12,7 @@
 
 #include "tests/core/ct/ct_folder.h"
 #include "tests/testing/meshes.h"
+#include "tests/testing/status_matchers.h"
 
 namespace tissueform {
 namespace {
@@ -31,7 +32,7 @@ using tissueform::testing::SharedDataPath;
 using tissueform::testing::StatusIs;
 using tissueform::testing::WorstPhantomError;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 using Series = std::vector<DicomFile>;
 

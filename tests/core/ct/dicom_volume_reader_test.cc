@@ -5,6 +5,7 @@
 
 #include "tests/core/ct/ct_folder.h"
 #include "tests/testing/meshes.h"
+#include "tests/testing/status_matchers.h"
 
 namespace tissueform {
 namespace {
@@ -21,7 +22,7 @@ using tissueform::testing::SeriesGeometry;
 using tissueform::testing::StatusIs;
 using tissueform::testing::WorstPhantomError;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 // A value that a slice must not have, or not beside the others, and what is said of it.
 struct BadValue {

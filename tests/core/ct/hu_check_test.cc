@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 using tissueform::testing::IsOk;
 using tissueform::testing::StatusIs;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 // 600 voxels of air, 300 of soft tissue, 100 of bone.
 std::vector<int16_t> Head(int add) {

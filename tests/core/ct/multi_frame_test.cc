@@ -6,6 +6,7 @@
 #include <random>
 
 #include "tests/core/ct/ct_folder.h"
+#include "tests/testing/status_matchers.h"
 
 namespace tissueform {
 namespace {
@@ -21,7 +22,7 @@ using tissueform::testing::SeriesGeometry;
 using tissueform::testing::StatusIs;
 using tissueform::testing::WorstPhantomError;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 class MultiFrameTest : public CtFolder {};
 

@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 using tissueform::testing::IsOk;
 using tissueform::testing::StatusIs;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 TEST(PatientAxesTest, FortyEightWaysToLieAreToldApart) {
   const std::string letters = "LRAPSI";

@@ -10,6 +10,7 @@
 #include "tests/core/ct/ct_folder.h"
 #include "tests/core/ct/packed.h"
 #include "tests/testing/meshes.h"
+#include "tests/testing/status_matchers.h"
 
 namespace tissueform {
 namespace {
@@ -24,7 +25,7 @@ using tissueform::testing::StatusIs;
 using tissueform::testing::TestDataPath;
 using tissueform::testing::WorstPhantomError;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 constexpr int kSizeX = 12;
 constexpr int kSizeY = 10;
 constexpr int kSizeZ = 9;

@@ -215,7 +215,7 @@ TEST(ArapDeformerTest, AnswerDoesNotDependOnTheNumberOfThreads) {
 
 TEST(ArapDeformerTest, OptionsAndPosesAreChecked) {
   const auto preparation = testing::PrepareMesh(JitteredBar(), 1);
-  constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+  using ::tissueform::testing::kInvalid;
   EXPECT_THAT(CreateArapDeformer(preparation, {0, 0.001, 5}),
               StatusIs(kInvalid, HasSubstr("max_iterations")));
   EXPECT_THAT(CreateArapDeformer(preparation, {10, 0.001, -1}),

@@ -20,7 +20,7 @@ using testing::Pose;
 using testing::PrepareBar;
 using testing::StatusIs;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 absl::StatusOr<std::unique_ptr<ElasticSystem>> CreateSystem(const ElasticSystemOptions& options) {
   const auto preparation = PrepareBar().value();

@@ -127,7 +127,7 @@ TEST_F(MeshPreparationTest, EveryModelCanBeCancelledBeforeItsFactor) {
 TEST_F(MeshPreparationTest, UnusableInputIsRefused) {
   const ConstraintSet constraints = testing::StackedHandles(mesh_, 1);
   const Eigen::VectorXd stiffness = testing::MixedStiffness(mesh_.num_tets());
-  constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+  using ::tissueform::testing::kInvalid;
   for (const double ratio : {-0.1, 0.5, std::nan("")}) {
     PreparationOptions options;
     options.poisson_ratio = ratio;

@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 using testing::IsOk;
 using testing::StatusIs;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 TEST(BarMeshTest, BarsOfTheSourcesTableHaveItsCounts) {
   const struct {

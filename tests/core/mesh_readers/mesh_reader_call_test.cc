@@ -20,7 +20,7 @@ using ::testing::IsEmpty;
 using tissueform::testing::IsOk;
 using tissueform::testing::StatusIs;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 absl::StatusOr<RawMesh> Call(const std::string& wish, const IsolationLimits& limits = {}) {
   return CallMeshReader("mesh_reader_test_helper", {wish, MeshFormat::kPly, 1}, limits);

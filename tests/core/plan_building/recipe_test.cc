@@ -15,7 +15,7 @@ namespace {
 using ::testing::HasSubstr;
 using testing::StatusIs;
 
-constexpr absl::StatusCode kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 // A recipe with these further keys.
 std::string WithKeys(const std::string& keys) {

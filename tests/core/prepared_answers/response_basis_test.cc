@@ -23,7 +23,7 @@ using testing::RandomNumbers;
 using testing::RandomPoses;
 using testing::StatusIs;
 
-constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 constexpr double kDegree = std::numbers::pi / 180;
 
 TetMesh JitteredBar() { return testing::Bar({4, 6, 8}, 2.0, 0.2); }

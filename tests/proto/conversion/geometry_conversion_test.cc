@@ -24,7 +24,7 @@ using ::tissueform::testing::Bar;
 using ::tissueform::testing::BarEnds;
 using ::tissueform::testing::StatusIs;
 
-constexpr absl::StatusCode kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 // On a mesh of 36 vertices.
 absl::StatusOr<VertexChoice> Choose(const v1::VertexSelection& selection) {

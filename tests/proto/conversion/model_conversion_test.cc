@@ -14,7 +14,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::tissueform::testing::StatusIs;
 
-constexpr absl::StatusCode kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 TEST(ModelConversionTest, EveryModelSurvivesTheJourney) {
   for (const DeformationModel model :

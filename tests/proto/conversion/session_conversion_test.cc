@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 using ::tissueform::testing::IsOk;
 using ::tissueform::testing::StatusIs;
 
-constexpr absl::StatusCode kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 TEST(SessionConversionTest, NamesAreStrict) {
   EXPECT_EQ(SessionName("0aZ"), "sessions/0aZ");

@@ -18,7 +18,7 @@ using ::tissueform::testing::IsOk;
 using ::tissueform::testing::StatusIs;
 using EarlyAnswer = FrameFlow::EarlyAnswer;
 
-constexpr absl::StatusCode kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 AnswerFrame Answer(const WaitingPose& pose) {
   return {.sequence = pose.sequence,

@@ -30,7 +30,7 @@ using ::tissueform::testing::SampleMesh;
 using ::tissueform::testing::StatusIs;
 using ::tissueform::testing::Store;
 
-constexpr absl::StatusCode kInvalid = absl::StatusCode::kInvalidArgument;
+using ::tissueform::testing::kInvalid;
 
 HandlePose Turn(double degrees) {
   HandlePose pose;
