@@ -81,6 +81,7 @@ class HousekeepingTest : public ::testing::Test {
                       [&made](Opened session) { made.set_value(std::move(session)); });
     Opened session = made.get_future().get();
     EXPECT_THAT(session, IsOk());
+    WaitForWorker();
     return session.value_or(nullptr);
   }
 
@@ -90,7 +91,17 @@ class HousekeepingTest : public ::testing::Test {
                     [&opened](Opened session) { opened.set_value(std::move(session)); });
     Opened session = opened.get_future().get();
     EXPECT_THAT(session, IsOk());
+    WaitForWorker();
     return session.value_or(nullptr);
+  }
+
+  // The job that has answered holds what it worked on until it ends.
+  void WaitForWorker() {
+    for (const Lane lane : {Lane::kStore, Lane::kBatch, Lane::kSolves}) {
+      std::promise<void> reached;
+      pool_->Post(lane, [&reached] { reached.set_value(); });
+      reached.get_future().wait();
+    }
   }
 
   absl::StatusOr<SessionRecord> Record(const std::string& id) {
