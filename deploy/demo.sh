@@ -7,6 +7,8 @@
 #
 #   deploy/demo.sh [options of `tissueform demo`]
 #
+# With --serve the server keeps running afterwards, with what it has predicted, until Ctrl-C.
+#
 # TISSUEFORM_BUILD_DIR and JOBS: see deploy/build.sh.
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -6,6 +6,7 @@
 #include "client/cli/load/load_command.h"
 #include "client/cli/online/demo_command.h"
 #include "client/cli/online/drag_command.h"
+#include "client/cli/online/prediction_command.h"
 #include "client/cli/online/run_command.h"
 #include "client/cli/online/server_info_command.h"
 #include "client/cli/online/server_mesh_command.h"
@@ -21,6 +22,7 @@ int main(int argc, char** argv) {
     tissueform::AddSessionCommand(app, work);
     tissueform::AddServerMeshCommand(app, work);
     tissueform::AddWatchCommand(app, work);
+    tissueform::AddPredictionCommand(app, work);
     tissueform::AddServerInfoCommand(app, work);
     tissueform::AddDemoCommand(app, work);
   });

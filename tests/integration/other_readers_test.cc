@@ -155,7 +155,7 @@ TEST_F(OtherReadersTest, DeformAndCompare) {
   ExpectOthersReadTheSame(Path("models/linear_elastic.vtu"));
 }
 
-TEST_F(OtherReadersTest, RunAndDemo) {
+TEST_F(OtherReadersTest, RunExportAndDemo) {
   const std::string plan = TestDataPath("plans/tongue/plan.json");
   ASSERT_OK_AND_ASSIGN(const std::unique_ptr<ServerProcess> server,
                        ServerProcess::Start(ProgramPath("tissueform-server"),
@@ -163,6 +163,15 @@ TEST_F(OtherReadersTest, RunAndDemo) {
                                             std::chrono::seconds(60)));
   ASSERT_THAT(Run({"run", plan, "--server", server->address(), "--out", "run.vtu"}), Succeeds());
   ExpectOthersReadTheSame(Path("run.vtu"));
+  const ProcessResult made = Run({"prediction", "create", plan, "--server", server->address()});
+  ASSERT_THAT(made, Succeeds());
+  const std::string name = made.out.substr(0, made.out.find('\n'));
+  for (const char* out : {"kept.vtu", "kept.stl", "kept.ply"}) {
+    ASSERT_THAT(Run({"prediction", "export", name, "--server", server->address(), "--plan", plan,
+                     "--out", out}),
+                Succeeds());
+    ExpectOthersReadTheSame(Path(out));
+  }
   ASSERT_EQ(ExitCodeOf(absl::StrCat("env -u DISPLAY PATH=/nonexistent ", ProgramPath("tissueform"),
                                     " demo --no-browser --seconds 0.1 --plan ", plan, " --out ",
                                     Path("demo"), " > ", Path("demo.txt"))),

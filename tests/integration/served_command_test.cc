@@ -235,6 +235,13 @@ TEST_F(ServedCommandTest, DemoComparesWithTheElasticModelAsInProcess) {
   // The largest difference is on the skin here; float32 steps at 8 mm are 4.8e-7 mm.
   EXPECT_NEAR(difference["regions"]["free skin"]["max_mm"],
               (ours.mesh.positions() - other.mesh.positions()).rowwise().norm().maxCoeff(), 2e-6);
+  // What the server keeps of it, and how far neo_hookean lies from that.
+  EXPECT_THAT(Read("out.txt"), ContainsRegex("kept by the server: predictions/[0-9a-f]+ "));
+  EXPECT_THAT(Summary()["prediction"], StartsWith("predictions/"));
+  const Json refinement = Summary()["refinement"];
+  EXPECT_NE(refinement["prediction"], Summary()["prediction"]);
+  EXPECT_EQ(refinement["distances"]["vertices"], ours.mesh.num_vertices());
+  EXPECT_GT(refinement["distances"]["max_mm"], refinement["distances"]["mean_mm"]);
   // A tongue has no parts of a face.
   EXPECT_EQ(difference["regions"].size(), 1U);
   EXPECT_TRUE(Summary()["movement"].empty());
@@ -254,6 +261,36 @@ TEST_F(ServedCommandTest, DemoMovesTheJawOfTheBundledHeadBy8MmAlsoWithoutADispla
   EXPECT_GT(chin["forward_mm"], 4 * 8 / 6.0);
   EXPECT_LT(chin["forward_mm"], 8.5);
   EXPECT_LT(summary["movement"]["nose"]["foremost"]["total_mm"], 1);
+}
+
+TEST_F(ServedCommandTest, DemoServesWhatItPredictedUntilItIsInterrupted) {
+  const std::string command = "echo $$; exec env -u DISPLAY PATH=/nonexistent " +
+                              ProgramPath("tissueform") + " demo --serve --seconds 0.1 --plan " +
+                              kTonguePlan + " --out " + folder_.string() + " 2>" + PathOf("err");
+  FILE* demo = popen(command.c_str(), "r");
+  ASSERT_NE(demo, nullptr);
+  std::array<char, 512> line{};
+  ASSERT_NE(std::fgets(line.data(), line.size(), demo), nullptr);
+  const pid_t pid = std::atoi(line.data());
+  ASSERT_GT(pid, 1);
+  const std::string serves = "the server keeps running at ";
+  bool served = false;
+  while (std::fgets(line.data(), line.size(), demo) != nullptr) {
+    const std::string text = line.data();
+    if (text.rfind(serves, 0) != 0) continue;
+    served = true;
+    const std::string address = text.substr(serves.size(), text.find(',') - serves.size());
+    const auto client = TissueformClient::Connect(address, {});
+    EXPECT_THAT(client, IsOk());
+    if (client.ok()) {
+      const auto predictions = (*client)->predictions().List();
+      EXPECT_THAT(predictions, IsOk());
+      EXPECT_EQ(predictions.ok() ? predictions->size() : 0, 2U);
+    }
+    kill(pid, SIGINT);
+  }
+  EXPECT_TRUE(served) << Read("err");
+  EXPECT_EQ(WEXITSTATUS(pclose(demo)), 0);
 }
 
 TEST_F(ServedCommandTest, AnInterruptedDemoEndsItsServer) {

@@ -23,6 +23,7 @@
 #include "client/cli/online/drag.h"
 #include "client/cli/online/face_movement.h"
 #include "client/cli/online/handle_words.h"
+#include "client/cli/online/prediction_export.h"
 #include "client/cli/online/server_process.h"
 #include "client/cli/shared/companion.h"
 #include "client/cli/shared/demo_paths.h"
@@ -33,8 +34,6 @@
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
 #include "core/constraints/handle_pose.h"
-#include "core/mesh/tet_topology.h"
-#include "core/mesh_io/triangle_mesh_io.h"
 #include "core/planning/plan_io.h"
 #include "core/problem/plan_problem.h"
 #include "core/process/child_process.h"
@@ -55,6 +54,7 @@ struct DemoOptions {
   int port = 0;
   std::string encoding = "float32";
   bool no_browser = false;
+  bool serve = false;
   DragOptions drag;
 
   std::string Path(const std::string& name) const { return out + "/" + name; }
@@ -159,15 +159,6 @@ absl::StatusOr<DemoDrags> Summarize(const PlanProblem& problem, const TwoDrags& 
   return summary;
 }
 
-absl::Status WriteSkin(const std::string& path, const PlanProblem& problem,
-                       const Positions& deformed) {
-  Positions written = deformed;
-  SwapToOrFromLps(problem.written_in, &written);
-  TF_ASSIGN_OR_RETURN(TriangleMesh skin,
-                      TriangleMesh::Create(std::move(written), BoundaryFacets(*problem.mesh)));
-  return WriteTriangleMesh(path, {std::move(skin), {}, {}});
-}
-
 absl::Status WriteResults(const DemoOptions& options, const DemoCase& demo, const DragResult& drag,
                           const DemoDrags& summary, const DemoPrediction& prediction) {
   TF_RETURN_IF_ERROR(WriteFramesCsv(options.FramesPath(), drag));
@@ -199,7 +190,25 @@ void DrawPictures(const DemoOptions& options, const PlanProblem& problem,
   }
 }
 
-absl::Status DragAndPredict(const DemoOptions& options, const DemoCase& demo,
+// How often it is looked whether the server has ended by itself.
+constexpr std::chrono::milliseconds kServeStep{200};
+
+// Until Ctrl-C, which is its regular end.
+absl::Status Serve(ServerProcess* server) {
+  absl::PrintF(
+      "\nthe server keeps running at %s, with its session and predictions, until Ctrl-C. In "
+      "another terminal:\n  tissueform prediction list --server %s\n",
+      server->address(), server->address());
+  while (!interrupted) {
+    // Ctrl-C reaches both, in any order.
+    if (server->WaitForExit(kServeStep).has_value() && !interrupted) {
+      return absl::UnavailableError("the server has ended");
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status DragAndPredict(const DemoOptions& options, const DemoCase& demo, ServerProcess* server,
                             TissueformClient* client, const absl::Status& display) {
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<PlanSession> session,
                       PlanSession::Create(client, demo.problem));
@@ -217,10 +226,12 @@ absl::Status DragAndPredict(const DemoOptions& options, const DemoCase& demo,
   TF_RETURN_IF_ERROR(CheckNotInterrupted());
   PrintDrags(summary);
   PrintPrediction(prediction);
+  PrintKept(prediction);
   PrintInWords(summary, prediction);
   TF_RETURN_IF_ERROR(WriteResults(options, demo, drags.skin, summary, prediction));
   DrawPictures(options, demo.problem, prediction, display);
-  return CheckNotInterrupted();
+  TF_RETURN_IF_ERROR(CheckNotInterrupted());
+  return options.serve ? Serve(server) : absl::OkStatus();
 }
 
 absl::Status RunDemo(const DemoOptions& options) {
@@ -240,7 +251,7 @@ absl::Status RunDemo(const DemoOptions& options) {
   TF_RETURN_IF_ERROR(CheckNotInterrupted());
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client,
                       TissueformClient::Connect(server->address(), {}));
-  return DragAndPredict(options, demo, client.get(), display.status());
+  return DragAndPredict(options, demo, server.get(), client.get(), display.status());
 }
 
 }  // namespace
@@ -268,8 +279,11 @@ void AddDemoCommand(CLI::App& app, CommandWork* work) {
       ->capture_default_str();
   command->add_flag("--no-browser", options->no_browser,
                     "for scripts: never open a browser (this version opens none)");
+  command->add_flag("--serve", options->serve,
+                    "keep the server running at the end, until Ctrl-C, and tell its address");
   command->footer(
       "Starts the tissueform-server that lies beside this program on loopback and ends it again.\n"
+      "It keeps the prediction at the end of the drag, and one that neo_hookean has refined.\n"
       "The lower jaw of the bundled head goes 8 mm forward, 2 more than its plan. Open front.png,\n"
       "left.png and three_quarter.png, and result.vtu or skin.stl in ParaView or 3D Slicer.");
   command->callback([options, work] { *work = [options] { return RunDemo(*options); }; });

@@ -11,6 +11,7 @@
 #include "client/cpp/plan_session.h"
 #include "core/base/status_macros.h"
 #include "core/planning/model_names.h"
+#include "proto/conversion/prediction_conversion.h"
 
 namespace tissueform {
 namespace {
@@ -36,6 +37,24 @@ absl::StatusOr<std::vector<RegionDistances>> Differences(const PlanProblem& prob
   }
   regions.insert(regions.end(), face.begin(), face.end());
   return DistancesByRegion(distances, regions);
+}
+
+// The slow model that iterates, at the end, where there is time for it.
+absl::Status KeepAndRefine(const PlanProblem& problem, TissueformClient* client,
+                           const std::string& session, DemoPrediction* prediction) {
+  const std::vector<NamedPose> poses = NamedPoses(problem);
+  PredictionCalls& calls = client->predictions();
+  TF_ASSIGN_OR_RETURN(const v1::Prediction kept, calls.Create(session, poses));
+  prediction->kept = kept.name();
+  if (kept.model() == v1::DEFORMATION_MODEL_NEO_HOOKEAN) return absl::OkStatus();
+  const auto refined = calls.Create(session, poses, v1::DEFORMATION_MODEL_NEO_HOOKEAN);
+  prediction->refined_answer = refined.status();
+  if (!refined.ok()) return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(const ComparedPredictions compared,
+                      calls.Compare(kept.name(), refined->name()));
+  prediction->refined = refined->name();
+  prediction->refinement = ToDistanceSummary(compared.comparison.distances());
+  return absl::OkStatus();
 }
 
 OrderedJson MovementToJson(const Movement& movement) {
@@ -66,6 +85,7 @@ absl::StatusOr<DemoPrediction> PredictAtEnd(const PlanProblem& problem,
     TF_ASSIGN_OR_RETURN(prediction.differences,
                         Differences(problem, face, prediction, *other_answer));
   }
+  TF_RETURN_IF_ERROR(KeepAndRefine(problem, client, session, &prediction));
   return prediction;
 }
 
@@ -83,6 +103,23 @@ void AddToJson(const DemoPrediction& prediction, OrderedJson* json) {
                                                      {"regions", OrderedJson::object()}};
   for (const auto& [name, distances] : prediction.differences) {
     difference["regions"][name] = DistancesToJson(distances);
+  }
+  (*json)["prediction"] = prediction.kept;
+  if (!prediction.refined.empty()) {
+    (*json)["refinement"] = {{"prediction", prediction.refined},
+                             {"model", "neo_hookean"},
+                             {"distances", DistancesToJson(prediction.refinement)}};
+  }
+}
+
+void PrintKept(const DemoPrediction& prediction) {
+  absl::PrintF("\nkept by the server: %s (%s)\n", prediction.kept, prediction.model);
+  if (!prediction.refined.empty()) {
+    absl::PrintF(
+        "refined by neo_hookean: %s, which differs by %.2f mm on average and %.2f mm at most\n",
+        prediction.refined, prediction.refinement.mean_mm, prediction.refinement.max_mm);
+  } else if (!prediction.refined_answer.ok()) {
+    absl::PrintF("not refined by neo_hookean: %s\n", prediction.refined_answer.message());
   }
 }
 

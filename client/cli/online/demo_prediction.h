@@ -12,6 +12,7 @@
 #include "client/cli/compare/comparison_report.h"
 #include "client/cli/online/face_movement.h"
 #include "client/cpp/tissueform_client.h"
+#include "core/deformation/comparison.h"
 #include "core/problem/plan_problem.h"
 
 namespace tissueform {
@@ -30,11 +31,20 @@ struct DemoPrediction {
   std::string other_model;
   std::vector<RegionDistances> differences;
   absl::Status other_answer;
+
+  // What the server keeps: the prediction, and the same by neo_hookean, with how far that lies from
+  // it at all vertices. Empty where the plan's model is neo_hookean, or it could not answer, and
+  // why.
+  std::string kept;  // "predictions/{id}"
+  std::string refined;
+  DistanceSummary refinement;
+  absl::Status refined_answer;
 };
 
 // Asks the server for the end pose by the plan's model, and by linear_elastic (gradient_field where
-// the plan's is that) of the same session. `face` are the FaceRegions of the problem. Errors: those
-// of DeformOnce with the plan's model.
+// the plan's is that) of the same session. Then has the server keep the first answer, and refine it
+// by neo_hookean. `face` are the FaceRegions of the problem. Errors: those of DeformOnce with the
+// plan's model, and of keeping its answer.
 absl::StatusOr<DemoPrediction> PredictAtEnd(const PlanProblem& problem,
                                             const std::vector<ComparedRegion>& face,
                                             TissueformClient* client, const std::string& session);
@@ -44,5 +54,7 @@ void AddToJson(const DemoPrediction& prediction, nlohmann::ordered_json* json);
 
 // For people, on stdout: the tables.
 void PrintPrediction(const DemoPrediction& prediction);
+// What the server keeps of it.
+void PrintKept(const DemoPrediction& prediction);
 
 }  // namespace tissueform

@@ -7,12 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "absl/strings/ascii.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
-#include "absl/strings/strip.h"
-#include "absl/time/time.h"
 
+#include "client/cli/online/resource_text.h"
 #include "client/cli/shared/companion.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/status_macros.h"
@@ -25,19 +23,9 @@ struct SessionOptions {
   std::string name;
 };
 
-std::string TimeText(const google::protobuf::Timestamp& time) {
-  return absl::FormatTime("%Y-%m-%d %H:%M:%S", absl::FromUnixSeconds(time.seconds()),
-                          absl::LocalTimeZone());
-}
-
 std::string StateText(const v1::Session& session) {
   if (session.state() == v1::SESSION_STATE_STORED) return "stored";
   return absl::StrFormat("ready, %.0f MiB", static_cast<double>(session.bytes_held()) / (1 << 20));
-}
-
-std::string ModelText(v1::DeformationModel model) {
-  return absl::AsciiStrToLower(
-      absl::StripPrefix(v1::DeformationModel_Name(model), "DEFORMATION_MODEL_"));
 }
 
 absl::Status List(const SessionOptions& options) {
@@ -84,9 +72,7 @@ void AddSessionCommand(CLI::App& app, CommandWork* work) {
       sub->add_option("SESSION", options->name, "its name, with \"sessions/\" or without")
           ->required();
     }
-    sub->add_option("--server", options->server, "where the server listens")
-        ->required()
-        ->type_name("HOST:PORT");
+    AddServerOption(sub, &options->server);
     sub->callback([options, work, run] { *work = [options, run] { return run(*options); }; });
   };
   add("list", "all sessions, in memory or not", false, List);

@@ -32,6 +32,8 @@ int RunCommandLine(int argc, char** argv,
   CLI::App app(kDescription, "tissueform");
   app.footer(kFooter);
   app.set_version_flag("--version", std::string("tissueform ") + kVersion);
+  // One: after it a command's name is a word like others (`prediction compare` is not `compare`).
+  app.require_subcommand(0, 1);
   CommandWork work;
   add_commands(app, &work);
   try {

@@ -40,6 +40,9 @@ inline constexpr CompanionCommand kMeshDeleteCommand = {
     "delete", "delete a mesh of a server from which no session is made", "tissueform-online"};
 inline constexpr CompanionCommand kWatchCommand = {
     "watch", "follow a session that somebody drags, a line a second", "tissueform-online"};
+inline constexpr CompanionCommand kPredictionCommand = {
+    "prediction", "make, list, compare, export and delete the predictions that a server keeps",
+    "tissueform-online"};
 inline constexpr CompanionCommand kServerInfoCommand = {
     "server-info", "tell what a server is: version, models, limits", "tissueform-online"};
 inline constexpr CompanionCommand kExperimentsCommand = {

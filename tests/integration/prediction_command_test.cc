@@ -1,0 +1,150 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/strings/match.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "nlohmann/json.hpp"
+
+#include "client/cli/online/server_process.h"
+#include "core/mesh/tet_topology.h"
+#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh_io/triangle_mesh_io.h"
+#include "tests/testing/run_tissueform.h"
+#include "tests/testing/status_matchers.h"
+#include "tests/testing/test_paths.h"
+
+// `tissueform prediction` as a real program with a real server.
+namespace tissueform::testing {
+namespace {
+
+using Json = nlohmann::json;
+using ::testing::AllOf;
+using ::testing::ContainsRegex;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+const std::string kTonguePlan = SourcePath("tests/data/plans/tongue/plan.json");
+
+class PredictionCommandTest : public CliTest {
+ protected:
+  void SetUp() override {
+    CliTest::SetUp();
+    ASSERT_OK_AND_ASSIGN(server_,
+                         ServerProcess::Start(ProgramPath("tissueform-server"),
+                                              {"--in-memory", "--port", "0", "--log-level", "warn"},
+                                              std::chrono::seconds(60)));
+  }
+
+  ProcessResult Prediction(std::vector<std::string> words) const {
+    words.insert(words.begin(), "prediction");
+    words.insert(words.end(), {"--server", server_->address()});
+    return Run(words);
+  }
+  // Its name is the first line.
+  std::string Create(std::vector<std::string> words) const {
+    words.insert(words.begin(), {"create", kTonguePlan});
+    const ProcessResult result = Prediction(words);
+    EXPECT_THAT(result, Succeeds());
+    EXPECT_THAT(result.out, StartsWith("predictions/"));
+    return result.out.substr(0, result.out.find('\n'));
+  }
+  // In this process, without a server. It may warn of inverted tets.
+  void Deform(const std::string& model, const std::string& out) const {
+    EXPECT_EQ(Run({"deform", kTonguePlan, "--model", model, "--out", out}).exit_code, 0);
+  }
+  Json ReadJson(const std::string& name) const { return Json::parse(Read(name)); }
+
+  std::unique_ptr<ServerProcess> server_;
+};
+
+TEST_F(PredictionCommandTest, ListsShowsComparesAndDeletes) {
+  const std::string field = Create({});
+  const std::string elastic = Create({"--model", "linear_elastic"});
+  EXPECT_THAT(Prediction({"list"}).out,
+              AllOf(HasSubstr(field), HasSubstr(elastic), ContainsRegex("\n2 predictions\n")));
+  const ProcessResult shown = Prediction({"show", field, "--json"});
+  const Json told = Json::parse(shown.out);
+  EXPECT_EQ(told["prediction"], field);
+  EXPECT_EQ(told["model"], "gradient_field");
+  EXPECT_THAT(told["notice"], HasSubstr("not a medical device"));
+  const std::string id = field.substr(field.find('/') + 1);
+  EXPECT_THAT(Prediction({"show", id}).out, HasSubstr(field));
+
+  const ProcessResult compared = Prediction({"compare", field, elastic, "--json"});
+  EXPECT_THAT(compared, Succeeds());
+  const Json json = Json::parse(compared.out);
+  EXPECT_EQ(json["other_model"], "linear_elastic");
+  // The same from two results of `deform`.
+  Deform("gradient_field", "field.vtu");
+  Deform("linear_elastic", "elastic.vtu");
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile one, ReadTetMesh(Path("field.vtu")));
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile other, ReadTetMesh(Path("elastic.vtu")));
+  const Eigen::VectorXd distances =
+      (one.mesh.positions() - other.mesh.positions()).rowwise().norm();
+  EXPECT_NEAR(json["distances"]["max_mm"], distances.maxCoeff(), 2e-6);  // float32
+  EXPECT_NEAR(json["distances"]["mean_mm"], distances.mean(), 2e-6);
+  EXPECT_EQ(json["distances"]["vertices"], distances.size());
+  EXPECT_THAT(Prediction({"compare", field, elastic}).out, ContainsRegex("\nall +"));
+
+  EXPECT_THAT(Prediction({"delete", field}), Succeeds());
+  EXPECT_THAT(Prediction({"show", field}), FailsWith(1, HasSubstr("no prediction")));
+  EXPECT_THAT(Prediction({"compare", elastic}), FailsWith(1, HasSubstr("--model")));
+  EXPECT_THAT(Prediction({"compare", elastic, "--model", "arap"}),
+              FailsWith(1, HasSubstr("session")));  // ended with `create`
+}
+
+TEST_F(PredictionCommandTest, ExportsAreTheResultWithItsProvenance) {
+  const std::string name = Create({"--model", "linear_elastic"});
+  for (const std::string out : {"after.vtu", "after.stl", "after.ply", "after.json"}) {
+    EXPECT_THAT(Prediction({"export", name, "--plan", kTonguePlan, "--out", out}), Succeeds());
+  }
+  Deform("linear_elastic", "deform.vtu");
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile after, ReadTetMesh(Path("after.vtu")));
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile deform, ReadTetMesh(Path("deform.vtu")));
+  // Coordinates are below 8 mm: float32 steps there are 4.8e-7 mm.
+  EXPECT_LT((after.mesh.positions() - deform.mesh.positions()).cwiseAbs().maxCoeff(), 5e-7);
+  EXPECT_EQ(after.cell_data.size(), deform.cell_data.size());
+  for (const char* surface : {"after.stl", "after.ply"}) {
+    ASSERT_OK_AND_ASSIGN(const TriangleMeshFile skin, ReadTriangleMesh(Path(surface)));
+    EXPECT_EQ(skin.mesh.num_triangles(), BoundaryFacets(after.mesh).rows()) << surface;
+  }
+  const Json provenance = ReadJson("after.vtu.json");
+  EXPECT_EQ(provenance["file"], "after.vtu");
+  EXPECT_EQ(provenance["prediction"], name);
+  EXPECT_EQ(provenance["model"], "linear_elastic");
+  EXPECT_EQ(provenance["mesh_sha256"].get<std::string>().size(), 64U);
+  EXPECT_GT(provenance["quality"]["max_displacement_mm"], 0);
+  EXPECT_FALSE(provenance["poses"].empty());
+  EXPECT_THAT(provenance["create_time"], ContainsRegex("^20..-..-..T..:..:..Z$"));
+  EXPECT_THAT(provenance["notice"], HasSubstr("not a medical device"));
+  const Json whole = ReadJson("after.json");
+  ASSERT_EQ(whole["positions_mm"].size(), static_cast<size_t>(after.mesh.num_vertices()));
+  EXPECT_EQ(whole["positions_mm"][7][2], after.mesh.positions()(7, 2));
+}
+
+TEST_F(PredictionCommandTest, ExportRefusesAnotherMeshAndWritesNothing) {
+  const std::string name = Create({});
+  const std::string other = SourcePath("tests/data/plans/head_chin/plan.json");
+  EXPECT_THAT(Prediction({"export", name, "--plan", other, "--out", "after.vtu"}),
+              FailsWith(1, HasSubstr("is not what predictions/")));
+  WriteBar();
+  EXPECT_THAT(Prediction({"export", name, "--mesh", "bar.vtu", "--out", "after.vtu"}),
+              FailsWith(1, HasSubstr("is not what predictions/")));
+  EXPECT_THAT(Prediction({"export", name, "--out", "after.stl"}),
+              FailsWith(1, HasSubstr("--plan")));
+  EXPECT_THAT(Prediction({"export", name, "--plan", kTonguePlan, "--out", "after.obj"}),
+              FailsWith(1, HasSubstr(".ply")));
+  EXPECT_THAT(Prediction({"create"}), FailsWith(1, HasSubstr("--session")));
+  for (const std::string& file : Files()) {
+    EXPECT_FALSE(absl::StartsWith(file, "after")) << file;
+  }
+}
+
+}  // namespace
+}  // namespace tissueform::testing
