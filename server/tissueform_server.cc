@@ -78,15 +78,20 @@ ConnectionListener::Options ListenerOptions(const ServerOptions& options) {
           .most_of_address = options.max_connections_per_address};
 }
 
+// Every option by its place: one that is added does not compile here until it was decided whether
+// it is a limit.
 NamedLimits LimitsOf(const ServerOptions& options) {
-  NamedLimits limits = ToNamedLimits(options.limits);
+  const auto& [host, port, memory_budget_bytes, workers, service, max_calls_per_connection,
+               max_connections, max_connections_per_address, drain_deadline, in_memory, data_dir,
+               log_level] = options;
+  NamedLimits limits = ToNamedLimits(service);
   limits["max_message_bytes"] = kMaxReceiveBytes;
-  limits["memory_budget_bytes"] = options.memory_budget_bytes;
-  limits["workers"] = options.workers;
-  limits["max_calls_per_connection"] = options.max_calls_per_connection;
-  limits["max_connections"] = options.max_connections;
-  limits["max_connections_per_address"] = options.max_connections_per_address;
-  limits["drain_deadline_ms"] = std::chrono::milliseconds(options.drain_deadline).count();
+  limits["memory_budget_bytes"] = memory_budget_bytes;
+  limits["workers"] = workers;
+  limits["max_calls_per_connection"] = max_calls_per_connection;
+  limits["max_connections"] = max_connections;
+  limits["max_connections_per_address"] = max_connections_per_address;
+  limits["drain_deadline_ms"] = std::chrono::milliseconds(drain_deadline).count();
   return limits;
 }
 

@@ -43,26 +43,32 @@ void AddEncodings(v1::ServerInfo* info) {
 
 }  // namespace
 
+// Every member by its place: one that is added to ServiceLimits does not compile here until it has
+// a name, too.
 NamedLimits ToNamedLimits(const ServiceLimits& limits) {
-  return {{"max_vertices", limits.max_vertices},
-          {"max_tets", limits.max_tets},
-          {"max_mesh_bytes", limits.max_mesh_bytes},
-          {"max_sessions", limits.max_sessions},
-          {"max_stored_sessions", limits.max_stored_sessions},
-          {"max_streams", limits.max_streams},
-          {"max_watches", limits.max_watches},
-          {"max_watches_per_session", limits.max_watches_per_session},
-          {"session_idle_ttl_ms", Milliseconds(limits.session_idle_ttl)},
-          {"retention_days", limits.retention_days},
-          {"configuration_deadline_ms", Milliseconds(limits.configuration_deadline)},
-          {"upload_silence_ms", Milliseconds(limits.upload_silence)},
-          {"max_handles", limits.max_handles},
-          {"max_cell_arrays", limits.max_cell_arrays},
-          {"max_name_bytes", limits.max_name_bytes},
-          {"max_request_id_bytes", limits.max_request_id_bytes},
-          {"max_chunk_bytes", limits.max_chunk_bytes},
-          {"max_unacked", limits.max_unacked},
-          {"max_iterations", limits.max_iterations}};
+  const auto& [max_vertices, max_tets, max_mesh_bytes, max_sessions, max_stored_sessions,
+               max_streams, max_watches, max_watches_per_session, session_idle_ttl, retention_days, configuration_deadline,
+               upload_silence, max_handles, max_cell_arrays, max_name_bytes, max_request_id_bytes,
+               max_chunk_bytes, max_unacked, max_iterations] = limits;
+  return {{"max_vertices", max_vertices},
+          {"max_tets", max_tets},
+          {"max_mesh_bytes", max_mesh_bytes},
+          {"max_sessions", max_sessions},
+          {"max_stored_sessions", max_stored_sessions},
+          {"max_streams", max_streams},
+          {"max_watches", max_watches},
+          {"max_watches_per_session", max_watches_per_session},
+          {"session_idle_ttl_ms", Milliseconds(session_idle_ttl)},
+          {"retention_days", retention_days},
+          {"configuration_deadline_ms", Milliseconds(configuration_deadline)},
+          {"upload_silence_ms", Milliseconds(upload_silence)},
+          {"max_handles", max_handles},
+          {"max_cell_arrays", max_cell_arrays},
+          {"max_name_bytes", max_name_bytes},
+          {"max_request_id_bytes", max_request_id_bytes},
+          {"max_chunk_bytes", max_chunk_bytes},
+          {"max_unacked", max_unacked},
+          {"max_iterations", max_iterations}};
 }
 
 ServerInfoService::ServerInfoService(ServiceGate* gate, const NamedLimits& limits) : gate_(gate) {

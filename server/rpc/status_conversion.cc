@@ -11,6 +11,7 @@
 #include "google/rpc/status.pb.h"
 
 #include "core/base/error_reason.h"
+#include "server/store/store_errors.h"
 
 namespace tissueform {
 namespace {
@@ -45,7 +46,7 @@ grpc::Status ToGrpcStatus(const absl::Status& status) {
   if (status.ok()) {
     return grpc::Status::OK;
   }
-  const std::string message = Cut(status.message());
+  const std::string message = Cut(MessageForClients(status));
   return {static_cast<grpc::StatusCode>(status.code()), message, Details(status, message)};
 }
 

@@ -21,6 +21,7 @@
 
 #include "core/base/status_macros.h"
 #include "server/store/durable_file.h"
+#include "server/store/store_errors.h"
 
 namespace tissueform {
 namespace {
@@ -168,10 +169,12 @@ absl::Status DataFolder::CheckStillThere() const {
   if (stat(path_.c_str(), &status) == 0 && status.st_dev == device_ && status.st_ino == inode_) {
     return absl::OkStatus();
   }
-  return absl::UnavailableError(
-      absl::StrCat("data folder ", path_,
-                   ": it has been removed or replaced while the server runs, nothing can be kept; "
-                   "put it back and start the server again"));
+  return NamingPath(
+      absl::UnavailableError(absl::StrCat(
+          "data folder ", path_,
+          ": it has been removed or replaced while the server runs, nothing can be kept; "
+          "put it back and start the server again")),
+      path_);
 }
 
 }  // namespace tissueform

@@ -13,6 +13,7 @@
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "server/store/durable_file.h"
+#include "server/store/store_errors.h"
 
 namespace tissueform {
 namespace {
@@ -200,6 +201,6 @@ absl::StatusOr<bool> Database::TruncateLog() {
   return true;
 }
 
-absl::Status Database::Error() const { return ToStatus(handle_, path_); }
+absl::Status Database::Error() const { return NamingPath(ToStatus(handle_, path_), path_); }
 
 }  // namespace tissueform

@@ -16,6 +16,7 @@
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "server/store/fault_points.h"
+#include "server/store/store_errors.h"
 
 namespace tissueform {
 namespace {
@@ -34,22 +35,26 @@ absl::Status WriteParts(const std::string& path, const std::vector<absl::string_
   return file.Sync();
 }
 
-}  // namespace
-
-absl::Status FileError(int error_number, absl::string_view what, const std::string& path) {
+absl::Status ErrorOf(int error_number, const std::string& what) {
   switch (error_number) {
     case ENOSPC:
     case EDQUOT:
     case EFBIG:
-      return WithReason(absl::ResourceExhaustedError(
-                            absl::StrCat(what, " ", path, ": the disk is full; free some space")),
-                        ErrorReason::kDiskFull);
+      return WithReason(
+          absl::ResourceExhaustedError(absl::StrCat(what, ": the disk is full; free some space")),
+          ErrorReason::kDiskFull);
     case EROFS:
       return absl::FailedPreconditionError(
-          absl::StrCat(what, " ", path, ": the disk is read-only; mount it writable"));
+          absl::StrCat(what, ": the disk is read-only; mount it writable"));
     default:
-      return absl::ErrnoToStatus(error_number, absl::StrCat(what, " ", path));
+      return absl::ErrnoToStatus(error_number, what);
   }
+}
+
+}  // namespace
+
+absl::Status FileError(int error_number, absl::string_view what, const std::string& path) {
+  return NamingPath(ErrorOf(error_number, absl::StrCat(what, " ", path)), path);
 }
 
 absl::StatusOr<OpenFile> OpenFile::Open(const std::string& path, int flags) {

@@ -5,7 +5,9 @@
 
 #include <chrono>
 
+#include "absl/strings/cord.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
@@ -15,6 +17,11 @@
 #include "server/store/session_store.h"
 
 namespace tissueform {
+namespace {
+
+constexpr absl::string_view kPathUrl = "type.tissueform/LocalPath";
+
+}  // namespace
 
 absl::Status NoSession(absl::string_view id) {
   return WithReason(absl::NotFoundError(absl::StrCat("no record of session \"", id, "\"")),
@@ -109,6 +116,18 @@ absl::Status CheckPrediction(const PredictionRecord& record, const std::string& 
                                                    " vertices; it needs 12 a vertex"));
   }
   return absl::OkStatus();
+}
+
+absl::Status NamingPath(absl::Status status, absl::string_view path) {
+  status.SetPayload(kPathUrl, absl::Cord(path));  // does nothing to an OK status
+  return status;
+}
+
+std::string MessageForClients(const absl::Status& status) {
+  const std::string message(status.message());
+  const auto path = status.GetPayload(kPathUrl);
+  if (!path.has_value() || path->empty()) return message;
+  return absl::StrReplaceAll(message, {{std::string(*path), "(on the server)"}});
 }
 
 int64_t SystemUnixSeconds() {

@@ -30,4 +30,10 @@ absl::Status BadLimit(int limit);                                     // Invalid
 absl::Status CheckMeshName(absl::string_view sha256);                 // InvalidArgument: no SHA-256
 absl::Status Damaged(absl::string_view what, absl::string_view why);  // DataLoss
 
+// `status` whose message names that file or folder of this machine: good for the log and for who
+// starts the server, nothing for its clients. OK stays OK.
+absl::Status NamingPath(absl::Status status, absl::string_view path);
+// The message of `status` without such a path.
+std::string MessageForClients(const absl::Status& status);
+
 }  // namespace tissueform

@@ -3,14 +3,17 @@
 
 #include "server/rpc/status_conversion.h"
 
+#include <cerrno>
 #include <string>
 
+#include "gmock/gmock.h"
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 #include "gtest/gtest.h"
 
 #include "client/cpp/client_call.h"
 #include "core/base/error_reason.h"
+#include "server/store/durable_file.h"
 
 namespace tissueform {
 namespace {
@@ -54,6 +57,15 @@ TEST(StatusConversionTest, TheClientGetsBackWhatTheServerHad) {
   const absl::Status status =
       WithReason(absl::NotFoundError("no such mesh"), ErrorReason::kMeshNotFound, {{"a", "b=c"}});
   EXPECT_EQ(FromGrpcStatus(ToGrpcStatus(status)), status);  // payloads too
+}
+
+TEST(StatusConversionTest, PathsOfTheServerStayThere) {
+  const absl::Status status = FileError(ENOSPC, "cannot write", "/srv/patients/tissueform.db-wal");
+  EXPECT_THAT(std::string(status.message()), ::testing::HasSubstr("/srv/patients"));
+  const grpc::Status sent = ToGrpcStatus(status);
+  EXPECT_EQ(sent.error_message(),
+            "cannot write (on the server): the disk is full; free some space");
+  EXPECT_THAT(sent.error_details(), ::testing::Not(::testing::HasSubstr("patients")));
 }
 
 TEST(StatusConversionTest, DetailsThatNobodyUnderstandsLeaveTheCodeAndTheMessage) {
