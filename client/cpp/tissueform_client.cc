@@ -203,6 +203,16 @@ absl::StatusOr<std::vector<v1::Session>> TissueformClient::ListSessions() {
   return sessions;
 }
 
+absl::StatusOr<v1::Session> TissueformClient::UpdateSession(
+    const v1::UpdateSessionRequest& request) {
+  grpc::ClientContext context;
+  SetDeadline(&context);
+  AddSessionHeader(request.name(), &context);
+  v1::Session session;
+  TF_RETURN_IF_ERROR(FromGrpcStatus(sessions_->UpdateSession(&context, request, &session)));
+  return session;
+}
+
 absl::Status TissueformClient::DeleteSession(const std::string& name) {
   grpc::ClientContext context;
   SetDeadline(&context);

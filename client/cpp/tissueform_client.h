@@ -65,6 +65,8 @@ class TissueformClient {
   absl::StatusOr<v1::Session> GetSession(const std::string& name);
   // All of them, page after page.
   absl::StatusOr<std::vector<v1::Session>> ListSessions();
+  // Prepared anew when it returns. Errors: Aborted also when request.etag is not the session's.
+  absl::StatusOr<v1::Session> UpdateSession(const v1::UpdateSessionRequest& request);
   absl::Status DeleteSession(const std::string& name);
 
   // `model` is the session's own when unspecified.

@@ -11,6 +11,7 @@
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/geometry_conversion.h"
+#include "server/store/store_errors.h"
 
 namespace tissueform {
 
@@ -161,7 +162,9 @@ void DeformStreamReactor::TakeSession(absl::StatusOr<std::shared_ptr<Session>> s
 
 absl::Status DeformStreamReactor::Configure(std::shared_ptr<Session> session) {
   if (configuration_ != nullptr) {
-    TF_ASSIGN_OR_RETURN(configuration_, ConfigurationFor(*configuration_, std::move(session)));
+    if (configuration_->session->updated()) returning_ = Returning::kUpdated;
+    TF_ASSIGN_OR_RETURN(configuration_, ConfigurationFor(stream_request_, *configuration_->session,
+                                                         std::move(session)));
     return absl::OkStatus();
   }
   TF_ASSIGN_OR_RETURN(configuration_, ReadConfiguration(stream_request_, std::move(session)));
@@ -177,7 +180,9 @@ void DeformStreamReactor::Begin(StreamBegin begin) {
                        FormOf(*configuration_, begin.started.started()));
     started_ = std::move(begin.started);
   }
-  if (std::exchange(restoring_, false)) notices_.emplace_back().mutable_restored();
+  const Returning returning = std::exchange(returning_, Returning::kNo);
+  if (returning == Returning::kRestored) notices_.emplace_back().mutable_restored();
+  if (returning == Returning::kUpdated) notices_.emplace_back().mutable_updated();
 }
 
 absl::Status DeformStreamReactor::TakePose(const v1::PoseUpdate& update) {
@@ -191,9 +196,9 @@ absl::Status DeformStreamReactor::TakePose(const v1::PoseUpdate& update) {
 void DeformStreamReactor::StartCommit() {
   committing_ = true;
   registry_->pool().Post(
-      Lane::kFrames, [this, id = stream_request_.session_id,
+      Lane::kFrames, [this, session = configuration_->session,
                       pose = *std::exchange(to_commit_, std::nullopt)]() mutable {
-        registry_->CommitPoses(id, std::move(pose.poses),
+        registry_->CommitPoses(session, std::move(pose.poses),
                                [this, sequence = pose.sequence](const absl::Status& outcome) {
                                  FinishCommit(sequence, outcome);
                                });
@@ -205,7 +210,7 @@ void DeformStreamReactor::FinishCommit(uint64_t sequence, const absl::Status& ou
   committing_ = false;
   v1::CommittedNotice* notice = notices_.emplace_back().mutable_committed();
   notice->set_sequence(sequence);
-  if (!outcome.ok()) notice->set_failure(std::string(outcome.message()));
+  if (!outcome.ok()) notice->set_failure(MessageForClients(outcome));
   Advance();
 }
 
@@ -333,8 +338,10 @@ void DeformStreamReactor::FinishAnswer(const Session& session, std::optional<Wai
   flow_->FinishSolve(answer.ok() ? *std::move(answer) : std::nullopt);
   if (left_memory && !outcome_.has_value()) {
     if (pose.has_value()) flow_->PutBack(*std::move(pose));
-    restoring_ = true;
-    notices_.emplace_back().mutable_evicted();
+    if (!session.updated()) {
+      returning_ = Returning::kRestored;
+      notices_.emplace_back().mutable_evicted();
+    }
     StartOpening();
   }
   Advance();

@@ -120,7 +120,9 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   std::optional<DragPublisher> publisher_ ABSL_GUARDED_BY(mutex_);     // empty before `started`
   std::optional<v1::DeformResponse> started_ ABSL_GUARDED_BY(mutex_);  // waits for its write
   bool has_started_ ABSL_GUARDED_BY(mutex_) = false;                   // it was written
-  bool restoring_ ABSL_GUARDED_BY(mutex_) = false;  // the session is coming back to memory
+  // What is to be said when the session that has left memory is there again.
+  enum class Returning { kNo, kRestored, kUpdated };
+  Returning returning_ ABSL_GUARDED_BY(mutex_) = Returning::kNo;
   std::deque<v1::DeformNotice> notices_ ABSL_GUARDED_BY(mutex_);  // wait for their write
   std::optional<WaitingPose> to_commit_ ABSL_GUARDED_BY(mutex_);  // the newest that is to be kept
   bool committing_ ABSL_GUARDED_BY(mutex_) = false;

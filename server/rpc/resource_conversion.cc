@@ -23,6 +23,24 @@ constexpr int kPageSize = 100;
 constexpr int kMaxPageSize = 1000;
 constexpr size_t kMaxPageTokenBytes = 128;
 
+SessionRequestLimits RequestLimits(const StoredMesh& mesh, const ServiceLimits& limits) {
+  return {.num_vertices = mesh.mesh.num_vertices(),
+          .max_handles = limits.max_handles,
+          .max_name_bytes = limits.max_name_bytes,
+          .max_request_id_bytes = limits.max_request_id_bytes,
+          .max_iterations = limits.max_iterations};
+}
+
+// What a session is made from on its mesh.
+void SetRecipe(SessionRequest request, SessionRecord* record) {
+  record->stiffness = std::move(request.stiffness);
+  record->fixed = std::move(request.fixed);
+  record->handles = std::move(request.handles);
+  record->model = request.model;
+  record->poisson_ratio = request.poisson_ratio;
+  record->gradient_field = request.gradient_field;
+}
+
 void AddPreparation(const Session& session, v1::Session* proto) {
   const int64_t num_vertices = session.mesh().mesh.num_vertices();
   const ConstraintSet& constraints = session.constraints();
@@ -59,25 +77,51 @@ v1::Mesh ToProto(const MeshView& view) {
 absl::StatusOr<SessionRecord> ToSessionRecord(const v1::CreateSessionRequest& request,
                                               const StoredMesh& mesh, const Principal& owner,
                                               const ServiceLimits& limits) {
-  TF_ASSIGN_OR_RETURN(
-      SessionRequest checked,
-      ToSessionRequest(request, {.num_vertices = mesh.mesh.num_vertices(),
-                                 .max_handles = limits.max_handles,
-                                 .max_name_bytes = limits.max_name_bytes,
-                                 .max_request_id_bytes = limits.max_request_id_bytes,
-                                 .max_iterations = limits.max_iterations}));
+  TF_ASSIGN_OR_RETURN(SessionRequest checked,
+                      ToSessionRequest(request, RequestLimits(mesh, limits)));
   SessionRecord record;
   record.id = std::move(checked.session_id);
   record.owner = owner.name;
   record.mesh_sha256 = mesh.sha256;
-  record.stiffness = std::move(checked.stiffness);
-  record.fixed = std::move(checked.fixed);
-  record.handles = std::move(checked.handles);
-  record.model = checked.model;
-  record.poisson_ratio = checked.poisson_ratio;
-  record.gradient_field = checked.gradient_field;
   record.request_id = std::move(checked.request_id);
   record.request_fingerprint = RequestFingerprint(request);
+  SetRecipe(std::move(checked), &record);
+  return record;
+}
+
+absl::Status CheckNamesSomething(const v1::UpdateSessionRequest& request) {
+  if (request.has_stiffness() || request.has_regions() || request.has_gradient_field() ||
+      request.has_poisson_ratio() || request.model() != v1::DEFORMATION_MODEL_UNSPECIFIED) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(
+      "the request changes nothing; set stiffness, regions, model, gradient_field or "
+      "poisson_ratio");
+}
+
+// Through the same checks as a new one.
+absl::StatusOr<SessionRecord> ToUpdatedRecord(const v1::UpdateSessionRequest& request,
+                                              SessionRecord record, const StoredMesh& mesh,
+                                              const ServiceLimits& limits) {
+  SessionRequest before;
+  before.stiffness = record.stiffness;
+  before.fixed = record.fixed;
+  before.handles = record.handles;
+  before.model = record.model;
+  before.poisson_ratio = record.poisson_ratio;
+  before.gradient_field = record.gradient_field;
+  v1::CreateSessionRequest merged = ToProto(before);
+  if (request.has_stiffness()) *merged.mutable_stiffness() = request.stiffness();
+  if (request.has_regions()) {
+    *merged.mutable_fixed_vertices() = request.regions().fixed_vertices();
+    *merged.mutable_handles() = request.regions().handles();
+  }
+  if (request.model() != v1::DEFORMATION_MODEL_UNSPECIFIED) merged.set_model(request.model());
+  if (request.has_gradient_field()) *merged.mutable_gradient_field() = request.gradient_field();
+  if (request.has_poisson_ratio()) merged.set_poisson_ratio(request.poisson_ratio());
+  TF_ASSIGN_OR_RETURN(SessionRequest checked,
+                      ToSessionRequest(merged, RequestLimits(mesh, limits)));
+  SetRecipe(std::move(checked), &record);
   return record;
 }
 

@@ -28,6 +28,12 @@ v1::Mesh ToProto(const MeshView& view);
 absl::StatusOr<SessionRecord> ToSessionRecord(const v1::CreateSessionRequest& request,
                                               const StoredMesh& mesh, const Principal& owner,
                                               const ServiceLimits& limits);
+// Errors (InvalidArgument): it changes nothing.
+absl::Status CheckNamesSomething(const v1::UpdateSessionRequest& request);
+// The record with what the request names. Errors: those of ToSessionRequest.
+absl::StatusOr<SessionRecord> ToUpdatedRecord(const v1::UpdateSessionRequest& request,
+                                              SessionRecord record, const StoredMesh& mesh,
+                                              const ServiceLimits& limits);
 v1::Session ToProto(const SessionRegistry::View& view);
 
 // Which part of a list is asked for.

@@ -101,6 +101,52 @@ class CreateSessionCall : public grpc::ServerUnaryReactor {
   std::shared_ptr<Session> session_;  // written before Finish, read after it
 };
 
+// One UpdateSession call. Deletes itself when gRPC is done with it.
+class UpdateSessionCall : public grpc::ServerUnaryReactor {
+ public:
+  UpdateSessionCall(CallScope scope, const ServiceLimits& limits, SessionRegistry* registry,
+                    const v1::UpdateSessionRequest* request, v1::Session* response)
+      : scope_(std::move(scope)),
+        limits_(limits),
+        registry_(registry),
+        request_(*request),
+        response_(response) {}
+
+  void Start() {
+    if (const absl::Status status = Begin(); !status.ok()) End(status);
+  }
+
+  void OnCancel() override { *cancelled_ = true; }
+  void OnDone() override { delete this; }
+
+ private:
+  absl::Status Begin() {
+    TF_RETURN_IF_ERROR(scope_.admission());
+    TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(request_.name()));
+    TF_RETURN_IF_ERROR(CheckNamesSomething(request_));
+    registry_->Update(
+        id, request_.etag(),
+        [this](SessionRecord record, const StoredMesh& mesh) {
+          return ToUpdatedRecord(request_, std::move(record), mesh, limits_);
+        },
+        cancelled_,
+        [this](const absl::StatusOr<SessionRegistry::View>& view) {
+          if (view.ok()) *response_ = ToProto(*view);
+          End(view.status());
+        });
+    return absl::OkStatus();
+  }
+
+  void End(const absl::Status& outcome) { Finish(scope_.End(outcome)); }
+
+  CallScope scope_;
+  const ServiceLimits& limits_;
+  SessionRegistry* const registry_;
+  const v1::UpdateSessionRequest& request_;
+  v1::Session* const response_;
+  const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
+};
+
 }  // namespace
 
 grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext* context,
@@ -148,6 +194,16 @@ grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerConte
                         });
         return absl::OkStatus();
       });
+}
+
+grpc::ServerUnaryReactor* SessionService::UpdateSession(grpc::CallbackServerContext* context,
+                                                        const v1::UpdateSessionRequest* request,
+                                                        v1::Session* response) {
+  auto* call = new UpdateSessionCall(
+      CallScope(context, "SessionService.UpdateSession", CallKind::kNewWork, gate_), limits_,
+      registry_, request, response);
+  call->Start();
+  return call;
 }
 
 grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerContext* context,

@@ -98,21 +98,20 @@ absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ReadConfiguration(
 }
 
 absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ConfigurationFor(
-    const StreamConfiguration& before, std::shared_ptr<Session> session) {
+    const StreamRequest& request, const Session& before, std::shared_ptr<Session> session) {
   const auto same_name = [](const HandleRegion& a, const HandleRegion& b) {
     return a.name == b.name;
   };
-  const std::vector<HandleRegion>& handles = before.session->constraints().handles();
+  const std::vector<HandleRegion>& handles = before.constraints().handles();
   const std::vector<HandleRegion>& handles_now = session->constraints().handles();
-  if (before.session->mesh().sha256 != session->mesh().sha256 ||
+  if (before.mesh().sha256 != session->mesh().sha256 ||
       !std::equal(handles.begin(), handles.end(), handles_now.begin(), handles_now.end(),
                   same_name)) {
-    return WithReason(absl::AbortedError("the session was updated; open the stream again"),
-                      ErrorReason::kSessionUpdated);
+    return WithReason(
+        absl::AbortedError("the session has other handles now; open the stream again"),
+        ErrorReason::kSessionUpdated);
   }
-  auto configuration = std::make_shared<StreamConfiguration>(before);
-  configuration->session = std::move(session);
-  return configuration;
+  return ReadConfiguration(request, std::move(session));
 }
 
 StreamBegin BeginWithoutPreparation(const StreamConfiguration& configuration) {

@@ -46,10 +46,10 @@ absl::StatusOr<StreamRequest> ReadStreamRequest(const v1::DeformConfiguration& p
 absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ReadConfiguration(
     const StreamRequest& request, std::shared_ptr<Session> session);
 
-// The same for the session that has come back to memory. Errors: Aborted (it is no longer the same:
-// it was updated).
+// The same for the session that has come back to memory, or was updated. Errors: Aborted (it has
+// other handles now), those of ReadConfiguration.
 absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ConfigurationFor(
-    const StreamConfiguration& before, std::shared_ptr<Session> session);
+    const StreamRequest& request, const Session& before, std::shared_ptr<Session> session);
 
 // What was made for a stream before it began.
 struct StreamBegin {

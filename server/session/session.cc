@@ -95,6 +95,11 @@ absl::Status Session::Prepare(const Eigen::VectorXd& stiffness,
 }
 
 absl::Status Session::Closed() const {
+  if (updated_) {
+    return WithReason(
+        absl::AbortedError(absl::StrCat("sessions/", id_, " was updated meanwhile; try again")),
+        ErrorReason::kSessionUpdated);
+  }
   return WithReason(
       absl::NotFoundError(absl::StrCat("sessions/", id_, " has been deleted; create it again")),
       ErrorReason::kSessionNotFound);
@@ -209,7 +214,7 @@ void Session::Close(CloseReason reason) {
   {
     MutexLock lock(mutex_);
     // First: who finds it closed asks why.
-    evicted_ = reason == CloseReason::kEvicted;
+    evicted_ = reason != CloseReason::kDeleted;
     std::swap(closed, models_);
     own_bytes_ = 0;
   }

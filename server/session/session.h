@@ -123,7 +123,7 @@ class Session {
   absl::StatusOr<std::optional<PreparedAnswer>> Respond(const ResponseClaim& claim,
                                                         absl::Span<const HandlePose> poses);
 
-  enum class CloseReason { kDeleted, kEvicted };
+  enum class CloseReason { kDeleted, kEvicted, kUpdated };
 
   // Any thread; on the strand where the memory is to be free afterwards even if something is being
   // solved. Gives the memory back; later calls of Deform fail. What is being made for the session
@@ -131,6 +131,14 @@ class Session {
   void Close(CloseReason reason);
   // Any thread. Closed, but the server still has the session: SessionRegistry::Open gives another.
   bool evicted() const { return evicted_; }
+  // Any thread. That other one is made from something else; and its handles are others, so that
+  // poses for this one say nothing to it. Stay so.
+  bool updated() const { return updated_; }
+  bool outdated() const { return outdated_; }
+  void MarkUpdated(bool other_handles) {
+    updated_ = true;
+    if (other_handles) outdated_ = true;
+  }
   // Any thread. Whether a call of PrepareModel or PrepareResponse is under way.
   bool making() const { return making_; }
 
@@ -182,6 +190,8 @@ class Session {
   std::atomic<int64_t> own_bytes_ = 0;
   std::atomic<bool> making_ = false;
   std::atomic<bool> evicted_ = false;
+  std::atomic<bool> updated_ = false;
+  std::atomic<bool> outdated_ = false;
   std::atomic<Clock::TimePoint> last_used_;
 
   mutable Mutex mutex_;

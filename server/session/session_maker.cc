@@ -53,24 +53,54 @@ void SessionMaker::Create(SessionRecord record, std::shared_ptr<const StoredMesh
 }
 
 void SessionMaker::Restore(const std::string& id, Cancellation cancellation, Callback done) {
-  store_->Get(id, [this, cancellation = std::move(cancellation),
+  const auto as_it_is = [](SessionRecord record, const StoredMesh&) { return record; };
+  Remake(id, as_it_is, std::move(cancellation),
+         [done = std::move(done)](absl::StatusOr<Remade> remade) {
+           if (remade.ok()) {
+             done(std::move(remade->session));
+           } else {
+             done(remade.status());
+           }
+         });
+}
+
+void SessionMaker::Remake(const std::string& id, Change change, Cancellation cancellation,
+                          std::function<void(absl::StatusOr<Remade>)> done) {
+  store_->Get(id, [this, change = std::move(change), cancellation = std::move(cancellation),
                    done = std::move(done)](absl::StatusOr<SessionRecord> record) mutable {
     if (!record.ok()) {
       done(record.status());
       return;
     }
     // Reading a mesh takes its time.
-    auto read = [this, record = *std::move(record), cancellation = std::move(cancellation),
-                 done]() mutable {
-      absl::StatusOr<std::shared_ptr<const StoredMesh>> mesh = catalog_->Load(record.mesh_sha256);
-      if (mesh.ok()) {
-        Make(std::move(record), *std::move(mesh), std::move(cancellation), std::move(done));
-      } else {
-        done(mesh.status());
-      }
-    };
-    if (!PostUnlessStopped(std::move(read))) done(absl::UnavailableError("the server is ending"));
+    const bool posted =
+        PostUnlessStopped([this, record = *std::move(record), change = std::move(change),
+                           cancellation = std::move(cancellation), done]() mutable {
+          MakeChanged(std::move(record), change, std::move(cancellation), std::move(done));
+        });
+    if (!posted) done(absl::UnavailableError("the server is ending"));
   });
+}
+
+void SessionMaker::MakeChanged(SessionRecord record, const Change& change,
+                               Cancellation cancellation,
+                               std::function<void(absl::StatusOr<Remade>)> done) {
+  absl::StatusOr<std::shared_ptr<const StoredMesh>> mesh = catalog_->Load(record.mesh_sha256);
+  absl::StatusOr<SessionRecord> changed =
+      mesh.ok() ? change(std::move(record), **mesh) : mesh.status();
+  if (!changed.ok()) {
+    done(changed.status());
+    return;
+  }
+  Make(*changed, *std::move(mesh), std::move(cancellation),
+       [record = *changed,
+        done = std::move(done)](absl::StatusOr<std::shared_ptr<Session>> session) mutable {
+         if (session.ok()) {
+           done(Remade{std::move(record), *std::move(session)});
+         } else {
+           done(session.status());
+         }
+       });
 }
 
 bool SessionMaker::PostUnlessStopped(WorkerPool::Job job) {

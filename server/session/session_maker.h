@@ -52,11 +52,25 @@ class SessionMaker {
   // MeshCatalog::Load and Session::Create.
   void Restore(const std::string& id, Cancellation cancellation, Callback done);
 
+  // Makes a session of a record in the store as `change` has left it, and keeps nothing. Errors:
+  // those of Restore and of `change`, which comes on a worker.
+  using Change =
+      std::function<absl::StatusOr<SessionRecord>(SessionRecord record, const StoredMesh& mesh)>;
+  struct Remade {
+    SessionRecord record;  // with the etag of the version that was changed
+    std::shared_ptr<Session> session;
+  };
+  void Remake(const std::string& id, Change change, Cancellation cancellation,
+              std::function<void(absl::StatusOr<Remade>)> done);
+
   // Nothing is posted to the pool any longer by what the store answers. Call it before the pool
   // ends.
   void Stop();
 
  private:
+  // On a worker.
+  void MakeChanged(SessionRecord record, const Change& change, Cancellation cancellation,
+                   std::function<void(absl::StatusOr<Remade>)> done);
   // False when the pool may have ended.
   bool PostUnlessStopped(WorkerPool::Job job) ABSL_LOCKS_EXCLUDED(mutex_);
 

@@ -7,52 +7,17 @@
 #include <future>
 #include <utility>
 
-#include "absl/strings/str_cat.h"
 #include "spdlog/spdlog.h"
 
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "server/auth/identity.h"
+#include "server/session/session_refusals.h"
 
 namespace tissueform {
 namespace {
 
 constexpr int kPageSize = 1000;
-
-absl::Status NoSuchSession(const std::string& id) {
-  return WithReason(absl::NotFoundError(absl::StrCat(
-                        "no session \"sessions/", id,
-                        "\": it was deleted, or removed after being idle; create it again")),
-                    ErrorReason::kSessionNotFound);
-}
-
-absl::Status OtherRequest(const std::string& request_id) {
-  return WithReason(
-      absl::InvalidArgumentError(absl::StrCat("request_id \"", request_id,
-                                              "\" was used for another request; choose a new one")),
-      ErrorReason::kRequestIdReused);
-}
-
-absl::Status TakenId(const std::string& id) {
-  return WithReason(
-      absl::AlreadyExistsError(absl::StrCat("a session \"sessions/", id,
-                                            "\" exists already; choose another session_id")),
-      ErrorReason::kSessionIdTaken);
-}
-
-absl::Status EndingId(const std::string& id) {
-  return WithReason(
-      absl::UnavailableError(
-          absl::StrCat("the session \"sessions/", id,
-                       "\" is being deleted; try again in a moment, or choose another session_id")),
-      ErrorReason::kSessionBeingDeleted);
-}
-
-absl::Status TooMany(int limit, absl::string_view what, absl::string_view remedy) {
-  return WithReason(absl::ResourceExhaustedError(absl::StrCat(
-                        "the server ", what, " ", limit, " sessions, as many as it may", remedy)),
-                    ErrorReason::kTooManySessions, {{"limit", absl::StrCat(limit)}});
-}
 
 // Where nobody waits for the end of a session.
 void WarnIfLeftBehind(const absl::Status& status) {
@@ -78,7 +43,12 @@ SessionRegistry::SessionRegistry(const ServiceLimits& limits, MemoryBudget* budg
       store_(store),
       catalog_(catalog),
       clock_(clock),
-      maker_(budget, pool, store, catalog, clock) {}
+      maker_(budget, pool, store, catalog, clock),
+      commits_(store),
+      updates_(&maker_, store, &commits_,
+               [this](const SessionMaker::Remade& remade, bool other_handles) {
+                 return Replace(remade, other_handles);
+               }) {}
 
 absl::Status SessionRegistry::LearnKnown() {
   SessionStore::ListRequest request{.owner = std::nullopt, .after = "", .limit = kPageSize};
@@ -167,8 +137,8 @@ SessionRegistry::Admission SessionRegistry::AdmitCreate(const SessionRecord& rec
   } else if (ending_.contains(record.id)) {
     admission.refusal = EndingId(record.id);
   } else if (table_.num_known() >= static_cast<size_t>(limits_.max_stored_sessions)) {
-    admission.refusal = TooMany(limits_.max_stored_sessions, "keeps",
-                                "; delete one or raise --max-stored-sessions");
+    admission.refusal = TooManySessions(limits_.max_stored_sessions, "keeps",
+                                        "; delete one or raise --max-stored-sessions");
   } else {
     admission.refusal = CheckRoom();
   }
@@ -191,6 +161,7 @@ SessionRegistry::Admission SessionRegistry::AdmitOpen(const std::string& id,
     making->waiters.push_back(waiter);
   } else if (admission.refusal = CheckRoom(); admission.refusal.ok()) {
     admission.started = table_.StartMaking(id, known->key, /*restores=*/true, waiter);
+    admission.started->version = known->version;
   }
   return admission;
 }
@@ -218,9 +189,10 @@ bool SessionRegistry::JoinEarlierRequest(const RequestKey& key, const SessionWai
 
 absl::Status SessionRegistry::CheckRoom() const {
   if (!Full()) return absl::OkStatus();
-  return TooMany(limits_.max_sessions, "holds",
-                 " in memory, and all are in use; try again in a moment, delete one, or raise "
-                 "--max-sessions");
+  return TooManySessions(
+      limits_.max_sessions, "holds",
+      " in memory, and all are in use; try again in a moment, delete one, or raise "
+      "--max-sessions");
 }
 
 bool SessionRegistry::Full() const {
@@ -277,6 +249,13 @@ void SessionRegistry::FinishRestore(const MakingPtr& making,
   {
     MutexLock lock(mutex_);
     KnownSession* known = table_.Find(making->id);
+    if (known != nullptr && known->session != nullptr) {
+      result = known->session;  // an update has made it meanwhile
+    } else if (known != nullptr && known->version != making->version) {
+      // That one has left memory again, and what was made is the session before it.
+      result = absl::CancelledError("the session was updated meanwhile");
+      making->version = known->version;
+    }
     // All who waited had cancelled, and then somebody came.
     again = absl::IsCancelled(result.status()) && known != nullptr &&
             std::any_of(making->waiters.begin(), making->waiters.end(),
@@ -397,9 +376,54 @@ void SessionRegistry::List(const SessionStore::ListRequest& request,
   });
 }
 
-void SessionRegistry::CommitPoses(const std::string& id, std::vector<HandlePose> poses,
-                                  StatusCallback done) {
-  store_->CommitPoses(id, std::move(poses), kStoreEpoch, std::move(done));
+void SessionRegistry::Update(const std::string& id, const std::string& etag,
+                             SessionMaker::Change change, CancelFlag cancelled,
+                             const std::function<void(absl::StatusOr<View>)>& done) {
+  MakeRoom();
+  absl::Status refusal;
+  {
+    MutexLock lock(mutex_);
+    const KnownSession* known = table_.Find(id);
+    if (known == nullptr) {
+      refusal = NoSuchSession(id);
+    } else if (known->session == nullptr) {
+      refusal = CheckRoom();
+    }
+  }
+  if (!refusal.ok()) {
+    done(std::move(refusal));
+    return;
+  }
+  updates_.Update(id, etag, std::move(change),
+                  Cancellation([cancelled] { return cancelled->load(); }),
+                  [id, done](absl::StatusOr<SessionMaker::Remade> remade) {
+                    if (remade.ok()) {
+                      done(View{std::move(remade->record), std::move(remade->session)});
+                    } else if (HasReason(remade.status(), ErrorReason::kSessionNotFound)) {
+                      done(NoSuchSession(id));
+                    } else {
+                      done(remade.status());
+                    }
+                  });
+}
+
+absl::Status SessionRegistry::Replace(const SessionMaker::Remade& remade, bool other_handles) {
+  std::shared_ptr<Session> before;
+  {
+    MutexLock lock(mutex_);
+    KnownSession* known = table_.Find(remade.record.id);
+    if (known == nullptr) return NoSuchSession(remade.record.id);  // deleted meanwhile
+    before = std::exchange(known->session, remade.session);
+    known->mesh.reset();
+    ++known->version;
+    if (before != nullptr) known->evicted.push_back(before);
+    // Whoever opens it from now on gets the new one; who holds another shall know why.
+    for (const std::weak_ptr<Session>& earlier : known->evicted) {
+      if (const std::shared_ptr<Session> held = earlier.lock()) held->MarkUpdated(other_handles);
+    }
+  }
+  if (before != nullptr) before->Close(Session::CloseReason::kUpdated);
+  return absl::OkStatus();
 }
 
 void SessionRegistry::Delete(const std::string& id, const StatusCallback& done) {

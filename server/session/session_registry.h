@@ -21,9 +21,11 @@
 #include "server/session/limits.h"
 #include "server/session/memory_budget.h"
 #include "server/session/mesh_catalog.h"
+#include "server/session/pose_commits.h"
 #include "server/session/session.h"
 #include "server/session/session_maker.h"
 #include "server/session/session_table.h"
+#include "server/session/session_updates.h"
 #include "server/session/worker_pool.h"
 #include "server/store/session_store.h"
 
@@ -104,9 +106,23 @@ class SessionRegistry {
   void List(const SessionStore::ListRequest& request,
             const std::function<void(absl::StatusOr<ViewPage>)>& done);
 
+  // Prepares the session anew from its record as `change` leaves it, then puts that into the place
+  // of the old one, which closes as updated. The name, and where the handles' names and their order
+  // stay also the committed poses, are kept; other handles begin at rest. `etag` is that of the
+  // version that is changed; empty: whatever it is. `done` gets the session when its new record is
+  // durable as far as the store is; after an error it is as it was.
+  //
+  // Errors: NotFound; Aborted (another version, or somebody else was faster); those of
+  // SessionMaker::Remake and SessionStore::Update; ResourceExhausted; Cancelled.
+  void Update(const std::string& id, const std::string& etag, SessionMaker::Change change,
+              CancelFlag cancelled, const std::function<void(absl::StatusOr<View>)>& done);
+
   // Keeps the poses as the session's last ones; `done` when they are durable as far as the store
-  // is. Errors: those of SessionStore::CommitPoses.
-  void CommitPoses(const std::string& id, std::vector<HandlePose> poses, StatusCallback done);
+  // is; it does not call the registry. Errors: those of PoseCommits::Commit.
+  void CommitPoses(std::shared_ptr<const Session> session, std::vector<HandlePose> poses,
+                   StatusCallback done) {
+    commits_.Commit(std::move(session), std::move(poses), std::move(done));
+  }
 
   // Calls `done` when the memory of the session is free and its record is gone. Errors: NotFound,
   // those of SessionStore::Delete.
@@ -171,6 +187,9 @@ class SessionRegistry {
   Cancellation CancellationOf(const MakingPtr& making) const;
   void FinishCreation(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
       ABSL_LOCKS_EXCLUDED(mutex_);
+  // Puts an updated session into its place. Errors: NotFound.
+  absl::Status Replace(const SessionMaker::Remade& remade, bool other_handles)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   void FinishRestore(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
       ABSL_LOCKS_EXCLUDED(mutex_);
   void EndUnused(const std::vector<std::pair<std::string, KnownSession>>& removed)
@@ -194,6 +213,8 @@ class SessionRegistry {
 
   // Self-synchronised.
   SessionMaker maker_;
+  PoseCommits commits_;
+  SessionUpdates updates_;
 
   mutable Mutex mutex_;
   SessionTable table_ ABSL_GUARDED_BY(mutex_);

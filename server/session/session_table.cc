@@ -55,8 +55,11 @@ std::optional<KnownSession> SessionTable::Take(const std::string& id) {
 
 SessionTable::MakingPtr SessionTable::StartMaking(std::string id, RequestKey key, bool restores,
                                                   SessionWaiter waiter) {
-  makings_.push_back(std::make_shared<SessionMaking>(
-      SessionMaking{std::move(id), std::move(key), restores, {std::move(waiter)}}));
+  makings_.push_back(
+      std::make_shared<SessionMaking>(SessionMaking{.id = std::move(id),
+                                                    .key = std::move(key),
+                                                    .restores = restores,
+                                                    .waiters = {std::move(waiter)}}));
   return makings_.back();
 }
 

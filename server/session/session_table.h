@@ -39,6 +39,7 @@ struct SessionMaking {
   std::string id;
   RequestKey key;
   bool restores = false;
+  int version = 0;                     // of what it is made from
   std::vector<SessionWaiter> waiters;  // guarded by the owner of the table
 };
 
@@ -47,6 +48,7 @@ struct KnownSession {
   std::shared_ptr<Session> session;  // null: it is in the store only
   RequestKey key;
   std::string mesh_sha256;
+  int version = 0;                              // how often it was updated
   int claims = 1;                               // who has seen its name
   Clock::TimePoint last_used;                   // while there is no session
   std::vector<std::weak_ptr<Session>> evicted;  // what it was before; whoever holds one comes back

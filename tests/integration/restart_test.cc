@@ -189,6 +189,47 @@ TEST_F(RestartTest, APredictionMadeTodayIsReadAndComparedTomorrow) {
   EXPECT_EQ(again.name(), made.name());
 }
 
+TEST_F(RestartTest, AnUpdateThatWasAcknowledgedIsThere) {
+  ASSERT_NO_FATAL_FAILURE(Start());
+  std::unique_ptr<TissueformClient> client = Connect();
+  const v1::Session session = MakeSession(client.get(), "a-session-of-this-test");
+  v1::UpdateSessionRequest request;
+  request.set_name(session.name());
+  request.set_etag(session.etag());
+  request.set_model(v1::DEFORMATION_MODEL_LINEAR_ELASTIC);
+  ASSERT_OK_AND_ASSIGN(const v1::Session updated, client->UpdateSession(request));
+  ASSERT_OK_AND_ASSIGN(const v1::DeformOnceResponse before,
+                       client->DeformOnce(session.name(), TopPose(SomePose(2))));
+  ASSERT_NO_FATAL_FAILURE(Kill());
+  ASSERT_NO_FATAL_FAILURE(Start());
+  client = Connect();
+  ASSERT_OK_AND_ASSIGN(const v1::Session found, client->GetSession(session.name()));
+  EXPECT_EQ(found.etag(), updated.etag());
+  EXPECT_EQ(found.model(), v1::DEFORMATION_MODEL_LINEAR_ELASTIC);
+  ASSERT_OK_AND_ASSIGN(const v1::DeformOnceResponse after,
+                       client->DeformOnce(session.name(), TopPose(SomePose(2))));
+  EXPECT_TRUE(after.positions() == before.positions()) << "to the last bit";
+}
+
+TEST_F(RestartTest, AFailedCommitIsToldWithoutTheServersPaths) {
+  ASSERT_NO_FATAL_FAILURE(Start());
+  const std::unique_ptr<TissueformClient> client = Connect();
+  const v1::Session session = MakeSession(client.get(), "a-session-of-this-test");
+  std::string failure;
+  DeformStream::Options options;
+  options.on_notice = [&failure](const v1::DeformNotice& notice) {
+    failure = notice.committed().failure();
+  };
+  ASSERT_OK_AND_ASSIGN(const auto stream, client->OpenStream(session.name(), options));
+  std::filesystem::remove_all(folder_);
+  ASSERT_THAT(stream->SendPoses(1, TopPose(SomePose(1)), /*commit=*/true), IsOk());
+  stream->CloseSending();
+  while (stream->Receive().has_value()) continue;
+  EXPECT_THAT(stream->Finish(), IsOk());
+  EXPECT_THAT(failure, HasSubstr("removed"));
+  EXPECT_THAT(failure, ::testing::Not(HasSubstr(folder_.filename().string())));
+}
+
 TEST_F(RestartTest, ASecondServerIsRefusedTheFolder) {
   ASSERT_NO_FATAL_FAILURE(Start());
   EXPECT_THAT(ServerProcess::Start(ProgramPath("tissueform-server"),

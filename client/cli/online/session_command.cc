@@ -4,6 +4,7 @@
 #include "client/cli/online/session_command.h"
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,12 @@ namespace {
 struct SessionOptions {
   std::string server;
   std::string name;
+  // Of an update; empty: as it is.
+  std::string etag;
+  std::string model;
+  std::optional<double> stiffness_pa;
+  std::string stiffness_array;
+  std::optional<double> poisson_ratio;
 };
 
 std::string StateText(const v1::Session& session) {
@@ -48,11 +55,50 @@ absl::Status Show(const SessionOptions& options) {
   return absl::OkStatus();
 }
 
+absl::Status Update(const SessionOptions& options) {
+  v1::UpdateSessionRequest request;
+  request.set_name(FullName(options.name));
+  request.set_etag(options.etag);
+  v1::DeformationModel model = v1::DEFORMATION_MODEL_UNSPECIFIED;
+  if (!options.model.empty() &&
+      !v1::DeformationModel_Parse("DEFORMATION_MODEL_" + absl::AsciiStrToUpper(options.model),
+                                  &model)) {
+    return absl::InvalidArgumentError(
+        "--model must be gradient_field, arap, linear_elastic or neo_hookean");
+  }
+  request.set_model(model);
+  if (options.stiffness_pa.has_value()) {
+    request.mutable_stiffness()->set_uniform_pa(*options.stiffness_pa);
+  } else if (!options.stiffness_array.empty()) {
+    request.mutable_stiffness()->set_cell_array(options.stiffness_array);
+  }
+  if (options.poisson_ratio.has_value()) request.set_poisson_ratio(*options.poisson_ratio);
+  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const v1::Session session, client->UpdateSession(request));
+  absl::PrintF("%s is prepared anew: %s, etag %s\n", session.name(), ModelText(session.model()),
+               session.etag());
+  return absl::OkStatus();
+}
+
 absl::Status Delete(const SessionOptions& options) {
   TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
   TF_RETURN_IF_ERROR(client->DeleteSession(FullSessionName(options.name)));
   absl::PrintF("%s is deleted\n", FullSessionName(options.name));
   return absl::OkStatus();
+}
+
+void AddUpdateOptions(CLI::App* command, SessionOptions* options) {
+  command->add_option("--model", options->model,
+                      "gradient_field, arap, linear_elastic or neo_hookean");
+  CLI::Option* uniform =
+      command->add_option("--stiffness-pa", options->stiffness_pa, "the same for every tet, in Pa");
+  command
+      ->add_option("--stiffness-array", options->stiffness_array,
+                   "a cell array of the mesh that holds it, in Pa")
+      ->excludes(uniform);
+  command->add_option("--poisson-ratio", options->poisson_ratio, "of the elastic models");
+  command->add_option("--etag", options->etag,
+                      "only if it is still this version (session show tells it)");
 }
 
 }  // namespace
@@ -66,7 +112,7 @@ void AddSessionCommand(CLI::App& app, CommandWork* work) {
   CLI::App* command = app.add_subcommand(kSessionCommand.name, kSessionCommand.description);
   command->require_subcommand(1);
   const auto add = [&](const char* name, const char* what, bool needs_name,
-                       absl::Status (*run)(const SessionOptions&)) {
+                       absl::Status (*run)(const SessionOptions&)) -> CLI::App* {
     CLI::App* sub = command->add_subcommand(name, what);
     if (needs_name) {
       sub->add_option("SESSION", options->name, "its name, with \"sessions/\" or without")
@@ -74,9 +120,12 @@ void AddSessionCommand(CLI::App& app, CommandWork* work) {
     }
     AddServerOption(sub, &options->server);
     sub->callback([options, work, run] { *work = [options, run] { return run(*options); }; });
+    return sub;
   };
   add("list", "all sessions, in memory or not", false, List);
   add("show", "what is known of one", true, Show);
+  AddUpdateOptions(add("update", "prepare one anew with another model or stiffness", true, Update),
+                   options.get());
   add("delete", "end one, and what is kept of it", true, Delete);
   command->footer("Example:\n  tissueform session list --server localhost:50051");
 }

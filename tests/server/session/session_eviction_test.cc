@@ -243,12 +243,13 @@ TEST_F(SessionEvictionTest, AStoreThatAnswersAtTheEndFindsNoPool) {
 }
 
 TEST_F(SessionEvictionTest, CommittedPosesAreInTheRecord) {
-  ASSERT_THAT(Create("a").get(), IsOk());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create("a").get());
   HandlePose pose;
   pose.translation_mm = {4, 5, 6};
   std::promise<absl::Status> committed;
-  registry_->CommitPoses(
-      "a", {pose}, [&committed](absl::Status status) { committed.set_value(std::move(status)); });
+  registry_->CommitPoses(session, {pose}, [&committed](absl::Status status) {
+    committed.set_value(std::move(status));
+  });
   EXPECT_THAT(committed.get_future().get(), IsOk());
   std::promise<absl::StatusOr<SessionRegistry::View>> looked;
   registry_->Look("a", [&looked](absl::StatusOr<SessionRegistry::View> view) {

@@ -1,0 +1,47 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/session/session_refusals.h"
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/error_reason.h"
+
+namespace tissueform {
+
+absl::Status NoSuchSession(const std::string& id) {
+  return WithReason(absl::NotFoundError(absl::StrCat(
+                        "no session \"sessions/", id,
+                        "\": it was deleted, or removed after being idle; create it again")),
+                    ErrorReason::kSessionNotFound);
+}
+
+absl::Status OtherRequest(const std::string& request_id) {
+  return WithReason(
+      absl::InvalidArgumentError(absl::StrCat("request_id \"", request_id,
+                                              "\" was used for another request; choose a new one")),
+      ErrorReason::kRequestIdReused);
+}
+
+absl::Status TakenId(const std::string& id) {
+  return WithReason(
+      absl::AlreadyExistsError(absl::StrCat("a session \"sessions/", id,
+                                            "\" exists already; choose another session_id")),
+      ErrorReason::kSessionIdTaken);
+}
+
+absl::Status EndingId(const std::string& id) {
+  return WithReason(
+      absl::UnavailableError(
+          absl::StrCat("the session \"sessions/", id,
+                       "\" is being deleted; try again in a moment, or choose another session_id")),
+      ErrorReason::kSessionBeingDeleted);
+}
+
+absl::Status TooManySessions(int limit, absl::string_view what, absl::string_view remedy) {
+  return WithReason(absl::ResourceExhaustedError(absl::StrCat(
+                        "the server ", what, " ", limit, " sessions, as many as it may", remedy)),
+                    ErrorReason::kTooManySessions, {{"limit", absl::StrCat(limit)}});
+}
+
+}  // namespace tissueform

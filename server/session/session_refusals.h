@@ -1,0 +1,21 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+
+// What the registry of sessions answers to those whom it does not serve.
+namespace tissueform {
+
+absl::Status NoSuchSession(const std::string& id);        // NotFound
+absl::Status OtherRequest(const std::string& request_id);  // InvalidArgument: its id was used
+absl::Status TakenId(const std::string& id);               // AlreadyExists
+absl::Status EndingId(const std::string& id);              // Unavailable: it is being deleted
+// ResourceExhausted: what the server does with so many ("keeps"), and what helps.
+absl::Status TooManySessions(int limit, absl::string_view what, absl::string_view remedy);
+
+}  // namespace tissueform

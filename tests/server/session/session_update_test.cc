@@ -1,0 +1,255 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// Sessions that are updated (server/session/session_registry.h).
+
+#include <atomic>
+#include <functional>
+#include <future>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "core/base/error_reason.h"
+#include "server/session/session_registry.h"
+#include "server/store/in_memory_session_store.h"
+#include "tests/testing/fake_clock.h"
+#include "tests/testing/meshes.h"
+#include "tests/testing/session_samples.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using testing::Bar;
+using testing::BarRecord;
+using testing::FakeClock;
+using testing::IsOk;
+using testing::SampleMesh;
+using testing::StatusIs;
+using testing::Store;
+
+using Opened = absl::StatusOr<std::shared_ptr<Session>>;
+using Updated = absl::StatusOr<SessionRegistry::View>;
+
+class SessionUpdateTest : public ::testing::Test {
+ protected:
+  SessionUpdateTest() {
+    bar_ = Store(SampleMesh(Bar({2, 2, 3})), &catalog_);
+    mesh_bytes_ = budget_.reserved_bytes();
+    SessionRecord record = BarRecord(*bar_);
+    record.id = "a";
+    std::promise<Opened> made;
+    registry_.Create(std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
+                     [&made](Opened session) { made.set_value(std::move(session)); });
+    first_ = made.get_future().get().value();
+  }
+  ~SessionUpdateTest() override { pool_.reset(); }
+
+  std::shared_ptr<Session> Open() {
+    std::promise<Opened> opened;
+    registry_.Open("a", std::make_shared<std::atomic<bool>>(),
+                   [&opened](Opened session) { opened.set_value(std::move(session)); });
+    Opened session = opened.get_future().get();
+    EXPECT_THAT(session, IsOk());
+    return session.value_or(nullptr);
+  }
+
+  SessionRecord Record() {
+    absl::StatusOr<SessionRecord> result;
+    store_.Get("a", [&result](absl::StatusOr<SessionRecord> got) { result = std::move(got); });
+    return result.value();
+  }
+
+  std::future<Updated> Update(const std::string& etag, std::function<void(SessionRecord*)> change,
+                              SessionRegistry::CancelFlag cancelled =
+                                  std::make_shared<std::atomic<bool>>()) {
+    auto promise = std::make_shared<std::promise<Updated>>();
+    registry_.Update(
+        "a", etag,
+        [change = std::move(change)](SessionRecord record, const StoredMesh& /*mesh*/) {
+          change(&record);
+          return absl::StatusOr<SessionRecord>(std::move(record));
+        },
+        std::move(cancelled),
+        [promise](Updated view) { promise->set_value(std::move(view)); });
+    return promise->get_future();
+  }
+
+  absl::Status Commit(const std::shared_ptr<Session>& session, const HandlePose& pose) {
+    std::promise<absl::Status> done;
+    registry_.CommitPoses(session, {pose},
+                          [&done](absl::Status status) { done.set_value(std::move(status)); });
+    return done.get_future().get();
+  }
+
+  static void Soften(SessionRecord* record) { record->stiffness = 500.0; }
+  static void Rename(SessionRecord* record) { record->handles[0].name = "crown"; }
+  static HandlePose Moved(double x) {
+    HandlePose pose;
+    pose.translation_mm = {x, 2, 3};
+    return pose;
+  }
+
+  FakeClock clock_;
+  ServiceLimits limits_;
+  MemoryBudget budget_{64 << 20};
+  MeshCatalog catalog_{limits_, &budget_, nullptr, &clock_};
+  InMemorySessionStore store_;
+  std::unique_ptr<WorkerPool> pool_ = std::make_unique<WorkerPool>(1);
+  SessionRegistry registry_{limits_, &budget_, pool_.get(), &store_, &catalog_, &clock_};
+  std::shared_ptr<const StoredMesh> bar_;
+  std::shared_ptr<Session> first_;
+  int64_t mesh_bytes_ = 0;
+};
+
+TEST_F(SessionUpdateTest, TheNameStaysAndTheRestIsWhatIsAskedFor) {
+  const SessionRecord before = Record();
+  ASSERT_OK_AND_ASSIGN(const SessionRegistry::View view,
+                       Update(before.etag, [](SessionRecord* record) {
+                         record->model = DeformationModel::kLinearElastic;
+                       }).get());
+  EXPECT_EQ(view.session->model(), DeformationModel::kLinearElastic);
+  EXPECT_EQ(view.session, Open());
+  EXPECT_EQ(Record().model, DeformationModel::kLinearElastic);
+  EXPECT_EQ(Record().etag, view.record.etag);
+  EXPECT_NE(view.record.etag, before.etag);
+  EXPECT_EQ(Record().created_s, before.created_s);
+  // The old one tells its holders to open the session again.
+  EXPECT_TRUE(first_->evicted());
+  EXPECT_TRUE(first_->updated());
+  EXPECT_FALSE(first_->outdated());
+  EXPECT_TRUE(HasReason(first_->Deform(first_->model(), {HandlePose()}, {}).status(),
+                        ErrorReason::kSessionUpdated));
+  EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_ + view.session->bytes_held());
+}
+
+TEST_F(SessionUpdateTest, AnOldEtagIsRefusedBeforeAnythingIsMade) {
+  const std::string etag = Record().etag;
+  ASSERT_THAT(Update(etag, Soften).get(), IsOk());
+  const std::shared_ptr<Session> second = Open();
+  const Updated stale = Update(etag, Rename).get();
+  EXPECT_THAT(stale, StatusIs(absl::StatusCode::kAborted));
+  EXPECT_TRUE(HasReason(stale.status(), ErrorReason::kStaleEtag));
+  EXPECT_EQ(Open(), second);
+  EXPECT_FALSE(second->updated());
+  EXPECT_THAT(Update("", Rename).get(), IsOk()) << "whatever it is";
+}
+
+TEST_F(SessionUpdateTest, OfTwoAtOnceOneIsKept) {
+  const std::string etag = Record().etag;
+  std::promise<void> go;
+  pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
+  std::future<Updated> one = Update(etag, Soften);
+  std::future<Updated> other =
+      Update(etag, [](SessionRecord* record) { record->stiffness = 700.0; });
+  go.set_value();
+  const Updated first = one.get();
+  const Updated second = other.get();
+  EXPECT_NE(first.ok(), second.ok());
+  const Updated& kept = first.ok() ? first : second;
+  EXPECT_TRUE(HasReason((first.ok() ? second : first).status(), ErrorReason::kStaleEtag));
+  EXPECT_EQ(Record().stiffness, kept->record.stiffness);
+  EXPECT_EQ(Open(), kept->session);
+}
+
+TEST_F(SessionUpdateTest, WhatCannotBeMadeLeavesTheSessionAsItWas) {
+  const SessionRecord before = Record();
+  const int64_t bytes = budget_.reserved_bytes();
+  EXPECT_THAT(Update("", [](SessionRecord* record) { record->stiffness = -1.0; }).get(),
+              StatusIs(absl::StatusCode::kInvalidArgument));
+  EXPECT_EQ(Record().etag, before.etag);
+  EXPECT_EQ(Open(), first_);
+  EXPECT_THAT(first_->Deform(first_->model(), {HandlePose()}, {}), IsOk());
+  EXPECT_EQ(budget_.reserved_bytes(), bytes);
+}
+
+TEST_F(SessionUpdateTest, ACancelledOneLeavesTheSessionAsItWas) {
+  const std::string etag = Record().etag;
+  std::promise<void> go;
+  pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
+  const auto cancelled = std::make_shared<std::atomic<bool>>(false);
+  std::future<Updated> updated = Update("", Soften, cancelled);
+  *cancelled = true;
+  go.set_value();
+  EXPECT_THAT(updated.get(), StatusIs(absl::StatusCode::kCancelled));
+  EXPECT_EQ(Record().etag, etag);
+  EXPECT_EQ(Open(), first_);
+}
+
+TEST_F(SessionUpdateTest, PosesThatAreCommittedWhileItIsPreparedAreKept) {
+  std::promise<void> go;
+  pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
+  std::future<Updated> updated = Update("", Soften);
+  EXPECT_THAT(Commit(first_, Moved(7)), IsOk());
+  go.set_value();
+  ASSERT_OK_AND_ASSIGN(const SessionRegistry::View view, updated.get());
+  ASSERT_EQ(view.record.last_poses.size(), 1U);
+  EXPECT_EQ(view.record.last_poses[0].translation_mm.x(), 7);
+  // A stream that has not noticed yet; its poses still fit.
+  EXPECT_THAT(Commit(first_, Moved(8)), IsOk());
+  EXPECT_EQ(Record().last_poses[0].translation_mm.x(), 8);
+}
+
+TEST_F(SessionUpdateTest, OtherHandlesBeginAtRestAndTakeNoPosesOfTheOldOnes) {
+  ASSERT_THAT(Commit(first_, Moved(7)), IsOk());
+  ASSERT_THAT(Update("", Rename).get(), IsOk());
+  EXPECT_TRUE(Record().last_poses.empty());
+  EXPECT_TRUE(first_->outdated());
+  const absl::Status refused = Commit(first_, Moved(8));
+  EXPECT_TRUE(HasReason(refused, ErrorReason::kSessionUpdated)) << refused;
+  EXPECT_TRUE(Record().last_poses.empty());
+  EXPECT_THAT(Commit(Open(), Moved(9)), IsOk());
+}
+
+TEST_F(SessionUpdateTest, WhoHoldsAnEvictedOneLearnsOfTheUpdate) {
+  clock_.Advance(2 * SessionRegistry::kInUse);
+  ASSERT_EQ(registry_.Evict([] { return false; }), 1);
+  EXPECT_FALSE(first_->updated());
+  ASSERT_THAT(Update("", Soften).get(), IsOk());
+  EXPECT_TRUE(first_->updated());
+  EXPECT_EQ(registry_.size(), 1);
+}
+
+TEST_F(SessionUpdateTest, AnOpenerWhoCameBeforeTheUpdateGetsTheUpdatedSession) {
+  clock_.Advance(2 * SessionRegistry::kInUse);
+  ASSERT_EQ(registry_.Evict([] { return false; }), 1);
+  std::promise<void> go;
+  pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
+  // In this order on the worker: the update's work, then the restore of the record before it.
+  std::future<Updated> updated = Update("", Soften);
+  std::promise<void> asked;
+  pool_->Post(Lane::kStore, [&asked] { asked.set_value(); });
+  asked.get_future().wait();
+  std::promise<Opened> opened;
+  registry_.Open("a", std::make_shared<std::atomic<bool>>(),
+                 [&opened](Opened session) { opened.set_value(std::move(session)); });
+  std::promise<void> read;
+  pool_->Post(Lane::kStore, [&read] { read.set_value(); });
+  read.get_future().wait();
+  go.set_value();
+  ASSERT_OK_AND_ASSIGN(const SessionRegistry::View view, updated.get());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, opened.get_future().get());
+  EXPECT_EQ(session, view.session);
+  EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_ + session->bytes_held());
+}
+
+TEST_F(SessionUpdateTest, WhatIsDeletedMeanwhileStaysDeleted) {
+  std::promise<void> go;
+  pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
+  std::future<Updated> updated = Update("", Soften);
+  std::promise<absl::Status> deleted;
+  registry_.Delete("a", [&](absl::Status status) { deleted.set_value(std::move(status)); });
+  EXPECT_THAT(deleted.get_future().get(), IsOk());
+  go.set_value();
+  EXPECT_THAT(updated.get(), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_EQ(registry_.size(), 0);
+  EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
+}
+
+}  // namespace
+}  // namespace tissueform
