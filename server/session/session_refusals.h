@@ -11,7 +11,7 @@
 // What the registry of sessions answers to those whom it does not serve.
 namespace tissueform {
 
-absl::Status NoSuchSession(const std::string& id);        // NotFound
+absl::Status NoSuchSession(const std::string& id);         // NotFound
 absl::Status OtherRequest(const std::string& request_id);  // InvalidArgument: its id was used
 absl::Status TakenId(const std::string& id);               // AlreadyExists
 absl::Status EndingId(const std::string& id);              // Unavailable: it is being deleted

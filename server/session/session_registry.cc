@@ -395,7 +395,7 @@ void SessionRegistry::Update(const std::string& id, const std::string& etag,
     return;
   }
   updates_.Update(id, etag, std::move(change),
-                  Cancellation([cancelled] { return cancelled->load(); }),
+                  Cancellation([cancelled = std::move(cancelled)] { return cancelled->load(); }),
                   [id, done](absl::StatusOr<SessionMaker::Remade> remade) {
                     if (remade.ok()) {
                       done(View{std::move(remade->record), std::move(remade->session)});

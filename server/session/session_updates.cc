@@ -26,8 +26,7 @@ void SessionUpdates::Update(const std::string& id, const std::string& etag,
   auto checked = [etag, change = std::move(change)](
                      SessionRecord record,
                      const StoredMesh& mesh) -> absl::StatusOr<SessionRecord> {
-    TF_RETURN_IF_ERROR(
-        CheckSessionWrite(record.id, etag, kStoreEpoch, record.etag, record.epoch));
+    TF_RETURN_IF_ERROR(CheckSessionWrite(record.id, etag, kStoreEpoch, record.etag, record.epoch));
     return change(std::move(record), mesh);
   };
   maker_->Remake(id, std::move(checked), std::move(cancellation),
@@ -48,8 +47,8 @@ void SessionUpdates::Keep(SessionMaker::Remade remade, Done done) {
     done(std::move(result));
   };
   // Once more: poses may have been committed while it was prepared.
-  store_->Get(id, [this, remade = std::move(remade), finish = std::move(finish)](
-                      absl::StatusOr<SessionRecord> current) mutable {
+  store_->Get(id, [this, remade = std::move(remade),
+                   finish = std::move(finish)](absl::StatusOr<SessionRecord> current) mutable {
     if (!current.ok()) {
       remade.session.reset();
       finish(current.status());

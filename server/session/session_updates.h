@@ -19,8 +19,8 @@
 
 namespace tissueform {
 
-// How a session is changed: made anew beside the old one, its record kept if nobody was faster, then
-// put into its place by whoever knows the sessions.
+// How a session is changed: made anew beside the old one, its record kept if nobody was faster,
+// then put into its place by whoever knows the sessions.
 //
 // Thread-safe.
 class SessionUpdates {

@@ -65,9 +65,9 @@ class SessionUpdateTest : public ::testing::Test {
     return result.value();
   }
 
-  std::future<Updated> Update(const std::string& etag, std::function<void(SessionRecord*)> change,
-                              SessionRegistry::CancelFlag cancelled =
-                                  std::make_shared<std::atomic<bool>>()) {
+  std::future<Updated> Update(
+      const std::string& etag, std::function<void(SessionRecord*)> change,
+      SessionRegistry::CancelFlag cancelled = std::make_shared<std::atomic<bool>>()) {
     auto promise = std::make_shared<std::promise<Updated>>();
     registry_.Update(
         "a", etag,
@@ -75,8 +75,7 @@ class SessionUpdateTest : public ::testing::Test {
           change(&record);
           return absl::StatusOr<SessionRecord>(std::move(record));
         },
-        std::move(cancelled),
-        [promise](Updated view) { promise->set_value(std::move(view)); });
+        std::move(cancelled), [promise](Updated view) { promise->set_value(std::move(view)); });
     return promise->get_future();
   }
 
