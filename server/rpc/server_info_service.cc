@@ -47,9 +47,9 @@ void AddEncodings(v1::ServerInfo* info) {
 // a name, too.
 NamedLimits ToNamedLimits(const ServiceLimits& limits) {
   const auto& [max_vertices, max_tets, max_mesh_bytes, max_sessions, max_stored_sessions,
-               max_streams, max_watches, max_watches_per_session, session_idle_ttl, retention_days, configuration_deadline,
-               upload_silence, max_handles, max_cell_arrays, max_name_bytes, max_request_id_bytes,
-               max_chunk_bytes, max_unacked, max_iterations] = limits;
+               max_streams, max_watches, max_watches_per_session, session_idle_ttl, retention_days,
+               configuration_deadline, upload_silence, max_handles, max_cell_arrays, max_name_bytes,
+               max_request_id_bytes, max_chunk_bytes, max_unacked, max_iterations] = limits;
   return {{"max_vertices", max_vertices},
           {"max_tets", max_tets},
           {"max_mesh_bytes", max_mesh_bytes},
