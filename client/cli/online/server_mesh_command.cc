@@ -25,7 +25,7 @@ struct ServerMeshOptions {
 };
 
 // With the collection's name or without.
-std::string FullName(const std::string& name) {
+std::string FullMeshName(const std::string& name) {
   return name.rfind("meshes/", 0) == 0 ? name : MeshName(name);
 }
 
@@ -71,8 +71,8 @@ absl::Status List(const ServerMeshOptions& options) {
 
 absl::Status Delete(const ServerMeshOptions& options) {
   TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
-  TF_RETURN_IF_ERROR(client->DeleteMesh(FullName(options.mesh)));
-  absl::PrintF("%s is deleted\n", FullName(options.mesh));
+  TF_RETURN_IF_ERROR(client->DeleteMesh(FullMeshName(options.mesh)));
+  absl::PrintF("%s is deleted\n", FullMeshName(options.mesh));
   return absl::OkStatus();
 }
 

@@ -57,7 +57,7 @@ absl::Status Show(const SessionOptions& options) {
 
 absl::Status Update(const SessionOptions& options) {
   v1::UpdateSessionRequest request;
-  request.set_name(FullName(options.name));
+  request.set_name(FullSessionName(options.name));
   request.set_etag(options.etag);
   v1::DeformationModel model = v1::DEFORMATION_MODEL_UNSPECIFIED;
   if (!options.model.empty() &&
