@@ -61,7 +61,8 @@ WatchStreamReactor::WatchStreamReactor(CallScope scope, const grpc::ByteBuffer& 
   MutexLock lock(mutex_);
   if (admission.ok()) {
     opening_ = true;
-    Open();
+    // Opening goes on when that is done: then the library has bound the reactor.
+    StartSendInitialMetadata();
   } else {
     End(admission);
     Advance();
@@ -82,7 +83,11 @@ absl::Status WatchStreamReactor::ReadRequest(const grpc::ByteBuffer& bytes) {
       absl::StrCat("max_unacked is ", max_unacked_, "; it must be 1 to ", limits_.max_unacked));
 }
 
-void WatchStreamReactor::Open() {
+void WatchStreamReactor::OnSendInitialMetadataDone(bool ok) {
+  if (!ok) {
+    FinishOpening(absl::CancelledError("the client is gone"));
+    return;
+  }
   registry_->pool().Post(Lane::kFrames, [this] {
     registry_->Open(session_id_, cancelled_,
                     [this](absl::StatusOr<std::shared_ptr<Session>> session) {

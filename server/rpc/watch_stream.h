@@ -38,6 +38,7 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   WatchStreamReactor(CallScope scope, const grpc::ByteBuffer& request, const ServiceLimits& limits,
                      SessionRegistry* registry, SessionWatches* watches);
 
+  void OnSendInitialMetadataDone(bool ok) override;
   void OnWriteDone(bool ok) override;
   void OnCancel() override;
   void OnDone() override;
@@ -50,8 +51,6 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
  private:
   absl::Status ReadRequest(const grpc::ByteBuffer& bytes);
 
-  // One after the other, until the watch has begun.
-  void Open();
   void TakeSession(absl::StatusOr<std::shared_ptr<Session>> session) ABSL_LOCKS_EXCLUDED(mutex_);
   void Join(const std::shared_ptr<Session>& session) ABSL_LOCKS_EXCLUDED(mutex_);
   // On the session's strand.

@@ -320,9 +320,10 @@ void SessionRegistry::End(const std::shared_ptr<Session>& session, const StatusC
 }
 
 void SessionRegistry::Forget(const std::string& id, StatusCallback done) {
-  observer_(id, Event::kDeleted);
   store_->Delete(id, "", kStoreEpoch,
                  [this, id, done = std::move(done)](const absl::Status& status) {
+                   // Only now: who comes to watch after it shall not find the record any longer.
+                   observer_(id, Event::kDeleted);
                    {
                      MutexLock lock(mutex_);
                      ending_.erase(id);

@@ -193,7 +193,9 @@ class FakeWriterCall : public grpc::ServerCallbackWriter<Response> {
     }
     state_.Finish(std::move(status));  // last: the test may destroy this object afterwards
   }
-  void SendInitialMetadata() override {}
+  void SendInitialMetadata() override {
+    state_.React([this] { reactor_->OnSendInitialMetadataDone(!state_.cancelled()); });
+  }
   void Write(const Response* message, grpc::WriteOptions) override {
     state_.React([this, message] {
       const bool ok = !state_.cancelled();
