@@ -7,6 +7,7 @@
 #include <string>
 
 #include "client/cli/shared/exit_code.h"
+#include "client/cli/shared/option_checks.h"
 #include "client/cli/shared/version.h"
 
 namespace tissueform {
@@ -36,6 +37,7 @@ int RunCommandLine(int argc, char** argv,
   app.require_subcommand(0, 1);
   CommandWork work;
   add_commands(app, &work);
+  RefuseNonFinite(&app);
   try {
     app.parse(argc, argv);
     if (!work) throw CLI::RequiredError::Subcommand(1);

@@ -3,7 +3,11 @@
 
 #include "client/cli/shared/option_checks.h"
 
+#include <cmath>
 #include <filesystem>
+
+#include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 
 namespace tissueform {
 namespace {
@@ -16,6 +20,12 @@ CLI::Validator Ending(const std::string& ending, const std::string& form) {
   return {check, form, ending + " ending"};
 }
 
+std::string NonFinite(const std::string& text) {
+  double value = 0;
+  return absl::SimpleAtod(text, &value) && !std::isfinite(value) ? text + " is no finite number"
+                                                                 : "";
+}
+
 }  // namespace
 
 CLI::Validator VtuEnding() { return Ending(".vtu", "OUT.vtu"); }
@@ -24,6 +34,16 @@ CLI::Validator VtpEnding() { return Ending(".vtp", "FILE.vtp"); }
 void AddAllowOutside(CLI::App* command, PlanReadOptions* options) {
   command->add_flag("--allow-outside", options->allow_outside,
                     "let the plan name a mesh outside its own folder");
+}
+
+// CLI11's ranges take "nan" for a number inside, and some have no upper end.
+void RefuseNonFinite(CLI::App* app) {
+  for (CLI::Option* option : app->get_options()) {
+    if (absl::StartsWith(option->get_type_name(), "FLOAT")) option->check(NonFinite, "");
+  }
+  for (CLI::App* command : app->get_subcommands([](const CLI::App*) { return true; })) {
+    RefuseNonFinite(command);
+  }
 }
 
 }  // namespace tissueform

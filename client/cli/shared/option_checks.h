@@ -19,4 +19,8 @@ CLI::Validator VtpEnding();
 // Adds the flag --allow-outside to a command that reads a plan. `options` outlives the parsing.
 void AddAllowOutside(CLI::App* command, PlanReadOptions* options);
 
+// Every option of `app` and its commands that is a floating-point number refuses "nan" and "inf".
+// To be called when all have been added.
+void RefuseNonFinite(CLI::App* app);
+
 }  // namespace tissueform

@@ -28,6 +28,13 @@ TEST_F(UsageTest, WrongUseIsOneLineAndExitCodeTwo) {
   EXPECT_THAT(Files(), IsEmpty());
 }
 
+TEST_F(UsageTest, NumbersAreFinite) {
+  EXPECT_THAT(Run({"drag", "plan.json", "--server", "localhost:1", "--rate", "nan"}),
+              FailsWith(2, HasSubstr("--rate: nan")));
+  EXPECT_THAT(Run({"mesh", "generate", "a.stl", "--out", "a.vtu", "--max-volume-mm3", "inf"}),
+              FailsWith(2, HasSubstr("--max-volume-mm3: inf")));
+}
+
 TEST_F(UsageTest, HelpTeachesByExamples) {
   EXPECT_THAT(Run({"--help"}).out, AllOf(HasSubstr("deform"), HasSubstr("not a medical device")));
   const std::vector<std::vector<std::string>> commands = {
