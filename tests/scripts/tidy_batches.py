@@ -136,12 +136,15 @@ def main():
         add(path, commands[path])
     # In the order of their folders: neighbours include the same.
     files = sorted((path, commands[path]) for path in chosen)
+    lines = []
     for number, batch in enumerate(put_together(files)):
         path = folder / f"batch_{number}.cc"
         path.write_text("".join(included(*numbered) for numbered in enumerate(batch.files)), encoding="utf-8")
         add(path, batch.arguments())
-        print(path, " ".join(str(file) for file in batch.files), sep="\t")
+        lines.append(f"{path}\t{' '.join(str(file) for file in batch.files)}")
     (folder / "compile_commands.json").write_text(json.dumps(database), encoding="utf-8")
+    # Not before: whoever reads the lines begins at once.
+    print(*lines, sep="\n")
 
 
 if __name__ == "__main__":

@@ -31,8 +31,8 @@ TEST_F(UsageTest, WrongUseIsOneLineAndExitCodeTwo) {
 TEST_F(UsageTest, NumbersAreFinite) {
   EXPECT_THAT(Run({"drag", "plan.json", "--server", "localhost:1", "--rate", "nan"}),
               FailsWith(2, HasSubstr("--rate: nan")));
-  EXPECT_THAT(Run({"mesh", "generate", "a.stl", "--out", "a.vtu", "--max-volume-mm3", "inf"}),
-              FailsWith(2, HasSubstr("--max-volume-mm3: inf")));
+  EXPECT_THAT(Run({"mesh", "generate", "a.stl", "--out", "a.vtu", "--radius-edge", "nan"}),
+              FailsWith(2, HasSubstr("--radius-edge: nan")));
 }
 
 TEST_F(UsageTest, HelpTeachesByExamples) {
