@@ -103,6 +103,7 @@ TEST_F(PredictionsTest, ARepeatedRequestIdGivesTheSamePrediction) {
 TEST_F(PredictionsTest, TheSameRequestFromManyAtOnceIsOnePrediction) {
   std::vector<std::string> names(4);
   std::vector<std::thread> threads;
+  threads.reserve(names.size());
   for (std::string& name : names) {
     threads.emplace_back([&] {
       const auto made = calls().Create(session_.name(), TopPose(SomePose(1)), {}, "one");
