@@ -127,6 +127,7 @@ TEST_F(PredictionsTest, ListsAllOrThoseOfASession) {
   }
   ASSERT_OK_AND_ASSIGN(std::vector<v1::Prediction> listed, calls().List(session_.name()));
   std::vector<std::string> names;
+  names.reserve(listed.size());
   for (const v1::Prediction& prediction : listed) names.push_back(prediction.name());
   EXPECT_THAT(names, ::testing::UnorderedElementsAreArray(ours));
   EXPECT_TRUE(std::is_sorted(names.begin(), names.end()));
