@@ -128,16 +128,18 @@ TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr
       budget_(options.memory_budget_bytes),
       stores_(std::move(stores)),
       catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),
+      uploads_(options.limits, &catalog_, &stores_->uploads()),
       pool_(std::make_unique<WorkerPool>(options.workers)),
       registry_(options.limits, &budget_, pool_.get(), &stores_->sessions(), &catalog_),
       housekeeping_({.retention_days = options.limits.retention_days}, stores_.get(), &registry_,
                     &catalog_),
       streams_(options.limits.max_streams),
       watches_(options.limits, pool_.get()),
-      mesh_service_(&gate_, options.limits, &catalog_, &registry_, pool_.get(), &timer_),
+      mesh_service_(&gate_, options.limits, &catalog_, &uploads_, &registry_, pool_.get(), &timer_),
       session_service_(&gate_, options.limits, &catalog_, &registry_),
       deform_service_(&gate_, options.limits, &registry_, &streams_, &watches_, &timer_),
-      prediction_service_(&gate_, options.limits, &registry_, &stores_->predictions(), &timer_),
+      prediction_service_(&gate_, options.limits, &registry_, &stores_->predictions(),
+                          &timer_),
       server_info_service_(&gate_, LimitsOf(options)) {
   SetBlasThreads(1);  // the pool's workers share the cores already
   registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {

@@ -23,6 +23,7 @@
 #include "server/session/housekeeping.h"
 #include "server/session/memory_budget.h"
 #include "server/session/mesh_catalog.h"
+#include "server/session/mesh_uploads.h"
 #include "server/session/session_registry.h"
 #include "server/session/worker_pool.h"
 #include "server/store/stores.h"
@@ -72,6 +73,7 @@ class TissueformServer {
   MemoryBudget budget_;
   std::unique_ptr<Stores> stores_;
   MeshCatalog catalog_;
+  MeshUploads uploads_;
   std::unique_ptr<WorkerPool> pool_;
   SessionRegistry registry_;
   Housekeeping housekeeping_;

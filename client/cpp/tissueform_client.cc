@@ -3,8 +3,6 @@
 
 #include "client/cpp/tissueform_client.h"
 
-#include <algorithm>
-
 #include "absl/strings/str_cat.h"
 #include "grpcpp/create_channel.h"
 #include "grpcpp/security/credentials.h"
@@ -18,8 +16,6 @@ namespace {
 
 // All vertices of a mesh of a million are 12 MB; gRPC's own limit is 4 MiB.
 constexpr int kMaxReceiveBytes = 256 << 20;
-// Well below the server's limit of 4 MiB a message.
-constexpr size_t kChunkBytes = 512 << 10;
 // A drag may rest for minutes. Routers forget connections on which nothing goes, and a server that
 // lost its power says nothing: this finds out within a minute.
 constexpr int kKeepaliveMilliseconds = 30'000;
@@ -39,28 +35,6 @@ std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address, bool own_
   arguments.SetInt(GRPC_ARG_DNS_MIN_TIME_BETWEEN_RESOLUTIONS_MS, kReconnectMilliseconds);
   if (own_connection) arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
-}
-
-// False when the call ended early; Finish says why.
-bool WriteChunks(const MeshPayloadView& payload,
-                 grpc::ClientWriter<v1::UploadMeshRequest>* writer) {
-  const int64_t total_bytes = payload.shape.TotalBytes();
-  int64_t offset = 0;
-  v1::UploadMeshRequest request;
-  for (const absl::string_view segment : payload.segments) {
-    for (size_t begin = 0; begin < segment.size(); begin += kChunkBytes) {
-      const absl::string_view data = segment.substr(begin, kChunkBytes);
-      v1::MeshChunk* chunk = request.mutable_chunk();
-      chunk->set_write_offset(offset);
-      chunk->set_data(data.data(), data.size());
-      offset += static_cast<int64_t>(data.size());
-      chunk->set_finish_write(offset == total_bytes);
-      if (!writer->Write(request)) {
-        return false;
-      }
-    }
-  }
-  return writer->WritesDone();
 }
 
 }  // namespace
@@ -103,7 +77,8 @@ absl::StatusOr<v1::ServerInfo> TissueformClient::GetServerInfo() {
 }
 
 absl::StatusOr<v1::Mesh> TissueformClient::UploadMesh(const TetMesh& mesh,
-                                                      const std::vector<CellArray>& cell_arrays) {
+                                                      const std::vector<CellArray>& cell_arrays,
+                                                      const UploadOptions& options) {
   for (const CellArray& array : cell_arrays) {
     if (array.values.size() != mesh.num_tets()) {
       return absl::InvalidArgumentError(absl::StrCat("cell array \"", array.name, "\" has ",
@@ -114,35 +89,29 @@ absl::StatusOr<v1::Mesh> TissueformClient::UploadMesh(const TetMesh& mesh,
   const MeshPayloadView payload = ViewMeshPayload(mesh.positions(), mesh.tets(), cell_arrays);
   const std::string sha256 = payload.Sha256();
   // The name is the content: asking costs one round trip, and the same head again costs no more.
+  const absl::StatusOr<v1::Mesh> known = GetMesh(MeshName(sha256));
+  if (!absl::IsNotFound(known.status())) return known;
+  return SendMesh(meshes_.get(), payload, sha256, options_.call_deadline, options);
+}
+
+absl::StatusOr<v1::Mesh> TissueformClient::GetMesh(const std::string& name) {
   grpc::ClientContext context;
   SetDeadline(&context);
   v1::GetMeshRequest request;
-  request.set_name(MeshName(sha256));
-  v1::Mesh known;
-  const grpc::Status status = meshes_->GetMesh(&context, request, &known);
-  if (status.ok()) {
-    return known;
-  }
-  if (status.error_code() != grpc::StatusCode::NOT_FOUND) {
-    return FromGrpcStatus(status);
-  }
-  return SendMesh(payload, sha256);
+  request.set_name(name);
+  v1::Mesh mesh;
+  TF_RETURN_IF_ERROR(FromGrpcStatus(meshes_->GetMesh(&context, request, &mesh)));
+  return mesh;
 }
 
-absl::StatusOr<v1::Mesh> TissueformClient::SendMesh(const MeshPayloadView& payload,
-                                                    const std::string& sha256) {
+absl::StatusOr<v1::QueryUploadResponse> TissueformClient::QueryUpload(const std::string& name) {
   grpc::ClientContext context;
   SetDeadline(&context);
-  v1::UploadMeshResponse response;
-  const auto writer = meshes_->UploadMesh(&context, &response);
-  v1::UploadMeshRequest request;
-  *request.mutable_header() = ToProto(payload.shape, sha256);
-  // Where a write fails the server has ended the call, often with a reason: Finish has it.
-  if (writer->Write(request)) {
-    WriteChunks(payload, writer.get());
-  }
-  TF_RETURN_IF_ERROR(FromGrpcStatus(writer->Finish()));
-  return std::move(*response.mutable_mesh());
+  v1::QueryUploadRequest request;
+  request.set_name(name);
+  v1::QueryUploadResponse response;
+  TF_RETURN_IF_ERROR(FromGrpcStatus(meshes_->QueryUpload(&context, request, &response)));
+  return response;
 }
 
 absl::StatusOr<std::vector<v1::Mesh>> TissueformClient::ListMeshes() {

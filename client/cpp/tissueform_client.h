@@ -14,6 +14,7 @@
 #include "grpcpp/channel.h"
 
 #include "client/cpp/deform_stream.h"
+#include "client/cpp/mesh_upload.h"
 #include "client/cpp/prediction_calls.h"
 #include "client/cpp/watch_stream.h"
 #include "core/mesh/tet_mesh.h"
@@ -52,11 +53,16 @@ class TissueformClient {
   // What the server is and takes.
   absl::StatusOr<v1::ServerInfo> GetServerInfo();
 
-  // Uploads the mesh with its arrays, unless the server has it.
+  // Uploads the mesh with its arrays, unless the server has it: see SendMesh in mesh_upload.h.
   //
-  // Errors: InvalidArgument also when an array has not one value per tet.
+  // Errors: InvalidArgument also when an array has not one value per tet; that of the first
+  // question when the server is away from the beginning.
   absl::StatusOr<v1::Mesh> UploadMesh(const TetMesh& mesh,
-                                      const std::vector<CellArray>& cell_arrays);
+                                      const std::vector<CellArray>& cell_arrays,
+                                      const UploadOptions& options = {});
+  // How much of a mesh that is not complete has come to the server.
+  absl::StatusOr<v1::QueryUploadResponse> QueryUpload(const std::string& name);
+  absl::StatusOr<v1::Mesh> GetMesh(const std::string& name);
   // All of them, page after page.
   absl::StatusOr<std::vector<v1::Mesh>> ListMeshes();
   absl::Status DeleteMesh(const std::string& name);
@@ -91,7 +97,6 @@ class TissueformClient {
   TissueformClient(const std::shared_ptr<grpc::Channel>& channel, const Options& options);
 
   void SetDeadline(grpc::ClientContext* context) const;
-  absl::StatusOr<v1::Mesh> SendMesh(const MeshPayloadView& payload, const std::string& sha256);
 
   const Options options_;
   const std::unique_ptr<v1::MeshService::Stub> meshes_;

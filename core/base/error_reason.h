@@ -42,6 +42,7 @@ enum class ErrorReason {
   kPredictionNotFound,
   kNotComparable,
   kUploadNotFound,
+  kUploadUnderWay,
   kDiskFull,
   // Of a code, where nothing more was said.
   kInvalidRequest,

@@ -15,11 +15,12 @@
 #include "server/rpc/resource_conversion.h"
 
 namespace tissueform {
+
 grpc::ServerReadReactor<v1::UploadMeshRequest>* MeshService::UploadMesh(
     grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) {
   return new MeshUploadStream(
       CallScope(context, "MeshService.UploadMesh", CallKind::kNewWork, gate_), limits_, catalog_,
-      pool_, timer_, response);
+      uploads_, pool_, timer_, response);
 }
 
 grpc::ServerUnaryReactor* MeshService::Run(grpc::CallbackServerContext* context,
@@ -29,6 +30,13 @@ grpc::ServerUnaryReactor* MeshService::Run(grpc::CallbackServerContext* context,
     pool_->Post(Lane::kStore, [end, work = std::move(work)] { end(work()); });
     return absl::OkStatus();
   });
+}
+
+grpc::ServerUnaryReactor* MeshService::QueryUpload(grpc::CallbackServerContext* context,
+                                                   const v1::QueryUploadRequest* request,
+                                                   v1::QueryUploadResponse* response) {
+  return Run(context, "MeshService.QueryUpload",
+             [=, this] { return FindUpload(*request, response); });
 }
 
 grpc::ServerUnaryReactor* MeshService::GetMesh(grpc::CallbackServerContext* context,
@@ -47,6 +55,15 @@ grpc::ServerUnaryReactor* MeshService::DeleteMesh(grpc::CallbackServerContext* c
                                                   const v1::DeleteMeshRequest* request,
                                                   google::protobuf::Empty* /*response*/) {
   return Run(context, "MeshService.DeleteMesh", [=, this] { return RemoveMesh(*request); });
+}
+
+absl::Status MeshService::FindUpload(const v1::QueryUploadRequest& request,
+                                     v1::QueryUploadResponse* response) {
+  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request.name()));
+  TF_ASSIGN_OR_RETURN(const UploadProgress progress, uploads_->Query(sha256));
+  response->set_committed_bytes(progress.committed_bytes);
+  response->set_total_bytes(progress.total_bytes);
+  return absl::OkStatus();
 }
 
 absl::Status MeshService::FindMesh(const v1::GetMeshRequest& request, v1::Mesh* response) {

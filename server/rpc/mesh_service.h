@@ -10,6 +10,7 @@
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
+#include "server/session/mesh_uploads.h"
 #include "server/session/session_registry.h"
 #include "server/session/worker_pool.h"
 #include "tissueform/v1/mesh_service.grpc.pb.h"
@@ -20,16 +21,21 @@ namespace tissueform {
 class MeshService final : public v1::MeshService::CallbackService {
  public:
   MeshService(ServiceGate* gate, const ServiceLimits& limits, MeshCatalog* catalog,
-              const SessionRegistry* registry, WorkerPool* pool, DeadlineTimer* timer)
+              MeshUploads* uploads, const SessionRegistry* registry, WorkerPool* pool,
+              DeadlineTimer* timer)
       : gate_(gate),
         limits_(limits),
         catalog_(catalog),
+        uploads_(uploads),
         registry_(registry),
         pool_(pool),
         timer_(timer) {}
 
   grpc::ServerReadReactor<v1::UploadMeshRequest>* UploadMesh(
       grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) override;
+  grpc::ServerUnaryReactor* QueryUpload(grpc::CallbackServerContext* context,
+                                        const v1::QueryUploadRequest* request,
+                                        v1::QueryUploadResponse* response) override;
   grpc::ServerUnaryReactor* GetMesh(grpc::CallbackServerContext* context,
                                     const v1::GetMeshRequest* request, v1::Mesh* response) override;
   grpc::ServerUnaryReactor* ListMeshes(grpc::CallbackServerContext* context,
@@ -44,6 +50,7 @@ class MeshService final : public v1::MeshService::CallbackService {
   grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::string_view method,
                                 std::function<absl::Status()> work);
 
+  absl::Status FindUpload(const v1::QueryUploadRequest& request, v1::QueryUploadResponse* response);
   absl::Status FindMesh(const v1::GetMeshRequest& request, v1::Mesh* response);
   absl::Status List(const v1::ListMeshesRequest& request, v1::ListMeshesResponse* response);
   absl::Status RemoveMesh(const v1::DeleteMeshRequest& request);
@@ -51,6 +58,7 @@ class MeshService final : public v1::MeshService::CallbackService {
   ServiceGate* const gate_;
   const ServiceLimits limits_;
   MeshCatalog* const catalog_;
+  MeshUploads* const uploads_;
   const SessionRegistry* const registry_;
   WorkerPool* const pool_;
   DeadlineTimer* const timer_;

@@ -14,43 +14,41 @@
 namespace tissueform {
 
 MeshUploadStream::MeshUploadStream(CallScope scope, const ServiceLimits& limits,
-                                   MeshCatalog* catalog, WorkerPool* pool, DeadlineTimer* timer,
-                                   v1::UploadMeshResponse* response)
+                                   MeshCatalog* catalog, MeshUploads* uploads, WorkerPool* pool,
+                                   DeadlineTimer* timer, v1::UploadMeshResponse* response)
     : scope_(std::move(scope)),
       limits_(limits),
       catalog_(catalog),
+      uploads_(uploads),
       pool_(pool),
       timer_(timer),
       response_(response) {
   MutexLock lock(mutex_);
   if (scope_.admission().ok()) {
-    last_heard_ = std::chrono::steady_clock::now();
+    Read();
     WaitForMore(last_heard_ + limits_.upload_silence);
-    StartRead(&request_);
   } else {
-    End(scope_.admission());
+    state_ = State::kEnded;
+    Finish(scope_.End(scope_.admission()));
   }
+}
+
+void MeshUploadStream::Read() {
+  state_ = State::kReading;
+  last_heard_ = std::chrono::steady_clock::now();
+  StartRead(&request_);
 }
 
 void MeshUploadStream::OnReadDone(bool ok) {
   MutexLock lock(mutex_);
-  if (ended_) return;  // the client was silent for too long
-  last_heard_ = std::chrono::steady_clock::now();
-  if (!ok) {
-    End(absl::InvalidArgumentError(
-        absl::StrCat("the upload ended after ", upload_ == nullptr ? 0 : upload_->committed_bytes(),
-                     " bytes without a chunk that has finish_write; send the whole mesh, in chunks "
-                     "of 1 MiB at most")));
-    return;
-  }
-  if (const absl::Status status = Take(); !status.ok()) {
-    End(status);
-  } else if (upload_ == nullptr) {
-    End(absl::OkStatus());  // the server has the mesh already
-  } else if (upload_->finished()) {
-    CheckOnWorker();
+  if (state_ == State::kEnded) return;  // the client was silent for too long
+  if (ok) {
+    state_ = State::kWorking;
+    pool_->Post(Lane::kStore, [this] { TakeMessage(); });
   } else {
-    StartRead(&request_);
+    PostEnd(absl::InvalidArgumentError(absl::StrCat(
+        "the upload ended after ", received_bytes_,
+        " bytes without a chunk that has finish_write; they are kept for a while: go on there")));
   }
 }
 
@@ -70,17 +68,40 @@ void MeshUploadStream::WaitForMore(DeadlineTimer::TimePoint until) {
 
 void MeshUploadStream::EndIfSilent() {
   MutexLock lock(mutex_);
-  if (ended_ || checking_) return;
-  const DeadlineTimer::TimePoint until = last_heard_ + limits_.upload_silence;
-  if (std::chrono::steady_clock::now() < until) {
+  if (state_ == State::kEnded) return;
+  const DeadlineTimer::TimePoint now = std::chrono::steady_clock::now();
+  // While a job works the client is not waited for.
+  const DeadlineTimer::TimePoint until =
+      (state_ == State::kWorking ? now : last_heard_) + limits_.upload_silence;
+  if (now < until) {
     WaitForMore(until);
     return;
   }
-  // It holds memory that others are refused.
-  End(WithReason(absl::DeadlineExceededError(
-                     absl::StrCat("no chunk came for ", limits_.upload_silence.count(),
-                                  " ms, and the upload was given up; send the mesh again")),
-                 ErrorReason::kUploadSilent));
+  PostEnd(WithReason(absl::DeadlineExceededError(absl::StrCat(
+                         "no chunk came for ", limits_.upload_silence.count(),
+                         " ms; ask QueryUpload how much of the mesh is there, and go on")),
+                     ErrorReason::kUploadSilent));
+}
+
+void MeshUploadStream::PostEnd(absl::Status outcome) {
+  state_ = State::kEnded;
+  pool_->Post(Lane::kStore, [this, outcome = std::move(outcome)] { End(outcome); });
+}
+
+void MeshUploadStream::TakeMessage() {
+  const bool last = request_.chunk().finish_write();
+  const absl::Status taken = Take();
+  if (!taken.ok() || upload_ == nullptr) {
+    End(taken);  // without an upload: the server has the mesh already
+    return;
+  }
+  MutexLock lock(mutex_);
+  received_bytes_ = upload_->received_bytes();
+  if (last) {
+    pool_->Post(Lane::kBatch, [this] { CheckMesh(); });
+  } else {
+    Read();
+  }
 }
 
 absl::Status MeshUploadStream::Take() {
@@ -98,42 +119,33 @@ absl::Status MeshUploadStream::TakeHeader() {
   if (!request_.has_header()) {
     return absl::InvalidArgumentError("the first message must be the header");
   }
-  MeshAnnouncement announcement = ToAnnouncement(request_.header());
+  UploadAnnouncement announcement = ToAnnouncement(request_.header());
   if (const auto known = catalog_->Look(announcement.sha256); known.ok()) {
     *response_->mutable_mesh() = ToProto(*known);
     response_->set_already_existed(true);
     response_->set_committed_bytes(announcement.total_bytes);
     return absl::OkStatus();
   }
-  TF_ASSIGN_OR_RETURN(upload_, catalog_->StartUpload(std::move(announcement)));
+  TF_ASSIGN_OR_RETURN(upload_, uploads_->Open(std::move(announcement)));
   return absl::OkStatus();
 }
 
-void MeshUploadStream::CheckOnWorker() {
-  checking_ = true;
-  pool_->Post(Lane::kBatch, [this] {
-    std::unique_ptr<MeshUpload> upload;
-    {
-      MutexLock lock(mutex_);
-      upload = std::move(upload_);
-    }
-    const int64_t committed_bytes = upload->committed_bytes();
-    auto stored = catalog_->Finish(std::move(upload));
-    MutexLock lock(mutex_);
-    const absl::Status outcome = stored.status();
-    if (stored.ok()) {
-      *response_->mutable_mesh() = ToProto(MeshView{RecordOf(**stored), *stored});
-      response_->set_committed_bytes(committed_bytes);
-      // Before the client has its answer: a mesh that it deletes at once is free at once.
-      stored->reset();
-    }
-    End(outcome);
-  });
+void MeshUploadStream::CheckMesh() {
+  auto stored = upload_->Finish();
+  if (stored.ok()) {
+    *response_->mutable_mesh() = ToProto(MeshView{RecordOf(**stored), *stored});
+    response_->set_committed_bytes(upload_->received_bytes());
+  }
+  const absl::Status outcome = stored.status();
+  // Before the client has its answer: a mesh that it deletes at once is free at once.
+  if (stored.ok()) stored->reset();
+  End(outcome);
 }
 
 void MeshUploadStream::End(const absl::Status& outcome) {
-  ended_ = true;
   upload_.reset();
+  MutexLock lock(mutex_);
+  state_ = State::kEnded;
   Finish(scope_.End(outcome));
 }
 

@@ -56,7 +56,7 @@ void AddPreparation(const Session& session, v1::Session* proto) {
 
 }  // namespace
 
-MeshAnnouncement ToAnnouncement(const v1::MeshHeader& header) {
+UploadAnnouncement ToAnnouncement(const v1::MeshHeader& header) {
   return {ToPayloadShape(header), header.total_bytes(), header.sha256()};
 }
 

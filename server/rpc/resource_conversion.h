@@ -13,6 +13,7 @@
 #include "server/session/mesh_catalog.h"
 #include "server/session/session_registry.h"
 #include "server/store/session_record.h"
+#include "server/store/upload_store.h"
 #include "tissueform/v1/mesh.pb.h"
 #include "tissueform/v1/mesh_service.pb.h"
 #include "tissueform/v1/session.pb.h"
@@ -21,7 +22,7 @@
 // The server's own resources as messages; everything else is converted by proto/conversion.
 namespace tissueform {
 
-MeshAnnouncement ToAnnouncement(const v1::MeshHeader& header);
+UploadAnnouncement ToAnnouncement(const v1::MeshHeader& header);
 v1::Mesh ToProto(const MeshView& view);
 
 // The record of a session that `owner` asks for on `mesh`. Errors: those of ToSessionRequest.

@@ -25,6 +25,7 @@ DeadlineTimer::Id DeadlineTimer::Start(TimePoint deadline, Expired expired) {
 }
 
 void DeadlineTimer::Cancel(Id id) {
+  if (id == Id()) return;  // it would be that of no function running, and waited for
   MutexLock lock(mutex_);
   waiting_.erase(id);
   while (running_ == id) changed_.Wait(mutex_);

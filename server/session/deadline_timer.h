@@ -33,7 +33,7 @@ class DeadlineTimer {
   // not take long. It may call Start.
   Id Start(TimePoint deadline, Expired expired);
   // Once it has returned, `expired` neither runs nor will. Not from within `expired`, and not
-  // while holding a lock that it takes.
+  // while holding a lock that it takes. Id(), which Start never gives, is nothing.
   void Cancel(Id id);
 
  private:

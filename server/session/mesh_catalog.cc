@@ -4,99 +4,28 @@
 #include "server/session/mesh_catalog.h"
 
 #include <algorithm>
-#include <cmath>
-#include <set>
 #include <utility>
-
-#include "absl/strings/str_cat.h"
 
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/tet_topology.h"
-#include "core/mesh/validation.h"
-#include "core/mesh_payload/sha256.h"
+#include "server/session/mesh_checks.h"
 
 namespace tissueform {
 namespace {
 
-// Upper bounds of what validation and the search for the skin hold at their peak, beside the mesh.
-// The most a tet takes are the four facets of the skin's search at 20 bytes, twice where all are
-// boundary, or four keys of 24 bytes in the search for facets with a third tet.
-constexpr int64_t kValidationBytesPerTet = 256;
-constexpr int64_t kValidationBytesPerVertex = 64;
-
-absl::Status CheckCount(int64_t count, int64_t max, absl::string_view field,
-                        absl::string_view option) {
-  if (count <= 0) {
-    return absl::InvalidArgumentError(absl::StrCat(field, " is ", count, "; it must be positive"));
-  }
-  if (count > max) {
-    return WithReason(
-        absl::ResourceExhaustedError(absl::StrCat(field, " is ", count, ", and the server takes ",
-                                                  max, " at most; raise its ", option)),
-        ErrorReason::kMeshTooLarge, {{"field", std::string(field)}, {"limit", absl::StrCat(max)}});
-  }
-  return absl::OkStatus();
-}
-
-absl::Status CheckCellArrayNames(const std::vector<std::string>& names,
-                                 const ServiceLimits& limits) {
-  if (names.size() > static_cast<size_t>(limits.max_cell_arrays)) {
-    return absl::InvalidArgumentError(absl::StrCat("mesh has ", names.size(), " cell arrays; send ",
-                                                   limits.max_cell_arrays, " at most"));
-  }
-  std::set<absl::string_view> seen;
-  for (const std::string& name : names) {
-    if (name.empty() || name.size() > static_cast<size_t>(limits.max_name_bytes)) {
-      return absl::InvalidArgumentError(absl::StrCat("name of cell array ", seen.size(), " has ",
-                                                     name.size(), " bytes; it needs 1 to ",
-                                                     limits.max_name_bytes));
-    }
-    if (!seen.insert(name).second) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("cell array \"", name, "\" is named twice; names must differ"));
-    }
-  }
-  return absl::OkStatus();
-}
-
-absl::Status CheckAnnouncement(const MeshAnnouncement& mesh, const ServiceLimits& limits) {
-  const MeshPayloadShape& shape = mesh.shape;
-  TF_RETURN_IF_ERROR(
-      CheckCount(shape.num_vertices, limits.max_vertices, "vertex_count", "--max-vertices"));
-  TF_RETURN_IF_ERROR(CheckCount(shape.num_tets, limits.max_tets, "tet_count", "--max-tets"));
-  TF_RETURN_IF_ERROR(CheckCellArrayNames(shape.cell_arrays, limits));
-  if (mesh.total_bytes != shape.TotalBytes()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("total_bytes is ", mesh.total_bytes, ", but ", shape.num_vertices,
-                     " vertices, ", shape.num_tets, " tets and ", shape.cell_arrays.size(),
-                     " cell arrays make ", shape.TotalBytes(), " bytes; correct the header"));
-  }
-  TF_RETURN_IF_ERROR(
-      CheckCount(mesh.total_bytes, limits.max_mesh_bytes, "total_bytes", "--max-mesh-mib"));
-  if (!IsSha256Hex(mesh.sha256)) {
-    return absl::InvalidArgumentError("sha256 must be 64 lower-case hexadecimal digits");
-  }
-  return absl::OkStatus();
-}
-
-absl::Status CheckCellArraysFinite(const std::vector<CellArray>& arrays) {
-  for (const CellArray& array : arrays) {
-    for (Eigen::Index t = 0; t < array.values.size(); ++t) {
-      if (!std::isfinite(array.values[t])) {
-        return absl::InvalidArgumentError(absl::StrCat("cell array \"", array.name,
-                                                       "\" is not finite at tet ", t,
-                                                       "; replace NaN and infinite values"));
-      }
-    }
-  }
-  return absl::OkStatus();
-}
-
-// What a mesh takes while it is checked or read.
-int64_t PeakBytes(const MeshAnnouncement& mesh) {
-  return mesh.total_bytes + kValidationBytesPerTet * mesh.shape.num_tets +
-         kValidationBytesPerVertex * mesh.shape.num_vertices;
+// From here on the reservation is what the mesh itself takes.
+absl::StatusOr<std::shared_ptr<const StoredMesh>> MakeStored(MemoryReservation reservation,
+                                                             const std::string& sha256,
+                                                             TetMesh mesh, MeshPayload* payload) {
+  std::vector<int32_t> skin = BoundaryVertices(mesh);
+  std::vector<CellArray> cell_arrays = std::move(payload->cell_arrays());
+  const int64_t payload_bytes =
+      ViewMeshPayload(mesh.positions(), mesh.tets(), cell_arrays).shape.TotalBytes();
+  TF_RETURN_IF_ERROR(reservation.Resize(
+      payload_bytes + static_cast<int64_t>(skin.size() * sizeof(int32_t)), "mesh"));
+  return std::make_shared<const StoredMesh>(StoredMesh{
+      std::move(reservation), sha256, std::move(mesh), std::move(cell_arrays), std::move(skin)});
 }
 
 absl::Status NoSuchMesh() {
@@ -122,46 +51,6 @@ MeshRecord RecordOf(const StoredMesh& mesh) {
   record.total_bytes = record.shape.TotalBytes();
   record.skin_vertex_count = static_cast<int64_t>(mesh.skin.size());
   return record;
-}
-
-MeshUpload::MeshUpload(MeshAnnouncement announcement, int64_t max_chunk_bytes,
-                       MemoryReservation reservation)
-    : announcement_(std::move(announcement)),
-      max_chunk_bytes_(max_chunk_bytes),
-      reservation_(std::move(reservation)),
-      payload_(announcement_.shape) {}
-
-absl::Status MeshUpload::Write(int64_t offset, absl::string_view data, bool finish) {
-  const auto size = static_cast<int64_t>(data.size());
-  if (finished_) {
-    return absl::InvalidArgumentError(
-        "chunk after finish_write; send nothing after the last chunk");
-  }
-  if (size > max_chunk_bytes_) {
-    return absl::InvalidArgumentError(absl::StrCat("chunk at ", offset, " has ", size,
-                                                   " bytes; send ", max_chunk_bytes_, " at most"));
-  }
-  if (offset != committed_bytes_) {
-    return WithReason(absl::InvalidArgumentError(
-                          absl::StrCat("chunk begins at ", offset, ", but ", committed_bytes_,
-                                       " bytes have come; send chunks without gaps")),
-                      ErrorReason::kChunkOutOfPlace,
-                      {{"committed_bytes", absl::StrCat(committed_bytes_)}});
-  }
-  if (size > announcement_.total_bytes - committed_bytes_) {
-    return absl::InvalidArgumentError(absl::StrCat("chunk at ", offset, " with ", size,
-                                                   " bytes goes past the end of the ",
-                                                   announcement_.total_bytes, " declared bytes"));
-  }
-  payload_.Write(offset, data);
-  committed_bytes_ += size;
-  finished_ = finish;
-  if (finish && committed_bytes_ != announcement_.total_bytes) {
-    return absl::InvalidArgumentError(absl::StrCat("finish_write after ", committed_bytes_, " of ",
-                                                   announcement_.total_bytes,
-                                                   " declared bytes; send the rest"));
-  }
-  return absl::OkStatus();
 }
 
 MeshCatalog::MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget, MeshStore* store,
@@ -192,38 +81,21 @@ class MeshCatalog::Arrival {
   const std::string sha256_;
 };
 
-absl::StatusOr<std::unique_ptr<MeshUpload>> MeshCatalog::StartUpload(
-    MeshAnnouncement announcement) {
-  TF_RETURN_IF_ERROR(CheckAnnouncement(announcement, limits_));
-  TF_ASSIGN_OR_RETURN(MemoryReservation reservation,
-                      budget_->Reserve(PeakBytes(announcement), "mesh"));
-  return std::unique_ptr<MeshUpload>(
-      new MeshUpload(std::move(announcement), limits_.max_chunk_bytes, std::move(reservation)));
+absl::Status MeshCatalog::Check(const UploadAnnouncement& announced) const {
+  return CheckAnnouncedMesh(announced, limits_);
 }
 
-absl::StatusOr<std::shared_ptr<const StoredMesh>> MeshCatalog::Finish(
-    std::unique_ptr<MeshUpload> upload) {
-  const std::string& sha256 = upload->announcement_.sha256;
-  if (upload->payload_.View().Sha256() != sha256) {
-    return WithReason(
-        absl::DataLossError(
-            "the payload does not have the declared SHA-256: it was damaged on its way, or the "
-            "digest was computed over something else (see MeshHeader.sha256); send it again"),
-        ErrorReason::kMeshDamagedOnItsWay);
-  }
-  TF_RETURN_IF_ERROR(CheckCellArraysFinite(upload->payload_.cell_arrays()));
-  TF_ASSIGN_OR_RETURN(TetMesh mesh, TetMesh::Create(std::move(upload->payload_.positions()),
-                                                    std::move(upload->payload_.tets())));
-  TF_RETURN_IF_ERROR(CheckTetMesh(mesh));
-  std::vector<int32_t> skin = BoundaryVertices(mesh);
-  TF_RETURN_IF_ERROR(upload->reservation_.Resize(
-      upload->announcement_.total_bytes + static_cast<int64_t>(skin.size() * sizeof(int32_t)),
-      "mesh"));
-  auto stored = std::make_shared<const StoredMesh>(
-      StoredMesh{std::move(upload->reservation_), sha256, std::move(mesh),
-                 std::move(upload->payload_.cell_arrays()), std::move(skin)});
+absl::StatusOr<std::shared_ptr<const StoredMesh>> MeshCatalog::Admit(
+    const UploadAnnouncement& announced, const ReadPayload& read) {
+  TF_ASSIGN_OR_RETURN(MemoryReservation reservation,
+                      budget_->Reserve(PeakBytes(announced.shape), "mesh"));
+  TF_ASSIGN_OR_RETURN(MeshPayload payload, read());
+  TF_ASSIGN_OR_RETURN(TetMesh mesh, CheckArrivedMesh(announced.sha256, &payload));
+  TF_ASSIGN_OR_RETURN(
+      std::shared_ptr<const StoredMesh> stored,
+      MakeStored(std::move(reservation), announced.sha256, std::move(mesh), &payload));
 
-  const Arrival arrival(this, sha256);
+  const Arrival arrival(this, announced.sha256);
   if (store_ != nullptr) {
     MeshRecord record = RecordOf(*stored);
     record.created_s = record.last_used_s = unix_clock_();
@@ -251,19 +123,15 @@ absl::StatusOr<std::shared_ptr<const StoredMesh>> MeshCatalog::Load(const std::s
   absl::StatusOr<MeshRecord> record = store_->Find(sha256);
   if (absl::IsNotFound(record.status())) return NoSuchMesh();
   TF_RETURN_IF_ERROR(record.status());
-  TF_ASSIGN_OR_RETURN(
-      MemoryReservation reservation,
-      budget_->Reserve(PeakBytes({record->shape, record->total_bytes, sha256}), "mesh"));
+  TF_ASSIGN_OR_RETURN(MemoryReservation reservation,
+                      budget_->Reserve(PeakBytes(record->shape), "mesh"));
   // The digest says that it is what was checked when it came.
   TF_ASSIGN_OR_RETURN(MeshPayload payload, store_->Read(sha256));
   TF_ASSIGN_OR_RETURN(TetMesh mesh,
                       TetMesh::Create(std::move(payload.positions()), std::move(payload.tets())));
-  std::vector<int32_t> skin = BoundaryVertices(mesh);
-  TF_RETURN_IF_ERROR(reservation.Resize(
-      record->total_bytes + static_cast<int64_t>(skin.size() * sizeof(int32_t)), "mesh"));
-  return Add(std::make_shared<const StoredMesh>(
-      StoredMesh{std::move(reservation), sha256, std::move(mesh), std::move(payload.cell_arrays()),
-                 std::move(skin)}));
+  TF_ASSIGN_OR_RETURN(std::shared_ptr<const StoredMesh> stored,
+                      MakeStored(std::move(reservation), sha256, std::move(mesh), &payload));
+  return Add(std::move(stored));
 }
 
 std::shared_ptr<const StoredMesh> MeshCatalog::Find(const std::string& sha256) {

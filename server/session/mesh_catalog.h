@@ -3,7 +3,7 @@
 
 #pragma once
 
-#include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <set>
@@ -22,6 +22,7 @@
 #include "server/session/memory_budget.h"
 #include "server/store/mesh_store.h"
 #include "server/store/session_store.h"
+#include "server/store/upload_store.h"
 
 namespace tissueform {
 
@@ -49,36 +50,6 @@ struct MeshViewPage {
   std::string next;  // MeshStore::Page::next
 };
 
-// What a client says of a mesh before it sends it.
-struct MeshAnnouncement {
-  MeshPayloadShape shape;
-  int64_t total_bytes = 0;
-  std::string sha256;
-};
-
-// A mesh that is being received; its memory is reserved. One thread at a time.
-class MeshUpload {
- public:
-  // Takes one chunk. Errors (InvalidArgument): a chunk that is too large, out of place or past the
-  // end; `finish` before all bytes are there.
-  absl::Status Write(int64_t offset, absl::string_view data, bool finish);
-
-  bool finished() const { return finished_; }
-  int64_t committed_bytes() const { return committed_bytes_; }
-
- private:
-  friend class MeshCatalog;
-
-  MeshUpload(MeshAnnouncement announcement, int64_t max_chunk_bytes, MemoryReservation reservation);
-
-  const MeshAnnouncement announcement_;
-  const int64_t max_chunk_bytes_;
-  MemoryReservation reservation_;
-  MeshPayload payload_;
-  int64_t committed_bytes_ = 0;
-  bool finished_ = false;
-};
-
 // The meshes of the server by their SHA-256: those in use are in memory, and where there is a store
 // all are in it.
 //
@@ -93,18 +64,18 @@ class MeshCatalog {
   // What is not in memory can be had again.
   bool keeps_meshes() const { return store_ != nullptr; }
 
-  // Checks what is announced and reserves memory for it.
-  //
-  // Errors: InvalidArgument (counts, names or digest that cannot be, counts that disagree with the
-  // bytes), ResourceExhausted (over a limit, or no room).
-  absl::StatusOr<std::unique_ptr<MeshUpload>> StartUpload(MeshAnnouncement announcement);
+  // What can be said of a mesh before a byte of it has come: CheckAnnouncedMesh within the limits.
+  absl::Status Check(const UploadAnnouncement& announced) const;
 
-  // Checks digest and content, and keeps the mesh. Computes for a while: call it on a worker. Where
-  // the same mesh has arrived in the meantime, that one is returned.
+  // Reserves memory, then reads the payload that has come, checks digest and content, and keeps the
+  // mesh. Computes for a while: call it on a worker. Where the same mesh has arrived in the
+  // meantime, that one is returned. REQUIRES: Check(announced) is OK.
   //
-  // Errors: DataLoss (wrong digest), InvalidArgument (NaN, infinity, not usable), those of
-  // MeshStore::Put. REQUIRES: upload->finished().
-  absl::StatusOr<std::shared_ptr<const StoredMesh>> Finish(std::unique_ptr<MeshUpload> upload);
+  // Errors: ResourceExhausted (no room: nothing was read), those of `read`, DataLoss (wrong
+  // digest), InvalidArgument (NaN, infinity, not usable), those of MeshStore::Put.
+  using ReadPayload = std::function<absl::StatusOr<MeshPayload>()>;
+  absl::StatusOr<std::shared_ptr<const StoredMesh>> Admit(const UploadAnnouncement& announced,
+                                                          const ReadPayload& read);
 
   // In memory. Null when it is not.
   std::shared_ptr<const StoredMesh> Find(const std::string& sha256);

@@ -252,7 +252,8 @@ absl::Status UploadStore::Append(const std::string& sha256, int64_t offset,
     return WithReason(absl::InvalidArgumentError(
                           absl::StrCat("upload of ", sha256, ": ", part->size,
                                        " bytes are committed; go on there, not at ", offset)),
-                      ErrorReason::kChunkOutOfPlace, {{"committed", absl::StrCat(part->size)}});
+                      ErrorReason::kChunkOutOfPlace,
+                      {{"committed_bytes", absl::StrCat(part->size)}});
   }
   if (count > part->announcement.total_bytes - offset) {
     return absl::InvalidArgumentError(absl::StrCat("upload of ", sha256, ": it ends at ",

@@ -76,6 +76,12 @@ TEST_F(ErrorReasonsTest, NoMemory) {
   EXPECT_EQ(ErrorInfoOf(full).metadata.at("limit_bytes"), "1000");
 }
 
+TEST_F(ErrorReasonsTest, AnUploadOfWhichNothingHasCome) {
+  EXPECT_THAT(Connect()->QueryUpload("meshes/" + std::string(64, '0')),
+              Because(ErrorReason::kUploadNotFound));
+  EXPECT_THAT(Connect()->QueryUpload("face.vtu"), Because(ErrorReason::kInvalidRequest));
+}
+
 TEST_F(ErrorReasonsTest, ADragThatGoesWrong) {
   const auto client = Connect();
   const v1::Session session = MakeSession(client.get(), problem_);

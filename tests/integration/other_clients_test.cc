@@ -57,6 +57,7 @@ TEST_F(OtherClientsTest, PythonFindsTheReasonOfEveryRpcsError) {
   EXPECT_THAT(out, AllOf(HasSubstr("grpc.health.v1.Health"),
                          HasSubstr("SessionService/GetSession INVALID_ARGUMENT INVALID_REQUEST"),
                          HasSubstr("MeshService/UploadMesh INVALID_ARGUMENT INVALID_REQUEST"),
+                         HasSubstr("MeshService/QueryUpload INVALID_ARGUMENT INVALID_REQUEST"),
                          HasSubstr("DeformService/Deform INVALID_ARGUMENT INVALID_REQUEST")));
 }
 

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,12 +17,14 @@
 
 #include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
+#include "grpcpp/create_channel.h"
 #include "gtest/gtest.h"
 
 #include "client/cli/online/server_process.h"
 #include "client/cpp/reattaching_stream.h"
 #include "client/cpp/tissueform_client.h"
 #include "proto/conversion/answer_conversion.h"
+#include "proto/conversion/mesh_conversion.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
@@ -187,6 +190,80 @@ TEST_F(RestartTest, APredictionMadeTodayIsReadAndComparedTomorrow) {
   ASSERT_OK_AND_ASSIGN(const v1::Prediction again,
                        calls.Create(made.session(), TopPose(SomePose(2)), {}, "request"));
   EXPECT_EQ(again.name(), made.name());
+}
+
+// Killed in the middle, with what QueryUpload has said before on the disk.
+TEST_F(RestartTest, AnUploadGoesOnThroughKillAndRestart) {
+  ASSERT_NO_FATAL_FAILURE(Start());
+  const BarProblem large(2, {16, 16, 40});
+  const std::vector<CellArray> arrays = large.CellArrays();
+  const MeshPayloadView payload =
+      ViewMeshPayload(large.mesh.positions(), large.mesh.tets(), arrays);
+  const std::string name = MeshName(payload.Sha256());
+  int64_t committed = 0;
+  std::vector<int64_t> resumed;
+  UploadOptions options;
+  options.on_progress = [&](int64_t sent, int64_t total) {
+    if (committed > 0 || sent < total / 2) return;
+    const std::unique_ptr<TissueformClient> other = Connect();
+    ASSERT_TRUE(Eventually([&] {
+      const absl::StatusOr<v1::QueryUploadResponse> query = other->QueryUpload(name);
+      committed = query.ok() ? query->committed_bytes() : 0;
+      return committed > 0;
+    }));
+    ASSERT_NO_FATAL_FAILURE(Kill());
+    ASSERT_NO_FATAL_FAILURE(Start());
+    ASSERT_OK_AND_ASSIGN(const v1::QueryUploadResponse query, Connect()->QueryUpload(name));
+    EXPECT_GE(query.committed_bytes(), committed);
+    EXPECT_LT(query.committed_bytes(), total);
+    committed = query.committed_bytes();
+  };
+  options.on_resumed = [&](int64_t from, int64_t /*total*/) { resumed.push_back(from); };
+  const std::unique_ptr<TissueformClient> client = Connect();
+  ASSERT_OK_AND_ASSIGN(const v1::Mesh mesh, client->UploadMesh(large.mesh, arrays, options));
+  EXPECT_EQ(mesh.name(), name);
+  EXPECT_THAT(resumed, ::testing::ElementsAre(committed));
+  // The server has checked the digest; these are the bytes that it keeps, behind their shape.
+  std::string sent;
+  for (const absl::string_view segment : payload.segments) absl::StrAppend(&sent, segment);
+  int found = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "blobs")) {
+    std::ifstream blob(entry.path(), std::ios::binary);
+    const std::string kept{std::istreambuf_iterator<char>(blob), {}};
+    found += kept.size() > sent.size() && kept.substr(kept.size() - sent.size()) == sent ? 1 : 0;
+  }
+  EXPECT_EQ(found, 1);
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "uploads")) << "nothing is left of the way";
+}
+
+TEST_F(RestartTest, WhatCameOfAnUploadThatItsClientBrokeOffIsThere) {
+  ASSERT_NO_FATAL_FAILURE(Start());
+  const MeshPayloadView payload = ViewMeshPayload(bar_.mesh.positions(), bar_.mesh.tets(), {});
+  {
+    const auto stub =
+        v1::MeshService::NewStub(grpc::CreateChannel(address_, grpc::InsecureChannelCredentials()));
+    grpc::ClientContext context;
+    v1::UploadMeshResponse response;
+    const auto writer = stub->UploadMesh(&context, &response);
+    v1::UploadMeshRequest request;
+    *request.mutable_header() = ToProto(payload.shape, payload.Sha256());
+    writer->Write(request);
+    request.mutable_chunk()->set_data(std::string(payload.segments[0].substr(0, 1000)));
+    writer->Write(request);
+    writer->WritesDone();
+    EXPECT_EQ(writer->Finish().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  }
+  ASSERT_NO_FATAL_FAILURE(Kill());
+  ASSERT_NO_FATAL_FAILURE(Start());
+  const std::unique_ptr<TissueformClient> client = Connect();
+  ASSERT_OK_AND_ASSIGN(const v1::QueryUploadResponse query,
+                       client->QueryUpload(MeshName(payload.Sha256())));
+  EXPECT_EQ(query.committed_bytes(), 1000);
+  UploadOptions options;
+  int64_t resumed = 0;
+  options.on_resumed = [&resumed](int64_t from, int64_t /*total*/) { resumed = from; };
+  EXPECT_THAT(client->UploadMesh(bar_.mesh, {}, options), IsOk());
+  EXPECT_EQ(resumed, 1000);
 }
 
 TEST_F(RestartTest, AnUpdateThatWasAcknowledgedIsThere) {

@@ -13,6 +13,7 @@
 #include <string>
 
 #include "gmock/gmock.h"
+#include "grpcpp/create_channel.h"
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
 #include <sys/wait.h>
@@ -25,7 +26,9 @@
 #include "core/mesh/tet_topology.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "core/mesh_io/triangle_mesh_io.h"
+#include "core/mesh_payload/mesh_payload.h"
 #include "core/planning/plan_io.h"
+#include "proto/conversion/mesh_conversion.h"
 #include "tests/testing/scoped_environment.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
@@ -148,6 +151,37 @@ TEST_F(ServedCommandTest, MeshesAreUploadedListedAndDeleted) {
   EXPECT_EQ(mesh("delete " + name, "again"), 1);
   EXPECT_THAT(Read("again"), HasSubstr("does not have this mesh"));
   EXPECT_NE(mesh("upload " + PathOf("none.vtu"), "none"), 0);
+}
+
+TEST_F(ServedCommandTest, AnUploadThatWasBrokenOffGoesOnAndSaysSo) {
+  ASSERT_OK_AND_ASSIGN(
+      const std::unique_ptr<ServerProcess> server,
+      ServerProcess::Start(ProgramPath("tissueform-server"),
+                           {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
+  ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(kTonguePlan));
+  ASSERT_OK_AND_ASSIGN(const PlanProblem problem, ResolvePlan(plan));
+  const TetMeshFile file{.mesh = *problem.mesh, .point_data = {}, .cell_data = {}};
+  ASSERT_THAT(WriteTetMesh(PathOf("mesh.vtu"), file), IsOk());
+  const MeshPayloadView payload = ViewMeshPayload(file.mesh.positions(), file.mesh.tets(), {});
+  const auto stub = v1::MeshService::NewStub(
+      grpc::CreateChannel(server->address(), grpc::InsecureChannelCredentials()));
+  grpc::ClientContext context;
+  v1::UploadMeshResponse response;
+  const auto writer = stub->UploadMesh(&context, &response);
+  v1::UploadMeshRequest request;
+  *request.mutable_header() = ToProto(payload.shape, payload.Sha256());
+  writer->Write(request);
+  request.mutable_chunk()->set_data(std::string(payload.segments[0].substr(0, 10'000)));
+  writer->Write(request);
+  writer->WritesDone();
+  ASSERT_EQ(writer->Finish().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(
+      ExitCodeOf(ProgramPath("tissueform") + " mesh upload " + PathOf("mesh.vtu") + " --server " +
+                 server->address() + " > " + PathOf("upload") + " 2> " + PathOf("lines")),
+      0);
+  EXPECT_THAT(Read("lines"),
+              ContainsRegex("the upload goes on: the server has 0.0 of [0-9.]+ MB already"));
+  EXPECT_THAT(Read("upload"), HasSubstr(payload.Sha256()));
 }
 
 TEST_F(ServedCommandTest, WatchTellsOfASessionThatNobodyDrags) {

@@ -3,7 +3,6 @@
 
 #include "tests/testing/session_samples.h"
 
-#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
@@ -16,7 +15,7 @@ SampleMesh::SampleMesh(TetMesh tet_mesh) : mesh(std::move(tet_mesh)) {
   cell_arrays = {{"youngs_modulus_pa", Eigen::VectorXd::Constant(mesh.num_tets(), 1000.0)}};
 }
 
-MeshAnnouncement SampleMesh::Announcement() const {
+UploadAnnouncement SampleMesh::Announcement() const {
   const MeshPayloadView view = ViewMeshPayload(mesh.positions(), mesh.tets(), cell_arrays);
   return {view.shape, view.shape.TotalBytes(), view.Sha256()};
 }
@@ -30,22 +29,17 @@ std::string SampleMesh::Payload() const {
   return payload;
 }
 
-std::shared_ptr<const StoredMesh> Store(const SampleMesh& sample, MeshCatalog* catalog,
-                                        size_t chunk_bytes) {
-  auto upload = catalog->StartUpload(sample.Announcement());
-  absl::Status status = upload.status();
-  const std::string payload = sample.Payload();
-  for (size_t offset = 0; status.ok() && offset < payload.size(); offset += chunk_bytes) {
-    status = (*upload)->Write(static_cast<int64_t>(offset),
-                              absl::string_view(payload).substr(offset, chunk_bytes),
-                              offset + chunk_bytes >= payload.size());
-  }
+std::shared_ptr<const StoredMesh> Store(const SampleMesh& sample, MeshCatalog* catalog) {
+  const UploadAnnouncement announcement = sample.Announcement();
+  absl::Status status = catalog->Check(announcement);
   if (status.ok()) {
-    if (auto stored = catalog->Finish(*std::move(upload)); stored.ok()) {
-      return *std::move(stored);
-    } else {
-      status = stored.status();
-    }
+    auto stored = catalog->Admit(announcement, [&sample, &announcement] {
+      MeshPayload payload(announcement.shape);
+      payload.Write(0, sample.Payload());
+      return payload;
+    });
+    if (stored.ok()) return *std::move(stored);
+    status = stored.status();
   }
   std::fprintf(stderr, "cannot store the sample: %s\n", status.ToString().c_str());
   std::abort();

@@ -10,6 +10,7 @@
 #include "core/mesh/tet_mesh.h"
 #include "server/session/mesh_catalog.h"
 #include "server/store/session_record.h"
+#include "server/store/upload_store.h"
 
 namespace tissueform::testing {
 
@@ -17,7 +18,7 @@ namespace tissueform::testing {
 struct SampleMesh {
   explicit SampleMesh(TetMesh tet_mesh);
 
-  MeshAnnouncement Announcement() const;
+  UploadAnnouncement Announcement() const;
   // All bytes in one string.
   std::string Payload() const;
 
@@ -25,9 +26,8 @@ struct SampleMesh {
   std::vector<CellArray> cell_arrays;
 };
 
-// Sends the sample in chunks of `chunk_bytes` and finishes. Aborts on errors.
-std::shared_ptr<const StoredMesh> Store(const SampleMesh& sample, MeshCatalog* catalog,
-                                        size_t chunk_bytes = 1000);
+// The catalog checks and keeps the sample. Aborts on errors.
+std::shared_ptr<const StoredMesh> Store(const SampleMesh& sample, MeshCatalog* catalog);
 
 // The record of a session on a stored bar: lowest layer fixed, highest layer the handle "top".
 SessionRecord BarRecord(const StoredMesh& bar);

@@ -3,6 +3,7 @@
 
 #include "client/cli/online/server_mesh_command.h"
 
+#include <cstdio>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,9 +11,11 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 
+#include "client/cli/online/upload_lines.h"
 #include "client/cli/shared/companion.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "proto/conversion/mesh_conversion.h"
 
@@ -54,7 +57,11 @@ void PrintHead() {
 absl::Status Upload(const ServerMeshOptions& options) {
   TF_ASSIGN_OR_RETURN(const TetMeshFile file, ReadTetMesh(options.mesh));
   TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
-  TF_ASSIGN_OR_RETURN(const v1::Mesh mesh, client->UploadMesh(file.mesh, ScalarsOfTets(file)));
+  const Stopwatch stopwatch;
+  UploadLines lines([](const std::string& line) { absl::FPrintF(stderr, "%s\n", line); },
+                    [&stopwatch] { return stopwatch.Seconds(); });
+  TF_ASSIGN_OR_RETURN(const v1::Mesh mesh,
+                      client->UploadMesh(file.mesh, ScalarsOfTets(file), lines.Options()));
   PrintHead();
   PrintMesh(mesh);
   return absl::OkStatus();

@@ -17,6 +17,7 @@
 #include "server/rpc/mesh_service.h"
 #include "server/rpc/session_service.h"
 #include "server/store/in_memory_session_store.h"
+#include "server/store/upload_store.h"
 #include "tests/server/rpc/fake_calls.h"
 #include "tests/testing/fake_clock.h"
 #include "tests/testing/meshes.h"
@@ -45,16 +46,6 @@ inline v1::DeformRequest Pose(uint64_t sequence) {
 inline v1::DeformRequest Ack(uint64_t sequence) {
   v1::DeformRequest request;
   request.mutable_ack()->set_sequence(sequence);
-  return request;
-}
-
-inline v1::UploadMeshRequest HeaderOf(const MeshAnnouncement& announcement) {
-  v1::UploadMeshRequest request;
-  request.mutable_header()->set_vertex_count(announcement.shape.num_vertices);
-  request.mutable_header()->set_tet_count(announcement.shape.num_tets);
-  request.mutable_header()->add_cell_arrays("youngs_modulus_pa");
-  request.mutable_header()->set_total_bytes(announcement.total_bytes);
-  request.mutable_header()->set_sha256(announcement.sha256);
   return request;
 }
 
@@ -119,6 +110,8 @@ class ReactorsTest : public ::testing::Test {
   ServiceGate gate_;
   MemoryBudget budget_{64 << 20};
   MeshCatalog catalog_{limits_, &budget_};
+  const std::unique_ptr<UploadStore> upload_store_ = *UploadStore::OpenTemporary();
+  MeshUploads uploads_{limits_, &catalog_, upload_store_.get()};
   std::unique_ptr<WorkerPool> workers_ = std::make_unique<WorkerPool>(kWorkers);
   InMemorySessionStore store_;
   FakeClock clock_;
@@ -126,7 +119,8 @@ class ReactorsTest : public ::testing::Test {
   DeformStreams streams_{limits_.max_streams};
   SessionWatches watches_{limits_, workers_.get()};
   DeadlineTimer timer_;
-  MeshService mesh_service_{&gate_, limits_, &catalog_, &registry_, workers_.get(), &timer_};
+  MeshService mesh_service_{&gate_,     limits_,        &catalog_, &uploads_,
+                            &registry_, workers_.get(), &timer_};
   SessionService session_service_{&gate_, limits_, &catalog_, &registry_};
   DeformService deform_service_{&gate_, limits_, &registry_, &streams_, &watches_, &timer_};
   std::unique_ptr<WorkerPool> reactions_ = std::make_unique<WorkerPool>(4);

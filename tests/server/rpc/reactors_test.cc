@@ -173,34 +173,6 @@ TEST_F(ReactorsTest, AClientThatDoesNotReadGetsOneWriteAndOthersGoOn) {
   EXPECT_EQ(streams_.size(), 0);
 }
 
-TEST_F(ReactorsTest, UploadsSurviveCancellationAtAnyChunk) {
-  const MeshAnnouncement announcement = sample_.Announcement();
-  const std::string payload = sample_.Payload();
-  constexpr int64_t kChunk = 500;
-  const auto chunks = static_cast<int64_t>(payload.size()) / kChunk + 1;
-  for (int64_t cancel_at = 0; cancel_at <= chunks; ++cancel_at) {
-    v1::UploadMeshResponse response;
-    FakeReaderCall<v1::UploadMeshRequest> call(reactions_.get());
-    call.Bind(mesh_service_.UploadMesh(nullptr, &response));
-    call.Send(HeaderOf(announcement));
-    v1::UploadMeshRequest request;
-    for (int64_t i = 0; i < chunks && i < cancel_at; ++i) {
-      request.mutable_chunk()->set_write_offset(i * kChunk);
-      request.mutable_chunk()->set_data(payload.substr(i * kChunk, kChunk));
-      request.mutable_chunk()->set_finish_write(i + 1 == chunks);
-      call.Send(request);
-    }
-    if (cancel_at < chunks) {
-      call.Cancel();
-      EXPECT_FALSE(call.WaitUntilDone()->ok());
-      EXPECT_EQ(budget_.reserved_bytes(), 0);
-    } else {
-      EXPECT_TRUE(call.WaitUntilDone()->ok());
-      EXPECT_EQ(response.committed_bytes(), announcement.total_bytes);
-    }
-  }
-}
-
 TEST_F(ReactorsTest, AStreamWithoutConfigurationIsGivenUpAndLeavesItsPlace) {
   ServiceLimits impatient = limits_;
   impatient.configuration_deadline = std::chrono::milliseconds(20);
@@ -231,23 +203,6 @@ TEST_F(ReactorsTest, AConfiguredStreamMayRest) {
   EXPECT_TRUE(stream.Receive()->has_frame());
   stream.CloseSending();
   EXPECT_TRUE(stream.WaitUntilDone()->ok());
-}
-
-TEST_F(ReactorsTest, ASilentUploadIsGivenUpAndItsMemoryIsFree) {
-  ServiceLimits impatient = limits_;
-  impatient.upload_silence = std::chrono::milliseconds(20);
-  MeshService service(&gate_, impatient, &catalog_, &registry_, workers_.get(), &timer_);
-  const MeshAnnouncement announcement = sample_.Announcement();
-  for (const bool with_header : {false, true}) {
-    v1::UploadMeshResponse response;
-    FakeReaderCall<v1::UploadMeshRequest> call(reactions_.get());
-    call.Bind(service.UploadMesh(nullptr, &response));
-    if (with_header) call.Send(HeaderOf(announcement));
-    const auto status = call.WaitUntilDone();
-    ASSERT_TRUE(status.has_value()) << "it waits for ever";
-    EXPECT_EQ(status->error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
-    EXPECT_EQ(budget_.reserved_bytes(), 0);
-  }
 }
 
 TEST_F(ReactorsTest, OnlyTheSessionsThatWereNotCancelledStay) {

@@ -44,6 +44,7 @@ TEST(DeadlineTimerTest, WhatIsCancelledIsNotCalled) {
   const DeadlineTimer::Id far = timer.Start(Now() + hours(1), [&] { called = true; });
   timer.Cancel(far);
   timer.Cancel(far);  // does no harm
+  timer.Cancel(DeadlineTimer::Id());
   std::promise<void> later;
   timer.Start(Now(), [&] { later.set_value(); });
   later.get_future().wait();

@@ -297,9 +297,8 @@ TEST_F(HousekeepingTest, UploadsThatWereBrokenOffGoAfterADay) {
   unix_s_ = SystemUnixSeconds();
   Restart();
   const SampleMesh sample(Bar({2, 2, 3}));
-  const MeshAnnouncement announced = sample.Announcement();
-  ASSERT_THAT(stores_->uploads().Begin({announced.shape, announced.total_bytes, announced.sha256}),
-              IsOk());
+  const UploadAnnouncement announced = sample.Announcement();
+  ASSERT_THAT(stores_->uploads().Begin(announced), IsOk());
   Pass(kDay - 60);
   EXPECT_EQ(housekeeping_->RunOnce().uploads, 0);
   Pass(120);

@@ -30,12 +30,16 @@ constexpr int64_t kBudgetBytes = 64 << 20;
 
 class MeshCatalogTest : public ::testing::Test {
  protected:
-  // Sends the whole payload in one chunk and finishes.
-  absl::Status UploadAs(const MeshAnnouncement& announcement, const std::string& payload) {
-    auto upload = catalog_.StartUpload(announcement);
-    if (!upload.ok()) return upload.status();
-    const absl::Status written = (*upload)->Write(0, payload, true);
-    return written.ok() ? catalog_.Finish(*std::move(upload)).status() : written;
+  absl::Status AdmitAs(const UploadAnnouncement& announcement, const std::string& payload) {
+    if (absl::Status status = catalog_.Check(announcement); !status.ok()) return status;
+    return catalog_
+        .Admit(announcement,
+               [&] {
+                 MeshPayload read(announcement.shape);
+                 read.Write(0, payload);
+                 return read;
+               })
+        .status();
   }
 
   const SampleMesh sample_{Bar({2, 2, 3}, 1.0, 0.2)};
@@ -44,16 +48,13 @@ class MeshCatalogTest : public ::testing::Test {
   MeshCatalog catalog_{limits_, &budget_};
 };
 
-TEST_F(MeshCatalogTest, AMeshComesOutAsItWentInWhateverTheChunks) {
-  for (const size_t chunk_bytes : {1UL, 7UL, 1000UL, 1UL << 20}) {
-    const auto stored = Store(sample_, &catalog_, chunk_bytes);
-    EXPECT_EQ(stored->mesh.positions(), sample_.mesh.positions());
-    EXPECT_EQ(stored->mesh.tets(), sample_.mesh.tets());
-    ASSERT_NE(stored->FindCellArray("youngs_modulus_pa"), nullptr);
-    EXPECT_EQ(stored->FindCellArray("youngs_modulus_pa")->values, sample_.cell_arrays[0].values);
-    EXPECT_EQ(stored->FindCellArray("other"), nullptr);
-    EXPECT_THAT(catalog_.Remove(stored->sha256), IsOk());
-  }
+TEST_F(MeshCatalogTest, AMeshComesOutAsItWentIn) {
+  const auto stored = Store(sample_, &catalog_);
+  EXPECT_EQ(stored->mesh.positions(), sample_.mesh.positions());
+  EXPECT_EQ(stored->mesh.tets(), sample_.mesh.tets());
+  ASSERT_NE(stored->FindCellArray("youngs_modulus_pa"), nullptr);
+  EXPECT_EQ(stored->FindCellArray("youngs_modulus_pa")->values, sample_.cell_arrays[0].values);
+  EXPECT_EQ(stored->FindCellArray("other"), nullptr);
 }
 
 TEST_F(MeshCatalogTest, TheSameMeshTwiceIsKeptOnce) {
@@ -107,18 +108,18 @@ TEST_F(MeshCatalogTest, AnotherNameOfAnArrayMakesAnotherMesh) {
 }
 
 TEST_F(MeshCatalogTest, WrongDigestIsDataLossAndLeavesNothing) {
-  MeshAnnouncement announcement = sample_.Announcement();
+  UploadAnnouncement announcement = sample_.Announcement();
   announcement.sha256[0] = announcement.sha256[0] == '0' ? '1' : '0';
-  EXPECT_THAT(UploadAs(announcement, sample_.Payload()),
+  EXPECT_THAT(AdmitAs(announcement, sample_.Payload()),
               StatusIs(absl::StatusCode::kDataLoss, HasSubstr("SHA-256")));
   EXPECT_EQ(budget_.reserved_bytes(), 0);
 }
 
 TEST_F(MeshCatalogTest, AnnouncementsThatCannotBeAreRefused) {
   const auto refused = [this](auto change, absl::StatusCode code, const char* text) {
-    MeshAnnouncement announcement = sample_.Announcement();
+    UploadAnnouncement announcement = sample_.Announcement();
     change(announcement);
-    EXPECT_THAT(catalog_.StartUpload(announcement), StatusIs(code, HasSubstr(text)));
+    EXPECT_THAT(catalog_.Check(announcement), StatusIs(code, HasSubstr(text)));
   };
   using Code = absl::StatusCode;
   refused([](auto& a) { a.shape.num_vertices = 0; }, Code::kInvalidArgument, "vertex_count");
@@ -142,37 +143,26 @@ TEST_F(MeshCatalogTest, AMeshOverTheSizeLimitIsRefused) {
   ServiceLimits small;
   small.max_mesh_bytes = sample_.Announcement().total_bytes - 1;
   MeshCatalog catalog(small, &budget_);
-  EXPECT_THAT(catalog.StartUpload(sample_.Announcement()),
+  EXPECT_THAT(catalog.Check(sample_.Announcement()),
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("--max-mesh-mib")));
 }
 
-TEST_F(MeshCatalogTest, MemoryIsReservedBeforeTheFirstChunk) {
+TEST_F(MeshCatalogTest, MemoryIsReservedBeforeTheMeshIsRead) {
   MemoryBudget tiny(sample_.Announcement().total_bytes - 1);
   MeshCatalog catalog(limits_, &tiny);
-  EXPECT_THAT(catalog.StartUpload(sample_.Announcement()),
+  EXPECT_THAT(catalog.Admit(sample_.Announcement(),
+                            []() -> absl::StatusOr<MeshPayload> {
+                              ADD_FAILURE() << "read without room";
+                              return absl::InternalError("");
+                            }),
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("mesh")));
-  ASSERT_OK_AND_ASSIGN(const auto upload, catalog_.StartUpload(sample_.Announcement()));
-  EXPECT_GE(budget_.reserved_bytes(), sample_.Announcement().total_bytes);
-}
-
-TEST_F(MeshCatalogTest, ChunksOutOfPlaceAreRefused) {
-  const std::string payload = sample_.Payload();
-  const auto start = [this] { return *catalog_.StartUpload(sample_.Announcement()); };
-  using Code = absl::StatusCode;
-  EXPECT_THAT(start()->Write(8, "12345678", false),
-              StatusIs(Code::kInvalidArgument, HasSubstr("without gaps")));
-  EXPECT_THAT(start()->Write(-8, "12345678", false),
-              StatusIs(Code::kInvalidArgument, HasSubstr("begins at -8")));
-  EXPECT_THAT(start()->Write(0, std::string((1 << 20) + 1, 'x'), false),
-              StatusIs(Code::kInvalidArgument, HasSubstr("1048576 at most")));
-  EXPECT_THAT(start()->Write(0, payload + "x", true),
-              StatusIs(Code::kInvalidArgument, HasSubstr("past the end")));
-  EXPECT_THAT(start()->Write(0, payload.substr(1), true),
-              StatusIs(Code::kInvalidArgument, HasSubstr("send the rest")));
-  const auto finished = start();
-  EXPECT_THAT(finished->Write(0, payload, true), IsOk());
-  EXPECT_THAT(finished->Write(static_cast<int64_t>(payload.size()), "", true),
-              StatusIs(Code::kInvalidArgument, HasSubstr("after finish_write")));
+  const auto reserved_while_it_reads = [this]() -> absl::StatusOr<MeshPayload> {
+    EXPECT_GE(budget_.reserved_bytes(), sample_.Announcement().total_bytes);
+    return absl::UnavailableError("the disk sleeps");
+  };
+  EXPECT_THAT(catalog_.Admit(sample_.Announcement(), reserved_while_it_reads),
+              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("sleeps")));
+  EXPECT_EQ(budget_.reserved_bytes(), 0);
 }
 
 TEST_F(MeshCatalogTest, MeshesThatNoDeformerCanUseAreRefused) {
@@ -187,7 +177,7 @@ TEST_F(MeshCatalogTest, MeshesThatNoDeformerCanUseAreRefused) {
     for (const absl::string_view segment : view.segments) {
       payload.append(segment.data(), segment.size());
     }
-    EXPECT_THAT(UploadAs({view.shape, view.shape.TotalBytes(), view.Sha256()}, payload),
+    EXPECT_THAT(AdmitAs({view.shape, view.shape.TotalBytes(), view.Sha256()}, payload),
                 StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(text)));
     EXPECT_EQ(budget_.reserved_bytes(), 0);
   };

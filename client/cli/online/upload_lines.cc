@@ -1,0 +1,42 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/online/upload_lines.h"
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+namespace tissueform {
+namespace {
+
+std::string PartOf(int64_t bytes, int64_t total_bytes) {
+  return absl::StrFormat("%.1f of %.1f MB", 1e-6 * static_cast<double>(bytes),
+                         1e-6 * static_cast<double>(total_bytes));
+}
+
+}  // namespace
+
+UploadOptions UploadLines::Options() {
+  UploadOptions options;
+  options.on_progress = [this](int64_t sent_bytes, int64_t total_bytes) {
+    Progress(sent_bytes, total_bytes);
+  };
+  options.on_interrupted = [this](const absl::Status& why) {
+    print_(absl::StrCat("the upload is interrupted (", why.message(), "); trying again"));
+  };
+  options.on_resumed = [this](int64_t from_bytes, int64_t total_bytes) {
+    print_(from_bytes == 0 ? "the upload begins anew"
+                           : absl::StrCat("the upload goes on: the server has ",
+                                          PartOf(from_bytes, total_bytes), " already"));
+  };
+  return options;
+}
+
+void UploadLines::Progress(int64_t sent_bytes, int64_t total_bytes) {
+  const double now_s = seconds_();
+  if (now_s < next_s_) return;
+  next_s_ = now_s + 1;
+  print_(absl::StrCat("uploading: ", PartOf(sent_bytes, total_bytes)));
+}
+
+}  // namespace tissueform
