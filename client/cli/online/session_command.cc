@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/ascii.h"
@@ -14,8 +15,11 @@
 
 #include "client/cli/online/resource_text.h"
 #include "client/cli/shared/companion.h"
+#include "client/cli/shared/option_checks.h"
+#include "client/cpp/plan_session.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/status_macros.h"
+#include "core/planning/plan_io.h"
 
 namespace tissueform {
 namespace {
@@ -29,6 +33,8 @@ struct SessionOptions {
   std::optional<double> stiffness_pa;
   std::string stiffness_array;
   std::optional<double> poisson_ratio;
+  std::string regions;  // a plan
+  PlanReadOptions reading;
 };
 
 std::string StateText(const v1::Session& session) {
@@ -56,6 +62,35 @@ absl::Status Show(const SessionOptions& options) {
   return absl::OkStatus();
 }
 
+// Vertices are numbers: they say something on a mesh with the same ones only. A plan's stiffness is
+// part of its mesh's name, but may be another one here.
+absl::Status CheckSameVertices(TissueformClient* client, const std::string& session,
+                               const PlanProblem& problem) {
+  TF_ASSIGN_OR_RETURN(const v1::Session described, client->GetSession(session));
+  TF_ASSIGN_OR_RETURN(const v1::Mesh mesh, client->GetMesh(described.mesh()));
+  if (mesh.vertex_count() == problem.mesh->num_vertices() &&
+      mesh.tet_count() == problem.mesh->num_tets()) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "the plan's mesh has %d vertices and %d tets, the mesh of %s %d and %d; name a plan of the "
+      "same mesh",
+      problem.mesh->num_vertices(), problem.mesh->num_tets(), session, mesh.vertex_count(),
+      mesh.tet_count()));
+}
+
+absl::Status SetRegions(const SessionOptions& options, TissueformClient* client,
+                        v1::UpdateSessionRequest* request) {
+  TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.regions, options.reading));
+  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
+  TF_RETURN_IF_ERROR(CheckSameVertices(client, request->name(), problem));
+  v1::CreateSessionRequest of_plan = ToProto(SessionRequestOf(problem, ""));
+  v1::SessionRegions* regions = request->mutable_regions();
+  *regions->mutable_fixed_vertices() = std::move(*of_plan.mutable_fixed_vertices());
+  *regions->mutable_handles() = std::move(*of_plan.mutable_handles());
+  return absl::OkStatus();
+}
+
 absl::Status Update(const SessionOptions& options) {
   v1::UpdateSessionRequest request;
   request.set_name(FullSessionName(options.name));
@@ -75,9 +110,11 @@ absl::Status Update(const SessionOptions& options) {
   }
   if (options.poisson_ratio.has_value()) request.set_poisson_ratio(*options.poisson_ratio);
   TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  if (!options.regions.empty()) TF_RETURN_IF_ERROR(SetRegions(options, client.get(), &request));
   TF_ASSIGN_OR_RETURN(const v1::Session session, client->UpdateSession(request));
-  absl::PrintF("%s is prepared anew: %s, etag %s\n", session.name(), ModelText(session.model()),
-               session.etag());
+  absl::PrintF("%s is prepared anew: %s, handles %s, %d vertices fixed, etag %s\n", session.name(),
+               ModelText(session.model()), absl::StrJoin(session.handles(), ", "),
+               session.fixed_vertex_count(), session.etag());
   return absl::OkStatus();
 }
 
@@ -98,6 +135,13 @@ void AddUpdateOptions(CLI::App* command, SessionOptions* options) {
                    "a cell array of the mesh that holds it, in Pa")
       ->excludes(uniform);
   command->add_option("--poisson-ratio", options->poisson_ratio, "of the elastic models");
+  command
+      ->add_option("--regions", options->regions,
+                   "a plan of the same mesh, whose fixed vertices and handles are taken in "
+                   "place of all regions; nothing else of it is. Where its handles are named as "
+                   "before, in the same order, open drags go on")
+      ->type_name("PLAN");
+  AddAllowOutside(command, &options->reading);
   command->add_option("--etag", options->etag,
                       "only if it is still this version (session show tells it)");
 }
@@ -125,8 +169,10 @@ void AddSessionCommand(CLI::App& app, CommandWork* work) {
   };
   add("list", "all sessions, in memory or not", false, List);
   add("show", "what is known of one", true, Show);
-  AddUpdateOptions(add("update", "prepare one anew with another model or stiffness", true, Update),
-                   options.get());
+  AddUpdateOptions(
+      add("update", "prepare one anew with another model or stiffness, or other regions", true,
+          Update),
+      options.get());
   add("delete", "end one, and what is kept of it", true, Delete);
   command->footer("Example:\n  tissueform session list --server localhost:50051");
 }
