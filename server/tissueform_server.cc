@@ -138,7 +138,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr
       mesh_service_(&gate_, options.limits, &catalog_, &uploads_, &registry_, pool_.get(), &timer_),
       session_service_(&gate_, options.limits, &catalog_, &registry_),
       deform_service_(&gate_, options.limits, &registry_, &streams_, &watches_, &timer_),
-      prediction_service_(&gate_, options.limits, &registry_, &stores_->predictions(),
+      prediction_service_(&gate_, options.limits, &catalog_, &registry_, &stores_->predictions(),
                           &timer_),
       server_info_service_(&gate_, LimitsOf(options)) {
   SetBlasThreads(1);  // the pool's workers share the cores already

@@ -122,7 +122,8 @@ absl::StatusOr<Positions> PredictionCalls::ReadPositions(const std::string& name
 }
 
 absl::StatusOr<ComparedPredictions> PredictionCalls::Compare(const std::string& name,
-                                                             const Other& other, bool differences) {
+                                                             const Other& other, bool differences,
+                                                             const AnswerVertices& vertices) {
   grpc::ClientContext context;
   SetDeadline(&context);
   v1::ComparePredictionsRequest request;
@@ -133,6 +134,7 @@ absl::StatusOr<ComparedPredictions> PredictionCalls::Compare(const std::string& 
     request.set_other_model(std::get<v1::DeformationModel>(other));
   }
   request.set_differences(differences);
+  *request.mutable_vertices() = ToProto(vertices);
   const auto reader = stub_->ComparePredictions(&context, request);
   ComparedPredictions compared;
   ChunkReader chunks;

@@ -24,7 +24,8 @@ namespace tissueform {
 // How two answers at one mesh differ.
 struct ComparedPredictions {
   v1::PredictionComparison comparison;
-  Positions differences;  // #V by 3, the other minus the first, in mm; empty unless asked for
+  // #vertices by 3, of those compared, the other minus the first, in mm; empty unless asked for.
+  Positions differences;
 };
 
 // What a server keeps of answers: the rpcs of PredictionService. Got from TissueformClient, whose
@@ -53,9 +54,11 @@ class PredictionCalls {
   absl::StatusOr<Positions> ReadPositions(const std::string& name);
 
   // `other` is the name of a prediction, or a model that the first one's session is asked for.
+  // Statistics and differences are of `vertices`.
   using Other = std::variant<std::string, v1::DeformationModel>;
   absl::StatusOr<ComparedPredictions> Compare(const std::string& name, const Other& other,
-                                              bool differences = false);
+                                              bool differences = false,
+                                              const AnswerVertices& vertices = {});
 
  private:
   void SetDeadline(grpc::ClientContext* context) const;

@@ -15,6 +15,7 @@
 #include "core/deformation/deformation_quality.h"
 #include "proto/conversion/answer_conversion.h"
 #include "proto/conversion/geometry_conversion.h"
+#include "proto/conversion/mesh_conversion.h"
 #include "proto/conversion/model_conversion.h"
 #include "proto/conversion/prediction_conversion.h"
 #include "server/rpc/message_stream.h"
@@ -46,17 +47,18 @@ absl::Status NotComparable(absl::string_view why) {
 // Float32 of every number, as in what is kept: a model that answers the same has no difference.
 Positions Rounded(const Positions& positions) { return positions.cast<float>().cast<double>(); }
 
-std::string Encode(const Positions& positions) {
-  return EncodePositions(positions, {}, v1::POSITION_ENCODING_FLOAT32, positions).bytes;
+std::string Encode(const Positions& positions, const VertexChoice& choice) {
+  return EncodePositions(positions, choice, v1::POSITION_ENCODING_FLOAT32, positions).bytes;
 }
 
 class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
  public:
   Comparison(CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
-             std::chrono::milliseconds patience, SessionRegistry* registry, PredictionStore* store,
-             const v1::ComparePredictionsRequest* request)
+             std::chrono::milliseconds patience, SessionRegistry* registry, MeshCatalog* catalog,
+             PredictionStore* store, const v1::ComparePredictionsRequest* request)
       : MessageStream(std::move(scope), context, timer, patience),
         registry_(registry),
+        catalog_(catalog),
         store_(store),
         request_(*request) {}
 
@@ -79,6 +81,10 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
  private:
   absl::Status ReadBoth() {
     TF_ASSIGN_OR_RETURN(one_, Read(request_.prediction(), store_));
+    if (!request_.vertices().has_skin()) {
+      TF_ASSIGN_OR_RETURN(choice_, ToVertexChoice(request_.vertices(),
+                                                  one_.prediction.vertex_count(), /*skin=*/{}));
+    }
     v1::PredictionComparison& told = comparison_;
     told.set_prediction(one_.prediction.name());
     told.set_model(one_.prediction.model());
@@ -113,6 +119,9 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
             End(answer.status());
             return;
           }
+          if (request_.vertices().has_skin()) {
+            choice_ = {.all = false, .vertices = answer->session->mesh().skin};
+          }
           comparison_.set_other_model(ToProto(answer->model));
           *comparison_.mutable_other_summary() = ToProto(answer->deformation.summary);
           *comparison_.mutable_other_quality() = ToProto(
@@ -137,21 +146,37 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
   }
 
   void Compare(const Positions& other) {
-    const absl::StatusOr<Eigen::VectorXd> distances = VertexDistances(one_.positions, other);
-    if (!distances.ok()) {
-      End(distances.status());
+    if (const absl::Status measured = Measure(other); !measured.ok()) {
+      End(measured);
       return;
     }
-    if (distances->size() > 0) {
-      Eigen::Index worst = 0;
-      distances->maxCoeff(&worst);
-      *comparison_.mutable_distances() =
-          ToProto(SummarizeDistances({distances->begin(), distances->end()}));
-      comparison_.mutable_distances()->set_worst_vertex(worst);
-    }
-    if (request_.differences()) differences_ = Encode(other - one_.positions);
     one_.positions.resize(0, 3);
     Send([this](v1::ComparePredictionsResponse* message) { return NextMessage(message); });
+  }
+
+  absl::Status Measure(const Positions& other) {
+    if (request_.vertices().has_skin() && choice_.all) TF_RETURN_IF_ERROR(ChooseSkin());
+    TF_ASSIGN_OR_RETURN(const Eigen::VectorXd all, VertexDistances(one_.positions, other));
+    const Eigen::VectorXd distances = choice_.all ? all : Eigen::VectorXd(all(choice_.vertices));
+    if (distances.size() > 0) {
+      Eigen::Index worst = 0;
+      distances.maxCoeff(&worst);
+      *comparison_.mutable_distances() =
+          ToProto(SummarizeDistances({distances.begin(), distances.end()}));
+      comparison_.mutable_distances()->set_worst_vertex(choice_.all ? worst
+                                                                    : choice_.vertices[worst]);
+    }
+    if (request_.differences()) differences_ = Encode(other - one_.positions, choice_);
+    return absl::OkStatus();
+  }
+
+  // Reading a mesh takes its time, too. Of a stream's selection: the same vertices.
+  absl::Status ChooseSkin() {
+    TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(one_.prediction.mesh()));
+    TF_ASSIGN_OR_RETURN(const std::shared_ptr<const StoredMesh> mesh, catalog_->Load(sha256));
+    TF_ASSIGN_OR_RETURN(choice_,
+                        ToVertexChoice(request_.vertices(), mesh->mesh.num_vertices(), mesh->skin));
+    return absl::OkStatus();
   }
 
   bool NextMessage(v1::ComparePredictionsResponse* message) {
@@ -164,10 +189,12 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
   }
 
   SessionRegistry* const registry_;
+  MeshCatalog* const catalog_;
   PredictionStore* const store_;
   const v1::ComparePredictionsRequest& request_;
   const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
   ReadPrediction one_;
+  VertexChoice choice_;
   v1::PredictionComparison comparison_;
   std::string differences_;
   size_t offset_ = 0;
@@ -178,9 +205,10 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
 
 grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* StartComparison(
     CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
-    std::chrono::milliseconds patience, SessionRegistry* registry, PredictionStore* store,
-    const v1::ComparePredictionsRequest* request) {
-  auto* call = new Comparison(std::move(scope), context, timer, patience, registry, store, request);
+    std::chrono::milliseconds patience, SessionRegistry* registry, MeshCatalog* catalog,
+    PredictionStore* store, const v1::ComparePredictionsRequest* request) {
+  auto* call =
+      new Comparison(std::move(scope), context, timer, patience, registry, catalog, store, request);
   call->Start();
   return call;
 }

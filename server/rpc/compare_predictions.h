@@ -9,6 +9,7 @@
 
 #include "server/rpc/call_scope.h"
 #include "server/session/deadline_timer.h"
+#include "server/session/mesh_catalog.h"
 #include "server/session/session_registry.h"
 #include "server/store/prediction_store.h"
 #include "tissueform/v1/prediction_service.pb.h"
@@ -16,11 +17,11 @@
 namespace tissueform {
 
 // Begins one ComparePredictions call: reads what is kept, asks the session where a model is
-// compared, and tells how far the two lie apart. It deletes itself. `context` may be null (see
-// CallScope); all other pointers must outlive the call.
+// compared and the catalog what is skin, and tells how far the two lie apart. It deletes itself.
+// `context` may be null (see CallScope); all other pointers must outlive the call.
 grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* StartComparison(
     CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
-    std::chrono::milliseconds patience, SessionRegistry* registry, PredictionStore* store,
-    const v1::ComparePredictionsRequest* request);
+    std::chrono::milliseconds patience, SessionRegistry* registry, MeshCatalog* catalog,
+    PredictionStore* store, const v1::ComparePredictionsRequest* request);
 
 }  // namespace tissueform

@@ -172,7 +172,7 @@ grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* PredictionService::Com
     grpc::CallbackServerContext* context, const v1::ComparePredictionsRequest* request) {
   return StartComparison(
       CallScope(context, "PredictionService.ComparePredictions", CallKind::kNewWork, gate_),
-      context, timer_, limits_.upload_silence, registry_, store_, request);
+      context, timer_, limits_.upload_silence, registry_, catalog_, store_, request);
 }
 
 grpc::ServerUnaryReactor* PredictionService::Run(

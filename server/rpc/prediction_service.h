@@ -11,6 +11,7 @@
 #include "server/rpc/call_scope.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
+#include "server/session/mesh_catalog.h"
 #include "server/session/session_registry.h"
 #include "server/store/prediction_store.h"
 #include "tissueform/v1/prediction_service.grpc.pb.h"
@@ -20,9 +21,14 @@ namespace tissueform {
 // tissueform.v1.PredictionService over a store. Stateless; all pointers must outlive it.
 class PredictionService final : public v1::PredictionService::CallbackService {
  public:
-  PredictionService(ServiceGate* gate, const ServiceLimits& limits, SessionRegistry* registry,
-                    PredictionStore* store, DeadlineTimer* timer)
-      : gate_(gate), limits_(limits), registry_(registry), store_(store), timer_(timer) {}
+  PredictionService(ServiceGate* gate, const ServiceLimits& limits, MeshCatalog* catalog,
+                    SessionRegistry* registry, PredictionStore* store, DeadlineTimer* timer)
+      : gate_(gate),
+        limits_(limits),
+        catalog_(catalog),
+        registry_(registry),
+        store_(store),
+        timer_(timer) {}
 
   grpc::ServerUnaryReactor* CreatePrediction(grpc::CallbackServerContext* context,
                                              const v1::CreatePredictionRequest* request,
@@ -53,6 +59,7 @@ class PredictionService final : public v1::PredictionService::CallbackService {
 
   ServiceGate* const gate_;
   const ServiceLimits limits_;
+  MeshCatalog* const catalog_;
   SessionRegistry* const registry_;
   PredictionStore* const store_;
   DeadlineTimer* const timer_;

@@ -91,6 +91,22 @@ TEST_F(PredictionCommandTest, ListsShowsComparesAndDeletes) {
   EXPECT_NEAR(json["distances"]["mean_mm"], distances.mean(), 2e-6);
   EXPECT_EQ(json["distances"]["vertices"], distances.size());
   EXPECT_THAT(Prediction({"compare", field, elastic}).out, ContainsRegex("\nall +"));
+  EXPECT_EQ(json["vertices"], "all");
+
+  const std::vector<int32_t> skin = BoundaryVertices(one.mesh);
+  const Eigen::VectorXd of_skin = distances(skin);
+  ASSERT_NE(of_skin.mean(), distances.mean());
+  const Json on_skin = Json::parse(Prediction({"compare", field, elastic, "--skin", "--json"}).out);
+  EXPECT_EQ(on_skin["vertices"], "skin");
+  EXPECT_EQ(on_skin["distances"]["vertices"], skin.size());
+  EXPECT_NEAR(on_skin["distances"]["mean_mm"], of_skin.mean(), 2e-6);
+  Write("list.txt", "7 3\n 11\n");
+  const std::vector<std::string> words = {"compare", field, elastic, "--vertices", "list.txt"};
+  EXPECT_THAT(Prediction(words).out, ContainsRegex("\nlisted +3 "));
+  Write("list.txt", "7 three");
+  EXPECT_THAT(Prediction(words), FailsWith(1, HasSubstr("\"three\" is no vertex")));
+  Write("list.txt", "7 7");
+  EXPECT_THAT(Prediction(words), FailsWith(1, HasSubstr("7")));
 
   EXPECT_THAT(Prediction({"delete", field}), Succeeds());
   EXPECT_THAT(Prediction({"show", field}), FailsWith(1, HasSubstr("no prediction")));

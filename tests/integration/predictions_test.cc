@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "gmock/gmock.h"
@@ -12,6 +13,7 @@
 
 #include "core/base/error_reason.h"
 #include "core/base/software_version.h"
+#include "core/mesh/tet_topology.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/status_matchers.h"
 
@@ -194,6 +196,55 @@ TEST_F(PredictionsTest, ComparesWithAnotherModelAsWithItsPrediction) {
   ASSERT_OK_AND_ASSIGN(const ComparedPredictions same,
                        calls().Compare(one.name(), v1::DEFORMATION_MODEL_GRADIENT_FIELD));
   EXPECT_EQ(same.comparison.distances().max_mm(), 0);
+}
+
+TEST_F(PredictionsTest, ComparesTheSkinOrListedVerticesOnly) {
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction one, Predict(1));
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction other, Predict(4));
+  ASSERT_OK_AND_ASSIGN(const Positions from, calls().ReadPositions(one.name()));
+  ASSERT_OK_AND_ASSIGN(const Positions to, calls().ReadPositions(other.name()));
+  const Positions moved = to - from;
+  using Kind = AnswerVertices::Kind;
+  const std::vector<int32_t> skin = BoundaryVertices(problem_.mesh);
+  ASSERT_LT(skin.size(), moved.rows());
+  for (const AnswerVertices& asked :
+       {AnswerVertices{Kind::kSkin, {}}, AnswerVertices{Kind::kList, {40, 3, 77}}}) {
+    const std::vector<int32_t>& vertices = asked.kind == Kind::kSkin ? skin : asked.list;
+    ASSERT_OK_AND_ASSIGN(const ComparedPredictions compared,
+                         calls().Compare(one.name(), other.name(), true, asked));
+    const Positions expected = moved(vertices, Eigen::all);
+    ASSERT_EQ(compared.differences.rows(), expected.rows());
+    EXPECT_LT((compared.differences - expected).cwiseAbs().maxCoeff(), 1e-6);
+    const Eigen::VectorXd distances = expected.rowwise().norm();
+    const v1::DistanceStatistics& told = compared.comparison.distances();
+    EXPECT_EQ(told.vertex_count(), vertices.size());
+    EXPECT_NEAR(told.mean_mm(), distances.mean(), 1e-12);
+    EXPECT_EQ(told.max_mm(), distances.maxCoeff());
+    EXPECT_EQ(moved.row(told.worst_vertex()).norm(), told.max_mm()) << "numbered as in the mesh";
+    EXPECT_THAT(vertices, ::testing::Contains(told.worst_vertex()));
+    ASSERT_OK_AND_ASSIGN(const ComparedPredictions by_model,
+                         calls().Compare(one.name(), one.model(), true, asked));
+    EXPECT_EQ(by_model.comparison.distances().vertex_count(), vertices.size());
+    EXPECT_EQ(by_model.comparison.distances().max_mm(), 0);
+  }
+}
+
+TEST_F(PredictionsTest, VerticesThatCannotBeComparedAreRefused) {
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction one, Predict(1));
+  const auto compare = [&](AnswerVertices::Kind kind, std::vector<int32_t> list) {
+    return calls().Compare(one.name(), one.name(), false, {kind, std::move(list)});
+  };
+  using Kind = AnswerVertices::Kind;
+  const auto count = static_cast<int32_t>(problem_.mesh.num_vertices());
+  for (const std::vector<int32_t>& list :
+       {std::vector<int32_t>{}, {-1}, {count}, {5, 5}, std::vector<int32_t>(count + 1, 0)}) {
+    EXPECT_THAT(compare(Kind::kList, list), StatusIs(absl::StatusCode::kInvalidArgument));
+  }
+  // What is skin only the mesh knows; numbers need none.
+  ASSERT_THAT(client_->DeleteSession(session_.name()), IsOk());
+  ASSERT_THAT(client_->DeleteMesh(session_.mesh()), IsOk());
+  EXPECT_THAT(compare(Kind::kSkin, {}), Because(ErrorReason::kMeshNotFound));
+  EXPECT_THAT(compare(Kind::kList, {5}), IsOk());
 }
 
 TEST_F(PredictionsTest, WhatCannotBeComparedIsRefused) {

@@ -3,11 +3,16 @@
 
 #include "client/cli/online/prediction_command.h"
 
+#include <cstdint>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 
@@ -39,6 +44,8 @@ struct PredictionOptions {
   std::string mesh;
   std::string out;
   bool json = false;
+  bool skin = false;
+  std::string vertices;  // a file
 
   std::string FullPrediction() const { return FullName("predictions", name); }
 };
@@ -125,6 +132,28 @@ absl::Status Show(const PredictionOptions& options) {
   return absl::OkStatus();
 }
 
+absl::StatusOr<std::vector<int32_t>> ReadVertexNumbers(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) return absl::NotFoundError(absl::StrCat(path, ": cannot be read"));
+  std::vector<int32_t> vertices;
+  for (std::string word; file >> word;) {
+    int32_t vertex = 0;
+    if (!absl::SimpleAtoi(word, &vertex)) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          path, ": \"", word, "\" is no vertex; write numbers from 0 on, with spaces between"));
+    }
+    vertices.push_back(vertex);
+  }
+  return vertices;
+}
+
+absl::StatusOr<AnswerVertices> ComparedVertices(const PredictionOptions& options) {
+  if (options.skin) return AnswerVertices{AnswerVertices::Kind::kSkin, {}};
+  if (options.vertices.empty()) return AnswerVertices{};
+  TF_ASSIGN_OR_RETURN(std::vector<int32_t> list, ReadVertexNumbers(options.vertices));
+  return AnswerVertices{AnswerVertices::Kind::kList, std::move(list)};
+}
+
 absl::Status Compare(const PredictionOptions& options) {
   if (options.other.empty() == options.model.empty()) {
     return absl::InvalidArgumentError("name another prediction, or a model (--model)");
@@ -132,9 +161,12 @@ absl::Status Compare(const PredictionOptions& options) {
   TF_ASSIGN_OR_RETURN(const v1::DeformationModel model, ModelOf(options));
   PredictionCalls::Other other = model;
   if (!options.other.empty()) other = FullName("predictions", options.other);
+  TF_ASSIGN_OR_RETURN(const AnswerVertices vertices, ComparedVertices(options));
+  const char* where = options.skin ? "skin" : options.vertices.empty() ? "all" : "listed";
   TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
   TF_ASSIGN_OR_RETURN(const ComparedPredictions compared,
-                      client->predictions().Compare(options.FullPrediction(), other));
+                      client->predictions().Compare(options.FullPrediction(), other,
+                                                    /*differences=*/false, vertices));
   const v1::PredictionComparison& told = compared.comparison;
   const DistanceSummary distances = ToDistanceSummary(told.distances());
   if (options.json) {
@@ -142,6 +174,7 @@ absl::Status Compare(const PredictionOptions& options) {
                      {"model", ModelText(told.model())},
                      {"other_prediction", told.other_prediction()},
                      {"other_model", ModelText(told.other_model())},
+                     {"vertices", where},
                      {"distances", DistancesToJson(distances)},
                      {"worst_vertex", told.distances().worst_vertex()}});
     return absl::OkStatus();
@@ -150,7 +183,7 @@ absl::Status Compare(const PredictionOptions& options) {
                told.other_prediction().empty() ? "its session now" : told.other_prediction(),
                ModelText(told.other_model()));
   PrintDistanceHeadline();
-  PrintDistances({{"all", distances}});
+  PrintDistances({{where, distances}});
   absl::PrintF("farthest at vertex %d\n", told.distances().worst_vertex());
   return absl::OkStatus();
 }
@@ -222,6 +255,13 @@ void AddPredictionCommand(CLI::App& app, CommandWork* work) {
   compare->add_option("OTHER", options->other, "the other prediction, of the same mesh");
   AddModelOption(compare, "in place of OTHER: what this model answers in the session of PREDICTION",
                  &options->model);
+  CLI::Option* skin = compare->add_flag(
+      "--skin", options->skin, "only the vertices of the mesh's surface (the server has the mesh)");
+  compare
+      ->add_option("--vertices", options->vertices,
+                   "only the vertices whose numbers, from 0 on, stand in this text file")
+      ->type_name("FILE")
+      ->excludes(skin);
   compare->add_flag("--json", options->json, "as JSON");
 
   CLI::App* save = add("export", "write one to a file", true, Export);
