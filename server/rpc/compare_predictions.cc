@@ -131,12 +131,13 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
   }
 
   absl::Status CheckSame(const Session& session) const {
-    if (session.mesh().mesh.num_vertices() == one_.prediction.vertex_count() &&
+    if (MeshName(session.mesh().sha256) == one_.prediction.mesh() &&
         RecipeSha256(session) == one_.prediction.recipe_sha256()) {
       return absl::OkStatus();
     }
     return NotComparable(
-        "the session has other regions or another stiffness than when the prediction was made; "
+        "the session has another mesh, other regions or another stiffness than when the prediction "
+        "was made; "
         "make the prediction again");
   }
 

@@ -46,8 +46,9 @@ class Search : public std::enable_shared_from_this<Search> {
   absl::Status TakeSession(std::shared_ptr<Session> session) {
     answer_.session = std::move(session);
     TF_ASSIGN_OR_RETURN(answer_.model, ToModel(question_.model, answer_.session->model()));
-    TF_ASSIGN_OR_RETURN(answer_.poses, ToPoses(question_.poses, answer_.session->constraints()));
+    // Before the poses, which a session that is not fit may not have the handles for.
     if (check_) TF_RETURN_IF_ERROR(check_(*answer_.session));
+    TF_ASSIGN_OR_RETURN(answer_.poses, ToPoses(question_.poses, answer_.session->constraints()));
     if (answer_.session->HasModel(answer_.model)) {
       PostSolve();
     } else {

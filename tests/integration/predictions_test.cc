@@ -274,6 +274,28 @@ TEST_F(PredictionsTest, WhatCannotBeComparedIsRefused) {
               Because(ErrorReason::kNotComparable));
 }
 
+TEST_F(PredictionsTest, ASessionWithOtherHandlesOrAnotherMeshIsNotCompared) {
+  SessionRequest request = problem_.Request(session_.mesh());
+  request.session_id = "a-session-that-changes";
+  request.stiffness = 1000.0;
+  ASSERT_OK_AND_ASSIGN(const v1::Session before, client_->CreateSession(request));
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction made,
+                       calls().Create(before.name(), TopPose(SomePose(1))));
+  SessionRequest other_handle = request;
+  other_handle.handles[0].name = "cap";
+  // The same regions of a mesh with as many vertices.
+  const BarProblem other(8);
+  ASSERT_OK_AND_ASSIGN(const v1::Mesh other_mesh, client_->UploadMesh(other.mesh, {}));
+  SessionRequest on_other_mesh = request;
+  on_other_mesh.mesh = other_mesh.name();
+  for (const SessionRequest& now : {other_handle, on_other_mesh}) {
+    ASSERT_THAT(client_->DeleteSession(before.name()), IsOk());
+    ASSERT_THAT(client_->CreateSession(now), IsOk());
+    EXPECT_THAT(calls().Compare(made.name(), v1::DEFORMATION_MODEL_LINEAR_ELASTIC),
+                Because(ErrorReason::kNotComparable));
+  }
+}
+
 TEST_F(PredictionsTest, BadRequestsAreRefusedAndLeaveNothing) {
   EXPECT_THAT(calls().Create("sessions/none", TopPose(SomePose(1))),
               Because(ErrorReason::kSessionNotFound));
