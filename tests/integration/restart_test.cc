@@ -4,7 +4,7 @@
 // What the real program has acknowledged is there when it is killed and started again, and a drag
 // goes on.
 
-#include <csignal>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -12,7 +12,6 @@
 #include <optional>
 #include <string>
 #include <thread>
-#include <unistd.h>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -25,6 +24,7 @@
 #include "client/cpp/tissueform_client.h"
 #include "proto/conversion/answer_conversion.h"
 #include "proto/conversion/mesh_conversion.h"
+#include "tests/integration/durable_server.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
@@ -34,41 +34,13 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr std::chrono::seconds kPatience{60};
-
 class RestartTest : public ::testing::Test {
  protected:
-  RestartTest() { std::filesystem::remove_all(folder_); }
-  ~RestartTest() override {
-    server_.reset();
-    std::filesystem::remove_all(folder_);
-  }
-
-  // At the port of the server before, where there was one.
-  void Start() {
-    const std::string port = address_.empty() ? "0" : address_.substr(address_.rfind(':') + 1);
-    absl::StatusOr<std::unique_ptr<ServerProcess>> server = ServerProcess::Start(
-        ProgramPath("tissueform-server"),
-        {"--data-dir", folder_.string(), "--port", port, "--log-level", "warn"}, kPatience);
-    ASSERT_THAT(server, IsOk());
-    server_ = *std::move(server);
-    address_ = server_->address();
-  }
-
-  // As the power switch would, but for what the kernel still holds.
-  void Kill() {
-    std::ifstream lock(folder_ / "lock");
-    pid_t pid = 0;
-    lock >> pid;
-    ASSERT_GT(pid, 1);
-    ASSERT_EQ(kill(pid, SIGKILL), 0);
-    EXPECT_TRUE(server_->WaitForExit(kPatience).has_value());
-    server_.reset();
-  }
+  void Start() { ASSERT_THAT(server_.Start(), IsOk()); }
+  void Kill() { ASSERT_THAT(server_.Kill(), IsOk()); }
 
   std::unique_ptr<TissueformClient> Connect() const {
-    absl::StatusOr<std::unique_ptr<TissueformClient>> client =
-        TissueformClient::Connect(address_, {.own_connection = true});
+    absl::StatusOr<std::unique_ptr<TissueformClient>> client = server_.Connect();
     EXPECT_THAT(client, IsOk());
     return client.ok() ? *std::move(client) : nullptr;
   }
@@ -83,11 +55,8 @@ class RestartTest : public ::testing::Test {
     return *session;
   }
 
-  const std::filesystem::path folder_ =
-      std::filesystem::path(::testing::TempDir()) / absl::StrCat("tissueform_restart_", getpid());
   const BarProblem bar_{1};
-  std::unique_ptr<ServerProcess> server_;
-  std::string address_;
+  DurableServer server_{"restart", {"--log-level", "warn"}};
 };
 
 TEST_F(RestartTest, ADragGoesOnThroughKillAndRestart) {
@@ -227,21 +196,22 @@ TEST_F(RestartTest, AnUploadGoesOnThroughKillAndRestart) {
   std::string sent;
   for (const absl::string_view segment : payload.segments) absl::StrAppend(&sent, segment);
   int found = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "blobs")) {
+  for (const auto& entry : std::filesystem::directory_iterator(server_.folder() / "blobs")) {
     std::ifstream blob(entry.path(), std::ios::binary);
     const std::string kept{std::istreambuf_iterator<char>(blob), {}};
     found += kept.size() > sent.size() && kept.substr(kept.size() - sent.size()) == sent ? 1 : 0;
   }
   EXPECT_EQ(found, 1);
-  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "uploads")) << "nothing is left of the way";
+  EXPECT_TRUE(std::filesystem::is_empty(server_.folder() / "uploads"))
+      << "nothing is left of the way";
 }
 
 TEST_F(RestartTest, WhatCameOfAnUploadThatItsClientBrokeOffIsThere) {
   ASSERT_NO_FATAL_FAILURE(Start());
   const MeshPayloadView payload = ViewMeshPayload(bar_.mesh.positions(), bar_.mesh.tets(), {});
   {
-    const auto stub =
-        v1::MeshService::NewStub(grpc::CreateChannel(address_, grpc::InsecureChannelCredentials()));
+    const auto stub = v1::MeshService::NewStub(
+        grpc::CreateChannel(server_.address(), grpc::InsecureChannelCredentials()));
     grpc::ClientContext context;
     v1::UploadMeshResponse response;
     const auto writer = stub->UploadMesh(&context, &response);
@@ -298,19 +268,20 @@ TEST_F(RestartTest, AFailedCommitIsToldWithoutTheServersPaths) {
     failure = notice.committed().failure();
   };
   ASSERT_OK_AND_ASSIGN(const auto stream, client->OpenStream(session.name(), options));
-  std::filesystem::remove_all(folder_);
+  std::filesystem::remove_all(server_.folder());
   ASSERT_THAT(stream->SendPoses(1, TopPose(SomePose(1)), /*commit=*/true), IsOk());
   stream->CloseSending();
   while (stream->Receive().has_value()) continue;
   EXPECT_THAT(stream->Finish(), IsOk());
   EXPECT_THAT(failure, HasSubstr("removed"));
-  EXPECT_THAT(failure, ::testing::Not(HasSubstr(folder_.filename().string())));
+  EXPECT_THAT(failure, ::testing::Not(HasSubstr(server_.folder().filename().string())));
 }
 
 TEST_F(RestartTest, ASecondServerIsRefusedTheFolder) {
   ASSERT_NO_FATAL_FAILURE(Start());
   EXPECT_THAT(ServerProcess::Start(ProgramPath("tissueform-server"),
-                                   {"--data-dir", folder_.string(), "--port", "0"}, kPatience),
+                                   {"--data-dir", server_.folder().string(), "--port", "0"},
+                                   std::chrono::seconds(60)),
               StatusIs(absl::StatusCode::kUnavailable));
   EXPECT_NE(Connect(), nullptr) << "the first one serves";
 }
