@@ -6,9 +6,6 @@
 #include <memory>
 #include <utility>
 
-#include "absl/strings/str_cat.h"
-
-#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "server/rpc/mesh_upload_stream.h"
@@ -85,15 +82,7 @@ absl::Status MeshService::List(const v1::ListMeshesRequest& request,
 
 absl::Status MeshService::RemoveMesh(const v1::DeleteMeshRequest& request) {
   TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request.name()));
-  // Without it they could not come back to memory.
-  const int users = catalog_->keeps_meshes() ? registry_->CountMadeFrom(sha256) : 0;
-  if (users > 0) {
-    return WithReason(absl::FailedPreconditionError(
-                          absl::StrCat(users, users == 1 ? " session is" : " sessions are",
-                                       " made from it; delete them first")),
-                      ErrorReason::kMeshInUse, {{"sessions", absl::StrCat(users)}});
-  }
-  return catalog_->Remove(sha256);
+  return registry_->RemoveMesh(sha256);
 }
 
 }  // namespace tissueform

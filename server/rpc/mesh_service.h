@@ -21,7 +21,7 @@ namespace tissueform {
 class MeshService final : public v1::MeshService::CallbackService {
  public:
   MeshService(ServiceGate* gate, const ServiceLimits& limits, MeshCatalog* catalog,
-              MeshUploads* uploads, const SessionRegistry* registry, WorkerPool* pool,
+              MeshUploads* uploads, SessionRegistry* registry, WorkerPool* pool,
               DeadlineTimer* timer)
       : gate_(gate),
         limits_(limits),
@@ -59,7 +59,7 @@ class MeshService final : public v1::MeshService::CallbackService {
   const ServiceLimits limits_;
   MeshCatalog* const catalog_;
   MeshUploads* const uploads_;
-  const SessionRegistry* const registry_;
+  SessionRegistry* const registry_;
   WorkerPool* const pool_;
   DeadlineTimer* const timer_;
 };

@@ -66,12 +66,13 @@ class MeshCatalog::Arrival {
   Arrival(MeshCatalog* catalog, std::string sha256)
       : catalog_(catalog), sha256_(std::move(sha256)) {
     MutexLock lock(catalog_->mutex_);
-    while (catalog_->removing_ == sha256_) catalog_->removed_.Wait(catalog_->mutex_);
+    while (catalog_->removing_.contains(sha256_)) catalog_->moved_.Wait(catalog_->mutex_);
     catalog_->arriving_.insert(sha256_);
   }
   ~Arrival() {
     MutexLock lock(catalog_->mutex_);
     catalog_->arriving_.erase(catalog_->arriving_.find(sha256_));
+    catalog_->moved_.NotifyAll();
   }
   Arrival(const Arrival&) = delete;
   Arrival& operator=(const Arrival&) = delete;
@@ -179,16 +180,27 @@ absl::StatusOr<MeshViewPage> MeshCatalog::List(const std::string& after, int lim
 }
 
 absl::Status MeshCatalog::Remove(const std::string& sha256) {
-  // From the store first: what fails there is still known.
-  if (store_ != nullptr) {
-    const absl::Status removed = store_->Delete(sha256);
-    if (absl::IsNotFound(removed)) return NoSuchMesh();
-    TF_RETURN_IF_ERROR(removed);
+  {
+    MutexLock lock(mutex_);
+    while (removing_.contains(sha256)) moved_.Wait(mutex_);
+    removing_.insert(sha256);
+    // Whoever has read it, or has put it into the store, would else give it to the others after it
+    // was removed.
+    while (arriving_.contains(sha256)) moved_.Wait(mutex_);
   }
+  return FinishRemoval(sha256);
+}
+
+absl::Status MeshCatalog::FinishRemoval(const std::string& sha256) {
+  // From the store first: what fails there is still known.
+  absl::Status status = store_ == nullptr ? NoSuchMesh() : store_->Delete(sha256);
   std::shared_ptr<const StoredMesh> removed;  // destroyed after the lock is released
   MutexLock lock(mutex_);
+  removing_.erase(sha256);
+  moved_.NotifyAll();
+  if (!status.ok() && !absl::IsNotFound(status)) return status;
   const auto found = meshes_.find(sha256);
-  if (found == meshes_.end()) return store_ == nullptr ? NoSuchMesh() : absl::OkStatus();
+  if (found == meshes_.end()) return status.ok() ? status : NoSuchMesh();
   removed = std::move(found->second.mesh);
   meshes_.erase(found);
   return absl::OkStatus();
@@ -223,18 +235,15 @@ absl::StatusOr<bool> MeshCatalog::RemoveUnused(const std::string& sha256, Clock:
   std::shared_ptr<const StoredMesh> removed;  // destroyed after the lock is released
   {
     MutexLock lock(mutex_);
-    if (arriving_.contains(sha256)) return false;
+    if (arriving_.contains(sha256) || removing_.contains(sha256)) return false;
     if (const auto found = meshes_.find(sha256); found != meshes_.end()) {
       if (found->second.mesh.use_count() > 1 || found->second.last_used > since) return false;
       removed = std::move(found->second.mesh);
       meshes_.erase(found);
     }
-    removing_ = sha256;
+    removing_.insert(sha256);
   }
-  const absl::Status status = store_->Delete(sha256);
-  MutexLock lock(mutex_);
-  removing_.clear();
-  removed_.NotifyAll();
+  const absl::Status status = FinishRemoval(sha256);
   if (!status.ok() && !absl::IsNotFound(status)) return status;
   return status.ok();
 }

@@ -89,8 +89,8 @@ class MeshCatalog {
   absl::StatusOr<MeshView> Look(const std::string& sha256);
   absl::StatusOr<MeshViewPage> List(const std::string& after, int limit);
 
-  // Users in memory keep the mesh until they end. Blocks on the disk. Errors: NotFound, those of
-  // MeshStore::Delete.
+  // Users in memory keep the mesh until they end; one that is on its way here arrives first, or
+  // comes after it. Blocks on the disk. Errors: NotFound, those of MeshStore::Delete.
   absl::Status Remove(const std::string& sha256);
 
   // Takes those meshes out of memory that nobody uses and nobody has asked for within `idle`.
@@ -111,10 +111,12 @@ class MeshCatalog {
     Clock::TimePoint last_used;
   };
 
-  // While it lives RemoveUnused leaves the mesh alone; the beginning waits for one under way.
+  // While it lives no mesh of that name is removed; the beginning waits for a removal under way.
   class Arrival;
 
   std::shared_ptr<const StoredMesh> Add(std::shared_ptr<const StoredMesh> mesh);
+  // From store and memory. REQUIRES: in removing_, from which it takes it.
+  absl::Status FinishRemoval(const std::string& sha256);
 
   // Constant.
   const ServiceLimits limits_;
@@ -126,8 +128,8 @@ class MeshCatalog {
   Mutex mutex_;
   std::map<std::string, Entry, std::less<>> meshes_ ABSL_GUARDED_BY(mutex_);
   std::multiset<std::string> arriving_ ABSL_GUARDED_BY(mutex_);
-  std::string removing_ ABSL_GUARDED_BY(mutex_);  // empty: none
-  ConditionVariable removed_;
+  std::set<std::string> removing_ ABSL_GUARDED_BY(mutex_);
+  ConditionVariable moved_;  // something has arrived, or was removed
 };
 
 }  // namespace tissueform

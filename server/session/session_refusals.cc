@@ -38,6 +38,18 @@ absl::Status EndingId(const std::string& id) {
       ErrorReason::kSessionBeingDeleted);
 }
 
+absl::Status MeshInUse(int sessions) {
+  return WithReason(absl::FailedPreconditionError(
+                        absl::StrCat(sessions, sessions == 1 ? " session is" : " sessions are",
+                                     " made from it; delete them first")),
+                    ErrorReason::kMeshInUse, {{"sessions", absl::StrCat(sessions)}});
+}
+
+absl::Status NoMeshAnyMore() {
+  return WithReason(absl::NotFoundError("the mesh was deleted meanwhile; upload it"),
+                    ErrorReason::kMeshNotFound);
+}
+
 absl::Status TooManySessions(int limit, absl::string_view what, absl::string_view remedy) {
   return WithReason(absl::ResourceExhaustedError(absl::StrCat(
                         "the server ", what, " ", limit, " sessions, as many as it may", remedy)),

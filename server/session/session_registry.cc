@@ -139,11 +139,12 @@ SessionRegistry::Admission SessionRegistry::AdmitCreate(const SessionRecord& rec
   } else if (table_.num_known() >= static_cast<size_t>(limits_.max_stored_sessions)) {
     admission.refusal = TooManySessions(limits_.max_stored_sessions, "keeps",
                                         "; delete one or raise --max-stored-sessions");
-  } else {
+  } else if (admission.refusal = CheckKept(record.mesh_sha256); admission.refusal.ok()) {
     admission.refusal = CheckRoom();
   }
   if (admission.refusal.ok()) {
-    admission.started = table_.StartMaking(record.id, key, /*restores=*/false, waiter);
+    admission.started =
+        table_.StartMaking(record.id, key, record.mesh_sha256, /*restores=*/false, waiter);
   }
   return admission;
 }
@@ -160,7 +161,8 @@ SessionRegistry::Admission SessionRegistry::AdmitOpen(const std::string& id,
   } else if (const MakingPtr making = table_.FindMaking(id); making != nullptr) {
     making->waiters.push_back(waiter);
   } else if (admission.refusal = CheckRoom(); admission.refusal.ok()) {
-    admission.started = table_.StartMaking(id, known->key, /*restores=*/true, waiter);
+    admission.started =
+        table_.StartMaking(id, known->key, known->mesh_sha256, /*restores=*/true, waiter);
     admission.started->version = known->version;
   }
   return admission;
@@ -185,6 +187,13 @@ bool SessionRegistry::JoinEarlierRequest(const RequestKey& key, const SessionWai
     making->waiters.push_back(waiter);
   }
   return true;
+}
+
+// The caller has found it and holds it, so it leaves the catalog by RemoveMesh only.
+absl::Status SessionRegistry::CheckKept(const std::string& mesh_sha256) const {
+  if (!catalog_->keeps_meshes()) return absl::OkStatus();
+  const bool leaves = meshes_on_their_way_out_.contains(mesh_sha256);
+  return leaves || catalog_->Find(mesh_sha256) == nullptr ? NoMeshAnyMore() : absl::OkStatus();
 }
 
 absl::Status SessionRegistry::CheckRoom() const {
@@ -223,7 +232,7 @@ void SessionRegistry::FinishCreation(const MakingPtr& making,
     waiters = table_.EndMaking(making);
     nobody_waits = waiters.empty();  // all have cancelled
     if (result.ok() && nobody_waits) {
-      ending_.insert(making->id);
+      ending_.emplace(making->id, making->mesh_sha256);
     } else if (result.ok()) {
       KnownSession known;
       known.session = *result;
@@ -527,12 +536,34 @@ int SessionRegistry::size() const {
 
 int SessionRegistry::CountMadeFrom(const std::string& mesh_sha256) const {
   MutexLock lock(mutex_);
-  return table_.CountMadeFrom(mesh_sha256);
+  return CountMadeFromLocked(mesh_sha256);
+}
+
+int SessionRegistry::CountMadeFromLocked(const std::string& mesh_sha256) const {
+  const auto ending =
+      std::count_if(ending_.begin(), ending_.end(),
+                    [&mesh_sha256](const auto& entry) { return entry.second == mesh_sha256; });
+  return table_.CountMadeFrom(mesh_sha256) + static_cast<int>(ending);
+}
+
+absl::Status SessionRegistry::RemoveMesh(const std::string& sha256) {
+  // Sessions in memory keep what nobody could read again.
+  if (!catalog_->keeps_meshes()) return catalog_->Remove(sha256);
+  {
+    MutexLock lock(mutex_);
+    const int sessions = CountMadeFromLocked(sha256);
+    if (sessions > 0) return MeshInUse(sessions);
+    meshes_on_their_way_out_.insert(sha256);
+  }
+  absl::Status removed = catalog_->Remove(sha256);
+  MutexLock lock(mutex_);
+  meshes_on_their_way_out_.erase(meshes_on_their_way_out_.find(sha256));
+  return removed;
 }
 
 std::optional<KnownSession> SessionRegistry::Take(const std::string& id) {
   std::optional<KnownSession> known = table_.Take(id);
-  if (known.has_value()) ending_.insert(id);
+  if (known.has_value()) ending_.emplace(id, known->mesh_sha256);
   return known;
 }
 

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -80,7 +81,7 @@ class SessionRegistry {
   //
   // Errors: those of Session::Create and SessionStore::Create; AlreadyExists (the id is taken);
   // ResourceExhausted (too many sessions); InvalidArgument (the request id belongs to another
-  // request); Cancelled.
+  // request); NotFound (the mesh was removed meanwhile); Cancelled.
   void Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh, CancelFlag cancelled,
               const SessionCallback& done);
 
@@ -148,13 +149,18 @@ class SessionRegistry {
   // In memory or not.
   bool Knows(const std::string& id) const;
 
+  // Takes the mesh out of the catalog, where that can have it again for no session: while it goes
+  // no session of it is begun. Blocks on the disk. Errors: FailedPrecondition (sessions are made
+  // from it, are being made or are not deleted to the end), those of MeshCatalog::Remove.
+  absl::Status RemoveMesh(const std::string& sha256) ABSL_LOCKS_EXCLUDED(mutex_);
+
   // Nothing is posted to the pool any longer: what the store answers from now on finds nobody who
   // waits. Call it before the pool ends, and end the store's calls before the registry.
   void Stop() { maker_.Stop(); }
 
   // In memory.
   int size() const;
-  // In memory or not.
+  // In memory or not, those that are being made and those whose record is not gone yet.
   int CountMadeFrom(const std::string& mesh_sha256) const;
 
   WorkerPool& pool() { return *pool_; }
@@ -175,6 +181,11 @@ class SessionRegistry {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // False when no session and no making has the request id.
   bool JoinEarlierRequest(const RequestKey& key, const SessionWaiter& waiter, Admission* admission)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Of a mesh that is to be made into a session. Errors: NotFound.
+  absl::Status CheckKept(const std::string& mesh_sha256) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  int CountMadeFromLocked(const std::string& mesh_sha256) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Errors: ResourceExhausted.
   absl::Status CheckRoom() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -218,7 +229,9 @@ class SessionRegistry {
 
   mutable Mutex mutex_;
   SessionTable table_ ABSL_GUARDED_BY(mutex_);
-  std::set<std::string> ending_ ABSL_GUARDED_BY(mutex_);  // taken out, but still in the store
+  // Id: mesh of those that are taken out, but still in the store.
+  std::map<std::string, std::string> ending_ ABSL_GUARDED_BY(mutex_);
+  std::multiset<std::string> meshes_on_their_way_out_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace tissueform

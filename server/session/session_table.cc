@@ -53,11 +53,13 @@ std::optional<KnownSession> SessionTable::Take(const std::string& id) {
   return std::move(node.mapped());
 }
 
-SessionTable::MakingPtr SessionTable::StartMaking(std::string id, RequestKey key, bool restores,
+SessionTable::MakingPtr SessionTable::StartMaking(std::string id, RequestKey key,
+                                                  std::string mesh_sha256, bool restores,
                                                   SessionWaiter waiter) {
   makings_.push_back(
       std::make_shared<SessionMaking>(SessionMaking{.id = std::move(id),
                                                     .key = std::move(key),
+                                                    .mesh_sha256 = std::move(mesh_sha256),
                                                     .restores = restores,
                                                     .waiters = {std::move(waiter)}}));
   return makings_.back();
@@ -128,9 +130,14 @@ std::vector<std::string> SessionTable::InUse(Clock::TimePoint since) const {
 }
 
 int SessionTable::CountMadeFrom(const std::string& mesh_sha256) const {
-  return static_cast<int>(std::count_if(
-      known_.begin(), known_.end(),
-      [&mesh_sha256](const auto& entry) { return entry.second.mesh_sha256 == mesh_sha256; }));
+  const auto known = std::count_if(known_.begin(), known_.end(), [&mesh_sha256](const auto& entry) {
+    return entry.second.mesh_sha256 == mesh_sha256;
+  });
+  const auto new_ones =
+      std::count_if(makings_.begin(), makings_.end(), [&mesh_sha256](const MakingPtr& making) {
+        return !making->restores && making->mesh_sha256 == mesh_sha256;
+      });
+  return static_cast<int>(known + new_ones);
 }
 
 size_t SessionTable::num_loaded_in_table() const {

@@ -38,6 +38,7 @@ struct SessionWaiter {
 struct SessionMaking {
   std::string id;
   RequestKey key;
+  std::string mesh_sha256;
   bool restores = false;
   int version = 0;                     // of what it is made from
   std::vector<SessionWaiter> waiters;  // guarded by the owner of the table
@@ -75,7 +76,8 @@ class SessionTable {
   // Empty when it is not known.
   std::optional<KnownSession> Take(const std::string& id);
 
-  MakingPtr StartMaking(std::string id, RequestKey key, bool restores, SessionWaiter waiter);
+  MakingPtr StartMaking(std::string id, RequestKey key, std::string mesh_sha256, bool restores,
+                        SessionWaiter waiter);
   // Those who still wait for it. REQUIRES: under way.
   std::vector<SessionWaiter> EndMaking(const MakingPtr& making);
   // Whoever came with this flag and still waits, taken out.
@@ -93,6 +95,7 @@ class SessionTable {
   // False of one that is not known.
   bool IsInUse(const std::string& id, Clock::TimePoint since) const;
 
+  // And those that are being made.
   int CountMadeFrom(const std::string& mesh_sha256) const;
 
   // In memory, or on the way there.
