@@ -53,10 +53,10 @@ std::string Encode(const Positions& positions, const VertexChoice& choice) {
 
 class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
  public:
-  Comparison(CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
+  Comparison(CallScope scope, CancelCall cancel, DeadlineTimer* timer,
              std::chrono::milliseconds patience, SessionRegistry* registry, MeshCatalog* catalog,
              PredictionStore* store, const v1::ComparePredictionsRequest* request)
-      : MessageStream(std::move(scope), context, timer, patience),
+      : MessageStream(std::move(scope), std::move(cancel), timer, patience),
         registry_(registry),
         catalog_(catalog),
         store_(store),
@@ -208,8 +208,8 @@ grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* StartComparison(
     CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
     std::chrono::milliseconds patience, SessionRegistry* registry, MeshCatalog* catalog,
     PredictionStore* store, const v1::ComparePredictionsRequest* request) {
-  auto* call =
-      new Comparison(std::move(scope), context, timer, patience, registry, catalog, store, request);
+  auto* call = new Comparison(std::move(scope), CancelOf(context), timer, patience, registry,
+                              catalog, store, request);
   call->Start();
   return call;
 }

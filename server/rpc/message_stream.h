@@ -16,6 +16,14 @@
 
 namespace tissueform {
 
+// Ends a call whose client takes nothing, from any thread. Nothing where there is no network.
+using CancelCall = std::function<void()>;
+inline CancelCall CancelOf(grpc::CallbackServerContext* context) {
+  return [context] {
+    if (context != nullptr) context->TryCancel();
+  };
+}
+
 // A call that answers with messages, each made when the client has taken the one before. Deletes
 // itself when gRPC is done with it.
 //
@@ -27,10 +35,10 @@ class MessageStream : public grpc::ServerWriteReactor<Response> {
   // Makes the next message; false when there is none. Called from threads of gRPC: not long.
   using Next = std::function<bool(Response* message)>;
 
-  // `context` (null where there is no network) and `timer` must outlive the call.
-  MessageStream(CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
+  // A message that is not taken within `patience` is the last one. `timer` must outlive the call.
+  MessageStream(CallScope scope, CancelCall cancel, DeadlineTimer* timer,
                 std::chrono::milliseconds patience)
-      : scope_(std::move(scope)), context_(context), timer_(timer), patience_(patience) {}
+      : scope_(std::move(scope)), cancel_(std::move(cancel)), timer_(timer), patience_(patience) {}
 
   const CallScope& scope() const { return scope_; }
 
@@ -63,14 +71,12 @@ class MessageStream : public grpc::ServerWriteReactor<Response> {
       return;
     }
     // Before the write, which may be done at once.
-    deadline_ = timer_->Start(std::chrono::steady_clock::now() + patience_, [this] {
-      if (context_ != nullptr) context_->TryCancel();
-    });
+    deadline_ = timer_->Start(std::chrono::steady_clock::now() + patience_, cancel_);
     this->StartWrite(&message_);
   }
 
   CallScope scope_;
-  grpc::CallbackServerContext* const context_;
+  const CancelCall cancel_;
   DeadlineTimer* const timer_;
   const std::chrono::milliseconds patience_;
   Next next_;

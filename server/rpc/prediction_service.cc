@@ -151,8 +151,8 @@ grpc::ServerUnaryReactor* PredictionService::CreatePrediction(
 grpc::ServerWriteReactor<v1::ReadPositionsResponse>* PredictionService::ReadPositions(
     grpc::CallbackServerContext* context, const v1::ReadPositionsRequest* request) {
   auto* call = new MessageStream<v1::ReadPositionsResponse>(
-      CallScope(context, "PredictionService.ReadPositions", CallKind::kUpkeep, gate_), context,
-      timer_, limits_.upload_silence);
+      CallScope(context, "PredictionService.ReadPositions", CallKind::kUpkeep, gate_),
+      CancelOf(context), timer_, limits_.upload_silence);
   registry_->pool().Post(Lane::kStore, [call, request, store = store_] {
     absl::StatusOr<std::string> positions = ReadFrom(*request, store);
     if (!positions.ok()) {

@@ -4,7 +4,9 @@
 #include "server/rpc/message_stream.h"
 
 #include <chrono>
+#include <future>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -23,15 +25,30 @@ using Message = v1::ReadPositionsResponse;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-// The client takes so many messages, then it is gone.
+// The client takes so many messages, then it is gone, or takes nothing until the call is cancelled.
 class FakeWriterCall : public grpc::ServerCallbackWriter<Message> {
  public:
-  FakeWriterCall(WorkerPool* pool, size_t most) : state_(pool), most_(most) {}
+  enum class Then { kGone, kTakesNothing };
+  FakeWriterCall(WorkerPool* pool, size_t most, Then then = Then::kGone)
+      : state_(pool), most_(most), then_(then) {}
 
   void Bind(MessageStream<Message>* stream) {
     stream_ = stream;
     BindReactor(stream);
     state_.Bind(stream);
+  }
+  // By the server.
+  void Cancel() {
+    {
+      MutexLock lock(mutex_);
+      ++cancellations_;
+      if (!std::exchange(write_waits_, false)) return;
+    }
+    state_.React([this] { stream_->OnWriteDone(false); });
+  }
+  int cancellations() const {
+    MutexLock lock(mutex_);
+    return cancellations_;
   }
   std::optional<grpc::Status> WaitUntilDone() { return state_.WaitUntilDone(); }
   std::vector<int64_t> offsets() const {
@@ -48,6 +65,8 @@ class FakeWriterCall : public grpc::ServerCallbackWriter<Message> {
         MutexLock lock(mutex_);
         ok = offsets_.size() < most_;
         if (ok) offsets_.push_back(message->chunk().offset());
+        write_waits_ = !ok && then_ == Then::kTakesNothing && cancellations_ == 0;
+        if (write_waits_) return;
       }
       stream_->OnWriteDone(ok);
     });
@@ -61,15 +80,19 @@ class FakeWriterCall : public grpc::ServerCallbackWriter<Message> {
   MessageStream<Message>* stream_ = nullptr;  // constant after Bind
   FakeCallState state_;
   const size_t most_;
+  const Then then_;
   mutable Mutex mutex_;
   std::vector<int64_t> offsets_ ABSL_GUARDED_BY(mutex_);
+  bool write_waits_ ABSL_GUARDED_BY(mutex_) = false;
+  int cancellations_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
 class MessageStreamTest : public ::testing::Test {
  protected:
-  MessageStream<Message>* NewStream() {
+  MessageStream<Message>* NewStream(
+      CancelCall cancel = [] {}, std::chrono::milliseconds patience = std::chrono::minutes(1)) {
     return new MessageStream<Message>(CallScope(nullptr, "Test.Read", CallKind::kUpkeep, &gate_),
-                                      nullptr, &timer_, std::chrono::minutes(1));
+                                      std::move(cancel), &timer_, patience);
   }
 
   static MessageStream<Message>::Next Offsets(int64_t count) {
@@ -109,6 +132,39 @@ TEST_F(MessageStreamTest, AClientThatIsGoneEndsIt) {
   EXPECT_EQ(status->error_code(), grpc::StatusCode::CANCELLED);
   EXPECT_THAT(call.offsets(), ElementsAre(0, 1));
   EXPECT_TRUE(Idle());
+}
+
+TEST_F(MessageStreamTest, AClientThatTakesNothingIsGivenUp) {
+  FakeWriterCall call(&reactions_, 3, FakeWriterCall::Then::kTakesNothing);
+  MessageStream<Message>* stream =
+      NewStream([&call] { call.Cancel(); }, std::chrono::milliseconds(20));
+  call.Bind(stream);
+  stream->Send(Offsets(1'000'000));
+  const std::optional<grpc::Status> status = call.WaitUntilDone();
+  ASSERT_TRUE(status.has_value()) << "it waits for ever";
+  EXPECT_EQ(status->error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_NE(status->error_message().find("in time"), std::string::npos);
+  EXPECT_EQ(call.cancellations(), 1);
+  EXPECT_THAT(call.offsets(), ElementsAre(0, 1, 2));
+  EXPECT_TRUE(Idle());
+}
+
+// Every message has the whole time, and what was taken leaves no deadline behind.
+TEST_F(MessageStreamTest, AClientThatTakesItsMessagesIsNotGivenUp) {
+  constexpr std::chrono::milliseconds kPatience{500};
+  FakeWriterCall call(&reactions_, 100);
+  MessageStream<Message>* stream = NewStream([&call] { call.Cancel(); }, kPatience);
+  call.Bind(stream);
+  stream->Send(Offsets(50));
+  const std::optional<grpc::Status> status = call.WaitUntilDone();
+  ASSERT_TRUE(status.has_value());
+  // Deadlines pass in their order: once this one has, those of the messages have.
+  std::promise<void> passed;
+  timer_.Start(std::chrono::steady_clock::now() + kPatience, [&passed] { passed.set_value(); });
+  passed.get_future().wait();
+  EXPECT_EQ(call.offsets().size(), 50U);
+  EXPECT_TRUE(status->ok());
+  EXPECT_EQ(call.cancellations(), 0);
 }
 
 TEST_F(MessageStreamTest, AnErrorInPlaceOfMessagesIsItsEnd) {
