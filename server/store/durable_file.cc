@@ -59,6 +59,14 @@ absl::Status FileError(int error_number, absl::string_view what, const std::stri
 
 absl::StatusOr<OpenFile> OpenFile::Open(const std::string& path, int flags) {
   const int descriptor = open(path.c_str(), flags | O_CLOEXEC, S_IRUSR | S_IWUSR);
+  // Not NotFound, which would say of a client's mesh or session that it is not there.
+  if (descriptor < 0 && errno == ENOENT && (flags & (O_CREAT | O_DIRECTORY)) != 0) {
+    return NamingPath(absl::UnavailableError(absl::StrCat(
+                          "cannot open ", path,
+                          ": its folder has been removed while the server runs, nothing can be "
+                          "kept; put it back and start the server again")),
+                      path);
+  }
   if (descriptor < 0) return FileError(errno, "cannot open", path);
   return OpenFile(path, descriptor);
 }

@@ -16,8 +16,8 @@
 namespace tissueform {
 
 // Files whose owner must know when they are on the disk. Errors of all: ResourceExhausted (the disk
-// is full, or a limit on files), FailedPrecondition (read-only), NotFound, or what the system says;
-// they name the path and say what to do.
+// is full, or a limit on files), FailedPrecondition (read-only), NotFound, Unavailable (no folder
+// to make a file in), or what the system says; they name the path and say what to do.
 
 // What the system has said, as a Status; `what` begins the message ("cannot write").
 absl::Status FileError(int error_number, absl::string_view what, const std::string& path);

@@ -231,6 +231,30 @@ TEST_F(DeformStreamTest, AVanishedConnectionLeavesNothingAndDisturbsNobody) {
   ExpectServes();
 }
 
+TEST_F(DeformStreamTest, AFloodOfPosesWithoutAcknowledgementsIsTwoFramesAndTheNewestPose) {
+  constexpr int kFlood = 20'000;
+  const int64_t bytes = server().memory_budget().reserved_bytes();
+  const auto flood = Open();
+  for (int sequence = 1; sequence <= kFlood; ++sequence) {
+    ASSERT_THAT(flood->SendPoses(sequence, TopPose(SomePose(sequence % 5))), IsOk());
+    if (sequence % 5'000 == 0) {
+      EXPECT_THAT(client_->DeformOnce(session_, TopPose(SomePose(1))), IsOk()) << "others go on";
+    }
+  }
+  // The credits are spent: what comes next is the newest pose, once no more will come.
+  std::vector<v1::DeformFrame> frames;
+  flood->CloseSending();
+  while (std::optional<v1::DeformFrame> frame = flood->Receive()) frames.push_back(*frame);
+  EXPECT_THAT(flood->Finish(), IsOk());
+  ASSERT_EQ(frames.size(), 3U);
+  EXPECT_EQ(frames[2].sequence(), static_cast<uint64_t>(kFlood));
+  int64_t accounted = 0;
+  for (const v1::DeformFrame& frame : frames) accounted += 1 + frame.coalesced_count();
+  EXPECT_EQ(accounted, kFlood);
+  EXPECT_EQ(server().memory_budget().reserved_bytes(), bytes);
+  ExpectServes();
+}
+
 TEST_F(DeformStreamTest, AReaderThatNeverReadsBlocksNobody) {
   const BarProblem big(2, {8, 8, 24});
   const std::string big_session = MakeSession(client_.get(), big).name();

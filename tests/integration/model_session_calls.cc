@@ -21,6 +21,7 @@ namespace {
 template <typename Map>
 std::vector<std::string> NamesOf(const Map& map) {
   std::vector<std::string> names;
+  names.reserve(map.size());
   for (const auto& [name, entry] : map) names.push_back(name);
   return names;
 }

@@ -22,6 +22,7 @@
 #include "client/cli/online/server_process.h"
 #include "client/cpp/reattaching_stream.h"
 #include "client/cpp/tissueform_client.h"
+#include "core/base/error_reason.h"
 #include "proto/conversion/answer_conversion.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "tests/integration/durable_server.h"
@@ -275,6 +276,29 @@ TEST_F(RestartTest, AFailedCommitIsToldWithoutTheServersPaths) {
   EXPECT_THAT(stream->Finish(), IsOk());
   EXPECT_THAT(failure, HasSubstr("removed"));
   EXPECT_THAT(failure, ::testing::Not(HasSubstr(server_.folder().filename().string())));
+}
+
+TEST_F(RestartTest, WithoutItsFolderTheServerKeepsNothingSaysSoAndAnswersOn) {
+  ASSERT_NO_FATAL_FAILURE(Start());
+  const std::unique_ptr<TissueformClient> client = Connect();
+  const v1::Session session = MakeSession(client.get(), "a-session-of-this-test");
+  std::filesystem::remove_all(server_.folder());
+  const BarProblem other(2);
+  SessionRequest request = bar_.Request(session.mesh());
+  request.session_id = "another-session-of-this-test";
+  for (const absl::Status& refused :
+       {client->UploadMesh(other.mesh, {}).status(), client->CreateSession(request).status(),
+        client->predictions().Create(session.name(), TopPose(SomePose(1))).status()}) {
+    EXPECT_THAT(refused, StatusIs(absl::StatusCode::kUnavailable));
+    EXPECT_EQ(ReasonOf(refused), ReasonName(ErrorReason::kUnavailable));
+    EXPECT_THAT(refused.message(), ::testing::Not(HasSubstr(server_.folder().filename().string())));
+  }
+  ASSERT_OK_AND_ASSIGN(const v1::DeformOnceResponse answer,
+                       client->DeformOnce(session.name(), TopPose(SomePose(3))));
+  ASSERT_OK_AND_ASSIGN(const Positions positions,
+                       DecodePositions(answer.positions(), bar_.mesh.num_vertices()));
+  EXPECT_LT((positions - bar_.Solve(SomePose(3))).cwiseAbs().maxCoeff(), kFloat32Tolerance);
+  EXPECT_THAT(server_.Drain(), IsOk());
 }
 
 TEST_F(RestartTest, ASecondServerIsRefusedTheFolder) {

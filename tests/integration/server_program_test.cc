@@ -1,7 +1,9 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include <array>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <future>
 #include <memory>
@@ -21,6 +23,7 @@
 
 #include "client/cli/online/server_process.h"
 #include "core/process/child_process.h"
+#include "tests/integration/durable_server.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/killed_starter.h"
 #include "tests/testing/status_matchers.h"
@@ -215,6 +218,39 @@ TEST(ServerProgramStartTest, WrongUseEndsWithTwo) {
   const std::string command = ProgramPath("tissueform-server") + " --port 99999 2>/dev/null";
   const int status = std::system(command.c_str());
   EXPECT_EQ(WEXITSTATUS(status), 2);
+}
+
+// What a program prints, and how it ends.
+std::pair<std::string, int> OutputOf(const std::string& command) {
+  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
+  std::string output;
+  std::array<char, 256> part{};
+  while (std::fgets(part.data(), part.size(), pipe) != nullptr) output += part.data();
+  return {output, WEXITSTATUS(pclose(pipe))};
+}
+
+TEST_F(ServerProgramTest, ATakenPortOrFolderIsOneLineAndTheEnd) {
+  const std::string& address = process_->address();
+  const std::string port = address.substr(address.rfind(':') + 1);
+  const DurableServer folder("taken");
+  const std::string options =
+      " --log-level off --data-dir " + folder.folder().string() + " --port ";
+  const std::string program = ProgramPath("tissueform-server") + options;
+  const auto [of_port, port_code] = OutputOf(program + port);
+  EXPECT_EQ(port_code, 1);
+  EXPECT_THAT(of_port, ::testing::StartsWith("tissueform-server: cannot listen on "));
+  EXPECT_EQ(of_port.find('\n'), of_port.size() - 1) << of_port;
+
+  ASSERT_OK_AND_ASSIGN(const auto holder,
+                       ServerProcess::Start(ProgramPath("tissueform-server"),
+                                            {"--log-level", "off", "--data-dir",
+                                             folder.folder().string(), "--port", "0"},
+                                            kPatience));
+  const auto [of_folder, folder_code] = OutputOf(program + "0");
+  EXPECT_EQ(folder_code, 1);
+  EXPECT_THAT(of_folder, HasSubstr("another server"));
+  EXPECT_EQ(of_folder.find('\n'), of_folder.size() - 1) << of_folder;
+  EXPECT_THAT(client_->GetServerInfo(), IsOk()) << "who was there serves on";
 }
 
 // gRPC 1.51 by itself is deaf for ever after this (CVE-2023-4785).

@@ -9,6 +9,7 @@
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "spdlog/spdlog.h"
 
 #include "server/rpc/resource_conversion.h"
 #include "tests/server/rpc/reactors_fixture.h"
@@ -170,6 +171,38 @@ TEST_F(ReactorsTest, AClientThatDoesNotReadGetsOneWriteAndOthersGoOn) {
   EXPECT_LE(stuck.writes_started(), 2) << "`started` and one frame";
   stuck.Cancel();
   EXPECT_EQ(stuck.WaitUntilDone()->error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_EQ(streams_.size(), 0);
+}
+
+TEST_F(ReactorsTest, OfTenThousandStreamsAsManyAreServedAsThereArePlaces) {
+  const auto level = spdlog::get_level();
+  spdlog::set_level(spdlog::level::off);  // one line for each that is refused
+  const std::string session = MakeSession();
+  ServiceLimits patient = limits_;
+  patient.configuration_deadline = std::chrono::minutes(10);
+  DeformService service(&gate_, patient, &registry_, &streams_, &watches_, &timer_);
+  const auto places = static_cast<size_t>(limits_.max_streams);
+  std::vector<std::unique_ptr<FakeStream>> streams;
+  for (int i = 0; i < 10'000; ++i) {
+    streams.push_back(std::make_unique<FakeStream>(reactions_.get()));
+    streams.back()->Bind(service.Deform(nullptr));
+  }
+  EXPECT_EQ(streams_.size(), limits_.max_streams);
+  for (size_t i = places; i < streams.size(); ++i) {
+    const auto status = streams[i]->WaitUntilDone();
+    ASSERT_TRUE(status.has_value());
+    ASSERT_EQ(status->error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+    ASSERT_NE(status->error_details().find("TOO_MANY_STREAMS"), std::string::npos);
+  }
+  spdlog::set_level(level);
+  for (size_t i = 0; i < places; ++i) {
+    streams[i]->Send(Configuration(session));
+    EXPECT_TRUE(streams[i]->Receive()->has_started());
+    streams[i]->Send(Pose(1));
+    EXPECT_TRUE(streams[i]->Receive()->has_frame());
+    streams[i]->CloseSending();
+    EXPECT_TRUE(streams[i]->WaitUntilDone()->ok());
+  }
   EXPECT_EQ(streams_.size(), 0);
 }
 
