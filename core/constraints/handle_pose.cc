@@ -16,6 +16,8 @@ namespace {
 // Far beyond any head, far below where squares overflow (docs/plan-format.md).
 constexpr double kLargestScale = 1e6;
 constexpr double kLargestLengthMm = 1e9;
+// Far beyond any twist; there sine and cosine still have ten digits.
+constexpr double kLargestAngle = 1e6;
 
 absl::Status CheckFinite(const Eigen::Vector3d& vector, absl::string_view field) {
   if (vector.allFinite()) {
@@ -49,6 +51,11 @@ absl::Status CheckPose(const HandlePose& pose) {
   }
   if (auto status = CheckFinite(pose.translation_mm, "translation"); !status.ok()) {
     return status;
+  }
+  if (const double largest = pose.rotation_vector.cwiseAbs().maxCoeff(); largest > kLargestAngle) {
+    return absl::InvalidArgumentError(absl::StrCat("pose has a rotation vector of ", largest,
+                                                   " radians; it may be ", kLargestAngle,
+                                                   " at most, so that positions stay finite"));
   }
   if (!std::isfinite(pose.scale) || pose.scale <= 0) {
     return absl::InvalidArgumentError(

@@ -12,7 +12,7 @@ namespace tissueform {
 
 // Where a handle goes: x = pivot + scale * exp([rotation_vector]) * (v - pivot) + translation.
 //
-// The rotation vector is axis times angle in radians and is not bounded: 2 pi about x is a full
+// The rotation vector is axis times angle in radians and goes beyond a turn: 2 pi about x is a full
 // twist, which the deformers tell from no rotation at all. That is why it is neither a quaternion
 // nor a matrix.
 struct HandlePose {
@@ -25,7 +25,7 @@ struct HandlePose {
 // exp([w]), the rotation by |w| about w. Accurate near zero.
 Eigen::Matrix3d RotationMatrix(const Eigen::Vector3d& rotation_vector);
 
-// InvalidArgument, naming the field, when a number is NaN or infinite or the scale is not positive.
+// InvalidArgument, naming the field: a number that is not finite, or too large; a scale <= 0.
 absl::Status CheckPose(const HandlePose& pose);
 
 Eigen::Vector3d ApplyPose(const HandlePose& pose, const Eigen::Vector3d& position);

@@ -86,6 +86,23 @@ TEST(CheckPoseTest, NumbersThatWouldOverflowAreRefused) {
   pose = {};
   pose.pivot_mm.x() = -1e300;
   EXPECT_THAT(CheckPose(pose), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("pivot")));
+  pose = {};
+  pose.rotation_vector.y() = -1e300;
+  EXPECT_THAT(CheckPose(pose),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("rotation vector")));
+}
+
+TEST(CheckPoseTest, TheLargestLegalNumbersGiveFinitePositions) {
+  const HandlePose pose{.rotation_vector = {1e6, -1e6, 1e6},
+                        .pivot_mm = {1e9, -1e9, 1e9},
+                        .translation_mm = {-1e9, 1e9, 1e9},
+                        .scale = 1e6};
+  ASSERT_THAT(CheckPose(pose), IsOk());
+  EXPECT_TRUE(ApplyPose(pose, {1, 2, 3}).allFinite());
+  EXPECT_LT((RotationMatrix(pose.rotation_vector) * RotationMatrix(-pose.rotation_vector) -
+             Eigen::Matrix3d::Identity())
+                .norm(),
+            1e-9);
 }
 
 HandlePose Turned() {
