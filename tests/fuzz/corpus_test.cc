@@ -60,7 +60,8 @@ INSTANTIATE_TEST_SUITE_P(
                       Target{"dicom_series", FuzzDicomSeries},
                       Target{"volume_header", FuzzVolumeHeader}, Target{"recipe", FuzzRecipe},
                       Target{"medit", FuzzMeditLines}, Target{"displacements", FuzzDisplacements},
-                      Target{"store_record", FuzzStoreRecord}),
+                      Target{"store_record", FuzzStoreRecord},
+                      Target{"deform_stream", FuzzDeformStream}),
     [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

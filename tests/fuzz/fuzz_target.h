@@ -39,6 +39,12 @@ void FuzzDisplacements(const uint8_t* data, size_t size);
 // A MEDIT text, before Gmsh sees it (CheckMeditLines).
 void FuzzMeditLines(const uint8_t* data, size_t size);
 
+// What clients send to DeformService: messages of drags and watches as they come from the network,
+// each after a byte that says of what and its length; the first byte may also end the drag, begin
+// another, take the session out of memory or drain the server. Every call ends with a code of its
+// rpc and a reason, and no number of an answer is infinite or none.
+void FuzzDeformStream(const uint8_t* data, size_t size);
+
 // Rows of a store's database and announcements of uploads, the first byte says of what
 // (ParseRecord, ParsePoses, ParseMesh, ParseAnnouncement, ParsePrediction, Unseal): what is
 // accepted comes back from its own bytes.

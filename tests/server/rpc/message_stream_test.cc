@@ -14,7 +14,7 @@
 #include "gtest/gtest.h"
 
 #include "core/base/mutex.h"
-#include "tests/server/rpc/fake_calls.h"
+#include "tests/testing/fake_calls.h"
 #include "tissueform/v1/prediction_service.pb.h"
 
 // Without sockets: reactions come from threads that ThreadSanitizer sees through.

@@ -18,7 +18,7 @@
 #include "server/rpc/session_service.h"
 #include "server/store/in_memory_session_store.h"
 #include "server/store/upload_store.h"
-#include "tests/server/rpc/fake_calls.h"
+#include "tests/testing/fake_calls.h"
 #include "tests/testing/fake_clock.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/session_samples.h"

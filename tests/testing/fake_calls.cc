@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "tests/server/rpc/fake_calls.h"
+#include "tests/testing/fake_calls.h"
 
 namespace tissueform::testing {
 
