@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "google/protobuf/stubs/logging.h"
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 #include "spdlog/spdlog.h"
@@ -59,6 +60,7 @@ double NumberIn(const google::protobuf::Message& message,
 RpcRig::RpcRig() {
   SetBlasThreads(1);
   spdlog::set_level(spdlog::level::off);
+  google::protobuf::SetLogHandler(nullptr);  // one line for every name that is no UTF-8
   registry.set_observer([this](const std::string& id, SessionRegistry::Event event) {
     watches.OnSessionEvent(id, event);
   });

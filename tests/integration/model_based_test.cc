@@ -5,7 +5,7 @@
 // acknowledged and predicts every answer, code and reason; the program ends in between, by itself
 // and by kill -9. Seeds and steps are fixed; by hand there may be more:
 //
-//   TISSUEFORM_MODEL_SEEDS=200 TISSUEFORM_MODEL_STEPS=400 bin/integration_model_test
+//   TISSUEFORM_MODEL_SEEDS=200 TISSUEFORM_MODEL_STEPS=400 build/release/bin/integration_model_test
 
 #include <algorithm>
 #include <cstdlib>
