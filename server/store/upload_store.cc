@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
@@ -87,6 +88,7 @@ struct UploadStore::Part {
     if (!named) TF_RETURN_IF_ERROR(SyncFolder(folder));
     named = true;
     synced = size;
+    synced_at = std::chrono::steady_clock::now();
     broken = false;
     return absl::OkStatus();
   }
@@ -98,6 +100,8 @@ struct UploadStore::Part {
   OpenFile mark ABSL_GUARDED_BY(mutex);
   int64_t size ABSL_GUARDED_BY(mutex);
   int64_t synced ABSL_GUARDED_BY(mutex);
+  std::chrono::steady_clock::time_point synced_at ABSL_GUARDED_BY(mutex) =
+      std::chrono::steady_clock::now();
   bool broken ABSL_GUARDED_BY(mutex) = false;   // a sync has failed
   bool named ABSL_GUARDED_BY(mutex) = false;    // the folder is synced
   bool dropped ABSL_GUARDED_BY(mutex) = false;  // its files are gone; whoever still has it looks
@@ -268,8 +272,9 @@ absl::Status UploadStore::Append(const std::string& sha256, int64_t offset,
   }
   TF_FAULT_POINT("upload.appended");
   part->size += count;
-  return part->size - part->synced >= kSyncEveryBytes && durable_ ? part->Sync(folder_)
-                                                                  : absl::OkStatus();
+  const bool due = part->size - part->synced >= kSyncEveryBytes ||
+                   std::chrono::steady_clock::now() - part->synced_at >= limits_.sync_every;
+  return due && durable_ ? part->Sync(folder_) : absl::OkStatus();
 }
 
 absl::StatusOr<int64_t> UploadStore::Committed(const std::string& sha256) {

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -27,6 +28,9 @@ struct UploadAnnouncement {
 struct UploadLimits {
   int64_t max_bytes = int64_t{8} << 30;  // received of all parts together
   int max_parts = 256;
+  // Bytes that have come since a part was synced and so long ago are synced with the next ones, so
+  // that of an upload over a slow line little is lost with the server.
+  std::chrono::milliseconds sync_every{2'000};
 };
 
 // Meshes that have not arrived in full: one file each (SHA256.part) with what was announced beside
@@ -34,8 +38,8 @@ struct UploadLimits {
 // it is whole.
 //
 // What is said to be committed (Begin, Committed) is on the disk: these sync first. Between them a
-// part is synced every kSyncEveryBytes. After a restart a part ends where it was last synced, so
-// call Committed where a stream ends, in whatever way.
+// part is synced every kSyncEveryBytes and UploadLimits::sync_every. After a restart a part ends
+// where it was last synced, so call Committed where a stream ends, in whatever way.
 //
 // Calls block on the disk. Thread-safe; calls for one part take turns.
 class UploadStore {

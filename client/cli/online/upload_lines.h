@@ -8,12 +8,14 @@
 #include <string>
 #include <utility>
 
+#include "absl/status/status.h"
+
 #include "client/cpp/mesh_upload.h"
 
 namespace tissueform {
 
 // Tells in lines how an upload goes: how far it is, a line a second once it has taken longer than
-// one; that it was interrupted; that it goes on, and where.
+// one; that it was interrupted, not at every attempt; that it goes on, and where.
 class UploadLines {
  public:
   using Print = std::function<void(const std::string& line)>;
@@ -27,10 +29,16 @@ class UploadLines {
 
  private:
   void Progress(int64_t sent_bytes, int64_t total_bytes);
+  void Interrupted(const absl::Status& why);
+  void Resumed(const std::string& line);
 
   const Print print_;
   const Seconds seconds_;
   double next_s_ = 1;
+  bool told_ = false;
+  absl::StatusCode interrupted_by_ = absl::StatusCode::kOk;
+  double interrupted_s_ = 0;
+  std::string resumed_;  // the last line of it since an interruption was told
 };
 
 }  // namespace tissueform

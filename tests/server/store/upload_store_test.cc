@@ -4,6 +4,7 @@
 #include "server/store/upload_store.h"
 
 #include <algorithm>
+#include <chrono>
 #include <ctime>
 #include <fcntl.h>
 #include <filesystem>
@@ -82,7 +83,17 @@ TEST_F(UploadStoreTest, APartGoesOnAfterARestart) {
   EXPECT_EQ(payload.View().Sha256(), name_);
 }
 
+TEST_F(UploadStoreTest, AfterSomeTimeWhatCameIsSyncedUnasked) {
+  Reopen({.sync_every = std::chrono::milliseconds(0)});
+  ASSERT_THAT(store_->Begin(announcement_), IsOk());
+  ASSERT_THAT(store_->Append(name_, 0, bytes_.substr(0, 5000)), IsOk());
+  Reopen();
+  ASSERT_OK_AND_ASSIGN(const int64_t committed, store_->Committed(name_));
+  EXPECT_EQ(committed, 5000);
+}
+
 TEST_F(UploadStoreTest, AfterARestartNothingStandsBehindTheLastSync) {
+  Reopen({.sync_every = std::chrono::hours(1)});
   ASSERT_THAT(store_->Begin(announcement_), IsOk());
   ASSERT_THAT(store_->Append(name_, 0, bytes_.substr(0, 5000)), IsOk());
   ASSERT_THAT(store_->Committed(name_), IsOk());

@@ -35,7 +35,7 @@ TEST_F(UploadLinesTest, ALongOneSaysALineASecond) {
     options_.on_progress(step * 100'000, 3'000'000);
   }
   EXPECT_THAT(lines_, ElementsAre("uploading: 0.8 of 3.0 MB", "uploading: 1.6 of 3.0 MB",
-                                  "uploading: 2.4 of 3.0 MB"));
+                                  "uploading: 2.4 of 3.0 MB", "uploading: 3.0 of 3.0 MB"));
 }
 
 TEST_F(UploadLinesTest, WhatHappenedIsSaidAtOnce) {
@@ -45,6 +45,18 @@ TEST_F(UploadLinesTest, WhatHappenedIsSaidAtOnce) {
   EXPECT_THAT(lines_, ElementsAre("the upload goes on: the server has 1.5 of 3.0 MB already",
                                   "the upload is interrupted (nobody is there); trying again",
                                   "the upload begins anew"));
+}
+
+TEST_F(UploadLinesTest, AttemptsThatFailAlikeAreNotAllTold) {
+  for (now_s_ = 0; now_s_ < 19; now_s_ += 2) {
+    options_.on_interrupted(absl::AbortedError("another client sends"));
+    options_.on_resumed(1'500'000, 3'000'000);
+  }
+  options_.on_interrupted(absl::UnavailableError("nobody is there"));
+  const std::string waits = "the upload is interrupted (another client sends); trying again";
+  const std::string goes_on = "the upload goes on: the server has 1.5 of 3.0 MB already";
+  EXPECT_THAT(lines_, ElementsAre(waits, goes_on, waits, goes_on,
+                                  "the upload is interrupted (nobody is there); trying again"));
 }
 
 }  // namespace
