@@ -17,21 +17,24 @@ DeformStream::~DeformStream() {
   }
 }
 
+v1::DeformConfiguration DeformStream::ConfigurationOf(const Options& options) {
+  v1::DeformConfiguration configuration;
+  *configuration.mutable_vertices() = ToProto(options.vertices);
+  configuration.set_model(options.model);
+  configuration.set_encoding(options.encoding);
+  if (options.prepared.has_value()) *configuration.mutable_prepared() = *options.prepared;
+  if (options.max_unacked.has_value()) configuration.set_max_unacked(*options.max_unacked);
+  return configuration;
+}
+
 absl::Status DeformStream::Start(v1::DeformService::Stub* stub, const std::string& session,
                                  const Options& options) {
   on_notice_ = options.on_notice;
   AddSessionHeader(session, &context_);
   call_ = stub->Deform(&context_);
   v1::DeformRequest request;
-  v1::DeformConfiguration* configuration = request.mutable_configuration();
-  configuration->set_session(session);
-  *configuration->mutable_vertices() = ToProto(options.vertices);
-  configuration->set_model(options.model);
-  configuration->set_encoding(options.encoding);
-  if (options.prepared.has_value()) *configuration->mutable_prepared() = *options.prepared;
-  if (options.max_unacked.has_value()) {
-    configuration->set_max_unacked(*options.max_unacked);
-  }
+  *request.mutable_configuration() = ConfigurationOf(options);
+  request.mutable_configuration()->set_session(session);
   v1::DeformResponse response;
   if (!Send(request).ok() || !call_->Read(&response)) {
     return Finish();

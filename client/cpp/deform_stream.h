@@ -39,6 +39,9 @@ class DeformStream {
     std::function<void(const v1::DeformNotice&)> on_notice;
   };
 
+  // What a stream with these options asks for, without its session.
+  static v1::DeformConfiguration ConfigurationOf(const Options& options);
+
   // Cancels the stream unless Finish was called.
   ~DeformStream();
 

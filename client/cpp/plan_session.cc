@@ -48,6 +48,18 @@ absl::StatusOr<std::unique_ptr<PlanSession>> PlanSession::Create(TissueformClien
   return std::unique_ptr<PlanSession>(new PlanSession(client, std::move(description)));
 }
 
+absl::StatusOr<std::unique_ptr<PlanSession>> PlanSession::Create(
+    TissueformClient* client, const PlanProblem& problem, const PreparationWait& wait,
+    const DeformStream::Options* stream) {
+  TF_ASSIGN_OR_RETURN(const v1::Mesh mesh, UploadMeshOf(client, problem));
+  TF_RETURN_IF_ERROR(wait.cancellation.Check());
+  v1::PrepareSessionRequest request;
+  *request.mutable_create() = ToProto(SessionRequestOf(problem, mesh.name()));
+  if (stream != nullptr) *request.mutable_stream() = DeformStream::ConfigurationOf(*stream);
+  TF_ASSIGN_OR_RETURN(v1::Session description, client->PrepareSession(request, wait));
+  return std::unique_ptr<PlanSession>(new PlanSession(client, std::move(description)));
+}
+
 PlanSession::PlanSession(TissueformClient* client, v1::Session description)
     : client_(client), description_(std::move(description)) {}
 

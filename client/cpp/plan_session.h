@@ -25,6 +25,11 @@ class PlanSession {
   // Errors: those of UploadMesh and CreateSession.
   static absl::StatusOr<std::unique_ptr<PlanSession>> Create(TissueformClient* client,
                                                              const PlanProblem& problem);
+  // The same for somebody who waits for it. Where `stream` is given, what a stream with these
+  // options asks for is made ready, too. Errors: and those of PrepareSession.
+  static absl::StatusOr<std::unique_ptr<PlanSession>> Create(
+      TissueformClient* client, const PlanProblem& problem, const PreparationWait& wait,
+      const DeformStream::Options* stream = nullptr);
   ~PlanSession();
   PlanSession(const PlanSession&) = delete;
   PlanSession& operator=(const PlanSession&) = delete;

@@ -182,6 +182,15 @@ absl::StatusOr<v1::Session> TissueformClient::UpdateSession(
   return session;
 }
 
+absl::StatusOr<v1::Session> TissueformClient::PrepareSession(
+    const v1::PrepareSessionRequest& request, const PreparationWait& wait) {
+  std::string name = request.open();
+  if (request.has_create()) name = SessionName(request.create().session_id());
+  if (request.has_update()) name = request.update().name();
+  return WaitForSession(sessions_.get(), request, name,
+                        std::chrono::system_clock::now() + options_.call_deadline, wait);
+}
+
 absl::Status TissueformClient::DeleteSession(const std::string& name) {
   grpc::ClientContext context;
   SetDeadline(&context);

@@ -16,6 +16,7 @@
 #include "client/cpp/deform_stream.h"
 #include "client/cpp/mesh_upload.h"
 #include "client/cpp/prediction_calls.h"
+#include "client/cpp/prepare_session.h"
 #include "client/cpp/watch_stream.h"
 #include "core/mesh/tet_mesh.h"
 #include "core/mesh_payload/mesh_payload.h"
@@ -73,6 +74,10 @@ class TissueformClient {
   absl::StatusOr<std::vector<v1::Session>> ListSessions();
   // Prepared anew when it returns. Errors: Aborted also when request.etag is not the session's.
   absl::StatusOr<v1::Session> UpdateSession(const v1::UpdateSessionRequest& request);
+  // CreateSession, UpdateSession, or a session that is to be in memory, with word of how far it is,
+  // and cancelled at once. Errors: theirs; Cancelled.
+  absl::StatusOr<v1::Session> PrepareSession(const v1::PrepareSessionRequest& request,
+                                             const PreparationWait& wait);
   absl::Status DeleteSession(const std::string& name);
 
   // `model` is the session's own when unspecified.

@@ -90,6 +90,7 @@ absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
   // in a scanner's coordinates, a small turn would be the difference of two large columns.
   elastic->origin_ =
       0.5 * (mesh.positions().colwise().minCoeff() + mesh.positions().colwise().maxCoeff());
+  TellProgress(options.observer, PreparationStage::kAssembling);
   Stopwatch stopwatch;
   {
     const PiecewiseLinearElements elements = ElementsOf(mesh);
@@ -97,41 +98,45 @@ absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
     const SparseMatrix K =
         ElasticStiffness(elements, vertex_cells, stiffness, options.poisson_ratio, options.threads);
     elastic->assemble_seconds_ = stopwatch.Seconds();
-    TF_ASSIGN_OR_RETURN(
-        elastic->system_,
-        DirichletSystem::Create(
-            K, ConstrainedUnknowns(constraints),
-            {.backend = options.backend, .admission = options.admission, .unknowns_per_node = 3},
-            cancellation));
+    TF_ASSIGN_OR_RETURN(elastic->system_,
+                        DirichletSystem::Create(K, ConstrainedUnknowns(constraints),
+                                                {.backend = options.backend,
+                                                 .admission = options.admission,
+                                                 .unknowns_per_node = 3,
+                                                 .observer = options.observer},
+                                                cancellation));
   }
   TF_ASSIGN_OR_RETURN(const double of_system,
                       elastic->system_->EstimateCondition(kConditionIterations));
   elastic->condition_estimate_ = std::max(of_system, VolumeToShear(options.poisson_ratio));
   TF_RETURN_IF_ERROR(CheckCondition(elastic->condition_estimate_, options.poisson_ratio));
   stopwatch.Restart();
-  TF_RETURN_IF_ERROR(elastic->PrepareResponses(mesh, constraints, options.admission, cancellation));
+  TF_RETURN_IF_ERROR(elastic->PrepareResponses(mesh, constraints, options, cancellation));
   elastic->response_seconds_ = stopwatch.Seconds();
   return elastic;
 }
 
 absl::Status ElasticSystem::PrepareResponses(const TetMesh& mesh, const ConstraintSet& constraints,
-                                             const FactorAdmission& admission,
+                                             const ElasticSystemOptions& options,
                                              const Cancellation& cancellation) {
   const Eigen::Index rows = 3 * mesh.num_vertices();
   const auto handles = static_cast<int>(constraints.handles().size());
-  if (admission) {
-    TF_RETURN_IF_ERROR(
-        admission(rows * kColumnsPerHandle * handles * static_cast<int64_t>(sizeof(double))));
+  const int columns = kColumnsPerHandle * handles;
+  if (options.admission) {
+    TF_RETURN_IF_ERROR(options.admission(rows * columns * static_cast<int64_t>(sizeof(double))));
   }
-  response_columns_.resize(rows, Eigen::Index{kColumnsPerHandle} * handles);
+  response_columns_.resize(rows, columns);
   // Handle by handle: 12 right-hand sides make one pass over the factor worth its reading, and all
   // handles at once would need their right-hand sides beside the columns.
   for (int h = 0; h < handles; ++h) {
     TF_RETURN_IF_ERROR(cancellation.Check());
+    TellProgress(options.observer, PreparationStage::kResponses, int64_t{kColumnsPerHandle} * h,
+                 columns);
     TF_ASSIGN_OR_RETURN(
         response_columns_.middleCols(Eigen::Index{kColumnsPerHandle} * h, kColumnsPerHandle),
         system_->Solve({}, AffineMotions(mesh, constraints, h, origin_)));
   }
+  TellProgress(options.observer, PreparationStage::kResponses, columns, columns);
   return absl::OkStatus();
 }
 

@@ -10,6 +10,7 @@
 #include "absl/types/span.h"
 
 #include "core/base/cancellation.h"
+#include "core/base/preparation_progress.h"
 #include "core/constraints/constraint_set.h"
 #include "core/constraints/handle_pose.h"
 #include "core/linear_solvers/dirichlet_system.h"
@@ -22,6 +23,7 @@ struct ElasticSystemOptions {
   CholeskyBackend backend = CholeskyBackend::kCholmod;
   FactorAdmission admission;  // may be empty; called for the factor, then for the response columns
   int threads = 1;
+  PreparationObserver observer = nullptr;  // may be empty; told of the response columns, too
 };
 
 // The stiffness matrix of linear elasticity with the constrained vertices eliminated and
@@ -79,7 +81,8 @@ class ElasticSystem {
   ElasticSystem() = default;
 
   absl::Status PrepareResponses(const TetMesh& mesh, const ConstraintSet& constraints,
-                                const FactorAdmission& admission, const Cancellation& cancellation);
+                                const ElasticSystemOptions& options,
+                                const Cancellation& cancellation);
 
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   Eigen::MatrixXd response_columns_;

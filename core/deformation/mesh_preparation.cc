@@ -32,6 +32,7 @@ absl::StatusOr<std::unique_ptr<PreparedLaplacian>> PrepareLaplacian(
   laplacian->negative_weights = CountNegativeWeights(L);
   TF_ASSIGN_OR_RETURN(laplacian->system,
                       DirichletSystem::Create(L, constraints.constrained(), options, cancellation));
+  TellProgress(options.observer, PreparationStage::kResponses);
   const Stopwatch stopwatch;
   TF_ASSIGN_OR_RETURN(laplacian->harmonic,
                       ComputeHarmonicFields(constraints, laplacian->system.get()));
@@ -64,12 +65,15 @@ MeshPreparation::MeshPreparation(const TetMesh& mesh, Eigen::VectorXd stiffness,
 
 absl::StatusOr<PreparedLaplacian*> MeshPreparation::Laplacian(const Cancellation& cancellation) {
   if (laplacian_ == nullptr) {
+    TellProgress(options_.observer, PreparationStage::kAssembling);
     const Stopwatch stopwatch;
     const SparseMatrix L = CotangentLaplacian(mesh_, stiffness_, options_.threads);
     const double assemble_seconds = stopwatch.Seconds();
-    TF_ASSIGN_OR_RETURN(
-        laplacian_,
-        PrepareLaplacian(L, constraints_, {options_.backend, options_.admission}, cancellation));
+    TF_ASSIGN_OR_RETURN(laplacian_, PrepareLaplacian(L, constraints_,
+                                                     {.backend = options_.backend,
+                                                      .admission = options_.admission,
+                                                      .observer = options_.observer},
+                                                     cancellation));
     laplacian_->assemble_seconds = assemble_seconds;
   }
   return laplacian_.get();
@@ -77,10 +81,11 @@ absl::StatusOr<PreparedLaplacian*> MeshPreparation::Laplacian(const Cancellation
 
 absl::StatusOr<ElasticSystem*> MeshPreparation::Elastic(const Cancellation& cancellation) {
   if (elastic_ == nullptr) {
-    TF_ASSIGN_OR_RETURN(elastic_, ElasticSystem::Create(mesh_, stiffness_, constraints_,
-                                                        {options_.poisson_ratio, options_.backend,
-                                                         options_.admission, options_.threads},
-                                                        cancellation));
+    TF_ASSIGN_OR_RETURN(
+        elastic_, ElasticSystem::Create(mesh_, stiffness_, constraints_,
+                                        {options_.poisson_ratio, options_.backend,
+                                         options_.admission, options_.threads, options_.observer},
+                                        cancellation));
   }
   return elastic_.get();
 }

@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/cancellation.h"
+#include "core/base/preparation_progress.h"
 #include "core/constraints/constraint_set.h"
 #include "core/deformation/elastic_system.h"
 #include "core/linear_solvers/dirichlet_system.h"
@@ -28,6 +29,7 @@ struct PreparationOptions {
   // The caller has found the mesh usable (CheckTetMesh): it is not asked
   // again.
   bool mesh_is_usable = false;
+  PreparationObserver observer = nullptr;  // of Laplacian and Elastic; may be empty
 };
 
 // The Laplacian of the mesh with the constrained vertices eliminated, and what is solved with it at

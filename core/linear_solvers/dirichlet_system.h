@@ -12,6 +12,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/cancellation.h"
+#include "core/base/preparation_progress.h"
 #include "core/base/types.h"
 #include "core/linear_solvers/sparse_cholesky.h"
 
@@ -40,6 +41,7 @@ class DirichletSystem {
     FactorAdmission admission;  // may be empty
     // Prescribed and free unknowns, too, come in whole nodes; see CreateSparseCholesky.
     int unknowns_per_node = 1;
+    PreparationObserver observer = nullptr;  // may be empty
   };
 
   // `K` is n by n, symmetric, both triangles stored. `prescribed` is rising and without repetition.

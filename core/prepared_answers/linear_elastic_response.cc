@@ -87,6 +87,8 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateLinearElasticResponse(
         LinearElasticResponseBytes(*preparation, static_cast<Eigen::Index>(vertices.size()))));
   }
   TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic(cancellation));
+  // Copied, not solved for: too short to be counted.
+  TellProgress(options.observer, PreparationStage::kAnswers);
   return std::make_unique<LinearElasticResponse>(preparation, *elastic, vertices,
                                                  options.tolerance_mm);
 }

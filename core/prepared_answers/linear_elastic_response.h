@@ -10,6 +10,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/cancellation.h"
+#include "core/base/preparation_progress.h"
 #include "core/deformation/mesh_preparation.h"
 #include "core/prepared_answers/vertex_response.h"
 
@@ -20,6 +21,7 @@ struct LinearElasticResponseOptions {
   // May be empty. Called with the bytes that the response will hold before any of them is
   // allocated.
   FactorAdmission admission;
+  PreparationObserver observer = nullptr;  // may be empty; told of the columns
 };
 
 // Bytes of a response of so many vertices; 12 columns a handle.

@@ -85,7 +85,7 @@ class ResponseBasis : public VertexResponse {
 
   absl::Status Prepare(const std::vector<int32_t>& vertices, MeshPreparation* preparation,
                        const Cancellation& cancellation) {
-    TF_RETURN_IF_ERROR(PrepareHandles(vertices, preparation));
+    TF_RETURN_IF_ERROR(PrepareHandles(vertices, preparation, cancellation));
     return PreparePolynomials(vertices, preparation, cancellation);
   }
 
@@ -132,10 +132,23 @@ class ResponseBasis : public VertexResponse {
     return 3 * num_polynomials_ + kColumnsPerHandle * static_cast<Eigen::Index>(h);
   }
 
-  absl::Status PrepareHandles(const std::vector<int32_t>& vertices, MeshPreparation* preparation) {
+  // Columns that are solved for: of the handles, and of the polynomials with a guard degree.
+  int64_t NumSolved() const {
+    const Eigen::Index measured =
+        SimplexPolynomials::NumTerms(expansion_.polynomials().dimension(), degree_ + 1);
+    return panel_.num_columns() + 3 * (measured - num_polynomials_);
+  }
+  void TellSolved(int64_t columns) const {
+    TellProgress(options_.observer, PreparationStage::kAnswers, columns, NumSolved());
+  }
+
+  absl::Status PrepareHandles(const std::vector<int32_t>& vertices, MeshPreparation* preparation,
+                              const Cancellation& cancellation) {
     TF_ASSIGN_OR_RETURN(const PreparedLaplacian* laplacian, preparation->Laplacian());
     const std::vector<HandleRegion>& handles = preparation->constraints().handles();
     for (size_t h = 0; h < handles.size(); ++h) {
+      TF_RETURN_IF_ERROR(cancellation.Check());
+      TellSolved(kColumnsPerHandle * static_cast<int64_t>(h));
       const Positions& rest = preparation->mesh().positions();
       origins_.emplace_back(rest(handles[h].vertices, Eigen::all).colwise().mean());
       TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd X,
@@ -158,6 +171,7 @@ class ResponseBasis : public VertexResponse {
     guard_gains_.setZero(measured - num_polynomials_);
     for (Eigen::Index first = 0; first < measured; first += kTermsPerPass) {
       TF_RETURN_IF_ERROR(cancellation.Check());
+      TellSolved(NumSolved() - 3 * (measured - first));
       const Eigen::Index count = std::min(kTermsPerPass, measured - first);
       TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd responses,
                           TermResponses(domain_, polynomials, first, count, preparation));
@@ -174,6 +188,7 @@ class ResponseBasis : public VertexResponse {
         }
       }
     }
+    TellSolved(NumSolved());
     return absl::OkStatus();
   }
 

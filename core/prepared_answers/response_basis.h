@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/cancellation.h"
+#include "core/base/preparation_progress.h"
 #include "core/deformation/mesh_preparation.h"
 #include "core/prepared_answers/vertex_response.h"
 
@@ -23,6 +24,7 @@ struct ResponseBasisOptions {
   double max_scale_change = 0.1;  // |s - 1|
   // May be empty. Called with the bytes that the basis will hold before any of them is allocated.
   FactorAdmission admission;
+  PreparationObserver observer = nullptr;  // may be empty; told of the columns
 };
 
 // What a basis will be, known from the tolerance and the prepared range before anything is built.

@@ -8,6 +8,7 @@
 #include "absl/status/statusor.h"
 
 #include "server/rpc/call_scope.h"
+#include "server/session/clock.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session_registry.h"
@@ -19,8 +20,8 @@ namespace tissueform {
 class SessionService final : public v1::SessionService::CallbackService {
  public:
   SessionService(ServiceGate* gate, const ServiceLimits& limits, MeshCatalog* catalog,
-                 SessionRegistry* registry)
-      : gate_(gate), limits_(limits), catalog_(catalog), registry_(registry) {}
+                 SessionRegistry* registry, const Clock* clock = Clock::System())
+      : gate_(gate), limits_(limits), catalog_(catalog), registry_(registry), clock_(clock) {}
 
   grpc::ServerUnaryReactor* CreateSession(grpc::CallbackServerContext* context,
                                           const v1::CreateSessionRequest* request,
@@ -34,6 +35,8 @@ class SessionService final : public v1::SessionService::CallbackService {
   grpc::ServerUnaryReactor* UpdateSession(grpc::CallbackServerContext* context,
                                           const v1::UpdateSessionRequest* request,
                                           v1::Session* response) override;
+  grpc::ServerWriteReactor<v1::PrepareSessionResponse>* PrepareSession(
+      grpc::CallbackServerContext* context, const v1::PrepareSessionRequest* request) override;
   grpc::ServerUnaryReactor* DeleteSession(grpc::CallbackServerContext* context,
                                           const v1::DeleteSessionRequest* request,
                                           google::protobuf::Empty* response) override;
@@ -43,6 +46,7 @@ class SessionService final : public v1::SessionService::CallbackService {
   const ServiceLimits limits_;
   MeshCatalog* const catalog_;
   SessionRegistry* const registry_;
+  const Clock* const clock_;
 };
 
 }  // namespace tissueform

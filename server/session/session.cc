@@ -176,6 +176,12 @@ absl::StatusOr<std::shared_ptr<ResponseClaim>> Session::PrepareResponse(
   return claim;
 }
 
+std::shared_ptr<const ProgressFeed::Follower> Session::Follow(const ResponseRequest& request,
+                                                              TellSession tell) const {
+  const absl::StatusOr<std::shared_ptr<SharedPreparation>> preparation = OpenPreparation();
+  return preparation.ok() ? (*preparation)->Follow(request, std::move(tell)) : nullptr;
+}
+
 absl::StatusOr<Deformation> Session::Deform(DeformationModel model,
                                             absl::Span<const HandlePose> poses,
                                             const DeformControl& control) {

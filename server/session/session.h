@@ -123,6 +123,11 @@ class Session {
   absl::StatusOr<std::optional<PreparedAnswer>> Respond(const ResponseClaim& claim,
                                                         absl::Span<const HandlePose> poses);
 
+  // Any thread. Hears how far the prepared answers are for as long as the result lives; see
+  // SharedPreparation::Follow. Null once closed.
+  std::shared_ptr<const ProgressFeed::Follower> Follow(const ResponseRequest& request,
+                                                       TellSession tell) const;
+
   enum class CloseReason { kDeleted, kEvicted, kUpdated };
 
   // Any thread; on the strand where the memory is to be free afterwards even if something is being

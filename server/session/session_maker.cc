@@ -17,26 +17,32 @@ SessionMaker::SessionMaker(MemoryBudget* budget, WorkerPool* pool, SessionStore*
       preparations_(budget, pool) {}
 
 void SessionMaker::Make(SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
-                        Cancellation cancellation, Callback done) {
+                        SessionCaller caller, Callback done) {
   std::shared_ptr<SharedPreparation> preparation = preparations_.Find(record);
   Strand& strand = preparation->strand();
-  strand.Post(Lane::kBatch,
-              [this, record = std::move(record), mesh = std::move(mesh),
-               preparation = std::move(preparation), cancellation = std::move(cancellation),
-               done = std::move(done)]() mutable {
-                done(Session::Create(std::move(record), std::move(mesh), std::move(preparation),
-                                     budget_, pool_, clock_, cancellation));
-              });
+  caller.Tell(SessionStage::kWaiting);
+  // From now on: others may be making what this one needs, too.
+  auto follower = preparation->Follow(record.model, caller.tell);
+  strand.Post(Lane::kBatch, [this, record = std::move(record), mesh = std::move(mesh),
+                             preparation = std::move(preparation), caller = std::move(caller),
+                             follower = std::move(follower), done = std::move(done)]() mutable {
+    caller.Tell(SessionStage::kAssembling);
+    auto session = Session::Create(std::move(record), std::move(mesh), std::move(preparation),
+                                   budget_, pool_, clock_, caller.cancellation);
+    follower.reset();
+    done(std::move(session));
+  });
 }
 
 void SessionMaker::Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
-                          Cancellation cancellation, Callback done) {
-  auto keep = [this, record,
+                          SessionCaller caller, Callback done) {
+  auto keep = [this, record, tell = caller.tell,
                done = std::move(done)](absl::StatusOr<std::shared_ptr<Session>> session) mutable {
     if (!session.ok()) {
       done(std::move(session));
       return;
     }
+    if (tell) tell({SessionStage::kKeeping});
     store_->Create(std::move(record), kStoreEpoch,
                    [session = *std::move(session),
                     done = std::move(done)](const absl::StatusOr<SessionRecord>& stored) mutable {
@@ -49,24 +55,24 @@ void SessionMaker::Create(SessionRecord record, std::shared_ptr<const StoredMesh
                      }
                    });
   };
-  Make(std::move(record), std::move(mesh), std::move(cancellation), std::move(keep));
+  Make(std::move(record), std::move(mesh), std::move(caller), std::move(keep));
 }
 
-void SessionMaker::Restore(const std::string& id, Cancellation cancellation, Callback done) {
+void SessionMaker::Restore(const std::string& id, SessionCaller caller, Callback done) {
   const auto as_it_is = [](SessionRecord record, const StoredMesh&) { return record; };
-  Remake(id, as_it_is, std::move(cancellation),
-         [done = std::move(done)](absl::StatusOr<Remade> remade) {
-           if (remade.ok()) {
-             done(std::move(remade->session));
-           } else {
-             done(remade.status());
-           }
-         });
+  Remake(id, as_it_is, std::move(caller), [done = std::move(done)](absl::StatusOr<Remade> remade) {
+    if (remade.ok()) {
+      done(std::move(remade->session));
+    } else {
+      done(remade.status());
+    }
+  });
 }
 
-void SessionMaker::Remake(const std::string& id, Change change, Cancellation cancellation,
+void SessionMaker::Remake(const std::string& id, Change change, SessionCaller caller,
                           std::function<void(absl::StatusOr<Remade>)> done) {
-  store_->Get(id, [this, change = std::move(change), cancellation = std::move(cancellation),
+  caller.Tell(SessionStage::kReadingMesh);
+  store_->Get(id, [this, change = std::move(change), caller = std::move(caller),
                    done = std::move(done)](absl::StatusOr<SessionRecord> record) mutable {
     if (!record.ok()) {
       done(record.status());
@@ -75,15 +81,14 @@ void SessionMaker::Remake(const std::string& id, Change change, Cancellation can
     // Reading a mesh takes its time.
     const bool posted =
         PostUnlessStopped([this, record = *std::move(record), change = std::move(change),
-                           cancellation = std::move(cancellation), done]() mutable {
-          MakeChanged(std::move(record), change, std::move(cancellation), std::move(done));
+                           caller = std::move(caller), done]() mutable {
+          MakeChanged(std::move(record), change, std::move(caller), std::move(done));
         });
     if (!posted) done(absl::UnavailableError("the server is ending"));
   });
 }
 
-void SessionMaker::MakeChanged(SessionRecord record, const Change& change,
-                               Cancellation cancellation,
+void SessionMaker::MakeChanged(SessionRecord record, const Change& change, SessionCaller caller,
                                std::function<void(absl::StatusOr<Remade>)> done) {
   absl::StatusOr<std::shared_ptr<const StoredMesh>> mesh = catalog_->Load(record.mesh_sha256);
   absl::StatusOr<SessionRecord> changed =
@@ -92,7 +97,7 @@ void SessionMaker::MakeChanged(SessionRecord record, const Change& change,
     done(changed.status());
     return;
   }
-  Make(*changed, *std::move(mesh), std::move(cancellation),
+  Make(*changed, *std::move(mesh), std::move(caller),
        [record = *changed,
         done = std::move(done)](absl::StatusOr<std::shared_ptr<Session>> session) mutable {
          if (session.ok()) {

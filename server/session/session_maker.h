@@ -16,6 +16,7 @@
 #include "server/session/memory_budget.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session.h"
+#include "server/session/session_progress.h"
 #include "server/session/shared_preparation.h"
 #include "server/session/worker_pool.h"
 #include "server/store/session_store.h"
@@ -24,6 +25,16 @@ namespace tissueform {
 
 // This process is the only one that writes to its store: a store on disk is locked by it.
 inline constexpr int64_t kStoreEpoch = 1;
+
+// Who waits for a session: whether anybody still does, and how they are told how far it is.
+struct SessionCaller {
+  Cancellation cancellation;
+  TellSession tell;  // may be empty
+
+  void Tell(SessionStage stage) const {
+    if (tell) tell({stage});
+  }
+};
 
 // Makes sessions on the workers, new ones and those that come back from their records, and shares
 // preparations between them. Who knows them and who waits for them is the registry's.
@@ -40,17 +51,17 @@ class SessionMaker {
 
   // Makes a session of `record` and keeps nothing. `mesh` is the one that the record names. Errors:
   // those of Session::Create.
-  void Make(SessionRecord record, std::shared_ptr<const StoredMesh> mesh, Cancellation cancellation,
+  void Make(SessionRecord record, std::shared_ptr<const StoredMesh> mesh, SessionCaller caller,
             Callback done);
 
   // Make, then the record is kept: no record tells of a session that could not be made. Errors: and
   // those of SessionStore::Create.
-  void Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
-              Cancellation cancellation, Callback done);
+  void Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh, SessionCaller caller,
+              Callback done);
 
   // Makes the session of a record in the store. Errors: those of SessionStore::Get,
   // MeshCatalog::Load and Session::Create.
-  void Restore(const std::string& id, Cancellation cancellation, Callback done);
+  void Restore(const std::string& id, SessionCaller caller, Callback done);
 
   // Makes a session of a record in the store as `change` has left it, and keeps nothing. Errors:
   // those of Restore and of `change`, which comes on a worker.
@@ -60,7 +71,7 @@ class SessionMaker {
     SessionRecord record;  // with the etag of the version that was changed
     std::shared_ptr<Session> session;
   };
-  void Remake(const std::string& id, Change change, Cancellation cancellation,
+  void Remake(const std::string& id, Change change, SessionCaller caller,
               std::function<void(absl::StatusOr<Remade>)> done);
 
   // Nothing is posted to the pool any longer by what the store answers. Call it before the pool
@@ -69,7 +80,7 @@ class SessionMaker {
 
  private:
   // On a worker.
-  void MakeChanged(SessionRecord record, const Change& change, Cancellation cancellation,
+  void MakeChanged(SessionRecord record, const Change& change, SessionCaller caller,
                    std::function<void(absl::StatusOr<Remade>)> done);
   // False when the pool may have ended.
   bool PostUnlessStopped(WorkerPool::Job job) ABSL_LOCKS_EXCLUDED(mutex_);

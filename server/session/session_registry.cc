@@ -67,13 +67,14 @@ absl::Status SessionRegistry::LearnKnown() {
   return absl::OkStatus();
 }
 
-void SessionRegistry::Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
-                             CancelFlag cancelled, const SessionCallback& done) {
+void SessionRegistry::Create(SessionRecord record, const std::shared_ptr<const StoredMesh>& mesh,
+                             CancelFlag cancelled, const SessionCallback& done,
+                             const TellSession& tell) {
   if (record.id.empty()) {
     record.id = RandomId();
   }
   MakeRoom();
-  const SessionWaiter waiter{std::move(cancelled), done};
+  const SessionWaiter waiter{std::move(cancelled), done, tell};
   Admission admission;
   {
     MutexLock lock(mutex_);
@@ -86,16 +87,14 @@ void SessionRegistry::Create(SessionRecord record, std::shared_ptr<const StoredM
   } else if (admission.started != nullptr && admission.started->restores) {
     StartRestore(admission.started);
   } else if (admission.started != nullptr) {
-    maker_.Create(
-        std::move(record), std::move(mesh), CancellationOf(admission.started),
-        [this, making = admission.started](absl::StatusOr<std::shared_ptr<Session>> made) {
-          FinishCreation(making, std::move(made));
-        });
+    StartCreation(admission.started, record, mesh);
+  } else if (admission.joined.has_value() && tell) {
+    tell(*admission.joined);
   }
 }
 
-void SessionRegistry::Open(const std::string& id, CancelFlag cancelled,
-                           const SessionCallback& done) {
+void SessionRegistry::Open(const std::string& id, CancelFlag cancelled, const SessionCallback& done,
+                           const TellSession& tell) {
   if (std::shared_ptr<Session> session = Loaded(id); session != nullptr) {
     done(std::move(session));
     return;
@@ -104,7 +103,7 @@ void SessionRegistry::Open(const std::string& id, CancelFlag cancelled,
   Admission admission;
   {
     MutexLock lock(mutex_);
-    admission = AdmitOpen(id, {std::move(cancelled), done});
+    admission = AdmitOpen(id, {std::move(cancelled), done, tell});
   }
   if (!admission.refusal.ok()) {
     done(std::move(admission.refusal));
@@ -112,6 +111,8 @@ void SessionRegistry::Open(const std::string& id, CancelFlag cancelled,
     done(std::move(admission.existing));
   } else if (admission.started != nullptr) {
     StartRestore(admission.started);
+  } else if (admission.joined.has_value() && tell) {
+    tell(*admission.joined);
   }
 }
 
@@ -159,7 +160,7 @@ SessionRegistry::Admission SessionRegistry::AdmitOpen(const std::string& id,
     known->session->Touch();
     admission.existing = known->session;
   } else if (const MakingPtr making = table_.FindMaking(id); making != nullptr) {
-    making->waiters.push_back(waiter);
+    Join(making, waiter, &admission);
   } else if (admission.refusal = CheckRoom(); admission.refusal.ok()) {
     admission.started =
         table_.StartMaking(id, known->key, known->mesh_sha256, /*restores=*/true, waiter);
@@ -180,13 +181,17 @@ bool SessionRegistry::JoinEarlierRequest(const RequestKey& key, const SessionWai
     claimant.claims = true;
     *admission = AdmitOpen(table_.IdOfRequest(key.request_id), claimant);
     if (admission->existing != nullptr) ++known->claims;
-  } else if (making->waiters.empty()) {
-    // It is being given up, perhaps past the last moment at which somebody could join.
-    admission->refusal = EndingId(making->id);
   } else {
-    making->waiters.push_back(waiter);
+    // Also where all who waited have cancelled: FinishCreation makes it again if it stops for that.
+    Join(making, waiter, admission);
   }
   return true;
+}
+
+void SessionRegistry::Join(const MakingPtr& making, const SessionWaiter& waiter,
+                           Admission* admission) {
+  making->waiters.push_back(waiter);
+  admission->joined = making->newest;
 }
 
 // The caller has found it and holds it, so it leaves the catalog by RemoveMesh only.
@@ -208,27 +213,48 @@ bool SessionRegistry::Full() const {
   return table_.num_loaded() >= static_cast<size_t>(limits_.max_sessions);
 }
 
+void SessionRegistry::StartCreation(const MakingPtr& making, const SessionRecord& record,
+                                    const std::shared_ptr<const StoredMesh>& mesh) {
+  maker_.Create(record, mesh, CallerOf(making),
+                [this, making, record, mesh](absl::StatusOr<std::shared_ptr<Session>> made) {
+                  if (!FinishCreation(making, std::move(made))) {
+                    StartCreation(making, record, mesh);
+                  }
+                });
+}
+
 void SessionRegistry::StartRestore(const MakingPtr& making) {
-  maker_.Restore(making->id, CancellationOf(making),
+  maker_.Restore(making->id, CallerOf(making),
                  [this, making](absl::StatusOr<std::shared_ptr<Session>> session) {
                    FinishRestore(making, std::move(session));
                  });
 }
 
-Cancellation SessionRegistry::CancellationOf(const MakingPtr& making) const {
-  return Cancellation([this, making] {
-    MutexLock lock(mutex_);
-    return std::all_of(making->waiters.begin(), making->waiters.end(),
-                       [](const SessionWaiter& waiter) { return waiter.cancelled->load(); });
-  });
+SessionCaller SessionRegistry::CallerOf(const MakingPtr& making) {
+  return {.cancellation = Cancellation([this, making] {
+            MutexLock lock(mutex_);
+            return !making->wanted();
+          }),
+          .tell = [this, making](const SessionProgress& progress) {
+            std::vector<TellSession> listening;
+            {
+              MutexLock lock(mutex_);
+              making->newest = progress;
+              for (const SessionWaiter& waiter : making->waiters) {
+                if (waiter.tell) listening.push_back(waiter.tell);
+              }
+            }
+            for (const TellSession& tell : listening) tell(progress);
+          }};
 }
 
-void SessionRegistry::FinishCreation(const MakingPtr& making,
+bool SessionRegistry::FinishCreation(const MakingPtr& making,
                                      absl::StatusOr<std::shared_ptr<Session>> result) {
   std::vector<SessionWaiter> waiters;
   bool nobody_waits = false;
   {
     MutexLock lock(mutex_);
+    if (absl::IsCancelled(result.status()) && making->wanted()) return false;
     waiters = table_.EndMaking(making);
     nobody_waits = waiters.empty();  // all have cancelled
     if (result.ok() && nobody_waits) {
@@ -248,6 +274,7 @@ void SessionRegistry::FinishCreation(const MakingPtr& making,
   for (const SessionWaiter& waiter : waiters) {
     waiter.done(result);
   }
+  return true;
 }
 
 void SessionRegistry::FinishRestore(const MakingPtr& making,
@@ -266,9 +293,7 @@ void SessionRegistry::FinishRestore(const MakingPtr& making,
       making->version = known->version;
     }
     // All who waited had cancelled, and then somebody came.
-    again = absl::IsCancelled(result.status()) && known != nullptr &&
-            std::any_of(making->waiters.begin(), making->waiters.end(),
-                        [](const SessionWaiter& waiter) { return !waiter.cancelled->load(); });
+    again = absl::IsCancelled(result.status()) && known != nullptr && making->wanted();
     if (!again) waiters = table_.EndMaking(making);
     if (result.ok() && known != nullptr) {
       known->session = *result;
@@ -388,7 +413,8 @@ void SessionRegistry::List(const SessionStore::ListRequest& request,
 
 void SessionRegistry::Update(const std::string& id, const std::string& etag,
                              SessionMaker::Change change, CancelFlag cancelled,
-                             const std::function<void(absl::StatusOr<View>)>& done) {
+                             const std::function<void(absl::StatusOr<View>)>& done,
+                             TellSession tell) {
   MakeRoom();
   absl::Status refusal;
   {
@@ -405,7 +431,9 @@ void SessionRegistry::Update(const std::string& id, const std::string& etag,
     return;
   }
   updates_.Update(id, etag, std::move(change),
-                  Cancellation([cancelled = std::move(cancelled)] { return cancelled->load(); }),
+                  {.cancellation = Cancellation(
+                       [cancelled = std::move(cancelled)] { return cancelled->load(); }),
+                   .tell = std::move(tell)},
                   [id, done](absl::StatusOr<SessionMaker::Remade> remade) {
                     if (remade.ok()) {
                       done(View{std::move(remade->record), std::move(remade->session)});

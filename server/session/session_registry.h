@@ -25,6 +25,7 @@
 #include "server/session/pose_commits.h"
 #include "server/session/session.h"
 #include "server/session/session_maker.h"
+#include "server/session/session_progress.h"
 #include "server/session/session_table.h"
 #include "server/session/session_updates.h"
 #include "server/session/worker_pool.h"
@@ -75,21 +76,22 @@ class SessionRegistry {
   // Makes a session of `record` on a worker, keeps the record and calls `done` once. A record
   // without id gets a random one. Calls with the same request id share one session; its making
   // stops early when `cancelled` is set for all who wait for it. `mesh` is the one that the record
-  // names.
+  // names. `tell` hears how far it is, also who joins later.
   //
   // Every successful answer is a claim on the session, see Abandon.
   //
   // Errors: those of Session::Create and SessionStore::Create; AlreadyExists (the id is taken);
   // ResourceExhausted (too many sessions); InvalidArgument (the request id belongs to another
   // request); NotFound (the mesh was removed meanwhile); Cancelled.
-  void Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh, CancelFlag cancelled,
-              const SessionCallback& done);
+  void Create(SessionRecord record, const std::shared_ptr<const StoredMesh>& mesh,
+              CancelFlag cancelled, const SessionCallback& done, const TellSession& tell = {});
 
   // Gives the session, made again from its record where it is not in memory. At once where it is.
   //
   // Errors: NotFound; those of Session::Create, SessionStore::Get and MeshCatalog::Load;
   // ResourceExhausted; Cancelled.
-  void Open(const std::string& id, CancelFlag cancelled, const SessionCallback& done);
+  void Open(const std::string& id, CancelFlag cancelled, const SessionCallback& done,
+            const TellSession& tell = {});
 
   // Answers those callers of Create and Open at once with Cancelled who came with this flag and
   // still wait; what is made for nobody else stops at its next stage.
@@ -116,7 +118,8 @@ class SessionRegistry {
   // Errors: NotFound; Aborted (another version, or somebody else was faster); those of
   // SessionMaker::Remake and SessionStore::Update; ResourceExhausted; Cancelled.
   void Update(const std::string& id, const std::string& etag, SessionMaker::Change change,
-              CancelFlag cancelled, const std::function<void(absl::StatusOr<View>)>& done);
+              CancelFlag cancelled, const std::function<void(absl::StatusOr<View>)>& done,
+              TellSession tell = {});
 
   // Keeps the poses as the session's last ones; `done` when they are durable as far as the store
   // is; it does not call the registry. Errors: those of PoseCommits::Commit.
@@ -172,7 +175,8 @@ class SessionRegistry {
   struct Admission {
     absl::Status refusal;
     std::shared_ptr<Session> existing;
-    MakingPtr started;  // all three empty: joined a making that is under way
+    MakingPtr started;
+    std::optional<SessionProgress> joined;  // how far a making is that was under way
   };
 
   Admission AdmitCreate(const SessionRecord& record, const SessionWaiter& waiter)
@@ -193,10 +197,15 @@ class SessionRegistry {
   // Tries to have room for one more session in memory.
   void MakeRoom() ABSL_LOCKS_EXCLUDED(mutex_);
 
+  static void Join(const MakingPtr& making, const SessionWaiter& waiter, Admission* admission);
+
+  void StartCreation(const MakingPtr& making, const SessionRecord& record,
+                     const std::shared_ptr<const StoredMesh>& mesh);
   void StartRestore(const MakingPtr& making);
-  // Whether all who wait for it have cancelled.
-  Cancellation CancellationOf(const MakingPtr& making) const;
-  void FinishCreation(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
+  // All who wait for it, at any time.
+  SessionCaller CallerOf(const MakingPtr& making);
+  // False when all who waited had cancelled, and then somebody came: it is to be made again.
+  bool FinishCreation(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
       ABSL_LOCKS_EXCLUDED(mutex_);
   // Puts an updated session into its place. Errors: NotFound.
   absl::Status Replace(const SessionMaker::Remade& remade, bool other_handles)

@@ -9,6 +9,11 @@
 
 namespace tissueform {
 
+bool SessionMaking::wanted() const {
+  return std::any_of(waiters.begin(), waiters.end(),
+                     [](const SessionWaiter& waiter) { return !waiter.cancelled->load(); });
+}
+
 KnownSession* SessionTable::Find(const std::string& id) {
   const auto found = known_.find(id);
   return found == known_.end() ? nullptr : &found->second;

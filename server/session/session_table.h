@@ -15,6 +15,7 @@
 
 #include "server/session/clock.h"
 #include "server/session/session.h"
+#include "server/session/session_progress.h"
 
 namespace tissueform {
 
@@ -31,7 +32,8 @@ struct SessionWaiter {
 
   CancelFlag cancelled;
   std::function<void(absl::StatusOr<std::shared_ptr<Session>>)> done;
-  bool claims = false;  // a successful answer is one more claim on a session that is known
+  TellSession tell = nullptr;  // may be empty
+  bool claims = false;         // a successful answer is one more claim on a session that is known
 };
 
 // A session that is being made, or made again from its record.
@@ -40,8 +42,13 @@ struct SessionMaking {
   RequestKey key;
   std::string mesh_sha256;
   bool restores = false;
-  int version = 0;                     // of what it is made from
-  std::vector<SessionWaiter> waiters;  // guarded by the owner of the table
+  int version = 0;  // of what it is made from
+  // Guarded by the owner of the table.
+  std::vector<SessionWaiter> waiters;
+  std::optional<SessionProgress> newest = std::nullopt;
+
+  // Whether somebody waits for it who has not cancelled.
+  bool wanted() const;
 };
 
 // A session that the server knows.

@@ -21,7 +21,7 @@ bool SameHandleNames(const std::vector<HandleRegion>& a, const std::vector<Handl
 }  // namespace
 
 void SessionUpdates::Update(const std::string& id, const std::string& etag,
-                            SessionMaker::Change change, Cancellation cancellation, Done done) {
+                            SessionMaker::Change change, const SessionCaller& caller, Done done) {
   // Before anything is prepared for a change that cannot be kept.
   auto checked = [etag, change = std::move(change)](
                      SessionRecord record,
@@ -29,17 +29,25 @@ void SessionUpdates::Update(const std::string& id, const std::string& etag,
     TF_RETURN_IF_ERROR(CheckSessionWrite(record.id, etag, kStoreEpoch, record.etag, record.epoch));
     return change(std::move(record), mesh);
   };
-  maker_->Remake(id, std::move(checked), std::move(cancellation),
-                 [this, done = std::move(done)](absl::StatusOr<SessionMaker::Remade> remade) {
-                   if (remade.ok()) {
-                     Keep(*std::move(remade), done);
-                   } else {
-                     done(remade.status());
-                   }
-                 });
+  maker_->Remake(
+      id, std::move(checked), caller,
+      [this, caller, done = std::move(done)](absl::StatusOr<SessionMaker::Remade> remade) {
+        if (remade.ok()) {
+          Keep(*std::move(remade), caller, done);
+        } else {
+          done(remade.status());
+        }
+      });
 }
 
-void SessionUpdates::Keep(SessionMaker::Remade remade, Done done) {
+void SessionUpdates::Keep(SessionMaker::Remade remade, const SessionCaller& caller, Done done) {
+  // The last moment.
+  if (const absl::Status wanted = caller.cancellation.Check(); !wanted.ok()) {
+    remade.session.reset();
+    done(wanted);
+    return;
+  }
+  caller.Tell(SessionStage::kKeeping);
   const std::string id = remade.record.id;
   commits_->Hold(id);
   auto finish = [this, id, done = std::move(done)](absl::StatusOr<SessionMaker::Remade> result) {

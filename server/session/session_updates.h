@@ -11,7 +11,6 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "core/base/cancellation.h"
 #include "server/session/pose_commits.h"
 #include "server/session/session.h"
 #include "server/session/session_maker.h"
@@ -40,10 +39,10 @@ class SessionUpdates {
   // Errors: Aborted (another version), those of SessionMaker::Remake, SessionStore::Update and
   // `replace`.
   void Update(const std::string& id, const std::string& etag, SessionMaker::Change change,
-              Cancellation cancellation, Done done);
+              const SessionCaller& caller, Done done);
 
  private:
-  void Keep(SessionMaker::Remade remade, Done done);
+  void Keep(SessionMaker::Remade remade, const SessionCaller& caller, Done done);
 
   SessionMaker* const maker_;
   SessionStore* const store_;

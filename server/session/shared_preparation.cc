@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/cleanup/cleanup.h"
+#include "absl/hash/hash.h"
+
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "core/mesh_payload/sha256.h"
@@ -41,6 +44,13 @@ bool IsElastic(DeformationModel model) {
   return model == DeformationModel::kLinearElastic || model == DeformationModel::kNeoHookean;
 }
 
+// Topics of the feed. Models of one factor share one: it is what takes the time.
+size_t TopicOf(DeformationModel model) { return IsElastic(model) ? 1 : 0; }
+size_t TopicOf(const ResponseRequest& request) {
+  return absl::HashOf(request.model, request.vertices, request.tolerance_mm,
+                      request.max_rotation_rad);
+}
+
 // A model on what is there already: transforms of the tets and fields at vertices.
 int64_t ModelBytes(int64_t num_vertices, int64_t num_tets) {
   constexpr int64_t kPerVertex = 200;
@@ -64,6 +74,7 @@ absl::Status SharedPreparation::Begin(const TetMesh& mesh, const Eigen::VectorXd
           LaplacianBytesBesideFactor(mesh.num_vertices(), mesh.num_tets(), NumHandles(constraints)),
           "session"));
   options.admission = [this](int64_t bytes) { return Admit(bytes); };
+  options.observer = Observer();
   TF_ASSIGN_OR_RETURN(preparation_,
                       MeshPreparation::Create(mesh, stiffness, constraints, std::move(options)));
   reservation_ = std::move(reservation);
@@ -91,6 +102,8 @@ absl::StatusOr<std::unique_ptr<Deformer>> SharedPreparation::MakeModel(
   // First an upper bound of what the model takes beside its factor; the factor comes on top,
   // through the admission, as soon as its analysis has told its bytes; at the end Settle gives back
   // what was too much.
+  feed_.Begin(TopicOf(options.model));
+  const absl::Cleanup end_of_topic = [this] { feed_.End(); };
   TF_RETURN_IF_ERROR(cancellation.Check());
   TF_RETURN_IF_ERROR(Admit(BytesBesideFactor(options)));
   absl::StatusOr<std::unique_ptr<Deformer>> deformer =
@@ -109,6 +122,8 @@ absl::StatusOr<std::shared_ptr<const SharedResponse>> SharedPreparation::Prepare
     responses_.splice(responses_.begin(), responses_, found);
     return responses_.front();
   }
+  feed_.Begin(TopicOf(request));
+  const absl::Cleanup end_of_topic = [this] { feed_.End(); };
   // Before the new one is made, so that old and new need not fit together.
   while (responses_.size() >= kMostResponses) responses_.pop_back();
   Settle();
@@ -134,7 +149,8 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> SharedPreparation::CreateRespons
   if (request.model == DeformationModel::kLinearElastic) {
     return CreateLinearElasticResponse(
         preparation_, request.vertices,
-        {.tolerance_mm = request.tolerance_mm, .admission = admission}, cancellation);
+        {.tolerance_mm = request.tolerance_mm, .admission = admission, .observer = Observer()},
+        cancellation);
   }
   if (request.model == DeformationModel::kGradientField &&
       gradient_field.rotation == RotationMode::kPropagated &&
@@ -142,13 +158,28 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> SharedPreparation::CreateRespons
     return CreateResponseBasis(preparation_, request.vertices,
                                {.tolerance_mm = request.tolerance_mm,
                                 .max_rotation_rad = request.max_rotation_rad,
-                                .admission = admission},
+                                .admission = admission,
+                                .observer = Observer()},
                                cancellation);
   }
   return WithReason(absl::InvalidArgumentError(
                         "only gradient_field with propagated rotations and cotangent guidance, and "
                         "linear_elastic, have prepared answers; leave `prepared` out"),
                     ErrorReason::kNoPreparedAnswers);
+}
+
+std::shared_ptr<const ProgressFeed::Follower> SharedPreparation::Follow(DeformationModel model,
+                                                                        TellSession tell) {
+  return feed_.Follow(TopicOf(model), std::move(tell));
+}
+
+std::shared_ptr<const ProgressFeed::Follower> SharedPreparation::Follow(
+    const ResponseRequest& request, TellSession tell) {
+  return feed_.Follow(TopicOf(request), std::move(tell));
+}
+
+PreparationObserver SharedPreparation::Observer() {
+  return [this](const PreparationProgress& progress) { feed_.Tell(ToSessionProgress(progress)); };
 }
 
 absl::Status SharedPreparation::Admit(int64_t more_bytes) {

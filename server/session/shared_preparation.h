@@ -22,6 +22,7 @@
 #include "core/mesh/tet_mesh.h"
 #include "core/prepared_answers/vertex_response.h"
 #include "server/session/memory_budget.h"
+#include "server/session/session_progress.h"
 #include "server/session/worker_pool.h"
 #include "server/store/session_record.h"
 
@@ -81,6 +82,12 @@ class SharedPreparation {
       const ResponseRequest& request, const GradientFieldOptions& gradient_field,
       const Cancellation& cancellation);
 
+  // Hears how far it is for as long as the result lives, while MakeModel makes what the model
+  // needs, or PrepareResponse these answers, whoever has asked for it. Null where `tell` is empty.
+  std::shared_ptr<const ProgressFeed::Follower> Follow(DeformationModel model, TellSession tell);
+  std::shared_ptr<const ProgressFeed::Follower> Follow(const ResponseRequest& request,
+                                                       TellSession tell);
+
   // With the prepared answers that are kept.
   int64_t bytes_held() const { return bytes_held_; }
 
@@ -88,6 +95,7 @@ class SharedPreparation {
   absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponse(
       const ResponseRequest& request, const GradientFieldOptions& gradient_field,
       const FactorAdmission& admission, const Cancellation& cancellation);
+  PreparationObserver Observer();
   // What a model takes that is still to be made, the factor apart.
   int64_t BytesBesideFactor(const DeformerOptions& options) const;
   absl::Status Admit(int64_t more_bytes);
@@ -99,6 +107,7 @@ class SharedPreparation {
 
   // Self-synchronised.
   Strand strand_;
+  ProgressFeed feed_;
   std::atomic<int64_t> bytes_held_ = 0;
 
   // The strand's.

@@ -54,11 +54,13 @@ TEST_F(OtherClientsTest, PythonFindsTheReasonOfEveryRpcsError) {
     GTEST_SKIP() << "python3-grpcio or python3-protobuf is missing: deploy/packages.txt lists them";
   }
   EXPECT_EQ(exit_code, 0) << out;
-  EXPECT_THAT(out, AllOf(HasSubstr("grpc.health.v1.Health"),
-                         HasSubstr("SessionService/GetSession INVALID_ARGUMENT INVALID_REQUEST"),
-                         HasSubstr("MeshService/UploadMesh INVALID_ARGUMENT INVALID_REQUEST"),
-                         HasSubstr("MeshService/QueryUpload INVALID_ARGUMENT INVALID_REQUEST"),
-                         HasSubstr("DeformService/Deform INVALID_ARGUMENT INVALID_REQUEST")));
+  EXPECT_THAT(out,
+              AllOf(HasSubstr("grpc.health.v1.Health"),
+                    HasSubstr("SessionService/GetSession INVALID_ARGUMENT INVALID_REQUEST"),
+                    HasSubstr("SessionService/PrepareSession INVALID_ARGUMENT INVALID_REQUEST"),
+                    HasSubstr("MeshService/UploadMesh INVALID_ARGUMENT INVALID_REQUEST"),
+                    HasSubstr("MeshService/QueryUpload INVALID_ARGUMENT INVALID_REQUEST"),
+                    HasSubstr("DeformService/Deform INVALID_ARGUMENT INVALID_REQUEST")));
 }
 
 TEST_F(OtherClientsTest, BufListsAndCallsRpcsByReflection) {

@@ -155,7 +155,7 @@ class FakeReaderCall : public grpc::ServerCallbackReader<Request> {
   FakeReads<Request> reads_;
 };
 
-// A call whose server alone speaks. Every write is read at once.
+// A call whose server alone speaks. Every write is read at once unless the client has stopped.
 template <typename Response>
 class FakeWriterCall : public grpc::ServerCallbackWriter<Response> {
  public:
@@ -166,7 +166,20 @@ class FakeWriterCall : public grpc::ServerCallbackWriter<Response> {
     this->BindReactor(reactor);
     state_.Bind(reactor);
   }
-  void Cancel() { state_.Cancel(); }
+  void Cancel() {
+    state_.Cancel();
+    ReadOn();
+  }
+  // From now on writes do not complete, until ReadOn.
+  void StopReading() {
+    MutexLock lock(mutex_);
+    stalled_ = true;
+  }
+  void ReadOn() {
+    MutexLock lock(mutex_);
+    stalled_ = false;
+    if (stalled_write_ != nullptr) Complete(std::exchange(stalled_write_, nullptr));
+  }
   // The next message of the server; empty when the call has ended, or after 30 s.
   std::optional<Response> Receive() {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
@@ -197,6 +210,20 @@ class FakeWriterCall : public grpc::ServerCallbackWriter<Response> {
     state_.React([this] { reactor_->OnSendInitialMetadataDone(!state_.cancelled()); });
   }
   void Write(const Response* message, grpc::WriteOptions) override {
+    MutexLock lock(mutex_);
+    if (stalled_) {
+      stalled_write_ = message;
+    } else {
+      Complete(message);
+    }
+  }
+  void WriteAndFinish(const Response*, grpc::WriteOptions, grpc::Status) override {}
+
+ private:
+  grpc::internal::ServerReactor* reactor() override { return nullptr; }
+  void CallOnDone() override {}
+
+  void Complete(const Response* message) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     state_.React([this, message] {
       const bool ok = !state_.cancelled();
       if (ok) {
@@ -207,17 +234,14 @@ class FakeWriterCall : public grpc::ServerCallbackWriter<Response> {
       reactor_->OnWriteDone(ok);
     });
   }
-  void WriteAndFinish(const Response*, grpc::WriteOptions, grpc::Status) override {}
-
- private:
-  grpc::internal::ServerReactor* reactor() override { return nullptr; }
-  void CallOnDone() override {}
 
   grpc::ServerWriteReactor<Response>* reactor_ = nullptr;  // constant after Bind
   FakeCallState state_;
   mutable Mutex mutex_;
   ConditionVariable changed_;
   std::deque<Response> responses_ ABSL_GUARDED_BY(mutex_);
+  const Response* stalled_write_ ABSL_GUARDED_BY(mutex_) = nullptr;
+  bool stalled_ ABSL_GUARDED_BY(mutex_) = false;
   bool ended_ ABSL_GUARDED_BY(mutex_) = false;
 };
 

@@ -30,7 +30,8 @@ std::string Slurp(const std::filesystem::path& path) {
 // and not otherwise.
 std::string WithoutProgress(const std::string& err) {
   static const std::regex kProgress(
-      "[a-z0-9_ ]+( \\.\\.\\.|: [0-9]+\\.[0-9] s)|\\[ *[0-9]+ % +[0-9]+\\.[0-9] s\\] .+");
+      "[a-z0-9_ ]+((: [a-z0-9, ]+)? \\.\\.\\.|: [0-9]+\\.[0-9] s)|\\[ *[0-9]+ % +[0-9]+\\.[0-9] "
+      "s\\] .+");
   std::istringstream lines(err);
   std::string kept;
   for (std::string line; std::getline(lines, line);) {

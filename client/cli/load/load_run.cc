@@ -12,6 +12,7 @@
 
 #include "client/cli/load/picture_age.h"
 #include "client/cli/online/drag.h"
+#include "client/cli/online/session_wait.h"
 #include "client/cpp/plan_session.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/status_macros.h"
@@ -52,7 +53,7 @@ class LoadDrag {
     auto drag = std::unique_ptr<LoadDrag>(new LoadDrag(kind, NamedPoses(problem)));
     TF_ASSIGN_OR_RETURN(drag->client_,
                         TissueformClient::Connect(address, {.own_connection = true}));
-    TF_ASSIGN_OR_RETURN(drag->session_, PlanSession::Create(drag->client_.get(), problem));
+    TF_ASSIGN_OR_RETURN(drag->session_, MakePlanSession(drag->client_.get(), problem, nullptr));
     DeformStream::Options stream;
     stream.vertices.kind = AnswerVertices::Kind::kSkin;
     if (kind.int16) stream.encoding = v1::POSITION_ENCODING_INT16_ZSTD;

@@ -25,6 +25,7 @@
 #include "client/cli/online/handle_words.h"
 #include "client/cli/online/prediction_export.h"
 #include "client/cli/online/server_process.h"
+#include "client/cli/online/session_wait.h"
 #include "client/cli/shared/companion.h"
 #include "client/cli/shared/demo_paths.h"
 #include "client/cli/shared/result_writer.h"
@@ -211,7 +212,7 @@ absl::Status Serve(ServerProcess* server) {
 absl::Status DragAndPredict(const DemoOptions& options, const DemoCase& demo, ServerProcess* server,
                             TissueformClient* client, const absl::Status& display) {
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<PlanSession> session,
-                      PlanSession::Create(client, demo.problem));
+                      MakePlanSession(client, demo.problem, &interrupted));
   const v1::Session& description = session->description();
   absl::PrintF("session ready: %d free vertices, factorised in %.1f ms, %.1f MiB\n",
                description.free_vertex_count(), description.seconds().factorise() * 1e3,

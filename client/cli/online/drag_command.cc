@@ -16,8 +16,8 @@
 #include "absl/strings/str_format.h"
 
 #include "client/cli/online/drag.h"
+#include "client/cli/online/session_wait.h"
 #include "client/cli/shared/companion.h"
-#include "client/cli/shared/stage_progress.h"
 #include "client/cpp/plan_session.h"
 #include "client/cpp/reattaching_stream.h"
 #include "core/base/percentiles.h"
@@ -113,12 +113,15 @@ void PrintTotals(const ReattachingStream& drag, const SendTimes& send_times,
   absl::PrintF("\n");
 }
 
-absl::Status Drag(TissueformClient* client, const PlanProblem& problem, const std::string& session,
+absl::Status Drag(TissueformClient* client, const PlanProblem& problem,
                   const DragCommandOptions& options) {
   DragTotals totals;
-  TF_ASSIGN_OR_RETURN(
-      const std::unique_ptr<ReattachingStream> drag,
-      ReattachingStream::Open(client, session, StreamOptions(problem, options, &totals)));
+  const ReattachingStream::Options stream = StreamOptions(problem, options, &totals);
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<PlanSession> own,
+                      MakePlanSession(client, problem, &interrupted, &stream.stream));
+  const std::string& session = own->name();
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<ReattachingStream> drag,
+                      ReattachingStream::Open(client, session, stream));
   absl::PrintF(
       "dragging %s, %d vertices a frame; kill the server and start it again to see the "
       "drag go on\n",
@@ -142,19 +145,14 @@ absl::Status Drag(TissueformClient* client, const PlanProblem& problem, const st
 
 absl::Status Run(const DragCommandOptions& options) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);  // seen at once, also through a pipe
+  struct sigaction action = {};
+  action.sa_handler = [](int) { interrupted = true; };
+  sigaction(SIGINT, &action, nullptr);
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan));
   TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client,
                       TissueformClient::Connect(options.server, {}));
-  std::unique_ptr<PlanSession> session;
-  {
-    const StageProgress progress("uploading and preparing the session");
-    TF_ASSIGN_OR_RETURN(session, PlanSession::Create(client.get(), problem));
-  }
-  struct sigaction action = {};
-  action.sa_handler = [](int) { interrupted = true; };
-  sigaction(SIGINT, &action, nullptr);
-  return Drag(client.get(), problem, session->name(), options);
+  return Drag(client.get(), problem, options);
 }
 
 }  // namespace

@@ -20,6 +20,7 @@
 #include "client/cli/online/prediction_export.h"
 #include "client/cli/online/resource_text.h"
 #include "client/cli/online/session_command.h"
+#include "client/cli/online/session_wait.h"
 #include "client/cli/shared/companion.h"
 #include "client/cli/shared/option_checks.h"
 #include "client/cli/shared/report_parts.h"
@@ -85,7 +86,8 @@ absl::StatusOr<v1::Prediction> MakePrediction(const PredictionOptions& options,
   if (!options.session.empty()) {
     return client->predictions().Create(session, NamedPoses(problem), model);
   }
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<PlanSession> own, PlanSession::Create(client, problem));
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<PlanSession> own,
+                      MakePlanSession(client, problem, /*stop=*/nullptr));
   return client->predictions().Create(own->name(), NamedPoses(problem), model);
 }
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "client/cli/online/session_wait.h"
 #include "client/cli/shared/companion.h"
 #include "client/cli/shared/option_checks.h"
 #include "client/cli/shared/result_writer.h"
@@ -35,11 +36,8 @@ absl::StatusOr<Positions> PredictOnServer(const RunOptions& options, const PlanP
                                           PredictionStats* stats) {
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client,
                       TissueformClient::Connect(options.server, {}));
-  std::unique_ptr<PlanSession> session;
-  {
-    const StageProgress progress("uploading and preparing the session");
-    TF_ASSIGN_OR_RETURN(session, PlanSession::Create(client.get(), problem));
-  }
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<PlanSession> session,
+                      MakePlanSession(client.get(), problem, /*stop=*/nullptr));
   const StageProgress progress("solving");
   TF_ASSIGN_OR_RETURN(const v1::DeformOnceResponse answer,
                       client->DeformOnce(session->description().name(), NamedPoses(problem)));

@@ -14,6 +14,7 @@
 #include "absl/strings/str_join.h"
 
 #include "client/cli/online/resource_text.h"
+#include "client/cli/online/session_wait.h"
 #include "client/cli/shared/companion.h"
 #include "client/cli/shared/option_checks.h"
 #include "client/cpp/plan_session.h"
@@ -111,7 +112,7 @@ absl::Status Update(const SessionOptions& options) {
   if (options.poisson_ratio.has_value()) request.set_poisson_ratio(*options.poisson_ratio);
   TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
   if (!options.regions.empty()) TF_RETURN_IF_ERROR(SetRegions(options, client.get(), &request));
-  TF_ASSIGN_OR_RETURN(const v1::Session session, client->UpdateSession(request));
+  TF_ASSIGN_OR_RETURN(const v1::Session session, UpdateAndTell(client.get(), request));
   absl::PrintF("%s is prepared anew: %s, handles %s, %d vertices fixed, etag %s\n", session.name(),
                ModelText(session.model()), absl::StrJoin(session.handles(), ", "),
                session.fixed_vertex_count(), session.etag());

@@ -230,6 +230,39 @@ TEST(ResponseBasisSelectionTest, ChosenVerticesComeInTheirOrder) {
   EXPECT_LE(some->ErrorBoundMm(poses), all->ErrorBoundMm(poses));
 }
 
+TEST(ResponseBasisProgressTest, ColumnsAreCountedUpToTheLastAndTheWorkCanEndBetweenThem) {
+  const TetMesh mesh = testing::Bar({3, 3, 6});
+  const auto preparation = testing::PrepareMesh(mesh, 2, {});
+  std::vector<int64_t> steps;
+  ResponseBasisOptions options;
+  options.observer = [&steps](const PreparationProgress& progress) {
+    EXPECT_EQ(progress.stage, PreparationStage::kAnswers);
+    steps.push_back(progress.step);
+    steps.push_back(progress.steps);
+  };
+  const std::vector<int32_t> vertices = {0, 1, 2};
+  ASSERT_OK_AND_ASSIGN(const auto basis, CreateResponseBasis(preparation, vertices, options));
+  const int64_t all = steps.back();
+  EXPECT_GE(all, basis->num_terms()) << "those of the guard degree are measured, too";
+  for (size_t i = 0; i < steps.size(); i += 2) {
+    EXPECT_EQ(steps[i + 1], all);
+    if (i > 0) {
+      EXPECT_GT(steps[i], steps[i - 2]);
+    }
+  }
+  EXPECT_EQ(steps.front(), 0);
+  EXPECT_EQ(steps[steps.size() - 2], all);
+  // Cancelled at a column: none comes after it.
+  for (const int64_t last : {int64_t{0}, all / 2}) {
+    steps.clear();
+    const Cancellation cancellation(
+        [&] { return !steps.empty() && steps[steps.size() - 2] >= last; });
+    EXPECT_THAT(CreateResponseBasis(preparation, vertices, options, cancellation),
+                StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
+    EXPECT_LT(steps[steps.size() - 2], all);
+  }
+}
+
 TEST(ResponseBasisErrorTest, RefusalComesBeforeAnythingIsBuilt) {
   const TetMesh mesh = JitteredBar();
   const auto preparation = testing::PrepareMesh(mesh, 1);

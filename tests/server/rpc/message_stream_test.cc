@@ -26,10 +26,10 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 // The client takes so many messages, then it is gone, or takes nothing until the call is cancelled.
-class FakeWriterCall : public grpc::ServerCallbackWriter<Message> {
+class LeavingClientCall : public grpc::ServerCallbackWriter<Message> {
  public:
   enum class Then { kGone, kTakesNothing };
-  FakeWriterCall(WorkerPool* pool, size_t most, Then then = Then::kGone)
+  LeavingClientCall(WorkerPool* pool, size_t most, Then then = Then::kGone)
       : state_(pool), most_(most), then_(then) {}
 
   void Bind(MessageStream<Message>* stream) {
@@ -111,7 +111,7 @@ class MessageStreamTest : public ::testing::Test {
 };
 
 TEST_F(MessageStreamTest, EveryMessageIsSentInOrderThenItEnds) {
-  FakeWriterCall call(&reactions_, 100);
+  LeavingClientCall call(&reactions_, 100);
   MessageStream<Message>* stream = NewStream();
   call.Bind(stream);
   stream->Send(Offsets(4));
@@ -123,7 +123,7 @@ TEST_F(MessageStreamTest, EveryMessageIsSentInOrderThenItEnds) {
 }
 
 TEST_F(MessageStreamTest, AClientThatIsGoneEndsIt) {
-  FakeWriterCall call(&reactions_, 2);
+  LeavingClientCall call(&reactions_, 2);
   MessageStream<Message>* stream = NewStream();
   call.Bind(stream);
   stream->Send(Offsets(1'000'000));
@@ -135,7 +135,7 @@ TEST_F(MessageStreamTest, AClientThatIsGoneEndsIt) {
 }
 
 TEST_F(MessageStreamTest, AClientThatTakesNothingIsGivenUp) {
-  FakeWriterCall call(&reactions_, 3, FakeWriterCall::Then::kTakesNothing);
+  LeavingClientCall call(&reactions_, 3, LeavingClientCall::Then::kTakesNothing);
   MessageStream<Message>* stream =
       NewStream([&call] { call.Cancel(); }, std::chrono::milliseconds(20));
   call.Bind(stream);
@@ -152,7 +152,7 @@ TEST_F(MessageStreamTest, AClientThatTakesNothingIsGivenUp) {
 // Every message has the whole time, and what was taken leaves no deadline behind.
 TEST_F(MessageStreamTest, AClientThatTakesItsMessagesIsNotGivenUp) {
   constexpr std::chrono::milliseconds kPatience{500};
-  FakeWriterCall call(&reactions_, 100);
+  LeavingClientCall call(&reactions_, 100);
   MessageStream<Message>* stream = NewStream([&call] { call.Cancel(); }, kPatience);
   call.Bind(stream);
   stream->Send(Offsets(50));
@@ -168,7 +168,7 @@ TEST_F(MessageStreamTest, AClientThatTakesItsMessagesIsNotGivenUp) {
 }
 
 TEST_F(MessageStreamTest, AnErrorInPlaceOfMessagesIsItsEnd) {
-  FakeWriterCall call(&reactions_, 100);
+  LeavingClientCall call(&reactions_, 100);
   MessageStream<Message>* stream = NewStream();
   call.Bind(stream);
   stream->End(absl::NotFoundError("nothing"));

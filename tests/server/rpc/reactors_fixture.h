@@ -121,7 +121,7 @@ class ReactorsTest : public ::testing::Test {
   DeadlineTimer timer_;
   MeshService mesh_service_{&gate_,     limits_,        &catalog_, &uploads_,
                             &registry_, workers_.get(), &timer_};
-  SessionService session_service_{&gate_, limits_, &catalog_, &registry_};
+  SessionService session_service_{&gate_, limits_, &catalog_, &registry_, &clock_};
   DeformService deform_service_{&gate_, limits_, &registry_, &streams_, &watches_, &timer_};
   std::unique_ptr<WorkerPool> reactions_ = std::make_unique<WorkerPool>(4);
 };

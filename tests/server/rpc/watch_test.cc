@@ -273,17 +273,16 @@ TEST_F(WatchTest, WhatCannotBeWatchedIsRefused) {
     EXPECT_THAT(status->error_message(), HasSubstr(text));
   };
   const std::string session = MakeSession();
-  using Code = grpc::StatusCode;
-  refused("meshes/1", {}, Code::INVALID_ARGUMENT, "sessions/");
-  refused("sessions/none-of-that-name", {}, Code::NOT_FOUND, "none-of-that-name");
-  refused(session, 0, Code::INVALID_ARGUMENT, "max_unacked");
-  refused(session, limits_.max_unacked + 1, Code::INVALID_ARGUMENT, "max_unacked");
+  refused("meshes/1", {}, grpc::StatusCode::INVALID_ARGUMENT, "sessions/");
+  refused("sessions/none-of-that-name", {}, grpc::StatusCode::NOT_FOUND, "none-of-that-name");
+  refused(session, 0, grpc::StatusCode::INVALID_ARGUMENT, "max_unacked");
+  refused(session, limits_.max_unacked + 1, grpc::StatusCode::INVALID_ARGUMENT, "max_unacked");
   std::vector<std::unique_ptr<WatchCall>> all;
   for (int i = 0; i < limits_.max_watches_per_session; ++i) {
     all.push_back(Watch(session));
     all.back()->Begin(v1::WATCH_ORIGIN_REST);
   }
-  refused(session, {}, Code::RESOURCE_EXHAUSTED, "--max-watches-per-session");
+  refused(session, {}, grpc::StatusCode::RESOURCE_EXHAUSTED, "--max-watches-per-session");
   for (const auto& watch : all) {
     watch->Cancel();
     watch->WaitUntilDone();
@@ -291,7 +290,7 @@ TEST_F(WatchTest, WhatCannotBeWatchedIsRefused) {
   auto again = Watch(session);
   again->Begin(v1::WATCH_ORIGIN_REST);
   gate_.StartDraining();
-  refused(session, {}, Code::UNAVAILABLE, "draining");
+  refused(session, {}, grpc::StatusCode::UNAVAILABLE, "draining");
   again->Cancel();
   again->WaitUntilDone();
 }

@@ -251,15 +251,54 @@ TEST_F(SessionRegistryTest, ACancelledCallerIsAnsweredAtOnceAndWhatWasMadeForItE
   registry_->CancelWait(cancelled);
   // The worker has not begun.
   EXPECT_THAT(result.get(), StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
-  EXPECT_THAT(Create({"id", "print", "chosen"}).get(),
-              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("try again")))
-      << "what is given up is not joined";
+  EXPECT_THAT(Create({"", "", "chosen"}).get(), StatusIs(absl::StatusCode::kAlreadyExists))
+      << "another request must wait";
   go.set_value();
   Drain();
   EXPECT_EQ(registry_->size(), 0);
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
   EXPECT_THAT(Stored(), ::testing::IsEmpty());
   EXPECT_THAT(Create({"id", "print", "chosen"}).get(), IsOk());
+}
+
+TEST_F(SessionRegistryTest, ARepeatedRequestJoinsWhatIsGivenUpBeforeItHasStopped) {
+  std::promise<void> go;
+  pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
+  const auto cancelled = std::make_shared<std::atomic<bool>>(true);
+  std::future<CreateResult> gone = Create({"id", "print", "chosen"}, cancelled);
+  registry_->CancelWait(cancelled);
+  EXPECT_THAT(gone.get(), StatusIs(absl::StatusCode::kCancelled));
+  std::future<CreateResult> again = Create({"id", "print", "chosen"});
+  go.set_value();
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, again.get());
+  Drain();
+  EXPECT_EQ(registry_->size(), 1);
+  EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_ + session->bytes_held());
+  EXPECT_THAT(Stored(), ::testing::ElementsAre("chosen"));
+}
+
+TEST_F(SessionRegistryTest, ARepeatedRequestTakesUpWhatWasCancelledInTheSameStage) {
+  const auto cancelled = std::make_shared<std::atomic<bool>>(false);
+  std::future<CreateResult> again;
+  std::promise<CreateResult> first;
+  SessionRecord record = BarRecord(*bar_);
+  record.request_id = "id";
+  record.request_fingerprint = "print";
+  registry_->Create(
+      record, bar_, cancelled,
+      [&first](CreateResult result) { first.set_value(std::move(result)); },
+      [&](const SessionProgress& progress) {
+        if (progress.stage != SessionStage::kOrdering) return;
+        *cancelled = true;
+        registry_->CancelWait(cancelled);
+        // On this very worker: it goes on to its next stage afterwards.
+        again = Create({"id", "print", ""});
+      });
+  EXPECT_THAT(first.get_future().get(), StatusIs(absl::StatusCode::kCancelled));
+  Drain();
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, again.get());
+  EXPECT_EQ(registry_->size(), 1);
+  EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_ + session->bytes_held());
 }
 
 TEST_F(SessionRegistryTest, ASessionThatNobodyWaitsForAnyMoreEndsThoughItIsMade) {

@@ -1,0 +1,124 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cpp/prepare_session.h"
+
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "grpcpp/client_context.h"
+#include "grpcpp/completion_queue.h"
+#include "grpcpp/support/async_stream.h"
+
+#include "client/cpp/client_call.h"
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+constexpr std::chrono::milliseconds kAsk{100};
+
+// One call on a queue of its own, so that waiting for a message can be interrupted.
+class Call {
+ public:
+  Call(const std::string& session, std::chrono::system_clock::time_point deadline,
+       const PreparationWait& wait)
+      : wait_(wait) {
+    AddSessionHeader(session, &context_);
+    context_.set_deadline(deadline);
+  }
+  ~Call() {
+    queue_.Shutdown();
+    void* tag = nullptr;
+    bool ok = false;
+    while (queue_.Next(&tag, &ok)) {
+    }
+  }
+  Call(const Call&) = delete;
+  Call& operator=(const Call&) = delete;
+
+  absl::StatusOr<v1::Session> Run(v1::SessionService::Stub* stub,
+                                  const v1::PrepareSessionRequest& request) {
+    std::optional<v1::Session> session;
+    reader_ = stub->AsyncPrepareSession(&context_, request, &queue_, this);
+    bool open = Wait();
+    while (open) {
+      v1::PrepareSessionResponse response;
+      reader_->Read(&response, this);
+      open = Wait();
+      if (!open) break;
+      if (response.has_session()) session = std::move(*response.mutable_session());
+      if (response.has_progress() && wait_.on_progress) wait_.on_progress(response.progress());
+    }
+    grpc::Status status;
+    reader_->Finish(&status, this);
+    Wait();
+    TF_RETURN_IF_ERROR(FromGrpcStatus(status));
+    if (session.has_value()) return *std::move(session);
+    return absl::InternalError(
+        "the preparation ended without a session; the server speaks another version");
+  }
+
+ private:
+  // Until what was begun has ended; false when there is no more to come.
+  bool Wait() {
+    while (true) {
+      if (wait_.cancellation.requested()) context_.TryCancel();
+      void* tag = nullptr;
+      bool ok = false;
+      const auto next = queue_.AsyncNext(&tag, &ok, std::chrono::system_clock::now() + kAsk);
+      if (next == grpc::CompletionQueue::GOT_EVENT) return ok;
+      if (next == grpc::CompletionQueue::SHUTDOWN) return false;
+    }
+  }
+
+  const PreparationWait& wait_;
+  grpc::ClientContext context_;
+  grpc::CompletionQueue queue_;
+  std::unique_ptr<grpc::ClientAsyncReader<v1::PrepareSessionResponse>> reader_;
+};
+
+std::string StageText(v1::PreparationStage stage) {
+  switch (stage) {
+    case v1::PREPARATION_STAGE_READING_MESH:
+      return "reading the mesh";
+    case v1::PREPARATION_STAGE_WAITING:
+      return "waiting for its turn";
+    case v1::PREPARATION_STAGE_ASSEMBLING:
+      return "assembling";
+    case v1::PREPARATION_STAGE_ORDERING:
+      return "ordering";
+    case v1::PREPARATION_STAGE_FACTORISING:
+      return "factorising";
+    case v1::PREPARATION_STAGE_RESPONSES:
+      return "preparing the model";
+    case v1::PREPARATION_STAGE_KEEPING:
+      return "keeping the session";
+    case v1::PREPARATION_STAGE_ANSWERS:
+      return "preparing answers";
+    default:
+      return "preparing";  // of a newer server
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<v1::Session> WaitForSession(v1::SessionService::Stub* stub,
+                                           const v1::PrepareSessionRequest& request,
+                                           const std::string& session,
+                                           std::chrono::system_clock::time_point deadline,
+                                           const PreparationWait& wait) {
+  return Call(session, deadline, wait).Run(stub, request);
+}
+
+std::string ProgressText(const v1::PreparationProgress& progress) {
+  std::string text = StageText(progress.stage());
+  if (progress.steps() > 0) {
+    absl::StrAppend(&text, ", ", progress.step(), " of ", progress.steps(), " columns");
+  }
+  return text;
+}
+
+}  // namespace tissueform

@@ -1,0 +1,36 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+namespace tissueform {
+
+// What is done before a mesh can be deformed, in this order; what is there already is left out.
+enum class PreparationStage {
+  kAssembling,
+  kOrdering,     // and the symbolic analysis
+  kFactorising,  // and the estimate of the condition
+  kResponses,  // what poses are answered with: harmonic fields, or the columns of an elastic system
+  kAnswers,    // columns of prepared answers
+};
+
+struct PreparationProgress {
+  PreparationStage stage = PreparationStage::kAssembling;
+  int64_t step = 0;   // so many columns are done
+  int64_t steps = 0;  // of so many; 0: the stage does not count
+};
+
+// How far long work is: passed down to it, called when a stage begins and after each step of one
+// that counts, on the thread that works. May be empty. It must not take long; what it tells must
+// outlive the work. (Whether anybody still waits is asked of a Cancellation.)
+using PreparationObserver = std::function<void(const PreparationProgress& progress)>;
+
+inline void TellProgress(const PreparationObserver& observer, PreparationStage stage,
+                         int64_t step = 0, int64_t steps = 0) {
+  if (observer) observer({stage, step, steps});
+}
+
+}  // namespace tissueform

@@ -1,0 +1,94 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/base/mutex.h"
+#include "core/base/preparation_progress.h"
+#include "server/session/clock.h"
+
+namespace tissueform {
+
+// What a session goes through until it is ready, in this order; what it does not need is left out.
+enum class SessionStage {
+  kReadingMesh,
+  kWaiting,  // until a worker is free, and what was begun earlier for others is done
+  // Those of PreparationStage.
+  kAssembling,
+  kOrdering,
+  kFactorising,
+  kResponses,
+  kKeeping,  // its record is written
+  kAnswers,  // of PreparationStage, for a stream that is to come
+};
+
+struct SessionProgress {
+  SessionStage stage = SessionStage::kReadingMesh;
+  int64_t step = 0;   // so many are done
+  int64_t steps = 0;  // of so many; 0: the stage does not count
+
+  friend bool operator==(const SessionProgress&, const SessionProgress&) = default;
+};
+
+SessionProgress ToSessionProgress(const PreparationProgress& progress);
+
+// Called from any thread, also when nobody listens any longer: short, and it waits for nothing. May
+// be empty.
+using TellSession = std::function<void(const SessionProgress& progress)>;
+
+// From what is made in one place to all who wait for it. One thing is made at a time; each has a
+// topic, a number by which those who wait say what they wait for.
+//
+// Begin, Tell and End by one thread at a time; Follow from any.
+class ProgressFeed {
+ public:
+  struct Follower;
+
+  // Hears of the topic for as long as the result lives, and at once how far it is where it is being
+  // made. Null where `tell` is empty.
+  std::shared_ptr<const Follower> Follow(size_t topic, TellSession tell);
+
+  void Begin(size_t topic);
+  // Nobody hears it outside of Begin and End.
+  void Tell(const SessionProgress& progress);
+  void End();
+
+ private:
+  Mutex mutex_;
+  std::vector<std::weak_ptr<const Follower>> followers_ ABSL_GUARDED_BY(mutex_);
+  std::optional<size_t> topic_ ABSL_GUARDED_BY(mutex_);
+  std::optional<SessionProgress> newest_ ABSL_GUARDED_BY(mutex_);
+};
+
+// What of its progress a call is told: every stage, but where one counts no more than about five
+// steps a second. Nothing goes back: where the call of somebody else ended in the middle, what that
+// had done is done again, unseen.
+//
+// One thread at a time.
+class ProgressPace {
+ public:
+  static constexpr std::chrono::milliseconds kInterval{200};
+
+  // `clock` must outlive it.
+  explicit ProgressPace(const Clock* clock) : clock_(clock) {}
+
+  void Offer(const SessionProgress& progress);
+  // What is to be told now; empty: nothing.
+  std::optional<SessionProgress> Take();
+
+ private:
+  const Clock* const clock_;
+  std::optional<SessionProgress> newest_;
+  std::optional<SessionProgress> told_;
+  Clock::TimePoint told_at_;
+};
+
+}  // namespace tissueform
