@@ -20,6 +20,8 @@ namespace tissueform {
 struct HandleRegion {
   std::string name;
   std::vector<int32_t> vertices;
+
+  friend bool operator==(const HandleRegion&, const HandleRegion&) = default;
 };
 
 // Which vertices are fixed, which belong to which handle; all others are free. Immutable.

@@ -103,6 +103,7 @@ absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
                                                 {.backend = options.backend,
                                                  .admission = options.admission,
                                                  .unknowns_per_node = 3,
+                                                 .node_order = options.node_order,
                                                  .observer = options.observer},
                                                 cancellation));
   }

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
@@ -23,6 +24,7 @@ struct ElasticSystemOptions {
   CholeskyBackend backend = CholeskyBackend::kCholmod;
   FactorAdmission admission;  // may be empty; called for the factor, then for the response columns
   int threads = 1;
+  std::vector<int32_t> node_order = {};    // of the vertices, see DirichletSystem::Options
   PreparationObserver observer = nullptr;  // may be empty; told of the response columns, too
 };
 

@@ -61,7 +61,8 @@ MeshPreparation::MeshPreparation(const TetMesh& mesh, Eigen::VectorXd stiffness,
       constraints_(std::move(constraints)),
       options_(std::move(options)),
       elements_(ElementsOf(mesh)),
-      vertex_cells_(elements_.cells, elements_.num_vertices()) {}
+      vertex_cells_(elements_.cells, elements_.num_vertices()),
+      node_order_(options_.node_order) {}
 
 absl::StatusOr<PreparedLaplacian*> MeshPreparation::Laplacian(const Cancellation& cancellation) {
   if (laplacian_ == nullptr) {
@@ -72,20 +73,26 @@ absl::StatusOr<PreparedLaplacian*> MeshPreparation::Laplacian(const Cancellation
     TF_ASSIGN_OR_RETURN(laplacian_, PrepareLaplacian(L, constraints_,
                                                      {.backend = options_.backend,
                                                       .admission = options_.admission,
+                                                      .node_order = node_order_,
                                                       .observer = options_.observer},
                                                      cancellation));
     laplacian_->assemble_seconds = assemble_seconds;
+    node_order_ = laplacian_->system->node_order();
   }
   return laplacian_.get();
 }
 
 absl::StatusOr<ElasticSystem*> MeshPreparation::Elastic(const Cancellation& cancellation) {
   if (elastic_ == nullptr) {
-    TF_ASSIGN_OR_RETURN(
-        elastic_, ElasticSystem::Create(mesh_, stiffness_, constraints_,
-                                        {options_.poisson_ratio, options_.backend,
-                                         options_.admission, options_.threads, options_.observer},
-                                        cancellation));
+    TF_ASSIGN_OR_RETURN(elastic_, ElasticSystem::Create(mesh_, stiffness_, constraints_,
+                                                        {.poisson_ratio = options_.poisson_ratio,
+                                                         .backend = options_.backend,
+                                                         .admission = options_.admission,
+                                                         .threads = options_.threads,
+                                                         .node_order = node_order_,
+                                                         .observer = options_.observer},
+                                                        cancellation));
+    node_order_ = elastic_->system().node_order();
   }
   return elastic_.get();
 }
@@ -96,6 +103,7 @@ int64_t MeshPreparation::bytes_held() const {
 
 int64_t MeshPreparation::laplacian_bytes() const {
   return vertex_cells_.bytes_held() + BytesOf(stiffness_) + BytesOf(elements_.measures) +
+         static_cast<int64_t>(node_order_.size() * sizeof(int32_t)) +
          (laplacian_ != nullptr ? laplacian_->bytes_held() : 0);
 }
 

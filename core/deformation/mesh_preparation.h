@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "absl/status/statusor.h"
 
@@ -30,6 +31,9 @@ struct PreparationOptions {
   // again.
   bool mesh_is_usable = false;
   PreparationObserver observer = nullptr;  // of Laplacian and Elastic; may be empty
+  // A permutation of the vertices from an earlier preparation, see MeshPreparation::node_order;
+  // empty, or of another mesh's length: one is looked for.
+  std::vector<int32_t> node_order = {};
 };
 
 // The Laplacian of the mesh with the constrained vertices eliminated, and what is solved with it at
@@ -82,6 +86,11 @@ class MeshPreparation {
   bool has_laplacian() const { return laplacian_ != nullptr; }
   bool has_elastic() const { return elastic_ != nullptr; }
 
+  // The fill-reducing order of the vertices that all factors use, known with the first of them:
+  // kept, it makes the same factors again without being looked for. Empty where the backend keeps
+  // none.
+  const std::vector<int32_t>& node_order() const { return node_order_; }
+
   // Everything made so far; the mesh is not counted.
   int64_t bytes_held() const;
   // Of it what the models on the Laplacian need: all but the elastic system.
@@ -102,6 +111,8 @@ class MeshPreparation {
   // Null until asked for.
   std::unique_ptr<PreparedLaplacian> laplacian_;
   std::unique_ptr<ElasticSystem> elastic_;
+
+  std::vector<int32_t> node_order_;
 };
 
 }  // namespace tissueform

@@ -104,6 +104,15 @@ SparseMatrix NodePattern(const SparseMatrix& A, int b) {
   return pattern;
 }
 
+std::vector<int32_t> OrderOfUnknowns(const std::vector<int32_t>& node_order, int b) {
+  std::vector<int32_t> order;
+  order.reserve(node_order.size() * static_cast<size_t>(b));
+  for (const int32_t node : node_order) {
+    for (int k = 0; k < b; ++k) order.push_back(node * b + k);
+  }
+  return order;
+}
+
 absl::Status CheckPivots(const SupernodalFactor& factor) {
   for (size_t s = 0; s + 1 < factor.first_columns.size(); ++s) {
     const int32_t columns = factor.first_columns[s + 1] - factor.first_columns[s];
@@ -141,15 +150,13 @@ struct SolveWorkspace {
 
 class CholmodCholesky : public SparseCholesky {
  public:
-  explicit CholmodCholesky(int unknowns_per_node) : unknowns_per_node_(unknowns_per_node) {
+  explicit CholmodCholesky(OrderingHints hints) : hints_(std::move(hints)) {
     cholmod_start(&common_);
-    // METIS alone: measured on the largest bar of the benchmarks (262,701 vertices) its ordering
-    // gives a factor in 9.7 s, that of AMD in 26 s; to try several would cost all of them in every
-    // analysis. Always supernodal: CHOLMOD would choose otherwise for small matrices, and
-    // SupernodalSolver needs the dense blocks.
+    // Always supernodal: CHOLMOD would choose otherwise for small matrices, and SupernodalSolver
+    // needs the dense blocks.
     common_.supernodal = CHOLMOD_SUPERNODAL;
     common_.nmethods = 1;
-    common_.method[0].ordering = CHOLMOD_METIS;
+    common_.method[0].ordering = CHOLMOD_GIVEN;
     common_.postorder = 1;
     common_.print = 0;
     common_.error_handler = nullptr;
@@ -167,16 +174,21 @@ class CholmodCholesky : public SparseCholesky {
     if (A.rows() != A.cols()) {
       return absl::InvalidArgumentError("matrix of the linear system is not square");
     }
-    cholmod_sparse view = ViewLowerTriangle(A);
     cholmod_free_factor(&factor_, &common_);
-    if (unknowns_per_node_ > 1 && A.rows() > 0 && A.rows() % unknowns_per_node_ == 0) {
-      AnalyzeByNodes(A, &view);
+    const bool in_nodes = A.rows() % hints_.unknowns_per_node == 0;
+    const int b = in_nodes ? hints_.unknowns_per_node : 1;
+    if (hints_.node_order.size() == static_cast<size_t>(A.rows() / b)) {
+      node_order_ = hints_.node_order;
     } else {
-      const std::lock_guard lock(OrderingMutex());
-      factor_ = cholmod_analyze(&view, &common_);
+      TF_RETURN_IF_ERROR(FindNodeOrder(A, b));
     }
+    cholmod_sparse view = ViewLowerTriangle(A);
+    std::vector<int32_t> order = OrderOfUnknowns(node_order_, b);
+    factor_ = cholmod_analyze_p(&view, order.data(), nullptr, 0, &common_);
     return ToStatus(common_.status, "analysing the linear system");
   }
+
+  const std::vector<int32_t>& node_order() const override { return node_order_; }
 
   int64_t factor_bytes() const override {
     return static_cast<int64_t>(factor_->xsize * sizeof(double) +
@@ -237,31 +249,21 @@ class CholmodCholesky : public SparseCholesky {
 
   // The displacements of a vertex have the same neighbours, so an ordering of the vertices orders
   // the unknowns, and its graph has b * b times fewer entries.
-  void AnalyzeByNodes(const SparseMatrix& A, cholmod_sparse* view) {
-    const int b = unknowns_per_node_;
+  //
+  // METIS alone: measured on the largest bar of the benchmarks (262,701 vertices) its ordering
+  // gives a factor in 9.7 s, that of AMD in 26 s; to try several would cost all of them in every
+  // analysis.
+  absl::Status FindNodeOrder(const SparseMatrix& A, int b) {
     const SparseMatrix pattern = NodePattern(A, b);
     cholmod_sparse nodes = ViewLowerTriangle(pattern);
-    std::vector<int32_t> node_order(static_cast<size_t>(pattern.cols()));
-    {
-      const std::lock_guard lock(OrderingMutex());
-      if (cholmod_metis(&nodes, nullptr, 0, 1, node_order.data(), &common_) == 0) {
-        return;
-      }
-    }
-    std::vector<int32_t> order;
-    order.reserve(static_cast<size_t>(A.rows()));
-    for (const int32_t node : node_order) {
-      for (int k = 0; k < b; ++k) {
-        order.push_back(node * b + k);
-      }
-    }
-    common_.method[0].ordering = CHOLMOD_GIVEN;
-    factor_ = cholmod_analyze_p(view, order.data(), nullptr, 0, &common_);
-    // For the next analysis, of whatever size.
-    common_.method[0].ordering = CHOLMOD_METIS;
+    node_order_.resize(static_cast<size_t>(pattern.cols()));
+    const std::lock_guard lock(OrderingMutex());
+    cholmod_metis(&nodes, nullptr, 0, 0, node_order_.data(), &common_);
+    return ToStatus(common_.status, "ordering the linear system");
   }
 
-  const int unknowns_per_node_;
+  const OrderingHints hints_;
+  std::vector<int32_t> node_order_;
   cholmod_common common_{};
   cholmod_factor* factor_ = nullptr;
   mutable WorkspacePool<SolveWorkspace> workspaces_;
@@ -269,8 +271,8 @@ class CholmodCholesky : public SparseCholesky {
 
 }  // namespace
 
-std::unique_ptr<SparseCholesky> CreateCholmodCholesky(int unknowns_per_node) {
-  return std::make_unique<CholmodCholesky>(unknowns_per_node);
+std::unique_ptr<SparseCholesky> CreateCholmodCholesky(OrderingHints hints) {
+  return std::make_unique<CholmodCholesky>(std::move(hints));
 }
 
 }  // namespace tissueform

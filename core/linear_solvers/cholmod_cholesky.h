@@ -10,6 +10,6 @@
 namespace tissueform {
 
 // CHOLMOD's supernodal Cholesky with METIS ordering.
-std::unique_ptr<SparseCholesky> CreateCholmodCholesky(int unknowns_per_node);
+std::unique_ptr<SparseCholesky> CreateCholmodCholesky(OrderingHints hints);
 
 }  // namespace tissueform

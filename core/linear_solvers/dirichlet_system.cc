@@ -59,6 +59,19 @@ SparseMatrix ExtractBlock(const SparseMatrix& K, const std::vector<int32_t>& row
   return block;
 }
 
+// An order of all nodes without those that have no number, by their numbers.
+std::vector<int32_t> OrderOfFreeNodes(const std::vector<int32_t>& node_order,
+                                      const std::vector<int32_t>& free_number, int b) {
+  std::vector<int32_t> order;
+  if (node_order.size() * static_cast<size_t>(b) != free_number.size()) return order;
+  for (const int32_t node : node_order) {
+    if (const int32_t number = free_number[node * b]; number != kNotInSystem) {
+      order.push_back(number / b);
+    }
+  }
+  return order;
+}
+
 // The same at every call; without a pattern that an eigenvector could be orthogonal to.
 Eigen::MatrixXd RandomUnitVector(Eigen::Index size) {
   std::mt19937 generator(1);
@@ -82,6 +95,7 @@ absl::StatusOr<std::unique_ptr<DirichletSystem>> DirichletSystem::Create(
   TF_RETURN_IF_ERROR(CheckPrescribed(K, prescribed));
   auto system = absl::WrapUnique(new DirichletSystem());
   system->size_ = K.rows();
+  system->unknowns_per_node_ = options.unknowns_per_node;
   system->prescribed_ = prescribed;
 
   std::vector<bool> is_prescribed(K.rows(), false);
@@ -108,7 +122,9 @@ absl::StatusOr<std::unique_ptr<DirichletSystem>> DirichletSystem::Create(
 
   TF_RETURN_IF_ERROR(cancellation.Check());
   TellProgress(options.observer, PreparationStage::kOrdering);
-  system->cholesky_ = CreateSparseCholesky(options.backend, options.unknowns_per_node);
+  system->cholesky_ = CreateSparseCholesky(
+      options.backend, {options.unknowns_per_node, OrderOfFreeNodes(options.node_order, free_number,
+                                                                    options.unknowns_per_node)});
   Stopwatch stopwatch;
   TF_RETURN_IF_ERROR(system->cholesky_->Analyze(system->free_free_));
   system->factorization_.analyse_seconds = stopwatch.Restart();
@@ -181,6 +197,22 @@ double DirichletSystem::RelativeResidual(const Eigen::MatrixXd& rhs,
       free_free_.selfadjointView<Eigen::Lower>() * free_solution - right;
   const double norm = right.norm();
   return norm > 0 ? residual.norm() / norm : residual.norm();
+}
+
+std::vector<int32_t> DirichletSystem::node_order() const {
+  if (free_.empty() || cholesky_->node_order().empty()) return {};
+  const int b = unknowns_per_node_;
+  std::vector<int32_t> order;
+  order.reserve(static_cast<size_t>(size_ / b));
+  std::vector<bool> is_free(static_cast<size_t>(size_ / b), false);
+  for (const int32_t node : cholesky_->node_order()) {
+    order.push_back(free_[node * b] / b);
+    is_free[order.back()] = true;
+  }
+  for (int32_t node = 0; node < size_ / b; ++node) {
+    if (!is_free[node]) order.push_back(node);
+  }
+  return order;
 }
 
 int64_t DirichletSystem::bytes_held() const {

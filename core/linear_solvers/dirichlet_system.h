@@ -39,8 +39,10 @@ class DirichletSystem {
   struct Options {
     CholeskyBackend backend = CholeskyBackend::kCholmod;
     FactorAdmission admission;  // may be empty
-    // Prescribed and free unknowns, too, come in whole nodes; see CreateSparseCholesky.
+    // Prescribed and free unknowns, too, come in whole nodes; see OrderingHints.
     int unknowns_per_node = 1;
+    // Of all nodes, see node_order(); of another number of them: passed over.
+    std::vector<int32_t> node_order = {};
     PreparationObserver observer = nullptr;  // may be empty
   };
 
@@ -86,6 +88,10 @@ class DirichletSystem {
   Eigen::Index num_free() const { return static_cast<Eigen::Index>(free_.size()); }
   const std::vector<int32_t>& free() const { return free_; }
   const FactorizationSummary& factorization() const { return factorization_; }
+  // A permutation of all nodes, the free ones in the order in which they are eliminated and then
+  // the others: the same order again, also in a system of the same nodes with other unknowns, need
+  // not be looked for. Empty without free unknowns, or where the backend keeps none.
+  std::vector<int32_t> node_order() const;
   int64_t bytes_held() const;
 
  private:
@@ -93,6 +99,7 @@ class DirichletSystem {
 
   // Constant after Create.
   Eigen::Index size_ = 0;
+  int unknowns_per_node_ = 1;
   std::vector<int32_t> free_;        // rising
   std::vector<int32_t> prescribed_;  // rising
   SparseMatrix free_free_;           // #free by #free: the lower triangle of A

@@ -5,6 +5,7 @@
 
 #include <limits>
 #include <new>
+#include <vector>
 
 #include <Eigen/SparseCholesky>
 
@@ -53,6 +54,11 @@ class EigenCholesky : public SparseCholesky {
       return absl::ResourceExhaustedError("out of memory while analysing the linear system");
     }
     return absl::OkStatus();
+  }
+
+  const std::vector<int32_t>& node_order() const override {
+    static const std::vector<int32_t> none;
+    return none;
   }
 
   int64_t factor_bytes() const override {

@@ -3,17 +3,18 @@
 
 #include "core/linear_solvers/sparse_cholesky.h"
 
+#include <utility>
+
 #include "core/linear_solvers/cholmod_cholesky.h"
 #include "core/linear_solvers/eigen_cholesky.h"
 
 namespace tissueform {
 
-std::unique_ptr<SparseCholesky> CreateSparseCholesky(CholeskyBackend backend,
-                                                     int unknowns_per_node) {
+std::unique_ptr<SparseCholesky> CreateSparseCholesky(CholeskyBackend backend, OrderingHints hints) {
   // The one place that knows which backends there are; a new one is a new file and a new case.
   switch (backend) {
     case CholeskyBackend::kCholmod:
-      return CreateCholmodCholesky(unknowns_per_node);
+      return CreateCholmodCholesky(std::move(hints));
     case CholeskyBackend::kEigen:
       break;
   }

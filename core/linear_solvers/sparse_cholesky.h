@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -43,6 +44,11 @@ class SparseCholesky {
   // too large).
   virtual absl::Status Analyze(const SparseMatrix& A) = 0;
 
+  // The fill-reducing order of A's nodes that the last analysis has found or was given, before it
+  // was postordered: the same order again gives the same factor, bit by bit. Empty where the
+  // backend keeps none. Known once Analyze has succeeded.
+  virtual const std::vector<int32_t>& node_order() const = 0;
+
   // Bytes that the numeric factor will hold, or holds. Known once Analyze has succeeded, before
   // anything of that size is allocated.
   virtual int64_t factor_bytes() const = 0;
@@ -62,10 +68,19 @@ class SparseCholesky {
   virtual int64_t single_precision_bytes() const = 0;
 };
 
-// Never null. `unknowns_per_node`: rows b i to b i + b - 1 of every matrix belong to node i and are
-// coupled to the same others (the displacements of a vertex), so ordering the nodes, which takes a
-// fraction of the time, orders the rows. A hint: a backend may pass it over.
+// What is known of the matrices beforehand. Hints: a backend may pass them over.
+struct OrderingHints {
+  // b: rows b i to b i + b - 1 of every matrix belong to node i and are coupled to the same others
+  // (the displacements of a vertex), so ordering the nodes, which takes a fraction of the time,
+  // orders the rows.
+  int unknowns_per_node = 1;
+  // A permutation of the nodes to eliminate them by, see SparseCholesky::node_order. Empty, or of
+  // another number of nodes: one is looked for.
+  std::vector<int32_t> node_order = {};
+};
+
+// Never null.
 std::unique_ptr<SparseCholesky> CreateSparseCholesky(CholeskyBackend backend,
-                                                     int unknowns_per_node = 1);
+                                                     OrderingHints hints = {});
 
 }  // namespace tissueform

@@ -33,6 +33,7 @@ DeformerOptions OptionsOf(const SessionRecord& record) {
   options.model = record.model;
   options.preparation.poisson_ratio = record.poisson_ratio;
   options.preparation.mesh_is_usable = true;  // MeshCatalog
+  options.preparation.node_order = record.node_order;
   options.gradient_field = record.gradient_field;
   // Told in every answer; a small part of a solve.
   options.gradient_field.compute_residual = true;

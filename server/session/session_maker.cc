@@ -17,7 +17,7 @@ SessionMaker::SessionMaker(MemoryBudget* budget, WorkerPool* pool, SessionStore*
       preparations_(budget, pool) {}
 
 void SessionMaker::Make(SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
-                        SessionCaller caller, Callback done) {
+                        SessionCaller caller, MadeCallback done) {
   std::shared_ptr<SharedPreparation> preparation = preparations_.Find(record);
   Strand& strand = preparation->strand();
   caller.Tell(SessionStage::kWaiting);
@@ -27,24 +27,31 @@ void SessionMaker::Make(SessionRecord record, std::shared_ptr<const StoredMesh> 
                              preparation = std::move(preparation), caller = std::move(caller),
                              follower = std::move(follower), done = std::move(done)]() mutable {
     caller.Tell(SessionStage::kAssembling);
-    auto session = Session::Create(std::move(record), std::move(mesh), std::move(preparation),
-                                   budget_, pool_, clock_, caller.cancellation);
+    absl::StatusOr<std::shared_ptr<Session>> session = Session::Create(
+        record, std::move(mesh), preparation, budget_, pool_, clock_, caller.cancellation);
     follower.reset();
-    done(std::move(session));
+    if (!session.ok()) {
+      preparation.reset();
+      done(session.status());
+      return;
+    }
+    record.node_order = preparation->node_order();
+    preparation.reset();  // else it would outlive what `done` does with the session
+    done(Made{std::move(record), *std::move(session)});
   });
 }
 
 void SessionMaker::Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
                           SessionCaller caller, Callback done) {
-  auto keep = [this, record, tell = caller.tell,
-               done = std::move(done)](absl::StatusOr<std::shared_ptr<Session>> session) mutable {
-    if (!session.ok()) {
-      done(std::move(session));
+  auto keep = [this, tell = caller.tell,
+               done = std::move(done)](absl::StatusOr<Made> made) mutable {
+    if (!made.ok()) {
+      done(made.status());
       return;
     }
     if (tell) tell({SessionStage::kKeeping});
-    store_->Create(std::move(record), kStoreEpoch,
-                   [session = *std::move(session),
+    store_->Create(std::move(made->record), kStoreEpoch,
+                   [session = std::move(made->session),
                     done = std::move(done)](const absl::StatusOr<SessionRecord>& stored) mutable {
                      if (stored.ok()) {
                        done(std::move(session));
@@ -60,17 +67,17 @@ void SessionMaker::Create(SessionRecord record, std::shared_ptr<const StoredMesh
 
 void SessionMaker::Restore(const std::string& id, SessionCaller caller, Callback done) {
   const auto as_it_is = [](SessionRecord record, const StoredMesh&) { return record; };
-  Remake(id, as_it_is, std::move(caller), [done = std::move(done)](absl::StatusOr<Remade> remade) {
-    if (remade.ok()) {
-      done(std::move(remade->session));
+  Remake(id, as_it_is, std::move(caller), [done = std::move(done)](absl::StatusOr<Made> made) {
+    if (made.ok()) {
+      done(std::move(made->session));
     } else {
-      done(remade.status());
+      done(made.status());
     }
   });
 }
 
 void SessionMaker::Remake(const std::string& id, Change change, SessionCaller caller,
-                          std::function<void(absl::StatusOr<Remade>)> done) {
+                          MadeCallback done) {
   caller.Tell(SessionStage::kReadingMesh);
   store_->Get(id, [this, change = std::move(change), caller = std::move(caller),
                    done = std::move(done)](absl::StatusOr<SessionRecord> record) mutable {
@@ -89,23 +96,18 @@ void SessionMaker::Remake(const std::string& id, Change change, SessionCaller ca
 }
 
 void SessionMaker::MakeChanged(SessionRecord record, const Change& change, SessionCaller caller,
-                               std::function<void(absl::StatusOr<Remade>)> done) {
+                               MadeCallback done) {
   absl::StatusOr<std::shared_ptr<const StoredMesh>> mesh = catalog_->Load(record.mesh_sha256);
-  absl::StatusOr<SessionRecord> changed =
-      mesh.ok() ? change(std::move(record), **mesh) : mesh.status();
+  absl::StatusOr<SessionRecord> changed = mesh.ok() ? change(record, **mesh) : mesh.status();
   if (!changed.ok()) {
     done(changed.status());
     return;
   }
-  Make(*changed, *std::move(mesh), std::move(caller),
-       [record = *changed,
-        done = std::move(done)](absl::StatusOr<std::shared_ptr<Session>> session) mutable {
-         if (session.ok()) {
-           done(Remade{std::move(record), *std::move(session)});
-         } else {
-           done(session.status());
-         }
-       });
+  // An order of other free vertices would do, but a worse one than may be found.
+  if (changed->fixed != record.fixed || changed->handles != record.handles) {
+    changed->node_order.clear();
+  }
+  Make(*std::move(changed), *std::move(mesh), std::move(caller), std::move(done));
 }
 
 bool SessionMaker::PostUnlessStopped(WorkerPool::Job job) {

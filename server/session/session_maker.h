@@ -45,6 +45,13 @@ class SessionMaker {
  public:
   using Callback = std::function<void(absl::StatusOr<std::shared_ptr<Session>>)>;
 
+  // A session, and the record that it was made of with the order of vertices that this has found.
+  struct Made {
+    SessionRecord record;
+    std::shared_ptr<Session> session;
+  };
+  using MadeCallback = std::function<void(absl::StatusOr<Made>)>;
+
   // All must outlive it and its sessions.
   SessionMaker(MemoryBudget* budget, WorkerPool* pool, SessionStore* store, MeshCatalog* catalog,
                const Clock* clock);
@@ -52,7 +59,7 @@ class SessionMaker {
   // Makes a session of `record` and keeps nothing. `mesh` is the one that the record names. Errors:
   // those of Session::Create.
   void Make(SessionRecord record, std::shared_ptr<const StoredMesh> mesh, SessionCaller caller,
-            Callback done);
+            MadeCallback done);
 
   // Make, then the record is kept: no record tells of a session that could not be made. Errors: and
   // those of SessionStore::Create.
@@ -63,16 +70,12 @@ class SessionMaker {
   // MeshCatalog::Load and Session::Create.
   void Restore(const std::string& id, SessionCaller caller, Callback done);
 
-  // Makes a session of a record in the store as `change` has left it, and keeps nothing. Errors:
-  // those of Restore and of `change`, which comes on a worker.
+  // Makes a session of a record in the store as `change` has left it, and keeps nothing; the record
+  // has the etag of the version that was changed. Errors: those of Restore and of `change`, which
+  // comes on a worker.
   using Change =
       std::function<absl::StatusOr<SessionRecord>(SessionRecord record, const StoredMesh& mesh)>;
-  struct Remade {
-    SessionRecord record;  // with the etag of the version that was changed
-    std::shared_ptr<Session> session;
-  };
-  void Remake(const std::string& id, Change change, SessionCaller caller,
-              std::function<void(absl::StatusOr<Remade>)> done);
+  void Remake(const std::string& id, Change change, SessionCaller caller, MadeCallback done);
 
   // Nothing is posted to the pool any longer by what the store answers. Call it before the pool
   // ends.
@@ -81,7 +84,7 @@ class SessionMaker {
  private:
   // On a worker.
   void MakeChanged(SessionRecord record, const Change& change, SessionCaller caller,
-                   std::function<void(absl::StatusOr<Remade>)> done);
+                   MadeCallback done);
   // False when the pool may have ended.
   bool PostUnlessStopped(WorkerPool::Job job) ABSL_LOCKS_EXCLUDED(mutex_);
 

@@ -46,7 +46,7 @@ SessionRegistry::SessionRegistry(const ServiceLimits& limits, MemoryBudget* budg
       maker_(budget, pool, store, catalog, clock),
       commits_(store),
       updates_(&maker_, store, &commits_,
-               [this](const SessionMaker::Remade& remade, bool other_handles) {
+               [this](const SessionMaker::Made& remade, bool other_handles) {
                  return Replace(remade, other_handles);
                }) {}
 
@@ -434,7 +434,7 @@ void SessionRegistry::Update(const std::string& id, const std::string& etag,
                   {.cancellation = Cancellation(
                        [cancelled = std::move(cancelled)] { return cancelled->load(); }),
                    .tell = std::move(tell)},
-                  [id, done](absl::StatusOr<SessionMaker::Remade> remade) {
+                  [id, done](absl::StatusOr<SessionMaker::Made> remade) {
                     if (remade.ok()) {
                       done(View{std::move(remade->record), std::move(remade->session)});
                     } else if (HasReason(remade.status(), ErrorReason::kSessionNotFound)) {
@@ -445,7 +445,7 @@ void SessionRegistry::Update(const std::string& id, const std::string& etag,
                   });
 }
 
-absl::Status SessionRegistry::Replace(const SessionMaker::Remade& remade, bool other_handles) {
+absl::Status SessionRegistry::Replace(const SessionMaker::Made& remade, bool other_handles) {
   std::shared_ptr<Session> before;
   {
     MutexLock lock(mutex_);

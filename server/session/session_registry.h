@@ -208,7 +208,7 @@ class SessionRegistry {
   bool FinishCreation(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
       ABSL_LOCKS_EXCLUDED(mutex_);
   // Puts an updated session into its place. Errors: NotFound.
-  absl::Status Replace(const SessionMaker::Remade& remade, bool other_handles)
+  absl::Status Replace(const SessionMaker::Made& remade, bool other_handles)
       ABSL_LOCKS_EXCLUDED(mutex_);
   void FinishRestore(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
       ABSL_LOCKS_EXCLUDED(mutex_);

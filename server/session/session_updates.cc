@@ -29,18 +29,17 @@ void SessionUpdates::Update(const std::string& id, const std::string& etag,
     TF_RETURN_IF_ERROR(CheckSessionWrite(record.id, etag, kStoreEpoch, record.etag, record.epoch));
     return change(std::move(record), mesh);
   };
-  maker_->Remake(
-      id, std::move(checked), caller,
-      [this, caller, done = std::move(done)](absl::StatusOr<SessionMaker::Remade> remade) {
-        if (remade.ok()) {
-          Keep(*std::move(remade), caller, done);
-        } else {
-          done(remade.status());
-        }
-      });
+  maker_->Remake(id, std::move(checked), caller,
+                 [this, caller, done = std::move(done)](absl::StatusOr<SessionMaker::Made> remade) {
+                   if (remade.ok()) {
+                     Keep(*std::move(remade), caller, done);
+                   } else {
+                     done(remade.status());
+                   }
+                 });
 }
 
-void SessionUpdates::Keep(SessionMaker::Remade remade, const SessionCaller& caller, Done done) {
+void SessionUpdates::Keep(SessionMaker::Made remade, const SessionCaller& caller, Done done) {
   // The last moment.
   if (const absl::Status wanted = caller.cancellation.Check(); !wanted.ok()) {
     remade.session.reset();
@@ -50,7 +49,7 @@ void SessionUpdates::Keep(SessionMaker::Remade remade, const SessionCaller& call
   caller.Tell(SessionStage::kKeeping);
   const std::string id = remade.record.id;
   commits_->Hold(id);
-  auto finish = [this, id, done = std::move(done)](absl::StatusOr<SessionMaker::Remade> result) {
+  auto finish = [this, id, done = std::move(done)](absl::StatusOr<SessionMaker::Made> result) {
     commits_->Release(id);
     done(std::move(result));
   };
@@ -73,7 +72,7 @@ void SessionUpdates::Keep(SessionMaker::Remade remade, const SessionCaller& call
                        finish(kept.status());
                        return;
                      }
-                     SessionMaker::Remade result{*std::move(kept), std::move(session)};
+                     SessionMaker::Made result{*std::move(kept), std::move(session)};
                      const absl::Status status = replace_(result, other_handles);
                      if (status.ok()) {
                        finish(std::move(result));

@@ -24,10 +24,9 @@ namespace tissueform {
 // Thread-safe.
 class SessionUpdates {
  public:
-  using Done = std::function<void(absl::StatusOr<SessionMaker::Remade>)>;
+  using Done = std::function<void(absl::StatusOr<SessionMaker::Made>)>;
   // Puts a session whose record is kept into its place; not OK when there is none any more.
-  using Replace =
-      std::function<absl::Status(const SessionMaker::Remade& remade, bool other_handles)>;
+  using Replace = std::function<absl::Status(const SessionMaker::Made& remade, bool other_handles)>;
 
   // All must outlive it.
   SessionUpdates(SessionMaker* maker, SessionStore* store, PoseCommits* commits, Replace replace)
@@ -42,7 +41,7 @@ class SessionUpdates {
               const SessionCaller& caller, Done done);
 
  private:
-  void Keep(SessionMaker::Remade remade, const SessionCaller& caller, Done done);
+  void Keep(SessionMaker::Made remade, const SessionCaller& caller, Done done);
 
   SessionMaker* const maker_;
   SessionStore* const store_;

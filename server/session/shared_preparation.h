@@ -88,6 +88,9 @@ class SharedPreparation {
   std::shared_ptr<const ProgressFeed::Follower> Follow(const ResponseRequest& request,
                                                        TellSession tell);
 
+  // On the strand. MeshPreparation::node_order, for a record. REQUIRES: Begin succeeded.
+  const std::vector<int32_t>& node_order() const { return preparation_->node_order(); }
+
   // With the prepared answers that are kept.
   int64_t bytes_held() const { return bytes_held_; }
 

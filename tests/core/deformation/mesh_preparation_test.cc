@@ -3,6 +3,9 @@
 
 #include "core/deformation/mesh_preparation.h"
 
+#include <algorithm>
+#include <numeric>
+#include <random>
 #include <vector>
 
 #include "gmock/gmock.h"
@@ -57,6 +60,44 @@ TEST_F(MeshPreparationTest, SecondModelDoesNotFactoriseAgain) {
   const int after_elastic = admissions_;
   ASSERT_THAT(preparation->Elastic(), IsOk());
   EXPECT_EQ(admissions_, after_elastic);
+}
+
+TEST_F(MeshPreparationTest, OneOrderOfTheVerticesServesAllFactors) {
+  const auto laplacian_first = Prepare();
+  EXPECT_THAT(laplacian_first->node_order(), ::testing::IsEmpty());
+  ASSERT_OK_AND_ASSIGN(const PreparedLaplacian* laplacian, laplacian_first->Laplacian());
+  const std::vector<int32_t> order = laplacian_first->node_order();
+  std::vector<int32_t> all(mesh_.num_vertices());
+  std::iota(all.begin(), all.end(), 0);
+  EXPECT_THAT(order, ::testing::UnorderedElementsAreArray(all));
+  ASSERT_THAT(laplacian_first->Elastic(), IsOk());
+  EXPECT_EQ(laplacian_first->node_order(), order);
+
+  // Both systems have the graph of the mesh's edges, so it does not matter which is made first:
+  // what is made again from a record has the same bits.
+  const auto elastic_first = Prepare();
+  ASSERT_OK_AND_ASSIGN(const ElasticSystem* elastic, elastic_first->Elastic());
+  EXPECT_EQ(elastic_first->node_order(), order);
+  ASSERT_OK_AND_ASSIGN(const PreparedLaplacian* second, elastic_first->Laplacian());
+  EXPECT_EQ(second->harmonic, laplacian->harmonic);
+  EXPECT_EQ(elastic->response_columns(), laplacian_first->Elastic().value()->response_columns());
+}
+
+TEST_F(MeshPreparationTest, AnOrderThatIsGivenIsTheOneThatIsUsed) {
+  const auto found = Prepare();
+  ASSERT_OK_AND_ASSIGN(const ElasticSystem* best, found->Elastic());
+  PreparationOptions options;
+  options.node_order = found->node_order();
+  std::shuffle(options.node_order.begin(), options.node_order.end(), std::mt19937(3));
+  const auto given = testing::PrepareMesh(mesh_, 1, options);
+  ASSERT_OK_AND_ASSIGN(const ElasticSystem* worse, given->Elastic());
+  EXPECT_GT(worse->system().factorization().factor_bytes,
+            best->system().factorization().factor_bytes * 3 / 2);
+  EXPECT_LT((worse->response_columns() - best->response_columns()).cwiseAbs().maxCoeff(), 1e-10);
+  options.node_order.pop_back();
+  const auto short_by_one = testing::PrepareMesh(mesh_, 1, options);
+  ASSERT_THAT(short_by_one->Elastic(), IsOk());
+  EXPECT_EQ(short_by_one->node_order(), found->node_order()) << "passed over";
 }
 
 TEST_F(MeshPreparationTest, BytesAreThoseOfWhatWasMade) {

@@ -3,6 +3,8 @@
 
 #include "core/linear_solvers/sparse_cholesky.h"
 
+#include <algorithm>
+#include <numeric>
 #include <random>
 #include <utility>
 #include <vector>
@@ -107,7 +109,7 @@ TEST_P(SparseCholeskyTest, OrderingByNodesGivesTheSameSolution) {
     }
   }
   A.setFromTriplets(entries.begin(), entries.end());
-  const auto by_nodes = CreateSparseCholesky(GetParam(), 2);
+  const auto by_nodes = CreateSparseCholesky(GetParam(), {.unknowns_per_node = 2});
   ASSERT_THAT(by_nodes->Analyze(A), IsOk());
   ASSERT_THAT(by_nodes->Factorize(A), IsOk());
   ASSERT_THAT(cholesky_->Analyze(A), IsOk());
@@ -153,6 +155,66 @@ TEST_P(SparseCholeskyTest, IndefiniteMatrixIsRefused) {
 TEST_P(SparseCholeskyTest, RectangularMatrixIsRefused) {
   EXPECT_THAT(cholesky_->Analyze(SparseMatrix(3, 4)),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("not square")));
+}
+
+class NodeOrderTest : public ::testing::Test {
+ protected:
+  // Factor and solution with that order; none: with one that is looked for.
+  struct Outcome {
+    std::vector<int32_t> order;
+    int64_t factor_bytes = 0;
+    Eigen::MatrixXd solution;
+  };
+  Outcome SolveIn(const std::vector<int32_t>& order) const {
+    const auto cholesky = CreateSparseCholesky(CholeskyBackend::kCholmod, {.node_order = order});
+    Outcome outcome;
+    EXPECT_THAT(cholesky->Analyze(A_), IsOk());
+    outcome.order = cholesky->node_order();
+    outcome.factor_bytes = cholesky->factor_bytes();
+    EXPECT_THAT(cholesky->Factorize(A_), IsOk());
+    EXPECT_THAT(cholesky->Solve(rhs_, &outcome.solution), IsOk());
+    return outcome;
+  }
+
+  const SparseMatrix A_ = PositiveDefinite();
+  const Eigen::MatrixXd rhs_ = RandomMatrix(A_.rows(), 2);
+};
+
+TEST_F(NodeOrderTest, TheOrderThatWasFoundMakesTheSameFactorAgain) {
+  const Outcome found = SolveIn({});
+  std::vector<int32_t> sorted = found.order;
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<int32_t> all(A_.rows());
+  std::iota(all.begin(), all.end(), 0);
+  EXPECT_EQ(sorted, all);
+  const Outcome again = SolveIn(found.order);
+  EXPECT_EQ(again.order, found.order);
+  EXPECT_EQ(again.factor_bytes, found.factor_bytes);
+  EXPECT_EQ(again.solution, found.solution) << "to the last bit";
+}
+
+TEST_F(NodeOrderTest, AnotherOrderIsObeyedAndMakesAnotherFactorOfTheSameMatrix) {
+  const Outcome found = SolveIn({});
+  std::vector<int32_t> shuffled = found.order;
+  std::shuffle(shuffled.begin(), shuffled.end(), std::mt19937(3));
+  const Outcome other = SolveIn(shuffled);
+  EXPECT_EQ(other.order, shuffled);
+  EXPECT_GT(other.factor_bytes, found.factor_bytes * 3 / 2) << "fill";
+  EXPECT_LT((A_ * other.solution - rhs_).norm(), 1e-11 * rhs_.norm());
+}
+
+TEST_F(NodeOrderTest, AnOrderOfAnotherNumberOfNodesIsPassedOver) {
+  const Outcome found = SolveIn({});
+  std::vector<int32_t> longer = found.order;
+  longer.push_back(static_cast<int32_t>(A_.rows()));
+  EXPECT_EQ(SolveIn(longer).order, found.order);
+}
+
+TEST_F(NodeOrderTest, WhatIsNoPermutationIsRefused) {
+  std::vector<int32_t> twice = SolveIn({}).order;
+  twice[1] = twice[0];
+  const auto cholesky = CreateSparseCholesky(CholeskyBackend::kCholmod, {.node_order = twice});
+  EXPECT_THAT(cholesky->Analyze(A_), StatusIs(absl::StatusCode::kInternal));
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, SparseCholeskyTest,

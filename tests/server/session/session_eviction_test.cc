@@ -3,9 +3,11 @@
 //
 // Sessions that leave memory and come back from their records (server/session/session_registry.h).
 
+#include <algorithm>
 #include <atomic>
 #include <future>
 #include <memory>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -79,6 +81,12 @@ class SessionEvictionTest : public ::testing::Test {
     return done.get_future().get();
   }
 
+  SessionRecord Kept(const std::string& id) {
+    SessionRecord kept;
+    store_.Get(id, [&kept](absl::StatusOr<SessionRecord> record) { kept = *std::move(record); });
+    return kept;
+  }
+
   int EvictAll() {
     return registry_->Evict([] { return false; });
   }
@@ -127,6 +135,27 @@ TEST_F(SessionEvictionTest, WhatIsNotInUseGivesItsMemoryAndComesBackWithTheSameA
   EXPECT_EQ(Answer(*after), answer) << "to the last bit";
   EXPECT_EQ(registry_->size(), 1);
   EXPECT_EQ(Open("bar").get().value(), after);
+}
+
+TEST_F(SessionEvictionTest, TheOrderOfTheVerticesIsKeptAndNotLookedForAgain) {
+  bar_ = Store(SampleMesh(Bar({4, 4, 8})), &catalog_);
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> before, Create("bar").get());
+  SessionRecord record = Kept("bar");
+  EXPECT_EQ(record.node_order.size(), static_cast<size_t>(bar_->mesh.num_vertices()));
+  const auto factor_bytes_in = [&](std::vector<int32_t> order) {
+    record.node_order = std::move(order);
+    store_.Update(record, 1, [&](absl::StatusOr<SessionRecord> kept) { record = *kept; });
+    Restart();
+    const Opened after = Open("bar").get();
+    return after.ok() ? (*after)->preparation().factor_bytes : 0;
+  };
+  const int64_t found = before->preparation().factor_bytes;
+  const std::vector<int32_t> order = record.node_order;
+  EXPECT_EQ(factor_bytes_in(order), found);
+  std::vector<int32_t> shuffled = order;
+  std::shuffle(shuffled.begin(), shuffled.end(), std::mt19937(3));
+  EXPECT_GT(factor_bytes_in(shuffled), found) << "the kept order was not used";
+  EXPECT_EQ(factor_bytes_in({2, 0, 1}), found) << "that of another mesh";
 }
 
 TEST_F(SessionEvictionTest, ThoseUsedLongestAgoGoFirstAndNoMoreThanAreNeeded) {
