@@ -38,7 +38,7 @@ class LinearElasticResponse : public VertexResponse {
 
   double ErrorBoundMm(absl::Span<const HandlePose> poses) const override {
     // Nothing is truncated: 12 columns make every affine motion of a handle.
-    return panel_.RoundingBoundMm(elastic_.Coefficients(poses));
+    return panel_.Choose(elastic_.Coefficients(poses), tolerance_mm_).bound_mm;
   }
 
   bool Covers(absl::Span<const HandlePose> poses) const override {
@@ -46,16 +46,17 @@ class LinearElasticResponse : public VertexResponse {
   }
 
   void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) const override {
-    panel_.Evaluate(elastic_.Coefficients(poses), positions);
+    const Eigen::VectorXd coefficients = elastic_.Coefficients(poses);
+    panel_.Evaluate(coefficients, panel_.Choose(coefficients, tolerance_mm_), positions);
   }
 
   std::optional<double> Answer(absl::Span<const HandlePose> poses,
                                FloatPositions* positions) const override {
     const Eigen::VectorXd coefficients = elastic_.Coefficients(poses);
-    const double bound_mm = panel_.RoundingBoundMm(coefficients);
-    if (!(bound_mm <= tolerance_mm_)) return std::nullopt;
-    panel_.Evaluate(coefficients, positions);
-    return bound_mm;
+    const PanelResponse::Reading reading = panel_.Choose(coefficients, tolerance_mm_);
+    if (!(reading.bound_mm <= tolerance_mm_)) return std::nullopt;
+    panel_.Evaluate(coefficients, reading, positions);
+    return reading.bound_mm;
   }
 
   Eigen::Index num_vertices() const override { return panel_.num_vertices(); }

@@ -74,14 +74,14 @@ ResponseBasisPlan PlanOfDegree(int degree, size_t num_handles, Eigen::Index num_
 class ResponseBasis : public VertexResponse {
  public:
   ResponseBasis(const ResponseBasisPlan& plan, const ResponseBasisOptions& options,
-                const SimplexDomain& domain, Positions rest)
+                const SimplexDomain& domain, const Positions& rest)
       : options_(options),
         num_polynomials_(
             SimplexPolynomials::NumTerms(static_cast<int>(domain.dimension()), plan.degree)),
         degree_(plan.degree),
         domain_(domain),
         expansion_(domain, plan.degree + kGuardDegrees),
-        panel_(std::move(rest), PanelResponse::Rows::kVertices, plan.num_terms) {}
+        panel_(rest, PanelResponse::Rows::kVertices, plan.num_terms) {}
 
   absl::Status Prepare(const std::vector<int32_t>& vertices, MeshPreparation* preparation,
                        const Cancellation& cancellation) {
@@ -90,7 +90,7 @@ class ResponseBasis : public VertexResponse {
   }
 
   double ErrorBoundMm(absl::Span<const HandlePose> poses) const override {
-    return ErrorBoundMm(poses, Expand(poses));
+    return Plan(poses).bound_mm;
   }
 
   bool Covers(absl::Span<const HandlePose> poses) const override {
@@ -98,17 +98,17 @@ class ResponseBasis : public VertexResponse {
   }
 
   void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) const override {
-    panel_.Evaluate(Expand(poses).factors, positions);
+    const PlannedAnswer plan = Plan(poses);
+    panel_.Evaluate(plan.factors, plan.reading, positions);
   }
 
   std::optional<double> Answer(absl::Span<const HandlePose> poses,
                                FloatPositions* positions) const override {
     if (!InRange(poses)) return std::nullopt;
-    const Expansion expansion = Expand(poses);
-    const double bound_mm = ErrorBoundMm(poses, expansion);
-    if (!(bound_mm <= options_.tolerance_mm)) return std::nullopt;
-    panel_.Evaluate(expansion.factors, positions);
-    return bound_mm;
+    const PlannedAnswer plan = Plan(poses);
+    if (!(plan.bound_mm <= options_.tolerance_mm)) return std::nullopt;
+    panel_.Evaluate(plan.factors, plan.reading, positions);
+    return plan.bound_mm;
   }
 
   Eigen::Index num_vertices() const override { return panel_.num_vertices(); }
@@ -120,10 +120,11 @@ class ResponseBasis : public VertexResponse {
   }
 
  private:
-  // Of poses: what the columns are multiplied with.
-  struct Expansion {
-    ExpansionCoefficients coefficients;
+  // Of poses: what the columns are multiplied with, and how much of them is read.
+  struct PlannedAnswer {
     Eigen::MatrixXd factors;  // #columns by 3
+    PanelResponse::Reading reading;
+    double bound_mm = 0;  // with what the expansion leaves out
   };
 
   // Small ones first: high degrees before low ones, handles last.
@@ -200,15 +201,23 @@ class ResponseBasis : public VertexResponse {
     });
   }
 
-  Expansion Expand(absl::Span<const HandlePose> poses) const {
-    Expansion expansion;
-    expansion.coefficients = expansion_.Expand(poses);
-    Eigen::MatrixXd& factors = expansion.factors;
-    factors.resize(panel_.num_columns(), 3);
+  PlannedAnswer Plan(absl::Span<const HandlePose> poses) const {
+    const ExpansionCoefficients coefficients = expansion_.Expand(poses);
+    PlannedAnswer plan;
+    plan.factors = Factors(poses, coefficients);
+    const double truncation_mm = TruncationBoundMm(poses, coefficients);
+    plan.reading = panel_.Choose(plan.factors, options_.tolerance_mm - truncation_mm);
+    plan.bound_mm = truncation_mm + plan.reading.bound_mm;
+    return plan;
+  }
+
+  Eigen::MatrixXd Factors(absl::Span<const HandlePose> poses,
+                          const ExpansionCoefficients& coefficients) const {
+    Eigen::MatrixXd factors(panel_.num_columns(), 3);
     for (Eigen::Index n = 0; n < num_polynomials_; ++n) {
       // Row-major C seen column-major is its transpose.
       factors.middleRows<3>(ColumnOfPolynomial(n)) =
-          Eigen::Map<const Eigen::Matrix3d>(expansion.coefficients.row(n).data());
+          Eigen::Map<const Eigen::Matrix3d>(coefficients.row(n).data());
     }
     for (size_t h = 0; h < poses.size(); ++h) {
       const HandlePose& pose = poses[h];
@@ -218,12 +227,7 @@ class ResponseBasis : public VertexResponse {
       factors.row(ColumnOfHandle(h) + 3) =
           turn * (origins_[h] - pose.pivot_mm) + pose.translation_mm;
     }
-    return expansion;
-  }
-
-  double ErrorBoundMm(absl::Span<const HandlePose> poses, const Expansion& expansion) const {
-    return TruncationBoundMm(poses, expansion.coefficients) +
-           panel_.RoundingBoundMm(expansion.factors);
+    return factors;
   }
 
   double TruncationBoundMm(absl::Span<const HandlePose> poses,

@@ -85,23 +85,31 @@ TEST_F(EstimatedStreamTest, OnceAnswersWithItsHistory) {
 
 TEST_F(EstimatedStreamTest, EarlyAnswersComeBeforeTheConvergedOne) {
   const auto stream = Open(4);
-  ASSERT_THAT(stream->SendPoses(1, TopPose(Shift(2))), IsOk());
-  std::optional<v1::DeformFrame> frame = stream->Receive();
-  ASSERT_TRUE(frame.has_value());
-  EXPECT_TRUE(frame->refining()) << "the first iteration cannot have converged";
-  int32_t expected_refinement = 0;
-  while (frame->refining()) {
-    EXPECT_EQ(frame->sequence(), 1u);
-    EXPECT_EQ(frame->refinement(), expected_refinement++);
-    EXPECT_FALSE(frame->summary().converged());
-    ASSERT_THAT(stream->Ack(*frame), IsOk());
-    frame = stream->Receive();
+  // An early answer gives way to a later one while a message before it is still on its way, so a slow
+  // machine may see none for one pose; hardly for ten.
+  bool came_early = false;
+  for (int pose = 1; pose <= 10 && !came_early; ++pose) {
+    const HandlePose shift = Shift(2 + 0.1 * pose);
+    ASSERT_THAT(stream->SendPoses(pose, TopPose(shift)), IsOk());
+    std::optional<v1::DeformFrame> frame = stream->Receive();
     ASSERT_TRUE(frame.has_value());
+    int32_t expected_refinement = 0;
+    while (frame->refining()) {
+      came_early = true;
+      EXPECT_EQ(frame->sequence(), static_cast<uint64_t>(pose));
+      EXPECT_EQ(frame->refinement(), expected_refinement++);
+      EXPECT_FALSE(frame->summary().converged());
+      ASSERT_THAT(stream->Ack(*frame), IsOk());
+      frame = stream->Receive();
+      ASSERT_TRUE(frame.has_value());
+    }
+    EXPECT_TRUE(frame->summary().converged());
+    ASSERT_OK_AND_ASSIGN(const Positions positions,
+                         DecodePositions(frame->positions(), problem_.mesh.num_vertices()));
+    EXPECT_LT((positions - Solve(shift)).cwiseAbs().maxCoeff(), kFloat32Tolerance);
+    ASSERT_THAT(stream->Ack(*frame), IsOk());
   }
-  EXPECT_TRUE(frame->summary().converged());
-  ASSERT_OK_AND_ASSIGN(const Positions positions,
-                       DecodePositions(frame->positions(), problem_.mesh.num_vertices()));
-  EXPECT_LT((positions - Solve(Shift(2))).cwiseAbs().maxCoeff(), kFloat32Tolerance);
+  EXPECT_TRUE(came_early) << "the first iteration cannot have converged";
 }
 
 TEST_F(EstimatedStreamTest, WithOneCreditThereIsOneFrameAPose) {

@@ -8,30 +8,76 @@
 namespace tissueform {
 namespace {
 
+using Digits = PanelMatrix::Digits;
+
+PanelMatrix PanelsOf(const Eigen::MatrixXd& dense) {
+  PanelMatrix panels(dense.rows(), dense.cols());
+  for (Eigen::Index c = 0; c < dense.cols(); ++c) panels.SetColumn(c, dense.col(c));
+  return panels;
+}
+
+double LargestError(const Eigen::MatrixXd& dense, const PanelMatrix& panels, Eigen::Index count,
+                    Eigen::Index first, Digits digits) {
+  const Eigen::MatrixXd factors = Eigen::MatrixXd::Random(dense.cols(), count);
+  Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> product(dense.rows(),
+                                                                                count);
+  panels.Multiply(factors, first, digits, product.data());
+  const Eigen::Index rest = dense.cols() - first;
+  const Eigen::MatrixXd expected = dense.rightCols(rest) * factors.bottomRows(rest);
+  return (product.cast<double>() - expected).cwiseAbs().maxCoeff();
+}
+
 TEST(PanelMatrixTest, ProductEqualsThatOfADenseMatrix) {
-  for (const Eigen::Index rows : {1, 15, 16, 17, 31, 96, 97, 333}) {
+  for (const Eigen::Index rows : {1, 15, 16, 17, 31, 32, 33, 96, 97, 333}) {
     for (const Eigen::Index cols : {1, 3, 30}) {
       const Eigen::MatrixXd dense = Eigen::MatrixXd::Random(rows, cols);
-      PanelMatrix panels(rows, cols);
-      for (Eigen::Index c = 0; c < cols; ++c) {
-        panels.SetColumn(c, dense.col(c));
-      }
+      const PanelMatrix panels = PanelsOf(dense);
       for (const Eigen::Index count : {1, 3}) {
-        const FloatFactors factors = FloatFactors::Random(cols, count);
-        FloatFactors product(rows, count);
-        panels.Multiply(factors, product.data());
-        const Eigen::MatrixXd expected = dense * factors.cast<double>();
-        EXPECT_LT((product.cast<double>() - expected).cwiseAbs().maxCoeff(),
-                  1e-7 * static_cast<double>(cols + 2))
-            << rows << " by " << cols << ", " << count;
+        for (const Eigen::Index first : {Eigen::Index{0}, cols / 2}) {
+          EXPECT_LT(LargestError(dense, panels, count, first, Digits::kAll),
+                    1e-7 * static_cast<double>(cols + 2))
+              << rows << " by " << cols << ", " << count << " from " << first;
+        }
       }
     }
   }
 }
 
+TEST(PanelMatrixTest, UpperHalvesAreOffByHalfAStepAtMost) {
+  for (const Eigen::Index rows : {1, 17, 33, 333}) {
+    // Columns of very different sizes: each has its own step.
+    Eigen::MatrixXd dense = Eigen::MatrixXd::Random(rows, 5);
+    dense.col(1) *= 1e3;
+    dense.col(2) *= 1e-6;
+    dense.col(3).setZero();
+    const PanelMatrix panels = PanelsOf(dense);
+    double steps = 0;
+    for (Eigen::Index c = 0; c < dense.cols(); ++c) {
+      EXPECT_NEAR(panels.upper_step(c), dense.col(c).cwiseAbs().maxCoeff() / 32767,
+                  1e-12 * panels.upper_step(c));
+      steps += panels.upper_step(c) / 2;  // factors are at most 1
+    }
+    for (const Eigen::Index count : {1, 3}) {
+      const double error = LargestError(dense, panels, count, 0, Digits::kUpperHalf);
+      EXPECT_LT(error, steps + 1e-4);
+      if (rows == 333) {
+        EXPECT_GT(error, 0.1 * steps) << "all digits were read";
+      }
+    }
+  }
+}
+
+TEST(PanelMatrixTest, AColumnIsReplacedByTheNext) {
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Random(40, 2);
+  PanelMatrix panels = PanelsOf(dense);
+  dense.col(1) = 3 * Eigen::VectorXd::Random(40);
+  panels.SetColumn(1, dense.col(1));
+  EXPECT_LT(LargestError(dense, panels, 1, 0, Digits::kAll), 1e-6);
+}
+
 TEST(PanelMatrixTest, BytesAreThoseOfWholePanels) {
-  EXPECT_EQ(PanelMatrix(17, 5).bytes_held(), 2 * 16 * 5 * 4);
-  EXPECT_EQ(PanelMatrix::BytesNeeded(16, 5), 16 * 5 * 4);
+  EXPECT_EQ(PanelMatrix(33, 5).bytes_held(), 2 * 32 * 5 * 4);
+  EXPECT_EQ(PanelMatrix::BytesNeeded(32, 5), 32 * 5 * 4);
 }
 
 }  // namespace

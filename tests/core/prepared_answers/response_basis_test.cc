@@ -24,6 +24,8 @@ using testing::RandomPoses;
 using testing::StatusIs;
 
 using ::tissueform::testing::kInvalid;
+// So small that no bound keeps it: whatever there is of the columns is read.
+constexpr double kAllDigitsMm = 1e-6;
 constexpr double kDegree = std::numbers::pi / 180;
 
 TetMesh JitteredBar() { return testing::Bar({4, 6, 8}, 2.0, 0.2); }
@@ -59,6 +61,28 @@ class ResponseBasisTest : public ::testing::TestWithParam<std::tuple<TetMesh (*)
   int num_handles_ = std::get<1>(GetParam());
 };
 
+// A frame reads no more of the columns than its tolerance needs: the looser, the less.
+TEST_P(ResponseBasisTest, BoundHoldsForEveryToleranceAndTellsWhatWasRead) {
+  std::vector<double> errors;
+  for (const double tolerance : {1e-2, 1e-4, 1e-6}) {
+    ResponseBasisOptions options;
+    options.tolerance_mm = tolerance * mesh_.BoundingBoxDiagonal();
+    Prepared prepared(mesh_, num_handles_, options);
+    RandomNumbers random(7);
+    double largest = 0;
+    for (const double angle : {0.001, 0.03, 0.3}) {
+      const auto poses = RandomPoses(num_handles_, angle, 0.01, prepared.size, &random);
+      const double error = prepared.ErrorMm(poses);
+      EXPECT_LE(error, prepared.basis->ErrorBoundMm(poses)) << tolerance << ", " << angle;
+      EXPECT_LE(prepared.basis->ErrorBoundMm(poses), options.tolerance_mm);
+      largest = std::max(largest, error);
+    }
+    errors.push_back(largest);
+  }
+  EXPECT_GT(errors[0], 10 * errors[1]) << "as if all were read";
+  EXPECT_GT(errors[1], 10 * errors[2]);
+}
+
 // Over the prepared range, half of it and well beyond: never less than the error, and inside the
 // range not a hundred times as much.
 TEST_P(ResponseBasisTest, BoundHoldsAndIsNotTooWide) {
@@ -88,7 +112,9 @@ TEST_P(ResponseBasisTest, BoundHoldsAndIsNotTooWide) {
 }
 
 TEST_P(ResponseBasisTest, IdentityGivesRestAndHandlesGoWhereTheirPosesSay) {
-  Prepared prepared(mesh_, num_handles_, {});
+  ResponseBasisOptions options;
+  options.tolerance_mm = kAllDigitsMm;
+  Prepared prepared(mesh_, num_handles_, options);
   FloatPositions positions;
   prepared.basis->Evaluate(std::vector<HandlePose>(num_handles_), &positions);
   EXPECT_EQ(positions, mesh_.positions().cast<float>());
@@ -216,9 +242,11 @@ TEST(ResponseBasisSelectionTest, ChosenVerticesComeInTheirOrder) {
   const TetMesh mesh = JitteredBar();
   const auto preparation = testing::PrepareMesh(mesh, 1);
   const std::vector<int32_t> chosen = {100, 3, 57, 300};
+  ResponseBasisOptions options;
+  options.tolerance_mm = kAllDigitsMm;
   ASSERT_OK_AND_ASSIGN(const auto all,
-                       CreateResponseBasis(preparation, testing::AllVertices(mesh), {}));
-  ASSERT_OK_AND_ASSIGN(const auto some, CreateResponseBasis(preparation, chosen, {}));
+                       CreateResponseBasis(preparation, testing::AllVertices(mesh), options));
+  ASSERT_OK_AND_ASSIGN(const auto some, CreateResponseBasis(preparation, chosen, options));
   RandomNumbers random(9);
   const auto poses = RandomPoses(1, 0.4, 0, 10, &random);
   FloatPositions of_all;
