@@ -138,7 +138,9 @@ void PutHalf(int64_t half, bool second, int32_t* pair) {
                                       : (others & 0xffff0000U) | bits);
 }
 
-Eigen::Index NumPanels(Eigen::Index rows) { return (rows + PanelMatrix::kPanelRows - 1) / PanelMatrix::kPanelRows; }
+Eigen::Index NumPanels(Eigen::Index rows) {
+  return (rows + PanelMatrix::kPanelRows - 1) / PanelMatrix::kPanelRows;
+}
 
 }  // namespace
 

@@ -16,8 +16,8 @@ namespace tissueform {
 //
 // Entries are fixed-point numbers of 32 bits, each column by its own largest one. Upper and lower
 // halves lie apart: a product for which 16 bits are enough reads half of the bytes. That is twice
-// as fast where it counts, after a pause: between the frames of one drag at 30 Hz a processor sleeps
-// and loses what its caches held (measured: 0.35 ms in place of 0.09 for 2.6 MB).
+// as fast where it counts, after a pause: between the frames of one drag at 30 Hz a processor
+// sleeps and loses what its caches held (measured: 0.35 ms in place of 0.09 for 2.6 MB).
 class PanelMatrix {
  public:
   static constexpr int kPanelRows = 32;

@@ -30,9 +30,9 @@ class PanelResponse {
   struct Reading {
     Eigen::Index first_column = 0;  // those before it say less than matters
     PanelMatrix::Digits digits = PanelMatrix::Digits::kAll;
-    // How far, in mm, a vertex can be put off: by what is not read, and by rounding. A bound, not an
-    // estimate: every stored entry, factor, product and partial sum is counted with half a unit in
-    // the last place of the largest value that it can take.
+    // How far, in mm, a vertex can be put off: by what is not read, and by rounding. A bound, not
+    // an estimate: every stored entry, factor, product and partial sum is counted with half a unit
+    // in the last place of the largest value that it can take.
     double bound_mm = 0;
   };
 

@@ -85,8 +85,8 @@ TEST_F(EstimatedStreamTest, OnceAnswersWithItsHistory) {
 
 TEST_F(EstimatedStreamTest, EarlyAnswersComeBeforeTheConvergedOne) {
   const auto stream = Open(4);
-  // An early answer gives way to a later one while a message before it is still on its way, so a slow
-  // machine may see none for one pose; hardly for ten.
+  // An early answer gives way to a later one while a message before it is still on its way, so a
+  // slow machine may see none for one pose; hardly for ten.
   bool came_early = false;
   for (int pose = 1; pose <= 10 && !came_early; ++pose) {
     const HandlePose shift = Shift(2 + 0.1 * pose);

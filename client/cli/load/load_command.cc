@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "client/cli/load/bare_transport.h"
 #include "client/cli/load/load_report.h"
 #include "client/cli/load/load_run.h"
 #include "client/cli/online/server_process.h"
@@ -67,7 +68,13 @@ absl::Status Run(const LoadCommandOptions& options) {
   absl::FPrintF(stderr, "plan %s: %d vertices, %d tets, %s; preparing %d drags on %s ...\n", path,
                 problem.mesh->num_vertices(), problem.mesh->num_tets(), options.model,
                 options.load.sessions + options.load.slow_readers + options.load.refining, address);
-  TF_ASSIGN_OR_RETURN(const LoadResult result, RunLoad(address, problem, options.load));
+  TF_ASSIGN_OR_RETURN(LoadResult result, RunLoad(address, problem, options.load));
+  if (load.bare && !result.drags.empty() && result.drags.front().frames > 0) {
+    const DragLoad& drags = result.drags.front();
+    TF_ASSIGN_OR_RETURN(
+        result.bare_latencies_ms,
+        MeasureBareTransport(drags.bytes / drags.frames, load.poses_per_second, load.seconds));
+  }
   absl::PrintF("prepared in %.1f s, then %g s\n%s", result.preparing_seconds, options.load.seconds,
                LoadText(options.load, result));
   if (!options.json.empty()) {
@@ -119,6 +126,9 @@ void AddOptions(CLI::App* command, LoadCommandOptions* options) {
       ->capture_default_str();
   command->add_flag("--in-phase", load.in_phase,
                     "all drags send at the same moments; else they are spread out");
+  command->add_flag("--bare", load.bare,
+                    "afterwards also time frames of the same size that nobody computes, through\n"
+                    "gRPC alone: what a drag's latency cannot come below");
   command->add_option("--json", options->json, "also write the figures to this JSON file");
 }
 

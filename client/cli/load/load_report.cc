@@ -76,6 +76,13 @@ std::string LoadText(const LoadOptions& options, const LoadResult& result) {
                           result.session_seconds.size(),
                           PercentilesText(result.session_seconds, 2));
   }
+  if (!result.bare_latencies_ms.empty()) {
+    const double ratio = Percentile(result.drags.front().latencies_ms, 50) /
+                         Percentile(result.bare_latencies_ms, 50);
+    absl::StrAppendFormat(
+        &text, "gRPC alone, one stream: latency ms 50/90/99/most %s; %s take %.2f times that\n",
+        PercentilesText(result.bare_latencies_ms, 2), result.drags.front().kind, ratio);
+  }
   absl::StrAppendFormat(&text, "errors: %d\n", result.errors.size());
   for (size_t i = 0; i < std::min<size_t>(result.errors.size(), 3); ++i) {
     const absl::Status& error = result.errors[i];
@@ -108,6 +115,7 @@ Json LoadJson(const LoadOptions& options, const LoadResult& result) {
                              {"latency_ms", PercentilesJson(load.latencies_ms)},
                              {"solve_ms", PercentilesJson(load.solves_ms)}});
   }
+  json["bare_latency_ms"] = PercentilesJson(result.bare_latencies_ms);
   json["session_seconds"] = PercentilesJson(result.session_seconds);
   json["errors"] = result.errors.size();
   return json;

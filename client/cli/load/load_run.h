@@ -25,6 +25,7 @@ struct LoadOptions {
   int refining = 0;       // further drags, answered by neo_hookean: solves that iterate
   bool int16 = false;     // frames as int16 displacements with zstd instead of float32
   bool in_phase = false;  // all drags send at the same moments, instead of spread out
+  bool bare = false;      // frames of that size through gRPC alone, afterwards
 };
 
 // The drags of one kind together.
@@ -43,6 +44,7 @@ struct LoadResult {
   double preparing_seconds = 0;         // until all drags were ready to begin
   std::vector<DragLoad> drags;          // of the kinds that there were
   std::vector<double> session_seconds;  // of every session that churn made
+  std::vector<double> bare_latencies_ms;  // see MeasureBareTransport
   std::vector<absl::Status> errors;     // of drags and churn; what was not asked for is one
 };
 
