@@ -236,6 +236,8 @@ void DeformStreamReactor::Advance() {
   const bool busy = write_in_flight_ || committing_ || (flow_.has_value() && flow_->busy());
   if (outcome_.has_value() && !busy) {
     finished_ = true;
+    // Before the client hears of the end: who begins to watch then does not find a drag.
+    publisher_.reset();
     Finish(scope_.End(*outcome_));
   }
 }
