@@ -195,7 +195,8 @@ TEST_P(ModelBasedTest, EveryAnswerIsThatOfPlainMaps) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, ModelBasedTest, ::testing::Range(1, kParts + 1));
+INSTANTIATE_TEST_SUITE_P(Seeds, ModelBasedTest, ::testing::Range(1, kParts + 1),
+                         [](const auto& part) { return "Part" + std::to_string(part.param); });
 
 }  // namespace
 }  // namespace tissueform::testing

@@ -8,10 +8,10 @@
 #include <string>
 #include <thread>
 
-#include <grpcpp/grpcpp.h>
-
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include <grpcpp/grpcpp.h>
+
 #include "tissueform/v1/deform_service.grpc.pb.h"
 
 namespace tissueform {
@@ -76,8 +76,8 @@ absl::StatusOr<std::vector<double>> MeasureBareTransport(int64_t frame_bytes,
   if (server == nullptr || port == 0) {
     return absl::UnavailableError("no port of 127.0.0.1 is free for the bare server");
   }
-  const auto stub = v1::DeformService::NewStub(grpc::CreateChannel(
-      absl::StrCat("127.0.0.1:", port), grpc::InsecureChannelCredentials()));
+  const auto stub = v1::DeformService::NewStub(
+      grpc::CreateChannel(absl::StrCat("127.0.0.1:", port), grpc::InsecureChannelCredentials()));
   grpc::ClientContext context;
   const auto stream = stub->Deform(&context);
   const auto interval = std::chrono::duration_cast<SteadyClock::duration>(

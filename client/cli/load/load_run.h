@@ -41,11 +41,11 @@ struct DragLoad {
 };
 
 struct LoadResult {
-  double preparing_seconds = 0;         // until all drags were ready to begin
-  std::vector<DragLoad> drags;          // of the kinds that there were
-  std::vector<double> session_seconds;  // of every session that churn made
+  double preparing_seconds = 0;           // until all drags were ready to begin
+  std::vector<DragLoad> drags;            // of the kinds that there were
+  std::vector<double> session_seconds;    // of every session that churn made
   std::vector<double> bare_latencies_ms;  // see MeasureBareTransport
-  std::vector<absl::Status> errors;     // of drags and churn; what was not asked for is one
+  std::vector<absl::Status> errors;       // of drags and churn; what was not asked for is one
 };
 
 // Runs it against the server at `address`. Errors while the drags are prepared; later ones are
