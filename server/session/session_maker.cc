@@ -86,17 +86,15 @@ void SessionMaker::Remake(const std::string& id, Change change, SessionCaller ca
       return;
     }
     // Reading a mesh takes its time.
-    const bool posted =
-        PostUnlessStopped([this, record = *std::move(record), change = std::move(change),
-                           caller = std::move(caller), done]() mutable {
-          MakeChanged(std::move(record), change, std::move(caller), std::move(done));
-        });
+    const bool posted = PostUnlessStopped(
+        [this, record = *std::move(record), change = std::move(change), caller = std::move(caller),
+         done]() mutable { MakeChanged(record, change, std::move(caller), std::move(done)); });
     if (!posted) done(absl::UnavailableError("the server is ending"));
   });
 }
 
-void SessionMaker::MakeChanged(SessionRecord record, const Change& change, SessionCaller caller,
-                               MadeCallback done) {
+void SessionMaker::MakeChanged(const SessionRecord& record, const Change& change,
+                               SessionCaller caller, MadeCallback done) {
   absl::StatusOr<std::shared_ptr<const StoredMesh>> mesh = catalog_->Load(record.mesh_sha256);
   absl::StatusOr<SessionRecord> changed = mesh.ok() ? change(record, **mesh) : mesh.status();
   if (!changed.ok()) {

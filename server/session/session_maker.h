@@ -83,7 +83,7 @@ class SessionMaker {
 
  private:
   // On a worker.
-  void MakeChanged(SessionRecord record, const Change& change, SessionCaller caller,
+  void MakeChanged(const SessionRecord& record, const Change& change, SessionCaller caller,
                    MadeCallback done);
   // False when the pool may have ended.
   bool PostUnlessStopped(WorkerPool::Job job) ABSL_LOCKS_EXCLUDED(mutex_);

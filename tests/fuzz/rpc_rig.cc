@@ -68,7 +68,7 @@ RpcRig::RpcRig() {
   SessionRecord record = testing::BarRecord(*bar);
   record.id = "fuzzed";
   std::promise<bool> made;
-  registry.Create(std::move(record), std::move(bar), std::make_shared<std::atomic<bool>>(),
+  registry.Create(std::move(record), bar, std::make_shared<std::atomic<bool>>(),
                   [&made](const absl::StatusOr<std::shared_ptr<Session>>& session) {
                     made.set_value(session.ok());
                   });
