@@ -58,5 +58,10 @@ case $run in
 esac
 
 deploy/build.sh "$preset" "${targets[@]}"
+# A folder that another compiler made is made anew by CMake, without what the preset says.
+if ! grep -q '^TISSUEFORM_SANITIZE:[A-Z]*=.' "$TISSUEFORM_BUILD_DIR/CMakeCache.txt"; then
+  echo "run_sanitizers.sh: $TISSUEFORM_BUILD_DIR is no build with a sanitizer; delete it and try again" >&2
+  exit 1
+fi
 exec ctest --test-dir "$TISSUEFORM_BUILD_DIR" --output-on-failure --no-tests=error \
   --parallel "${JOBS:-$(nproc)}" "${selection[@]}" "$@"
