@@ -17,7 +17,7 @@
 namespace tissueform {
 
 // Nothing outlives the process. Every call is answered before it returns.
-class InMemorySessionStore final : public SessionStore {
+class InMemorySessionStore : public SessionStore {
  public:
   explicit InMemorySessionStore(UnixClock clock = SystemUnixSeconds) : clock_(std::move(clock)) {}
 

@@ -21,7 +21,7 @@ namespace tissueform {
 
 // Meshes and predictions of a server that keeps nothing: they go with the process. Every mesh is
 // held here once more, beside the copy that sessions use.
-class InMemoryMeshStore final : public MeshStore {
+class InMemoryMeshStore : public MeshStore {
  public:
   absl::Status Put(const MeshRecord& record, const MeshPayloadView& payload) override;
   absl::StatusOr<MeshRecord> Find(const std::string& sha256) override;

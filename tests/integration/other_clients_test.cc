@@ -3,7 +3,6 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <memory>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -11,9 +10,8 @@
 #include "gtest/gtest.h"
 #include <sys/wait.h>
 
-#include "client/cli/online/server_process.h"
+#include "tests/integration/served_cli_test.h"
 #include "tests/testing/run_tissueform.h"
-#include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
 
 // The real server, asked by clients that are not ours and know nothing but what it says itself.
@@ -25,34 +23,28 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 constexpr int kModulesMissing = 77;
+constexpr char kHowToGetModules[] =
+    "python3-grpcio or python3-protobuf is missing: deploy/packages.txt lists them";
 
-class OtherClientsTest : public CliTest {
+class OtherClientsTest : public ServedCliTest {
  protected:
-  void SetUp() override {
-    CliTest::SetUp();
-    ASSERT_OK_AND_ASSIGN(server_,
-                         ServerProcess::Start(ProgramPath("tissueform-server"),
-                                              {"--in-memory", "--port", "0", "--log-level", "warn"},
-                                              std::chrono::seconds(60)));
-  }
-
   // Exit code; what it said is in out.txt.
   int Run(const std::string& command) const {
     return WEXITSTATUS(std::system(
         absl::StrCat("cd ", folder_.string(), " && ", command, " > out.txt 2>&1").c_str()));
   }
 
-  std::unique_ptr<ServerProcess> server_;
+  // One of the scripts beside this file, against the server.
+  int RunPython(const std::string& script) const {
+    return Run(absl::StrCat(TISSUEFORM_PYTHON, " ", SourcePath("tests/integration/"), script, " ",
+                            server_->address(), " ", GRPC_PROTOS, " ", GOOGLE_RPC_PROTOS));
+  }
 };
 
 TEST_F(OtherClientsTest, PythonFindsTheReasonOfEveryRpcsError) {
-  const int exit_code =
-      Run(absl::StrCat(TISSUEFORM_PYTHON, " ", SourcePath("tests/integration/call_every_rpc.py"),
-                       " ", server_->address(), " ", GRPC_PROTOS, " ", GOOGLE_RPC_PROTOS));
+  const int exit_code = RunPython("call_every_rpc.py");
   const std::string out = Read("out.txt");
-  if (exit_code == kModulesMissing) {
-    GTEST_SKIP() << "python3-grpcio or python3-protobuf is missing: deploy/packages.txt lists them";
-  }
+  if (exit_code == kModulesMissing) GTEST_SKIP() << kHowToGetModules;
   EXPECT_EQ(exit_code, 0) << out;
   EXPECT_THAT(out,
               AllOf(HasSubstr("grpc.health.v1.Health"),
@@ -61,6 +53,19 @@ TEST_F(OtherClientsTest, PythonFindsTheReasonOfEveryRpcsError) {
                     HasSubstr("MeshService/UploadMesh INVALID_ARGUMENT INVALID_REQUEST"),
                     HasSubstr("MeshService/QueryUpload INVALID_ARGUMENT INVALID_REQUEST"),
                     HasSubstr("DeformService/Deform INVALID_ARGUMENT INVALID_REQUEST")));
+}
+
+TEST_F(OtherClientsTest, PythonGoesOnWithAnUploadAndPreparesASession) {
+  const int exit_code = RunPython("send_and_prepare.py");
+  const std::string out = Read("out.txt");
+  if (exit_code == kModulesMissing) GTEST_SKIP() << kHowToGetModules;
+  EXPECT_EQ(exit_code, 0) << out;
+  EXPECT_EQ(out,
+            "broken off: INVALID_ARGUMENT\n"
+            "there: 5000 of 17688\n"
+            "mesh: True 225 768\n"
+            "progress: True in order: True\n"
+            "session: True True ['top']\n");
 }
 
 TEST_F(OtherClientsTest, BufListsAndCallsRpcsByReflection) {

@@ -1,8 +1,6 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include <chrono>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,10 +9,10 @@
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
 
-#include "client/cli/online/server_process.h"
 #include "core/mesh/tet_topology.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "core/mesh_io/triangle_mesh_io.h"
+#include "tests/integration/served_cli_test.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
@@ -31,16 +29,8 @@ using ::testing::StartsWith;
 
 const std::string kTonguePlan = SourcePath("tests/data/plans/tongue/plan.json");
 
-class PredictionCommandTest : public CliTest {
+class PredictionCommandTest : public ServedCliTest {
  protected:
-  void SetUp() override {
-    CliTest::SetUp();
-    ASSERT_OK_AND_ASSIGN(server_,
-                         ServerProcess::Start(ProgramPath("tissueform-server"),
-                                              {"--in-memory", "--port", "0", "--log-level", "warn"},
-                                              std::chrono::seconds(60)));
-  }
-
   ProcessResult Prediction(std::vector<std::string> words) const {
     words.insert(words.begin(), "prediction");
     words.insert(words.end(), {"--server", server_->address()});
@@ -59,8 +49,6 @@ class PredictionCommandTest : public CliTest {
     EXPECT_EQ(Run({"deform", kTonguePlan, "--model", model, "--out", out}).exit_code, 0);
   }
   Json ReadJson(const std::string& name) const { return Json::parse(Read(name)); }
-
-  std::unique_ptr<ServerProcess> server_;
 };
 
 TEST_F(PredictionCommandTest, ListsShowsComparesAndDeletes) {
@@ -105,6 +93,8 @@ TEST_F(PredictionCommandTest, ListsShowsComparesAndDeletes) {
   EXPECT_THAT(Prediction(words).out, ContainsRegex("\nlisted +3 "));
   Write("list.txt", "7 three");
   EXPECT_THAT(Prediction(words), FailsWith(1, HasSubstr("\"three\" is no vertex")));
+  Write("list.txt", " \n");
+  EXPECT_THAT(Prediction(words), FailsWith(1, HasSubstr("list.txt: names no vertex")));
   Write("list.txt", "7 7");
   EXPECT_THAT(Prediction(words), FailsWith(1, HasSubstr("7")));
 

@@ -1,7 +1,6 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include <chrono>
 #include <fstream>
 #include <iterator>
 #include <memory>
@@ -13,11 +12,11 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "client/cli/online/server_process.h"
 #include "client/cpp/plan_session.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/deformation/deformer.h"
 #include "core/planning/plan_io.h"
+#include "tests/integration/served_cli_test.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
@@ -32,14 +31,10 @@ using ::testing::HasSubstr;
 
 const std::string kTonguePlan = SourcePath("tests/data/plans/tongue/plan.json");
 
-class SessionCommandTest : public CliTest {
+class SessionCommandTest : public ServedCliTest {
  protected:
   void SetUp() override {
-    CliTest::SetUp();
-    ASSERT_OK_AND_ASSIGN(server_,
-                         ServerProcess::Start(ProgramPath("tissueform-server"),
-                                              {"--in-memory", "--port", "0", "--log-level", "warn"},
-                                              std::chrono::seconds(60)));
+    ServedCliTest::SetUp();
     ASSERT_OK_AND_ASSIGN(client_, TissueformClient::Connect(server_->address(), {}));
     ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(kTonguePlan));
     ASSERT_OK_AND_ASSIGN(problem_, ResolvePlan(plan));
@@ -69,7 +64,6 @@ class SessionCommandTest : public CliTest {
     return Run(words);
   }
 
-  std::unique_ptr<ServerProcess> server_;
   std::unique_ptr<TissueformClient> client_;
   std::optional<PlanProblem> problem_;
   std::unique_ptr<PlanSession> session_;

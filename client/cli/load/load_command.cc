@@ -48,6 +48,11 @@ absl::Status Run(const LoadCommandOptions& options) {
     return absl::InvalidArgumentError(
         "nothing is asked for; give --sessions, --slow-readers, --refining or --churn a number");
   }
+  if (load.bare && load.sessions + load.slow_readers + load.refining == 0) {
+    return absl::InvalidArgumentError(
+        "--bare sends frames of the size that a drag's have, and there is no drag; give "
+        "--sessions");
+  }
   if (!options.json.empty()) TF_RETURN_IF_ERROR(CheckWritable(options.json));
   TF_ASSIGN_OR_RETURN(const std::string path, FindDemoPlan(options.plan));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(path));

@@ -146,6 +146,10 @@ absl::StatusOr<std::vector<int32_t>> ReadVertexNumbers(const std::string& path) 
     }
     vertices.push_back(vertex);
   }
+  if (vertices.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(path, ": names no vertex; write numbers from 0 on, with spaces between"));
+  }
   return vertices;
 }
 

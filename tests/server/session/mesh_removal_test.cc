@@ -43,76 +43,38 @@ MATCHER_P(Because, reason, std::string(ReasonName(reason))) {
 }
 
 // Does something in the middle of a call.
-class InterruptedMeshStore : public MeshStore {
+class InterruptedMeshStore : public InMemoryMeshStore {
  public:
   absl::Status Put(const MeshRecord& record, const MeshPayloadView& payload) override {
-    absl::Status status = store_.Put(record, payload);
+    absl::Status status = InMemoryMeshStore::Put(record, payload);
     if (after_put) after_put();
     return status;
   }
-  absl::StatusOr<MeshRecord> Find(const std::string& sha256) override {
-    return store_.Find(sha256);
-  }
   absl::StatusOr<MeshPayload> Read(const std::string& sha256) override {
-    absl::StatusOr<MeshPayload> payload = store_.Read(sha256);
+    absl::StatusOr<MeshPayload> payload = InMemoryMeshStore::Read(sha256);
     if (after_read) after_read();
     return payload;
   }
-  absl::StatusOr<Page> List(const std::string& after, int limit) override {
-    return store_.List(after, limit);
-  }
   absl::Status Delete(const std::string& sha256) override {
     if (before_delete) before_delete();
-    return store_.Delete(sha256);
-  }
-  absl::Status Touch(const std::vector<std::string>& sha256s, int64_t now_s) override {
-    return store_.Touch(sha256s, now_s);
-  }
-  absl::StatusOr<std::vector<MeshRecord>> ListUnused(int64_t before_s, int limit) override {
-    return store_.ListUnused(before_s, limit);
+    return InMemoryMeshStore::Delete(sha256);
   }
 
   std::function<void()> after_put;
   std::function<void()> after_read;
   std::function<void()> before_delete;
-
- private:
-  InMemoryMeshStore store_;
 };
 
 // Deletes a record only when it may.
-class HeldSessionStore : public SessionStore {
+class HeldSessionStore : public InMemorySessionStore {
  public:
-  void Create(SessionRecord record, int64_t epoch, RecordCallback done) override {
-    store_.Create(std::move(record), epoch, std::move(done));
-  }
-  void Get(const std::string& id, RecordCallback done) override { store_.Get(id, std::move(done)); }
-  void Update(SessionRecord record, int64_t epoch, RecordCallback done) override {
-    store_.Update(std::move(record), epoch, std::move(done));
-  }
-  void CommitPoses(const std::string& id, std::vector<HandlePose> poses, int64_t epoch,
-                   StatusCallback done) override {
-    store_.CommitPoses(id, std::move(poses), epoch, std::move(done));
-  }
   void Delete(const std::string& id, const std::string& etag, int64_t epoch,
               StatusCallback done) override {
     if (on_delete) on_delete();
-    store_.Delete(id, etag, epoch, std::move(done));
-  }
-  void List(const ListRequest& request, PageCallback done) override {
-    store_.List(request, std::move(done));
-  }
-  void Touch(std::vector<std::string> ids, int64_t now_s, StatusCallback done) override {
-    store_.Touch(std::move(ids), now_s, std::move(done));
-  }
-  void ListUnused(int64_t before_s, int limit, PageCallback done) override {
-    store_.ListUnused(before_s, limit, std::move(done));
+    InMemorySessionStore::Delete(id, etag, epoch, std::move(done));
   }
 
   std::function<void()> on_delete;
-
- private:
-  InMemorySessionStore store_;
 };
 
 class MeshRemovalTest : public ::testing::Test {

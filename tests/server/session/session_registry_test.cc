@@ -46,38 +46,14 @@ struct Key {
 using CreateResult = absl::StatusOr<std::shared_ptr<Session>>;
 
 // Lets a test do something when a session has been made and its record is about to be kept.
-class WatchedStore : public SessionStore {
+class WatchedStore : public InMemorySessionStore {
  public:
   void Create(SessionRecord record, int64_t epoch, RecordCallback done) override {
     if (before_create) before_create();
-    store_.Create(std::move(record), epoch, std::move(done));
-  }
-  void Get(const std::string& id, RecordCallback done) override { store_.Get(id, std::move(done)); }
-  void Update(SessionRecord record, int64_t epoch, RecordCallback done) override {
-    store_.Update(std::move(record), epoch, std::move(done));
-  }
-  void CommitPoses(const std::string& id, std::vector<HandlePose> poses, int64_t epoch,
-                   StatusCallback done) override {
-    store_.CommitPoses(id, std::move(poses), epoch, std::move(done));
-  }
-  void Delete(const std::string& id, const std::string& etag, int64_t epoch,
-              StatusCallback done) override {
-    store_.Delete(id, etag, epoch, std::move(done));
-  }
-  void List(const ListRequest& request, PageCallback done) override {
-    store_.List(request, std::move(done));
-  }
-  void Touch(std::vector<std::string> ids, int64_t now_s, StatusCallback done) override {
-    store_.Touch(std::move(ids), now_s, std::move(done));
-  }
-  void ListUnused(int64_t before_s, int limit, PageCallback done) override {
-    store_.ListUnused(before_s, limit, std::move(done));
+    InMemorySessionStore::Create(std::move(record), epoch, std::move(done));
   }
 
   std::function<void()> before_create;
-
- private:
-  InMemorySessionStore store_;
 };
 
 // A server's inside without its network. One worker, so that a blocked worker holds everything.

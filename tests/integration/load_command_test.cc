@@ -1,0 +1,61 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <string>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "nlohmann/json.hpp"
+
+#include "tests/integration/served_cli_test.h"
+#include "tests/testing/run_tissueform.h"
+#include "tests/testing/test_paths.h"
+
+// `tissueform load` as a real program against a real server; what its times are is nobody's
+// business here.
+namespace tissueform::testing {
+namespace {
+
+using Json = nlohmann::json;
+using ::testing::HasSubstr;
+
+class LoadCommandTest : public ServedCliTest {
+ protected:
+  ProcessResult Load(std::vector<std::string> words) const {
+    words.insert(words.begin(), {"load", "--server", server_->address(), "--plan",
+                                 SourcePath("tests/data/plans/tongue/plan.json")});
+    return Run(words);
+  }
+};
+
+TEST_F(LoadCommandTest, TellsWhatItsDragsGot) {
+  const ProcessResult result = Load({"--sessions", "2", "--refining", "1", "--churn", "1",
+                                     "--seconds", "1", "--bare", "--json", "load.json"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("errors: 0"));
+  const Json json = Json::parse(Read("load.json"));
+  EXPECT_EQ(json["errors"], 0);
+  ASSERT_EQ(json["drags"].size(), 2U);
+  for (const Json& drags : json["drags"]) {
+    EXPECT_GT(drags["frames"], 0) << drags["kind"];
+    EXPECT_GT(drags["bytes"], drags["frames"]) << drags["kind"];
+    EXPECT_EQ(drags["latency_ms"]["count"], drags["frames"]) << drags["kind"];
+  }
+  // A prepared drag gets one frame a pose, or none when a newer pose came; neo_hookean's gets
+  // early ones, too.
+  EXPECT_EQ(json["drags"][0]["drags"], 2);
+  EXPECT_GE(json["drags"][0]["poses_sent"], json["drags"][0]["frames"]);
+  EXPECT_GT(json["bare_latency_ms"]["count"], 0);
+  EXPECT_GT(json["session_seconds"]["count"], 0);
+}
+
+TEST_F(LoadCommandTest, RefusesWhatCannotBeMeasured) {
+  EXPECT_THAT(Load({"--sessions", "0", "--churn", "0"}), FailsWith(1, HasSubstr("--sessions")));
+  EXPECT_THAT(Load({"--sessions", "0", "--churn", "1", "--bare"}),
+              FailsWith(1, HasSubstr("--bare")));
+  EXPECT_THAT(Load({"--json", "missing/load.json"}), FailsWith(1, HasSubstr("missing/load.json")));
+}
+
+}  // namespace
+}  // namespace tissueform::testing
