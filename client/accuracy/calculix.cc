@@ -77,21 +77,22 @@ absl::Status CheckLengths(const CalculixProblem& problem) {
   return absl::OkStatus();
 }
 
-// One line "node vx vy vz" of a block; false for any other line.
-bool ParseRow(absl::string_view line, Positions* displacements, Eigen::Index* rows) {
+// One line of a block, "number v v v": a vertex or tet, for stresses with the number of its
+// integration point, and its values. False for any other line.
+template <typename Values>
+bool ParseRow(absl::string_view line, Eigen::Index numbers, Values* values) {
   const std::vector<absl::string_view> fields =
       absl::StrSplit(line, absl::ByAnyChar(" \t\r"), absl::SkipEmpty());
-  int64_t node = 0;
-  Eigen::RowVector3d value;
-  if (fields.size() != 4 || !absl::SimpleAtoi(fields[0], &node) || node < 1 ||
-      node > displacements->rows()) {
+  int64_t row = 0;
+  if (static_cast<Eigen::Index>(fields.size()) != numbers + values->cols() ||
+      !absl::SimpleAtoi(fields[0], &row) || row < 1 || row > values->rows()) {
     return false;
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!absl::SimpleAtod(fields[static_cast<size_t>(axis) + 1], &value[axis])) return false;
+  Eigen::RowVectorXd value(values->cols());
+  for (Eigen::Index c = 0; c < value.size(); ++c) {
+    if (!absl::SimpleAtod(fields[static_cast<size_t>(numbers + c)], &value[c])) return false;
   }
-  displacements->row(node - 1) = value;
-  ++*rows;
+  values->row(row - 1) = value;
   return true;
 }
 
@@ -103,33 +104,71 @@ double TimeOf(absl::string_view headline) {
   return absl::SimpleAtod(fields.back(), &time) ? time : 0;
 }
 
+// What is printed of a quantity at the end of the step: "displacements" in the headline, so many
+// numbers before the values of a line, rows for so many vertices or tets.
+struct Quantity {
+  const char* name;
+  Eigen::Index numbers;
+  Eigen::Index rows;
+  Eigen::Index columns;
+};
+
+template <typename Values>
+absl::StatusOr<Values> ParseBlocks(absl::string_view dat, const Quantity& quantity) {
+  constexpr double kWholeLoad = 1 - 1e-6;
+  Values values = Values::Zero(quantity.rows, quantity.columns);
+  Eigen::Index rows = 0;
+  double time = 0;
+  bool is_wanted = false;
+  for (const absl::string_view line : absl::StrSplit(dat, '\n')) {
+    // A later block overwrites those of earlier increments; the time in its headline says whether
+    // it is that of the whole load. Blocks of one time are parts of one another's.
+    if (absl::StrContains(line, "time")) {
+      is_wanted = absl::StrContains(line, quantity.name);
+      if (!is_wanted) continue;
+      if (TimeOf(line) != time) rows = 0;
+      time = TimeOf(line);
+    } else if (is_wanted && ParseRow(line, quantity.numbers, &values)) {
+      ++rows;
+    }
+  }
+  if (time < kWholeLoad) {
+    return absl::InternalError(absl::StrCat("ccx printed no ", quantity.name,
+                                            " at the end of the step, only at time ", time));
+  }
+  if (rows != quantity.rows || !values.allFinite()) {
+    return absl::InternalError(absl::StrCat("ccx printed ", rows, " ", quantity.name, " for ",
+                                            quantity.rows,
+                                            quantity.numbers == 1 ? " vertices" : " tets"));
+  }
+  return values;
+}
+
+absl::Status ParseResult(const CalculixProblem& problem, const std::string& dat,
+                         CalculixResult* result) {
+  TF_ASSIGN_OR_RETURN(result->deformed,
+                      ParseCalculixDisplacements(dat, problem.mesh.num_vertices()));
+  result->deformed += problem.mesh.positions();
+  if (!problem.forces_and_stresses) return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(result->forces, ParseCalculixForces(dat, problem.mesh.num_vertices()));
+  TF_ASSIGN_OR_RETURN(result->stresses, ParseCalculixStresses(dat, problem.mesh.num_tets()));
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::StatusOr<Positions> ParseCalculixDisplacements(absl::string_view dat,
                                                      Eigen::Index num_vertices) {
-  constexpr double kWholeLoad = 1 - 1e-6;
-  Positions displacements = Positions::Zero(num_vertices, 3);
-  Eigen::Index rows = 0;
-  double time = 0;
-  for (const absl::string_view line : absl::StrSplit(dat, '\n')) {
-    // A later block overwrites those of earlier increments; the time in its headline says whether
-    // it is that of the whole load.
-    if (absl::StrContains(line, "displacements")) {
-      time = TimeOf(line);
-      rows = 0;
-    } else {
-      ParseRow(line, &displacements, &rows);
-    }
-  }
-  if (time < kWholeLoad) {
-    return absl::InternalError(
-        absl::StrCat("ccx printed no displacements at the end of the step, only at time ", time));
-  }
-  if (rows != num_vertices || !displacements.allFinite()) {
-    return absl::InternalError(
-        absl::StrCat("ccx printed ", rows, " displacements for ", num_vertices, " vertices"));
-  }
-  return displacements;
+  return ParseBlocks<Positions>(dat, {"displacements", 1, num_vertices, 3});
+}
+
+absl::StatusOr<Positions> ParseCalculixForces(absl::string_view dat, Eigen::Index num_vertices) {
+  return ParseBlocks<Positions>(dat, {"forces", 1, num_vertices, 3});
+}
+
+absl::StatusOr<Eigen::MatrixXd> ParseCalculixStresses(absl::string_view dat,
+                                                      Eigen::Index num_tets) {
+  return ParseBlocks<Eigen::MatrixXd>(dat, {"stresses", 2, num_tets, 6});
 }
 
 absl::StatusOr<CalculixResult> RunCalculix(const CalculixProblem& problem,
@@ -143,9 +182,7 @@ absl::StatusOr<CalculixResult> RunCalculix(const CalculixProblem& problem,
   TF_RETURN_IF_ERROR(RunProgram(folder));
   CalculixResult result;
   result.seconds = stopwatch.Seconds();
-  TF_ASSIGN_OR_RETURN(result.deformed, ParseCalculixDisplacements(ReadText(job + ".dat"),
-                                                                  problem.mesh.num_vertices()));
-  result.deformed += problem.mesh.positions();
+  TF_RETURN_IF_ERROR(ParseResult(problem, ReadText(job + ".dat"), &result));
   return result;
 }
 

@@ -18,7 +18,10 @@ namespace tissueform {
 
 struct CalculixResult {
   Positions deformed;  // #V by 3, mm; displacements come with seven digits
-  double seconds = 0;  // wall time of the program, reading and writing its files among it
+  // Where the problem asks for them, with seven digits, too.
+  Positions forces;          // #V by 3, Pa mm^2: what holds every vertex
+  Eigen::MatrixXd stresses;  // #T by 6, Pa: xx, yy, zz, xy, xz, yz
+  double seconds = 0;        // wall time of the program, reading and writing its files among it
 };
 
 // Solves the problem under the guard, with one thread; its files (problem.inp, .dat, .log and
@@ -34,5 +37,9 @@ absl::StatusOr<CalculixResult> RunCalculix(const CalculixProblem& problem,
 // is missing, when that does not hold every vertex at the end of the step.
 absl::StatusOr<Positions> ParseCalculixDisplacements(absl::string_view dat,
                                                      Eigen::Index num_vertices);
+
+// The same for forces, and for stresses, whose tets come in blocks by tissue.
+absl::StatusOr<Positions> ParseCalculixForces(absl::string_view dat, Eigen::Index num_vertices);
+absl::StatusOr<Eigen::MatrixXd> ParseCalculixStresses(absl::string_view dat, Eigen::Index num_tets);
 
 }  // namespace tissueform

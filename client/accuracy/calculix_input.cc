@@ -54,8 +54,9 @@ void AppendMaterial(const CalculixProblem& problem, double youngs_modulus, const
   }
 }
 
-// Elements, material and section for each distinct stiffness.
-void AppendTissues(const CalculixProblem& problem, std::string* text) {
+// Elements, material and section for each distinct stiffness. Returns how many there are; their
+// sets are E1, E2 and so on.
+int AppendTissues(const CalculixProblem& problem, std::string* text) {
   std::map<double, std::vector<Eigen::Index>> tets_of_stiffness;
   for (Eigen::Index t = 0; t < problem.stiffness.size(); ++t) {
     tets_of_stiffness[problem.stiffness[t]].push_back(t);
@@ -68,6 +69,7 @@ void AppendTissues(const CalculixProblem& problem, std::string* text) {
     AppendMaterial(problem, youngs_modulus, material, text);
     absl::StrAppend(text, "*SOLID SECTION, ELSET=", set, ", MATERIAL=", material, "\n");
   }
+  return number;
 }
 
 void AppendBoundary(const CalculixProblem& problem, std::string* text) {
@@ -79,6 +81,13 @@ void AppendBoundary(const CalculixProblem& problem, std::string* text) {
       absl::StrAppend(text, constrained[c] + 1, ", ", axis + 1, ", ", axis + 1, ", ", Number(value),
                       "\n");
     }
+  }
+}
+
+void AppendForcesAndStresses(int tissues, std::string* text) {
+  absl::StrAppend(text, "*NODE PRINT, NSET=ALL, FREQUENCY=1000000\nRF\n");
+  for (int tissue = 1; tissue <= tissues; ++tissue) {
+    absl::StrAppend(text, "*EL PRINT, ELSET=E", tissue, ", FREQUENCY=1000000\nS\n");
   }
 }
 
@@ -102,13 +111,15 @@ std::string CalculixInput(const CalculixProblem& problem) {
   const bool is_linear = problem.law == CalculixLaw::kLinear;
   std::string text;
   AppendNodes(problem.mesh.positions(), &text);
-  AppendTissues(problem, &text);
+  const int tissues = AppendTissues(problem, &text);
   // Increments: first, whole, smallest and largest share of the load.
   absl::StrAppend(&text, is_linear ? "*STEP\n*STATIC\n"
                                    : "*STEP, NLGEOM, INC=1000\n*STATIC\n0.2, 1, 1e-5, 0.5\n");
   AppendBoundary(problem, &text);
   // The last increment is printed whatever the frequency.
-  absl::StrAppend(&text, "*NODE PRINT, NSET=ALL, FREQUENCY=1000000\nU\n*END STEP\n");
+  absl::StrAppend(&text, "*NODE PRINT, NSET=ALL, FREQUENCY=1000000\nU\n");
+  if (problem.forces_and_stresses) AppendForcesAndStresses(tissues, &text);
+  absl::StrAppend(&text, "*END STEP\n");
   return text;
 }
 

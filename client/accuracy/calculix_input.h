@@ -27,6 +27,8 @@ struct CalculixProblem {
   ConstraintSet constraints;
   Positions displacements;  // of constraints.constrained(), as many rows, mm
   CalculixLaw law = CalculixLaw::kLinear;
+  // Print also what holds every vertex (RF) and the stresses of the tets (S, Cauchy's).
+  bool forces_and_stresses = false;
 };
 
 // Where the poses take the constrained vertices, minus where these rest: #constrained by 3, mm.

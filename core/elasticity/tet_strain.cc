@@ -3,21 +3,20 @@
 
 #include "core/elasticity/tet_strain.h"
 
-#include <cmath>
-
 #include <Eigen/Eigenvalues>
 
 #include "core/base/parallel_for.h"
-#include "core/elasticity/material.h"
 
 namespace tissueform {
 namespace {
 
 constexpr Eigen::Index kTetGrain = 4096;
 
+}  // namespace
+
 // sum over corners of d_a g_a^T with d = x - v: keeps the digits of small displacements.
-Eigen::Matrix3d DisplacementGradient(const PiecewiseLinearElements& elements,
-                                     const Positions& positions, Eigen::Index tet) {
+Eigen::Matrix3d TetDisplacementGradient(const PiecewiseLinearElements& elements,
+                                        const Positions& positions, Eigen::Index tet) {
   const auto displacement = [&](int corner) -> Eigen::Vector3d {
     const int32_t vertex = elements.cells(tet, corner);
     return positions.row(vertex) - elements.rest.row(vertex);
@@ -28,11 +27,9 @@ Eigen::Matrix3d DisplacementGradient(const PiecewiseLinearElements& elements,
   return edges * HatGradients<4>(elements, tet).transpose();
 }
 
-}  // namespace
-
 Eigen::Matrix3d TetDeformationGradient(const PiecewiseLinearElements& elements,
                                        const Positions& positions, Eigen::Index tet) {
-  return Eigen::Matrix3d::Identity() + DisplacementGradient(elements, positions, tet);
+  return Eigen::Matrix3d::Identity() + TetDisplacementGradient(elements, positions, tet);
 }
 
 PrincipalValues PrincipalGreenStrains(const PiecewiseLinearElements& elements,
@@ -40,7 +37,7 @@ PrincipalValues PrincipalGreenStrains(const PiecewiseLinearElements& elements,
   PrincipalValues strains(elements.num_cells(), 3);
   ParallelFor(threads, elements.num_cells(), kTetGrain, [&](Eigen::Index begin, Eigen::Index end) {
     for (Eigen::Index t = begin; t < end; ++t) {
-      const Eigen::Matrix3d H = DisplacementGradient(elements, positions, t);
+      const Eigen::Matrix3d H = TetDisplacementGradient(elements, positions, t);
       // (F^T F - I) / 2 written with H = F - I: the ones do not cancel, so small strains keep their
       // digits.
       const Eigen::Matrix3d strain = 0.5 * (H + H.transpose() + H.transpose() * H);
@@ -49,23 +46,6 @@ PrincipalValues PrincipalGreenStrains(const PiecewiseLinearElements& elements,
     }
   });
   return strains;
-}
-
-Eigen::VectorXd LinearVonMisesStress(const PiecewiseLinearElements& elements,
-                                     const Positions& positions, const Eigen::VectorXd& stiffness,
-                                     double poisson_ratio, int threads) {
-  // The spherical part of the stress plays no part: 2 mu dev(e) is the deviator.
-  const double unit_shear = ModuliOf(1.0, poisson_ratio).shear;
-  Eigen::VectorXd stress(elements.num_cells());
-  ParallelFor(threads, elements.num_cells(), kTetGrain, [&](Eigen::Index begin, Eigen::Index end) {
-    for (Eigen::Index t = begin; t < end; ++t) {
-      const Eigen::Matrix3d H = DisplacementGradient(elements, positions, t);
-      Eigen::Matrix3d deviator = 0.5 * (H + H.transpose());
-      deviator.diagonal().array() -= H.trace() / 3.0;
-      stress[t] = 2.0 * unit_shear * stiffness[t] * std::sqrt(1.5) * deviator.norm();
-    }
-  });
-  return stress;
 }
 
 }  // namespace tissueform

@@ -8,24 +8,21 @@
 
 namespace tissueform {
 
-// Deformation gradient F = dx/dv of a tet under `positions`, #V by 3: constant inside, the identity
-// at rest.
+// Displacement gradient H = d(x - v)/dv = F - I of a tet under `positions`, #V by 3: constant
+// inside, zero at rest, with the digits of small displacements.
+Eigen::Matrix3d TetDisplacementGradient(const PiecewiseLinearElements& elements,
+                                        const Positions& positions, Eigen::Index tet);
+
+// Deformation gradient F = dx/dv, the identity at rest.
 Eigen::Matrix3d TetDeformationGradient(const PiecewiseLinearElements& elements,
                                        const Positions& positions, Eigen::Index tet);
 
 // Principal values of the Green-Lagrange strain (F^T F - I) / 2, #T by 3, the largest first.
 // Turning or moving the whole body changes nothing, and a rigid motion gives zero; a stretch by s
-// gives (s^2 - 1) / 2 along it. The result does not depend on `threads`.
+// gives e = (s^2 - 1) / 2 along it. Of the same axes, ln(1 + 2 e) / 2 is the logarithmic strain.
+// The result does not depend on `threads`.
 using PrincipalValues = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 PrincipalValues PrincipalGreenStrains(const PiecewiseLinearElements& elements,
                                       const Positions& positions, int threads);
-
-// Von Mises stress of the linear model, #T, in Pa: of sigma = lambda tr(e) I + 2 mu e with the
-// small strain e = (F + F^T) / 2 - I. Only as good as the model: a large rotation shows as stress.
-//
-// REQUIRES: `stiffness` has one entry a tet, in Pa; CheckPoissonRatio is OK.
-Eigen::VectorXd LinearVonMisesStress(const PiecewiseLinearElements& elements,
-                                     const Positions& positions, const Eigen::VectorXd& stiffness,
-                                     double poisson_ratio, int threads);
 
 }  // namespace tissueform

@@ -65,7 +65,10 @@ absl::Status Run(const RunOptions& options) {
   stats.read_seconds = read_seconds;
   TF_ASSIGN_OR_RETURN(const Positions deformed, PredictOnServer(options, problem, &stats));
   TF_RETURN_IF_ERROR(WriteResult(options.out, plan, problem, deformed));
-  if (!options.stats.empty()) TF_RETURN_IF_ERROR(WriteStats(options.stats, stats));
+  if (!options.stats.empty()) {
+    stats.elastic = SummarizeElastic(problem, deformed);
+    TF_RETURN_IF_ERROR(WriteStats(options.stats, stats));
+  }
   PrintOutcome(options.out, stats);
   return absl::OkStatus();
 }

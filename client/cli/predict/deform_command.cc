@@ -82,7 +82,10 @@ absl::Status RunDeform(const DeformOptions& options) {
   stats.read_seconds = read_seconds;
   TF_ASSIGN_OR_RETURN(const Positions deformed, Predict(problem, &stats));
   TF_RETURN_IF_ERROR(WriteResult(options.out, plan, problem, deformed));
-  if (!options.stats.empty()) TF_RETURN_IF_ERROR(WriteStats(options.stats, stats));
+  if (!options.stats.empty()) {
+    stats.elastic = SummarizeElastic(problem, deformed);
+    TF_RETURN_IF_ERROR(WriteStats(options.stats, stats));
+  }
   PrintOutcome(options.out, stats);
   return absl::OkStatus();
 }
@@ -112,7 +115,9 @@ void AddDeformCommand(CLI::App& app, CommandWork* work) {
       "Examples:\n"
       "  tissueform deform plan.json --out after.vtu\n"
       "  tissueform deform plan.json --out after.vtu --stats stats.json\n"
-      "Open after.vtu in ParaView or 3D Slicer; displacement_mm is how far each vertex moved.");
+      "  tissueform deform plan.json --out after.vtu --model neo_hookean --stats stats.json\n"
+      "Open after.vtu in ParaView or 3D Slicer; displacement_mm is how far each vertex moved.\n"
+      "Elastic models add stress, energy and the forces that bone bears (docs/plan-format.md).");
   command->callback([options, work] { *work = [options] { return RunDeform(*options); }; });
 }
 

@@ -5,11 +5,14 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <initializer_list>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
 
+#include "client/cli/shared/elastic_results.h"
 #include "core/base/status_macros.h"
 #include "core/elasticity/tet_strain.h"
 #include "core/mesh_io/tet_mesh_io.h"
@@ -18,38 +21,17 @@
 namespace tissueform {
 namespace {
 
-Attribute DisplacementArray(const Positions& displacement) {
-  return {kDisplacementArray, 3,
-          std::vector<double>(displacement.data(), displacement.data() + displacement.size())};
+Attribute RowsArray(const char* name, const Positions& rows) {
+  return {name, 3, std::vector<double>(rows.data(), rows.data() + rows.size())};
 }
 
-std::vector<Attribute> WithDisplacement(std::vector<Attribute> point_data, Attribute displacement) {
-  std::erase_if(point_data, [](const Attribute& a) { return a.name == kDisplacementArray; });
-  point_data.push_back(std::move(displacement));
-  return point_data;
-}
-
-std::vector<double> ValuesOf(const PrincipalValues& values) {
-  return {values.data(), values.data() + values.size()};
-}
-
-// How each tet is stretched and, where the model knows it, what stress it bears.
-std::vector<Attribute> WithStrain(std::vector<Attribute> cell_data, const PlanProblem& problem,
-                                  const Positions& deformed) {
-  std::erase_if(cell_data, [](const Attribute& a) {
-    return a.name == kPrincipalStrainArray || a.name == kVonMisesStressArray;
+// Without what an earlier result has left in the plan's mesh.
+std::vector<Attribute> WithoutOld(std::vector<Attribute> arrays,
+                                  std::initializer_list<absl::string_view> names) {
+  std::erase_if(arrays, [names](const Attribute& a) {
+    return std::find(names.begin(), names.end(), a.name) != names.end();
   });
-  const PiecewiseLinearElements elements = ElementsOf(*problem.mesh);
-  const PreparationOptions& preparation = problem.deformer.preparation;
-  cell_data.push_back({kPrincipalStrainArray, 3,
-                       ValuesOf(PrincipalGreenStrains(elements, deformed, preparation.threads))});
-  if (problem.deformer.model == DeformationModel::kLinearElastic) {
-    const Eigen::VectorXd stress = LinearVonMisesStress(
-        elements, deformed, problem.stiffness, preparation.poisson_ratio, preparation.threads);
-    cell_data.push_back(
-        {kVonMisesStressArray, 1, std::vector<double>(stress.begin(), stress.end())});
-  }
-  return cell_data;
+  return arrays;
 }
 
 }  // namespace
@@ -68,11 +50,17 @@ absl::Status WriteResult(const std::string& path, const Plan& plan, const PlanPr
   Positions displacement = deformed - problem.mesh->positions();
   SwapToOrFromLps(problem.written_in, &written);
   SwapToOrFromLps(problem.written_in, &displacement);
+  const PrincipalValues strains = PrincipalGreenStrains(ElementsOf(*problem.mesh), deformed,
+                                                        problem.deformer.preparation.threads);
   TF_ASSIGN_OR_RETURN(TetMesh mesh, TetMesh::Create(std::move(written), problem.mesh->tets()));
-  return WriteTetMesh(
-      path, {.mesh = std::move(mesh),
-             .point_data = WithDisplacement(problem.point_data, DisplacementArray(displacement)),
-             .cell_data = WithStrain(problem.cell_data, problem, deformed)});
+  TetMeshFile file{std::move(mesh),
+                   WithoutOld(problem.point_data, {kDisplacementArray, kReactionForceArray}),
+                   WithoutOld(problem.cell_data,
+                              {kPrincipalStrainArray, kVonMisesStressArray, kEnergyDensityArray})};
+  file.point_data.push_back(RowsArray(kDisplacementArray, displacement));
+  file.cell_data.push_back(RowsArray(kPrincipalStrainArray, strains));
+  AddElasticArrays(problem, deformed, &file);
+  return WriteTetMesh(path, file);
 }
 
 }  // namespace tissueform

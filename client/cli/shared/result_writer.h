@@ -18,12 +18,10 @@ inline constexpr char kDisplacementArray[] = "displacement_mm";
 // Cell array of every result: the three principal Green-Lagrange strains of each tet, the largest
 // first.
 inline constexpr char kPrincipalStrainArray[] = "principal_strain";
-// Cell array of results of the linear elastic model.
-inline constexpr char kVonMisesStressArray[] = "von_mises_stress_pa";
 
 // Writes OUT.vtu: the plan's mesh with its points at `deformed` (#V by 3, LPS), written in the
-// plan's own coordinate system; a point array displacement_mm of three doubles; the cell arrays
-// principal_strain and, of the linear elastic model, von_mises_stress_pa; all arrays of the plan's
+// plan's own coordinate system; a point array displacement_mm of three doubles; the cell array
+// principal_strain; of the elastic models those of elastic_results.h; all arrays of the plan's
 // mesh, except that arrays of these names are replaced.
 //
 // Errors: FailedPrecondition when `path` is the plan's own mesh; Internal when a position is not

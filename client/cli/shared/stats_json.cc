@@ -63,22 +63,24 @@ PredictionStats StatsOf(const PlanProblem& problem) {
 }
 
 OrderedJson StatsToJson(const PredictionStats& stats) {
-  return {{"format", "tissueform-stats"},
-          {"version", kVersion},
-          {"model", stats.model},
-          {"rotation", stats.rotation},
-          {"poisson_ratio", stats.poisson_ratio},
-          {"counts", CountsToJson(stats)},
-          {"seconds", SecondsToJson(stats)},
-          {"iterations", stats.solve.iterations},
-          {"residual", stats.solve.residual},
-          {"converged", stats.solve.converged},
-          {"changes_mm", stats.solve.changes_mm},
-          {"energies_nj", stats.solve.energies_nj},
-          {"load", stats.solve.load},
-          {"bytes_held", stats.preparation.bytes_held},
-          {"quality", QualityToJson(stats)},
-          {"notice", kNotMedicalDeviceNotice}};
+  OrderedJson json = {{"format", "tissueform-stats"},
+                      {"version", kVersion},
+                      {"model", stats.model},
+                      {"rotation", stats.rotation},
+                      {"poisson_ratio", stats.poisson_ratio},
+                      {"counts", CountsToJson(stats)},
+                      {"seconds", SecondsToJson(stats)},
+                      {"iterations", stats.solve.iterations},
+                      {"residual", stats.solve.residual},
+                      {"converged", stats.solve.converged},
+                      {"changes_mm", stats.solve.changes_mm},
+                      {"energies_nj", stats.solve.energies_nj},
+                      {"load", stats.solve.load},
+                      {"bytes_held", stats.preparation.bytes_held},
+                      {"quality", QualityToJson(stats)}};
+  if (stats.elastic) json["elastic"] = ElasticToJson(*stats.elastic);
+  json["notice"] = kNotMedicalDeviceNotice;
+  return json;
 }
 
 void PrintOutcome(const std::string& out, const PredictionStats& stats) {

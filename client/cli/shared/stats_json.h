@@ -3,11 +3,13 @@
 
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "absl/status/status.h"
 #include "nlohmann/json.hpp"
 
+#include "client/cli/shared/elastic_results.h"
 #include "core/deformation/deformation_quality.h"
 #include "core/deformation/deformer.h"
 #include "core/problem/plan_problem.h"
@@ -28,6 +30,7 @@ struct PredictionStats {
   PreparationSummary preparation;
   SolveSummary solve;
   DeformationQuality quality;
+  std::optional<ElasticSummary> elastic;  // of the elastic models
 };
 
 // The counts, model and mode of a problem; the rest is left for the caller to fill.

@@ -8,6 +8,7 @@
 #include "client/accuracy/calculix.h"
 #include "core/deformation/create_deformer.h"
 #include "core/deformation/mesh_preparation.h"
+#include "core/elasticity/elastic_state.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 
@@ -28,19 +29,23 @@ class CalculixOracleTest : public ::testing::Test {
   // Largest distance of a vertex between the model and CalculiX, mm.
   absl::StatusOr<double> Distance(const AccuracyCase& problem, DeformationModel model,
                                   double poisson_ratio) const {
-    const CalculixLaw law =
-        model == DeformationModel::kLinearElastic ? CalculixLaw::kLinear : CalculixLaw::kNeoHookean;
-    const auto reference = RunCalculix(
-        {problem.mesh, problem.stiffness, poisson_ratio, problem.constraints,
-         ConstrainedDisplacements(problem.mesh, problem.constraints, problem.poses), law},
-        folder_);
+    const auto reference = Reference(problem, model, poisson_ratio, false);
     if (!reference.ok()) return reference.status();
     const auto answer = Answer(problem, model, poisson_ratio);
     if (!answer.ok()) return answer.status();
     return (*answer - reference->deformed).rowwise().norm().maxCoeff();
   }
 
- private:
+  absl::StatusOr<CalculixResult> Reference(const AccuracyCase& problem, DeformationModel model,
+                                           double poisson_ratio, bool forces_and_stresses) const {
+    const CalculixLaw law =
+        model == DeformationModel::kLinearElastic ? CalculixLaw::kLinear : CalculixLaw::kNeoHookean;
+    return RunCalculix({problem.mesh, problem.stiffness, poisson_ratio, problem.constraints,
+                        ConstrainedDisplacements(problem.mesh, problem.constraints, problem.poses),
+                        law, forces_and_stresses},
+                       folder_);
+  }
+
   static absl::StatusOr<Positions> Answer(const AccuracyCase& problem, DeformationModel model,
                                           double poisson_ratio) {
     PreparationOptions options;
@@ -58,6 +63,7 @@ class CalculixOracleTest : public ::testing::Test {
     return deformation->positions;
   }
 
+ private:
   std::string folder_;
 };
 
@@ -139,6 +145,63 @@ TEST_F(CalculixOracleTest, NeoHookeanEqualsCalculixOnTheTongue) {
   ASSERT_OK_AND_ASSIGN(const double distance,
                        Distance(tongue, DeformationModel::kNeoHookean, 0.45));
   EXPECT_LT(distance, 1e-3 * LargestMove(tongue));
+}
+
+// Von Mises of CalculiX's stresses: xx, yy, zz, xy, xz, yz.
+Eigen::VectorXd VonMises(const Eigen::MatrixXd& s) {
+  const auto normal = (s.col(0) - s.col(1)).array().square() +
+                      (s.col(1) - s.col(2)).array().square() +
+                      (s.col(2) - s.col(0)).array().square();
+  return (0.5 * normal + 3 * s.rightCols(3).array().square().rowwise().sum()).sqrt();
+}
+
+// What holds the first handle, by CalculiX, N.
+Eigen::Vector3d HandleForce(const AccuracyCase& problem, const CalculixResult& reference) {
+  const auto& handle = problem.constraints.handles()[0].vertices;
+  return 1e-6 * reference.forces(handle, Eigen::all).colwise().sum().transpose();
+}
+
+ElasticState StateAt(const AccuracyCase& problem, DeformationModel model, double poisson_ratio,
+                     const Positions& positions) {
+  return MeasureElasticState(
+      model == DeformationModel::kLinearElastic ? ElasticLaw::kLinear : ElasticLaw::kNeoHookean,
+      ElementsOf(problem.mesh), positions, problem.stiffness, poisson_ratio);
+}
+
+// Of the very positions that CalculiX has found, so that only their digits are between us. Its
+// stresses are Cauchy's, its forces those that hold the vertices.
+TEST_F(CalculixOracleTest, ForcesAndStressesOfOneStateEqualCalculix) {
+  constexpr double kNu = 0.45;
+  for (const auto& problem : {BlockUpCase(kBlockCells), TwistAndStretchCase(kBarCells)}) {
+    for (const auto model : {DeformationModel::kLinearElastic, DeformationModel::kNeoHookean}) {
+      ASSERT_OK_AND_ASSIGN(const CalculixResult reference,
+                           Reference(problem.value(), model, kNu, true));
+      const ElasticState state = StateAt(*problem, model, kNu, reference.deformed);
+      const Eigen::VectorXd von_mises = VonMises(reference.stresses);
+      EXPECT_LT((state.von_mises_pa - von_mises).cwiseAbs().maxCoeff(), 1e-5 * von_mises.maxCoeff())
+          << problem->name;
+      const Positions forces = 1e-6 * reference.forces;
+      // Forces are sums in which the large ones of neighbouring tets, which resist changes of
+      // volume, go against each other: the rounding of the positions shows more.
+      EXPECT_LT((state.forces_n - forces).norm(), 1e-4 * forces.norm()) << problem->name;
+    }
+  }
+}
+
+// Each by its own solver; CalculiX's search for the neo-Hookean equilibrium stops at 5e-3 of the
+// forces.
+TEST_F(CalculixOracleTest, ReactionsOfTheModelsEqualCalculix) {
+  const auto difference = [this](const AccuracyCase& problem, DeformationModel model) {
+    const CalculixResult reference = Reference(problem, model, 0.45, true).value();
+    const ElasticState state = StateAt(problem, model, 0.45, Answer(problem, model, 0.45).value());
+    const Eigen::Vector3d expected = HandleForce(problem, reference);
+    const auto& handle = problem.constraints.handles()[0].vertices;
+    return (ResultantOf(state, handle).force_n - expected).norm() / expected.norm();
+  };
+  ASSERT_OK_AND_ASSIGN(const AccuracyCase bend, BendCase(kBarCells));
+  EXPECT_LT(difference(bend, DeformationModel::kLinearElastic), 1e-5);
+  EXPECT_LT(difference(bend, DeformationModel::kNeoHookean), 5e-3);
+  EXPECT_LT(difference(Tongue().value(), DeformationModel::kLinearElastic), 1e-5);
 }
 
 }  // namespace

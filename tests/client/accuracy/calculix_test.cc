@@ -134,6 +134,26 @@ TEST_F(CalculixTest, StepThatDidNotEndIsAnError) {
   EXPECT_FALSE(ParseCalculixDisplacements("", 1).ok());
 }
 
+TEST_F(CalculixTest, ForcesAndStressesAreToldApartAndStressesPutTogetherFromTheirTissues) {
+  constexpr char kDat[] =
+      "\n displacements (vx,vy,vz) for set ALL and time  0.1000000E+01\n\n"
+      "         1  2.000000E+00 -3.000000E-01  0.000000E+00\n"
+      "\n forces (fx,fy,fz) for set ALL and time  0.1000000E+01\n\n"
+      "         1  7.000000E+00  8.000000E+00  9.000000E+00\n"
+      "\n stresses (elem, integ.pnt.,sxx,syy,szz,sxy,sxz,syz) for set E1 and time  0.1E+01\n\n"
+      "         2   1  1.0E+00  2.0E+00  3.0E+00  4.0E+00  5.0E+00  6.0E+00\n"
+      "\n stresses (elem, integ.pnt.,sxx,syy,szz,sxy,sxz,syz) for set E2 and time  0.1E+01\n\n"
+      "         1   1 -1.0E+00 -2.0E+00 -3.0E+00 -4.0E+00 -5.0E+00 -6.0E+00\n";
+  ASSERT_OK_AND_ASSIGN(const Positions displacements, ParseCalculixDisplacements(kDat, 1));
+  EXPECT_EQ(displacements, Positions({{2, -0.3, 0}}));
+  ASSERT_OK_AND_ASSIGN(const Positions forces, ParseCalculixForces(kDat, 1));
+  EXPECT_EQ(forces, Positions({{7, 8, 9}}));
+  ASSERT_OK_AND_ASSIGN(const Eigen::MatrixXd stresses, ParseCalculixStresses(kDat, 2));
+  EXPECT_EQ(stresses, Eigen::MatrixXd({{-1, -2, -3, -4, -5, -6}, {1, 2, 3, 4, 5, 6}}));
+  EXPECT_THAT(ParseCalculixStresses(kDat, 3).status().message(),
+              HasSubstr("2 stresses for 3 tets"));
+}
+
 TEST_F(CalculixTest, MissingProgramIsSaidWithItsPackage) {
   const ScopedEnvironment no_programs("PATH", "/nonexistent");
   const auto result = RunCalculix(StretchedBar(CalculixLaw::kLinear), folder_);

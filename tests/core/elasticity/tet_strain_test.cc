@@ -3,6 +3,8 @@
 
 #include "core/elasticity/tet_strain.h"
 
+#include <cmath>
+
 #include "gtest/gtest.h"
 
 #include "core/constraints/handle_pose.h"
@@ -36,16 +38,15 @@ TEST(TetStrainTest, StretchesComeOutWhateverTheRotation) {
   EXPECT_LT((strains.rowwise() - expected).cwiseAbs().maxCoeff(), 1e-13);
 }
 
-TEST(TetStrainTest, UniaxialStressIsItsOwnVonMisesStress) {
+TEST(TetStrainTest, LogarithmicStrainsFollowFromThem) {
   const TetMesh mesh = testing::Bar({2, 2, 3}, 1.0, 0.2);
-  const double nu = 0.3;
-  const double strain = 0.01;
-  const Eigen::Matrix3d F =
-      Eigen::Vector3d(1 - nu * strain, 1 - nu * strain, 1 + strain).asDiagonal();
-  const Eigen::VectorXd stiffness = Eigen::VectorXd::LinSpaced(mesh.num_tets(), 1000, 9000);
-  const Eigen::VectorXd stress =
-      LinearVonMisesStress(ElementsOf(mesh), Transformed(mesh, F), stiffness, nu, 1);
-  EXPECT_LT((stress - strain * stiffness).cwiseAbs().maxCoeff(), 1e-8);
+  const Eigen::Matrix3d F = RotationMatrix({0.5, 2, -1}) *
+                            Eigen::Vector3d(0.5, 2.0, 1.1).asDiagonal() *
+                            RotationMatrix({1, -0.2, 0.3}).transpose();
+  const PrincipalValues strains = PrincipalGreenStrains(ElementsOf(mesh), Transformed(mesh, F), 1);
+  const PrincipalValues logarithms = 0.5 * (2.0 * strains.array()).log1p();
+  const Eigen::RowVector3d expected(std::log(2.0), std::log(1.1), -std::log(2.0));
+  EXPECT_LT((logarithms.rowwise() - expected).cwiseAbs().maxCoeff(), 1e-13);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "nlohmann/json.hpp"
 
+#include "core/mesh/tet_quality.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "tests/testing/bar_mesh.h"
 #include "tests/testing/meshes.h"
@@ -25,8 +26,14 @@ class DeformTest : public CliTest {
     return nlohmann::json::parse(stream);
   }
 
-  Positions Displacements(const TetMeshFile& file) const {
-    const Attribute* array = FindAttribute(file.point_data, "displacement_mm");
+  static Eigen::Vector3d VectorOf(const nlohmann::json& json) {
+    return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
+  }
+
+  Positions Displacements(const TetMeshFile& file) const { return Rows(file, "displacement_mm"); }
+
+  Positions Rows(const TetMeshFile& file, const std::string& name) const {
+    const Attribute* array = FindAttribute(file.point_data, name);
     if (array == nullptr) return {};
     EXPECT_EQ(array->components, 3);
     EXPECT_TRUE(std::holds_alternative<std::vector<double>>(array->values));
@@ -65,9 +72,13 @@ TEST_F(DeformTest, EveryModelWritesStrainsAndKeepsTheHandleWhereItIsPut) {
     const Attribute* strain = FindAttribute(result.cell_data, "principal_strain");
     ASSERT_NE(strain, nullptr);
     EXPECT_EQ(strain->components, 3);
-    EXPECT_EQ(FindAttribute(result.cell_data, "von_mises_stress_pa") != nullptr,
-              model == "linear_elastic");
+    const bool is_elastic = model == "linear_elastic" || model == "neo_hookean";
+    for (const char* array : {"von_mises_stress_pa", "strain_energy_density_pa"}) {
+      EXPECT_EQ(FindAttribute(result.cell_data, array) != nullptr, is_elastic) << array;
+    }
+    EXPECT_EQ(FindAttribute(result.point_data, "reaction_force_n") != nullptr, is_elastic);
     const auto stats = nlohmann::json::parse(Read(model + ".json"));
+    EXPECT_EQ(stats.contains("elastic"), is_elastic);
     EXPECT_EQ(stats["model"], model);
     EXPECT_EQ(stats["converged"], true);
     EXPECT_EQ(stats["load"], 1);
@@ -77,6 +88,35 @@ TEST_F(DeformTest, EveryModelWritesStrainsAndKeepsTheHandleWhereItIsPut) {
   for (size_t i = 1; i < results.size(); ++i) {
     EXPECT_TRUE(results[i].bottomRows(25) == results[0].bottomRows(25)) << "the handle";
     EXPECT_GT((results[i] - results[0]).rowwise().norm().maxCoeff(), 0.1) << "another model";
+  }
+}
+
+TEST_F(DeformTest, ElasticResultsTellWhatHoldsTheTissueAndWhatItStores) {
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile rest, ReadTetMesh(TestDataPath("plans/bar/bar.vtu")));
+  for (const std::string model : {"linear_elastic", "neo_hookean"}) {
+    ASSERT_THAT(Run({"deform", TestDataPath("plans/bar/plan.json"), "--out", "out.vtu", "--model",
+                     model, "--stats", "stats.json"}),
+                Succeeds());
+    ASSERT_OK_AND_ASSIGN(const TetMeshFile result, ReadTetMesh(Path("out.vtu")));
+    const auto elastic = nlohmann::json::parse(Read("stats.json"))["elastic"];
+    const Positions forces = Rows(result, "reaction_force_n");
+    EXPECT_TRUE(forces.middleRows(25, 325 - 50).isZero(0)) << "free vertices";
+    const Eigen::Vector3d fixed = VectorOf(elastic["fixed"]["force_n"]);
+    const Eigen::Vector3d handle = VectorOf(elastic["handles"][0]["force_n"]);
+    EXPECT_EQ(elastic["handles"][0]["name"], "top");
+    EXPECT_LT((forces.topRows(25).colwise().sum().transpose() - fixed).norm(), 1e-12);
+    EXPECT_LT((forces.bottomRows(25).colwise().sum().transpose() - handle).norm(), 1e-12);
+    EXPECT_GT(handle.norm(), 1e-3);
+    EXPECT_NEAR(elastic["unbalanced_force_n"].get<double>(), (fixed + handle).norm(), 1e-15);
+    EXPECT_LT((fixed + handle).norm(), 1e-3 * handle.norm());
+    EXPECT_NEAR(VectorOf(elastic["fixed"]["about_mm"]).z(),
+                rest.mesh.positions().topRows(25).col(2).mean(), 1e-12);
+    const std::vector<double> density =
+        ToDoubles(*FindAttribute(result.cell_data, "strain_energy_density_pa"));
+    const double energy_nj =
+        TetVolumes(rest.mesh.positions(), rest.mesh.tets())
+            .dot(Eigen::Map<const Eigen::VectorXd>(density.data(), rest.mesh.num_tets()));
+    EXPECT_NEAR(elastic["strain_energy_mj"].get<double>(), 1e-6 * energy_nj, 1e-13 * energy_nj);
   }
 }
 
@@ -148,8 +188,12 @@ TEST_F(DeformTest, RasPlanGivesTheLpsResultWrittenInRas) {
   plan["handles"][0]["pose"]["pivot_mm"] = {-10, -10, 60};
   plan["handles"][0]["pose"]["translation_mm"] = {0, 6, 0};
   Write("plan.json", plan.dump());
-  ASSERT_THAT(Run({"deform", "plan.json", "--out", "ras.vtu"}), Succeeds());
-  ASSERT_THAT(Run({"deform", TestDataPath("plans/bar/plan.json"), "--out", "lps.vtu"}), Succeeds());
+  ASSERT_THAT(Run({"deform", "plan.json", "--out", "ras.vtu", "--model", "linear_elastic",
+                   "--stats", "ras.json"}),
+              Succeeds());
+  ASSERT_THAT(Run({"deform", TestDataPath("plans/bar/plan.json"), "--out", "lps.vtu", "--model",
+                   "linear_elastic", "--stats", "lps.json"}),
+              Succeeds());
   ASSERT_OK_AND_ASSIGN(const TetMeshFile ras, ReadTetMesh(Path("ras.vtu")));
   ASSERT_OK_AND_ASSIGN(const TetMeshFile lps, ReadTetMesh(Path("lps.vtu")));
   const Eigen::Array3d signs(-1, -1, 1);
@@ -158,6 +202,16 @@ TEST_F(DeformTest, RasPlanGivesTheLpsResultWrittenInRas) {
   };
   EXPECT_LT((to_lps(ras.mesh.positions()) - lps.mesh.positions()).cwiseAbs().maxCoeff(), 1e-12);
   EXPECT_LT((to_lps(Displacements(ras)) - Displacements(lps)).cwiseAbs().maxCoeff(), 1e-12);
+  const Positions forces = Rows(lps, "reaction_force_n");
+  EXPECT_LT((to_lps(Rows(ras, "reaction_force_n")) - forces).norm(), 1e-10 * forces.norm());
+  for (const char* vector : {"force_n", "moment_n_mm", "about_mm"}) {
+    const auto of_handle = [&](const char* file) {
+      return VectorOf(nlohmann::json::parse(Read(file))["elastic"]["handles"][0][vector]);
+    };
+    const Eigen::Vector3d in_lps = of_handle("lps.json");
+    const Eigen::Vector3d in_ras = of_handle("ras.json").array() * signs;
+    EXPECT_LT((in_ras - in_lps).norm(), 1e-9 * (1 + in_lps.norm())) << vector;
+  }
 }
 
 TEST_F(DeformTest, StatsTellCountsTimesAndQuality) {

@@ -1,0 +1,51 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "nlohmann/json.hpp"
+
+#include "core/base/types.h"
+#include "core/elasticity/elastic_state.h"
+#include "core/mesh_io/tet_mesh_io.h"
+#include "core/problem/plan_problem.h"
+
+namespace tissueform {
+
+// What results of linear_elastic and neo_hookean tell beyond positions, in files and in statistics.
+// All of it is found from the positions, so answers of a server, which come in single precision,
+// have it as well.
+
+// Cell arrays; the latter in single precision.
+inline constexpr char kVonMisesStressArray[] = "von_mises_stress_pa";
+inline constexpr char kEnergyDensityArray[] = "strain_energy_density_pa";
+// Point array: what holds a fixed vertex or one of a handle where it is; zero at free ones.
+inline constexpr char kReactionForceArray[] = "reaction_force_n";
+
+// Adds the arrays to `file` where the problem's model is elastic. `deformed` is #V by 3, LPS.
+void AddElasticArrays(const PlanProblem& problem, const Positions& deformed, TetMeshFile* file);
+
+// In the plan's own coordinate system.
+struct ElasticSummary {
+  struct HandleReaction {
+    std::string name;
+    Resultant reaction;
+  };
+  double strain_energy_mj = 0;
+  double unbalanced_force_n = 0;  // length of the sum of all reactions
+  Resultant fixed;
+  std::vector<HandleReaction> handles;
+};
+
+// Nothing where the problem's model is not elastic.
+std::optional<ElasticSummary> SummarizeElastic(const PlanProblem& problem,
+                                               const Positions& deformed);
+
+// Keys in the order in which docs/plan-format.md lists them; null for what is not finite.
+nlohmann::ordered_json ElasticToJson(const ElasticSummary& summary);
+
+}  // namespace tissueform
