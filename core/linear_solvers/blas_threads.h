@@ -12,6 +12,18 @@ namespace tissueform {
 // REQUIRES: threads >= 1.
 void SetBlasThreads(int threads);
 
+// So many of them as long as this lives, then one: a command that is alone in its process makes a
+// large factor with more. Back-substitutions, which are bound by reading the factor, gain nothing.
+// The last digits of a factor depend on the number. As SetBlasThreads not thread-safe: never in a
+// server, whose other sessions would change their digits with it.
+class BlasThreadsScope {
+ public:
+  explicit BlasThreadsScope(int threads) { SetBlasThreads(threads); }
+  ~BlasThreadsScope() { SetBlasThreads(1); }
+  BlasThreadsScope(const BlasThreadsScope&) = delete;
+  BlasThreadsScope& operator=(const BlasThreadsScope&) = delete;
+};
+
 // OpenBLAS chooses its kernels when it is loaded, by the model of the processor. One that is newer
 // than itself it takes for one of 2004 (Prescott), with kernels that need twice as long. Where
 // that is so, and the processor has AVX2 and FMA, this starts the program anew with the kernels for

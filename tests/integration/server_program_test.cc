@@ -229,6 +229,15 @@ std::pair<std::string, int> OutputOf(const std::string& command) {
   return {output, WEXITSTATUS(pclose(pipe))};
 }
 
+// For the whole process it would change the digits of sessions that come back from the store.
+TEST(ServerProgramStartTest, ServerHasNoChoiceOfSolverThreads) {
+  const std::string program = ProgramPath("tissueform-server");
+  const auto [output, exit_code] = OutputOf(program + " --solver-threads 2");
+  EXPECT_EQ(exit_code, 2);
+  EXPECT_THAT(output, HasSubstr("--solver-threads"));
+  EXPECT_EQ(OutputOf(program + " --help").first.find("solver-threads"), std::string::npos);
+}
+
 TEST_F(ServerProgramTest, ATakenPortOrFolderIsOneLineAndTheEnd) {
   const std::string& address = process_->address();
   const std::string port = address.substr(address.rfind(':') + 1);

@@ -49,7 +49,7 @@ void CheckUse(const CLI::App& command, const CompareOptions& options) {
   if (options.b.empty()) {
     throw CLI::ValidationError("B", "is required: two results, or one plan (.json)");
   }
-  for (const char* option : {"--models", "--reference", "--allow-outside"}) {
+  for (const char* option : {"--models", "--reference", "--solver-threads", "--allow-outside"}) {
     refuse(option, "is for a plan (.json)");
   }
   if (!options.out.empty() && !EndsWith(options.out, ".vtu")) {
@@ -73,6 +73,7 @@ void AddModelOptions(CLI::App* command, CompareOptions* options) {
                    "of a plan: threads to compute with; the answer does not depend on it")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
+  AddSolverThreads(command, "of a plan: ", &options->solver_threads);
   AddAllowOutside(command, &options->reading);
 }
 

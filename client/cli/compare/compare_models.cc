@@ -81,15 +81,19 @@ absl::Status CheckOutputs(const CompareOptions& options, const std::vector<std::
 }
 
 absl::StatusOr<ModelResult> RunModel(const std::string& name, const PlanProblem& problem,
-                                     const std::shared_ptr<MeshPreparation>& preparation) {
+                                     const std::shared_ptr<MeshPreparation>& preparation,
+                                     int solver_threads) {
   const StageProgress progress("predicting by " + name);
   ModelResult result;
   result.model = name;
   DeformerOptions options = problem.deformer;
   TF_ASSIGN_OR_RETURN(options.model, ModelFromName(name));
   Stopwatch stopwatch;
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<Deformer> deformer,
-                      CreateDeformer(preparation, options));
+  std::unique_ptr<Deformer> deformer;
+  {
+    const BlasThreadsScope factorising(solver_threads);  // as deform does
+    TF_ASSIGN_OR_RETURN(deformer, CreateDeformer(preparation, options));
+  }
   result.prepare_seconds = stopwatch.Restart();
   TF_ASSIGN_OR_RETURN(result.deformation, deformer->Deform(problem.poses));
   result.solve_seconds = stopwatch.Seconds();
@@ -134,13 +138,13 @@ absl::StatusOr<ModelComparison> RunModels(const CompareOptions& options,
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.a, options.reading));
   TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan));
   problem.deformer.preparation.threads = options.threads;
-  SetBlasThreads(1);  // as deform does: the last digits would depend on their number
   TF_ASSIGN_OR_RETURN(const auto preparation,
                       MeshPreparation::Create(*problem.mesh, problem.stiffness, problem.constraints,
                                               problem.deformer.preparation));
   ModelComparison comparison{plan, std::move(problem), {}};
   for (const std::string& model : models) {
-    TF_ASSIGN_OR_RETURN(ModelResult result, RunModel(model, comparison.problem, preparation));
+    TF_ASSIGN_OR_RETURN(ModelResult result,
+                        RunModel(model, comparison.problem, preparation, options.solver_threads));
     comparison.results.push_back(std::move(result));
   }
   TF_RETURN_IF_ERROR(MeasureDistances(options, &comparison));

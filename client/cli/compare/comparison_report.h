@@ -32,6 +32,7 @@ struct CompareOptions {
   std::string reference = "neo_hookean";
   PlanReadOptions reading;
   int threads = 1;
+  int solver_threads = 1;
 };
 
 // How far two results lie apart, by regions, as that command tells it.

@@ -29,6 +29,7 @@ struct DeformOptions {
   std::string model;
   std::string stats;
   int threads = AvailableProcessors();
+  int solver_threads = 1;
 };
 
 absl::Status CheckOutputs(const DeformOptions& options) {
@@ -57,6 +58,9 @@ absl::StatusOr<PlanProblem> ResolveWithProgress(const Plan& plan, double* second
 absl::StatusOr<Positions> Predict(const PlanProblem& problem, PredictionStats* stats) {
   std::unique_ptr<Deformer> deformer;
   {
+    // One unless told otherwise: more make a large factorisation faster, but the last digits of the
+    // answer depend on how many there are (docs/performance.md).
+    const BlasThreadsScope factorising(stats->solver_threads);
     const StageProgress progress("preparing the deformer");
     TF_ASSIGN_OR_RETURN(deformer, CreateDeformer(*problem.mesh, problem.stiffness,
                                                  problem.constraints, problem.deformer));
@@ -75,10 +79,8 @@ absl::Status RunDeform(const DeformOptions& options) {
   double read_seconds = 0;
   TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolveWithProgress(plan, &read_seconds));
   problem.deformer.preparation.threads = options.threads;
-  // On purpose one: more make a factorisation faster, but the last digits of the answer would
-  // depend on how many there are (docs/performance.md).
-  SetBlasThreads(1);
   PredictionStats stats = StatsOf(problem);
+  stats.solver_threads = options.solver_threads;
   stats.read_seconds = read_seconds;
   TF_ASSIGN_OR_RETURN(const Positions deformed, Predict(problem, &stats));
   TF_RETURN_IF_ERROR(WriteResult(options.out, plan, problem, deformed));
@@ -110,6 +112,7 @@ void AddDeformCommand(CLI::App& app, CommandWork* work) {
                    "threads to compute with; the answer does not depend on it")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
+  AddSolverThreads(command, "", &options->solver_threads);
   AddAllowOutside(command, &options->reading);
   command->footer(
       "Examples:\n"

@@ -36,6 +36,18 @@ void AddAllowOutside(CLI::App* command, PlanReadOptions* options) {
                     "let the plan name a mesh outside its own folder");
 }
 
+void AddSolverThreads(CLI::App* command, const std::string& when, int* threads) {
+  constexpr int kMostOfOpenBlas = 64;  // as Debian builds it
+  command
+      ->add_option("--solver-threads", *threads,
+                   when +
+                       "threads that a factorisation's dense kernels use; more than one is "
+                       "faster for large meshes on an idle machine only, and the last digits of "
+                       "the answer then depend on their number and on the machine")
+      ->check(CLI::Range(1, kMostOfOpenBlas))
+      ->capture_default_str();
+}
+
 // CLI11's ranges take "nan" for a number inside, and some have no upper end.
 void RefuseNonFinite(CLI::App* app) {
   for (CLI::Option* option : app->get_options()) {

@@ -3,6 +3,8 @@
 
 #pragma once
 
+#include <string>
+
 #include "CLI/CLI.hpp"
 
 #include "core/planning/plan_io.h"
@@ -18,6 +20,10 @@ CLI::Validator VtpEnding();
 
 // Adds the flag --allow-outside to a command that reads a plan. `options` outlives the parsing.
 void AddAllowOutside(CLI::App* command, PlanReadOptions* options);
+
+// Adds --solver-threads, for a command that makes factors alone in its process: what is given to
+// SetBlasThreads while it prepares. `threads` outlives the parsing and holds the default, 1.
+void AddSolverThreads(CLI::App* command, const std::string& when, int* threads);
 
 // Every option of `app` and its commands that is a floating-point number refuses "nan" and "inf".
 // To be called when all have been added.

@@ -76,6 +76,7 @@ OrderedJson StatsToJson(const PredictionStats& stats) {
                       {"changes_mm", stats.solve.changes_mm},
                       {"energies_nj", stats.solve.energies_nj},
                       {"load", stats.solve.load},
+                      {"solver_threads", stats.solver_threads},
                       {"bytes_held", stats.preparation.bytes_held},
                       {"quality", QualityToJson(stats)}};
   if (stats.elastic) json["elastic"] = ElasticToJson(*stats.elastic);

@@ -21,6 +21,7 @@ struct PredictionStats {
   std::string model;         // as in the plan
   std::string rotation;      // mode of the gradient field
   double poisson_ratio = 0;  // of the elastic models
+  int solver_threads = 1;
   Eigen::Index vertices = 0;
   Eigen::Index tets = 0;
   Eigen::Index fixed_vertices = 0;

@@ -248,6 +248,25 @@ TEST_F(DeformTest, NamedModelReplacesThatOfThePlan) {
   EXPECT_THAT(Files(), ElementsAre("out.vtu"));
 }
 
+TEST_F(DeformTest, OneSolverThreadIsTheDefaultToTheByteAndTwoAgree) {
+  const auto deform = [this](const std::string& out, std::vector<std::string> more) {
+    std::vector<std::string> words = {"deform",  TestDataPath("plans/tongue/plan.json"),
+                                      "--out",   out + ".vtu",
+                                      "--model", "linear_elastic",
+                                      "--stats", out + ".json"};
+    words.insert(words.end(), more.begin(), more.end());
+    EXPECT_THAT(Run(words), Succeeds());
+    return nlohmann::json::parse(Read(out + ".json"))["solver_threads"].get<int>();
+  };
+  EXPECT_EQ(deform("unsaid", {}), 1);
+  EXPECT_EQ(deform("one", {"--solver-threads", "1"}), 1);
+  EXPECT_EQ(deform("two", {"--solver-threads", "2"}), 2);
+  EXPECT_EQ(Read("one.vtu"), Read("unsaid.vtu"));
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile one, ReadTetMesh(Path("one.vtu")));
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile two, ReadTetMesh(Path("two.vtu")));
+  EXPECT_LT((one.mesh.positions() - two.mesh.positions()).cwiseAbs().maxCoeff(), 1e-9);
+}
+
 TEST_F(DeformTest, PlanCheckSaysWhatIsAskedFor) {
   const ProcessResult result = Run({"plan", "check", TestDataPath("plans/bar/plan.json")});
   EXPECT_THAT(result, Succeeds());

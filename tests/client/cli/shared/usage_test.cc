@@ -35,6 +35,17 @@ TEST_F(UsageTest, NumbersAreFinite) {
               FailsWith(2, HasSubstr("--radius-edge: nan")));
 }
 
+TEST_F(UsageTest, SolverThreadsOutOfRangeAreRefusedInOneLine) {
+  for (const char* number : {"0", "-1", "65", "1e9", "two"}) {
+    EXPECT_THAT(Run({"deform", "plan.json", "--out", "out.vtu", "--solver-threads", number}),
+                FailsWith(2, AllOf(HasSubstr("--solver-threads"), HasSubstr(number))));
+    EXPECT_THAT(Run({"compare", "plan.json", "--solver-threads", number}),
+                FailsWith(2, AllOf(HasSubstr("--solver-threads"), HasSubstr(number))));
+  }
+  EXPECT_THAT(Run({"compare", "a.vtu", "b.vtu", "--solver-threads", "2"}),
+              FailsWith(2, HasSubstr("--solver-threads: is for a plan")));
+}
+
 TEST_F(UsageTest, HelpTeachesByExamples) {
   EXPECT_THAT(Run({"--help"}).out, AllOf(HasSubstr("deform"), HasSubstr("not a medical device")));
   const std::vector<std::vector<std::string>> commands = {
