@@ -119,6 +119,36 @@ TEST_F(ServedCommandTest, RunEqualsDeformUpToFloat32) {
   EXPECT_TRUE(fs::exists(PathOf("run.json")));
 }
 
+TEST_F(ServedCommandTest, RunTellsTheReactionsThatDeformTells) {
+  ASSERT_OK_AND_ASSIGN(
+      const std::unique_ptr<ServerProcess> server,
+      ServerProcess::Start(ProgramPath("tissueform-server"),
+                           {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
+  std::ifstream bundled(SourcePath("tests/data/plans/bar/plan.json"));
+  Json plan = Json::parse(bundled);
+  plan["mesh"] = SourcePath("tests/data/plans/bar/bar.vtu");
+  plan["model"] = "neo_hookean";
+  std::ofstream(PathOf("plan.json")) << plan;
+  const auto elastic = [&](const std::string& command, const std::string& name) {
+    const std::string words = ProgramPath("tissueform") + " " + command + " " +
+                              PathOf("plan.json") + " --allow-outside --out " +
+                              PathOf(name + ".vtu") + " --stats " + PathOf(name + ".json");
+    EXPECT_EQ(ExitCodeOf(words), 0);
+    return Json::parse(Read(name + ".json")).at("elastic");
+  };
+  const Json served = elastic("run --server " + server->address(), "run");
+  const Json alone = elastic("deform", "deform");
+  const auto force = [](const Json& of) {
+    const auto numbers = of["handles"][0]["force_n"].get<std::array<double, 3>>();
+    return Eigen::Vector3d(numbers.data());
+  };
+  // Strains keep some five digits of positions in single precision.
+  const double energy = alone["strain_energy_mj"];
+  EXPECT_NEAR(served["strain_energy_mj"].get<double>(), energy, 1e-4 * energy);
+  EXPECT_LT((force(served) - force(alone)).norm(), 1e-4 * force(alone).norm());
+  EXPECT_NE(FindAttribute(ReadTetMesh(PathOf("run.vtu"))->point_data, "reaction_force_n"), nullptr);
+}
+
 TEST_F(ServedCommandTest, RunWithoutServerFailsAndWritesNothing) {
   EXPECT_EQ(ExitCodeOf(ProgramPath("tissueform") + " run " + kTonguePlan +
                        " --server 127.0.0.1:1 --out " + PathOf("run.vtu") + " 2>" + PathOf("err")),
