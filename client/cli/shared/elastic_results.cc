@@ -3,8 +3,11 @@
 
 #include "client/cli/shared/elastic_results.h"
 
+#include <limits>
 #include <utility>
 
+#include "core/base/percentiles.h"
+#include "core/elasticity/tet_strain.h"
 #include "core/operators/piecewise_linear_elements.h"
 
 namespace tissueform {
@@ -44,6 +47,24 @@ Attribute ReactionArray(const PlanProblem& problem, const ElasticState& state) {
 
 OrderedJson VectorToJson(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
+void SummarizeTets(const PlanProblem& problem, const Positions& deformed,
+                   const Eigen::VectorXd& von_mises, ElasticSummary* summary) {
+  // An inverted tet has none, and would be lost among the ranks.
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  const bool all_have = von_mises.allFinite();
+  const std::vector<double> stresses(von_mises.begin(), von_mises.end());
+  summary->von_mises_p50_pa = all_have ? Percentile(stresses, 50) : none;
+  summary->von_mises_p95_pa = all_have ? Percentile(stresses, 95) : none;
+  ElasticSummary::Extreme& stress = summary->von_mises_max_pa;
+  stress.value = von_mises.maxCoeff<Eigen::PropagateNaN>(&stress.tet);
+  const PrincipalValues strains = PrincipalGreenStrains(ElementsOf(*problem.mesh), deformed,
+                                                        problem.deformer.preparation.threads);
+  ElasticSummary::Extreme& longest = summary->principal_strain_max;
+  longest.value = strains.col(0).maxCoeff(&longest.tet);
+  ElasticSummary::Extreme& shortest = summary->principal_strain_min;
+  shortest.value = strains.col(2).minCoeff(&shortest.tet);
+}
+
 void AddResultant(const Resultant& resultant, OrderedJson* json) {
   (*json)["force_n"] = VectorToJson(resultant.force_n);
   (*json)["moment_n_mm"] = VectorToJson(resultant.moment_n_mm);
@@ -68,6 +89,7 @@ std::optional<ElasticSummary> SummarizeElastic(const PlanProblem& problem,
   if (!law) return std::nullopt;
   const ElasticState state = StateOf(*law, problem, deformed);
   ElasticSummary summary;
+  SummarizeTets(problem, deformed, state.von_mises_pa, &summary);
   summary.strain_energy_mj = state.strain_energy_mj;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   const Eigen::Array3d signs = SignsToLps(problem.written_in);
@@ -89,7 +111,19 @@ std::optional<ElasticSummary> SummarizeElastic(const PlanProblem& problem,
 }
 
 OrderedJson ElasticToJson(const ElasticSummary& summary) {
-  OrderedJson json = {{"strain_energy_mj", summary.strain_energy_mj},
+  const ElasticSummary::Extreme& longest = summary.principal_strain_max;
+  const ElasticSummary::Extreme& shortest = summary.principal_strain_min;
+  OrderedJson json = {{"von_mises_stress_pa",
+                       {{"p50", summary.von_mises_p50_pa},
+                        {"p95", summary.von_mises_p95_pa},
+                        {"max", summary.von_mises_max_pa.value},
+                        {"max_tet", summary.von_mises_max_pa.tet}}},
+                      {"principal_strain",
+                       {{"max", longest.value},
+                        {"max_tet", longest.tet},
+                        {"min", shortest.value},
+                        {"min_tet", shortest.tet}}},
+                      {"strain_energy_mj", summary.strain_energy_mj},
                       {"unbalanced_force_n", summary.unbalanced_force_n},
                       {"fixed", OrderedJson::object()},
                       {"handles", OrderedJson::array()}};

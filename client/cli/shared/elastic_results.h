@@ -35,6 +35,16 @@ struct ElasticSummary {
     std::string name;
     Resultant reaction;
   };
+  // A value of some tet, the largest or smallest of all.
+  struct Extreme {
+    double value = 0;
+    Eigen::Index tet = 0;
+  };
+  double von_mises_p50_pa = 0;  // over the tets; not a number where one has no stress
+  double von_mises_p95_pa = 0;
+  Extreme von_mises_max_pa;
+  Extreme principal_strain_max;  // Green-Lagrange
+  Extreme principal_strain_min;
   double strain_energy_mj = 0;
   double unbalanced_force_n = 0;  // length of the sum of all reactions
   Resultant fixed;

@@ -1,6 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include <algorithm>
 #include <fstream>
 
 #include "nlohmann/json.hpp"
@@ -111,6 +112,26 @@ TEST_F(DeformTest, ElasticResultsTellWhatHoldsTheTissueAndWhatItStores) {
     EXPECT_LT((fixed + handle).norm(), 1e-3 * handle.norm());
     EXPECT_NEAR(VectorOf(elastic["fixed"]["about_mm"]).z(),
                 rest.mesh.positions().topRows(25).col(2).mean(), 1e-12);
+    const std::vector<double> stress =
+        ToDoubles(*FindAttribute(result.cell_data, "von_mises_stress_pa"));
+    const auto& of_stress = elastic["von_mises_stress_pa"];
+    EXPECT_EQ(of_stress["max"], *std::max_element(stress.begin(), stress.end()));
+    EXPECT_EQ(of_stress["max"], stress[of_stress["max_tet"].get<size_t>()]);
+    const auto share_below = [&](const char* percentile) {
+      const double limit = of_stress[percentile].get<double>();
+      return static_cast<double>(std::count_if(stress.begin(), stress.end(),
+                                               [limit](double s) { return s <= limit; })) /
+             static_cast<double>(stress.size());
+    };
+    EXPECT_NEAR(share_below("p50"), 0.50, 0.001);
+    EXPECT_NEAR(share_below("p95"), 0.95, 0.001);
+    const std::vector<double> strain =
+        ToDoubles(*FindAttribute(result.cell_data, "principal_strain"));
+    const auto& of_strain = elastic["principal_strain"];
+    EXPECT_EQ(of_strain["max"], *std::max_element(strain.begin(), strain.end()));
+    EXPECT_EQ(of_strain["min"], *std::min_element(strain.begin(), strain.end()));
+    EXPECT_EQ(of_strain["max"], strain[3 * of_strain["max_tet"].get<size_t>()]);
+    EXPECT_EQ(of_strain["min"], strain[3 * of_strain["min_tet"].get<size_t>() + 2]);
     const std::vector<double> density =
         ToDoubles(*FindAttribute(result.cell_data, "strain_energy_density_pa"));
     const double energy_nj =
