@@ -74,8 +74,7 @@ void AddForces(const PiecewiseLinearElements& elements, Eigen::Index tet,
 
 }  // namespace
 
-// On one thread: 0.1 us a tet is a thousandth of what its factor takes, and the sums have one
-// order.
+// On one thread, so that the sums have one order: 0.2 us a tet, where a factor takes 5 and more.
 ElasticState MeasureElasticState(ElasticLaw law, const PiecewiseLinearElements& elements,
                                  const Positions& positions, const Eigen::VectorXd& stiffness,
                                  double poisson_ratio) {
