@@ -5,19 +5,35 @@
 
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "absl/types/span.h"
 
 #include "core/base/types.h"
 #include "core/constraints/handle_pose.h"
+#include "core/linear_solvers/dirichlet_system.h"
 
 namespace tissueform {
 
+// Why an iteration ended before it had converged.
+enum class GaveUp {
+  kNo,          // it has converged, or was cancelled
+  kIterations,  // as many as the options allow
+  kNoRoom,      // the memory for a second factor, which it needs, was refused
+  kArithmetic,  // no step makes it better: rounding is all that is left
+  kBlocked,     // parts of the body would have to pass through each other
+};
+
+// "iterations", "no_room", "arithmetic", "blocked"; empty for kNo.
+absl::string_view GaveUpName(GaveUp gave_up);
+
 // How an answer was found. Not reaching a tolerance is told here; it is not an error.
 struct SolveSummary {
-  int iterations = 1;  // linear solves
+  int iterations = 1;    // linear solves
+  int newton_steps = 0;  // of them those with a new factor
   bool converged = true;
   bool cancelled = false;  // stopped by DeformControl::on_progress
   double residual = 0;     // relative residual of the last linear solve; 0 unless asked for
@@ -29,6 +45,11 @@ struct SolveSummary {
   // Share of the poses' motion that was reached; below 1 when a model that loads in steps came no
   // further.
   double load = 1;
+  GaveUp gave_up = GaveUp::kNo;
+  // What stands in the way, a sentence without its full stop that names handles; empty where
+  // nothing does.
+  std::string obstacle;
+  int64_t second_factor_bytes = 0;  // that the search took meanwhile
   // Found by prepared answers (VertexResponse), and how far it may then lie from the direct one.
   bool prepared = false;
   double error_bound_mm = 0;
@@ -47,6 +68,9 @@ struct DeformControl {
   // Called with every answer but the last; returning false stops with that answer, marked as
   // cancelled.
   std::function<bool(const Deformation& so_far)> on_progress;
+  // May be empty. Asked, with the bytes, before an answer takes room for another factor, which it
+  // gives back at its end; an error leaves the search without that factor.
+  FactorAdmission admission = {};
 };
 
 // What preparing a deformer took and what it holds.

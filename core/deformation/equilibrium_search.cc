@@ -45,6 +45,11 @@ bool EquilibriumSearch::Start(Positions displacements) {
   return true;
 }
 
+void EquilibriumSearch::PreconditionBy(const DirichletSystem* system) {
+  history_.Clear();
+  tangent_ = system;
+}
+
 void EquilibriumSearch::Accept(Trial* trial) {
   std::swap(displacements_, trial->displacements);
   std::swap(gradient_, trial->gradient);
@@ -75,6 +80,7 @@ absl::StatusOr<double> EquilibriumSearch::Step() {
     history_.Clear();
     return Step();
   }
+  step_length_ = length;
   const Eigen::VectorXd before = free_gradient_;
   Accept(&trial_);
   direction *= length;
@@ -119,7 +125,7 @@ Eigen::VectorXd EquilibriumSearch::FreePart(const Positions& field) const {
 }
 
 absl::StatusOr<Eigen::VectorXd> EquilibriumSearch::Precondition(const Eigen::VectorXd& rhs) {
-  if (rounded_ != nullptr) {
+  if (tangent_ == nullptr && rounded_ != nullptr) {
     // Forces of any size fit into single precision as shares of the largest.
     const double unit = rhs.lpNorm<Eigen::Infinity>();
     if (unit == 0) {
@@ -130,7 +136,8 @@ absl::StatusOr<Eigen::VectorXd> EquilibriumSearch::Precondition(const Eigen::Vec
     return Eigen::VectorXd(unit * rounded_solution_.cast<double>());
   }
   rhs_ = rhs;
-  TF_RETURN_IF_ERROR(system_.SolveFree(rhs_, &solution_));
+  const DirichletSystem& system = tangent_ != nullptr ? *tangent_ : system_;
+  TF_RETURN_IF_ERROR(system.SolveFree(rhs_, &solution_));
   return Eigen::VectorXd(solution_.col(0));
 }
 

@@ -30,6 +30,11 @@ class EquilibriumSearch {
   // is changed, when they invert a tet.
   bool Start(Positions displacements);
 
+  // Forgets the steps so far and takes `system`, of the same free unknowns, in place of the linear
+  // stiffness as first inverse Hessian; null: the linear stiffness again. With the tangent at this
+  // state the next step is Newton's. `system` must live until another call.
+  void PreconditionBy(const DirichletSystem* system);
+
   // One step: one back-substitution, and an evaluation of the energy for every length that is
   // tried. Returns the largest change of a vertex in mm; 0 when no length lowers the energy: the
   // end of what the arithmetic can do.
@@ -37,6 +42,8 @@ class EquilibriumSearch {
   // Errors: those of the linear solver.
   absl::StatusOr<double> Step();
 
+  // Of the last step, as a part of the whole one; 0 before the first.
+  double step_length() const { return step_length_; }
   // The norm of the forces on the free vertices, which vanish in equilibrium, over that of the
   // forces that the constrained vertices bear plus force_unit.
   double residual() const { return residual_; }
@@ -70,7 +77,9 @@ class EquilibriumSearch {
   NeoHookeanEnergy::Value value_;
   Eigen::VectorXd free_gradient_;
   double residual_ = 0;
+  double step_length_ = 0;
   LbfgsHistory history_;
+  const DirichletSystem* tangent_ = nullptr;  // in place of the linear stiffness, or null
 
   // Workspaces.
   Trial trial_;

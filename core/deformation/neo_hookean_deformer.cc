@@ -6,9 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
@@ -16,7 +19,9 @@
 #include "core/deformation/deformation_checks.h"
 #include "core/deformation/equilibrium_search.h"
 #include "core/deformation/handle_targets.h"
+#include "core/deformation/load_obstacle.h"
 #include "core/deformation/load_path.h"
+#include "core/deformation/newton_fallback.h"
 #include "core/elasticity/neo_hookean_energy.h"
 
 namespace tissueform {
@@ -28,6 +33,8 @@ constexpr double kLargestTurn = std::numbers::pi / 6;
 // Load steps shorter than this are not tried: nine halvings of the whole way. What does not go
 // through then is reported with the load that was reached, and is no error.
 constexpr double kSmallestLoadStep = 1.0 / 512;
+// Tissue squeezed to less than this part of its volume stands in the way of a search.
+constexpr double kCrushed = 0.1;
 // Residual at which a load step is left for the next one: only the last equilibrium is an answer,
 // the ones before need to be near enough to begin the next step from.
 constexpr double kStepTolerance = 0.02;
@@ -49,6 +56,10 @@ absl::Status CheckOptions(const NeoHookeanOptions& options) {
   if (options.history < 0) {
     return absl::InvalidArgumentError(
         absl::StrCat("history is ", options.history, "; it must not be negative"));
+  }
+  if (options.newton_after < 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("newton_after is ", options.newton_after, "; it must not be negative"));
   }
   return absl::OkStatus();
 }
@@ -104,7 +115,8 @@ class NeoHookeanDeformer : public Deformer {
         shares_(HandleShares(elastic, rest().rows())),
         energy_(preparation_->elements(), preparation_->vertex_cells(), preparation_->stiffness(),
                 preparation_->options().poisson_ratio, preparation_->options().threads),
-        search_(&energy_, &elastic.system(), rounded, ForceUnit(*preparation_), options.history) {
+        search_(&energy_, &elastic.system(), rounded, ForceUnit(*preparation_), options.history),
+        newton_(preparation_.get(), &elastic, &search_, options.newton_after) {
     const FactorizationSummary& factorization = elastic_.system().factorization();
     summary_.assemble_seconds = elastic_.assemble_seconds();
     summary_.analyse_seconds = factorization.analyse_seconds;
@@ -118,6 +130,8 @@ class NeoHookeanDeformer : public Deformer {
   absl::StatusOr<Deformation> Deform(absl::Span<const HandlePose> poses,
                                      const DeformControl& control) override {
     TF_RETURN_IF_ERROR(CheckPoses(preparation_->constraints(), poses));
+    newton_.Begin(control.admission);
+    const absl::Cleanup end_of_newton = [this] { newton_.End(); };
     if (control.warm_start && !last_poses_.empty()) {
       TF_ASSIGN_OR_RETURN(Deformation deformation,
                           Walk(LoadPath(last_poses_, poses), Begin::kWhereItIs, control));
@@ -140,6 +154,7 @@ class NeoHookeanDeformer : public Deformer {
     const DeformControl& control;
     Stopwatch stopwatch;
     Deformation deformation;
+    double step = 1;  // of the load, next
 
     SolveSummary& summary() { return deformation.summary; }
   };
@@ -149,23 +164,23 @@ class NeoHookeanDeformer : public Deformer {
   // Follows the path as far as it goes and remembers the end for the next warm start.
   absl::StatusOr<Deformation> Walk(const LoadPath& path, Begin begin,
                                    const DeformControl& control) {
-    Run run{path, control, {}, {}};
+    Run run{path, control, {}, {}, {}};
     run.summary().iterations = 0;
     run.summary().load = 0;
     run.summary().converged = false;
     last_poses_.clear();
     // Only turns are cut into steps. A translation, however long, is tried at once from the linear
     // answer; where that inverts tets the way is walked from rest, in steps that are halved.
-    double step = std::min(1.0, kLargestTurn / std::max(path.LargestTurn(), kLargestTurn));
-    if (begin == Begin::kAtRest && !(step == 1.0 && StartFromLinear(&run))) {
+    run.step = std::min(1.0, kLargestTurn / std::max(path.LargestTurn(), kLargestTurn));
+    if (begin == Begin::kAtRest && !(run.step == 1.0 && StartFromLinear(&run))) {
       search_.Start(Positions::Zero(rest().rows(), 3));
     }
     if (run.summary().load == 1.0) {
       TF_RETURN_IF_ERROR(Relax(&run));
     }
-    while (run.summary().load < 1.0 && step >= kSmallestLoadStep && MayGoOn(&run)) {
-      if (!Advance(step, &run)) {
-        step *= 0.5;
+    while (run.summary().load < 1.0 && !IsBlocked(run) && MayGoOn(&run)) {
+      if (!Advance(&run)) {
+        run.step *= 0.5;
         continue;
       }
       TF_RETURN_IF_ERROR(Relax(&run));
@@ -187,16 +202,37 @@ class NeoHookeanDeformer : public Deformer {
     return true;
   }
 
-  // Carries the state on by a load step; false when that inverts tets.
-  bool Advance(double step, Run* run) {
-    const double begin = run->summary().load;
-    const double remaining = 1.0 - begin;
+  static bool IsBlocked(const Run& run) { return run.step < kSmallestLoadStep; }
+
+  // Where the next load step ends.
+  static double EndOfStep(const Run& run) {
+    const double remaining = 1.0 - run.deformation.summary.load;
     // No crumb is left for the end.
-    const double end = remaining < 1.01 * step ? 1.0 : begin + step;
+    return remaining < 1.01 * run.step ? 1.0 : run.deformation.summary.load + run.step;
+  }
+
+  std::optional<LoadObstacle> Crossing(const Run& run, double end) const {
+    return FindCrossing(*preparation_, run.path.PosesAt(run.deformation.summary.load),
+                        run.path.PosesAt(end));
+  }
+
+  // The state carried on to another load.
+  Positions Carried(const Run& run, double end) const {
     const Positions positions = rest() + search_.displacements();
-    Positions displacements = run->path.Carry(positions, shares_, begin, end) - rest();
-    SetConstrained(run->path.PosesAt(end), &displacements);
-    if (!search_.Start(std::move(displacements))) {
+    Positions displacements =
+        run.path.Carry(positions, shares_, run.deformation.summary.load, end) - rest();
+    SetConstrained(run.path.PosesAt(end), &displacements);
+    return displacements;
+  }
+
+  // Carries the state on by a load step; false when that inverts tets. Newton steps go on where
+  // L-BFGS got stuck, also to where a handle has passed through a region as a whole: not so far.
+  bool Advance(Run* run) {
+    const double end = EndOfStep(*run);
+    if (run->summary().newton_steps > 0 && Crossing(*run, end).has_value()) {
+      return false;
+    }
+    if (!search_.Start(Carried(*run, end))) {
       return false;
     }
     run->summary().load = end;
@@ -218,13 +254,19 @@ class NeoHookeanDeformer : public Deformer {
   absl::Status Relax(Run* run) {
     SolveSummary& summary = run->summary();
     const double tolerance = summary.load == 1.0 ? options_.tolerance : kStepTolerance;
+    newton_.Restart();
+    bool next_is_newton = false;
     while (search_.residual() > tolerance && MayGoOn(run) && Report(run)) {
+      const bool is_newton = next_is_newton || newton_.Consider(summary.iterations);
+      summary.newton_steps += is_newton ? 1 : 0;
       TF_ASSIGN_OR_RETURN(const double change, search_.Step());
       ++summary.iterations;
       summary.changes_mm.push_back(change);
       summary.energies_nj.push_back(search_.value().energy_nj);
-      // The search can do no more; the residual says below whether that is enough.
-      if (change == 0) {
+      // Where a step gets nowhere, Newton's may; where that does not, the search can do no more,
+      // and the residual says below whether that is enough.
+      next_is_newton = change == 0 && !is_newton && newton_.Take();
+      if (change == 0 && !next_is_newton) {
         break;
       }
     }
@@ -253,9 +295,44 @@ class NeoHookeanDeformer : public Deformer {
 
   void Finish(Run* run) {
     Describe(run);
+    SolveSummary& summary = run->summary();
+    summary.second_factor_bytes = summary.newton_steps > 0 ? newton_.bytes_needed() : 0;
+    if (!summary.converged && !summary.cancelled) {
+      ExplainGivingUp(run);
+    }
     if (run->summary().load == 1.0) {
       last_poses_ = run->path.PosesAt(1.0);
     }
+  }
+
+  void ExplainGivingUp(Run* run) const {
+    SolveSummary& summary = run->summary();
+    if (summary.load < 1.0 && IsBlocked(*run)) {
+      summary.gave_up = GaveUp::kBlocked;
+    } else if (newton_.had_no_room()) {
+      summary.gave_up = GaveUp::kNoRoom;
+    } else if (summary.iterations >= options_.max_iterations) {
+      summary.gave_up = GaveUp::kIterations;
+    } else {
+      summary.gave_up = GaveUp::kArithmetic;
+    }
+    if (summary.gave_up == GaveUp::kBlocked) {
+      // The smallest step that was tried shows what is in the way.
+      const double end = std::min(1.0, summary.load + 2 * run->step);
+      const std::optional<LoadObstacle> crossing = Crossing(*run, end);
+      summary.obstacle =
+          Say(crossing.has_value() ? *crossing
+                                   : FindObstacle(*preparation_, rest() + Carried(*run, end)));
+      return;
+    }
+    const LoadObstacle worst = FindObstacle(*preparation_, run->deformation.positions);
+    if (worst.volume_ratio < kCrushed) {
+      summary.obstacle = Say(worst);
+    }
+  }
+
+  std::string Say(const LoadObstacle& obstacle) const {
+    return tissueform::Describe(obstacle, preparation_->constraints());
   }
 
   // Constant after the constructor.
@@ -268,6 +345,7 @@ class NeoHookeanDeformer : public Deformer {
   // The state of the last answer; its poses when it had reached them, else none.
   NeoHookeanEnergy energy_;
   EquilibriumSearch search_;
+  NewtonFallback newton_;
   std::vector<HandlePose> last_poses_;
 };
 

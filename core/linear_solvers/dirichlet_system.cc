@@ -95,6 +95,7 @@ absl::StatusOr<std::unique_ptr<DirichletSystem>> DirichletSystem::Create(
   TF_RETURN_IF_ERROR(CheckPrescribed(K, prescribed));
   auto system = absl::WrapUnique(new DirichletSystem());
   system->size_ = K.rows();
+  system->entries_ = K.nonZeros();
   system->unknowns_per_node_ = options.unknowns_per_node;
   system->prescribed_ = prescribed;
 
@@ -102,20 +103,15 @@ absl::StatusOr<std::unique_ptr<DirichletSystem>> DirichletSystem::Create(
   for (const int32_t index : prescribed) {
     is_prescribed[index] = true;
   }
-  std::vector<int32_t> free_number(K.rows(), kNotInSystem);
   for (int32_t i = 0; i < K.rows(); ++i) {
     // A vertex of no cell has an empty row; in the system it would be a zero pivot. It keeps the
     // zero of `solution`.
     const bool empty = K.outerIndexPtr()[i] == K.outerIndexPtr()[i + 1];
     if (!is_prescribed[i] && !empty) {
-      free_number[i] = static_cast<int32_t>(system->free_.size());
       system->free_.push_back(i);
     }
   }
-  system->free_free_ =
-      ExtractBlock(K, free_number, system->num_free(), system->free_, BlockPart::kLowerTriangle);
-  system->free_prescribed_ =
-      ExtractBlock(K, free_number, system->num_free(), prescribed, BlockPart::kWhole);
+  system->ExtractBlocks(K);
   if (system->free_.empty()) {
     return system;
   }
@@ -123,8 +119,9 @@ absl::StatusOr<std::unique_ptr<DirichletSystem>> DirichletSystem::Create(
   TF_RETURN_IF_ERROR(cancellation.Check());
   TellProgress(options.observer, PreparationStage::kOrdering);
   system->cholesky_ = CreateSparseCholesky(
-      options.backend, {options.unknowns_per_node, OrderOfFreeNodes(options.node_order, free_number,
-                                                                    options.unknowns_per_node)});
+      options.backend,
+      {options.unknowns_per_node,
+       OrderOfFreeNodes(options.node_order, system->FreeNumbers(), options.unknowns_per_node)});
   Stopwatch stopwatch;
   TF_RETURN_IF_ERROR(system->cholesky_->Analyze(system->free_free_));
   system->factorization_.analyse_seconds = stopwatch.Restart();
@@ -138,6 +135,31 @@ absl::StatusOr<std::unique_ptr<DirichletSystem>> DirichletSystem::Create(
   TF_RETURN_IF_ERROR(system->cholesky_->Factorize(system->free_free_));
   system->factorization_.factorise_seconds = stopwatch.Restart();
   return system;
+}
+
+// Of every unknown: its place in free_, or kNotInSystem.
+std::vector<int32_t> DirichletSystem::FreeNumbers() const {
+  std::vector<int32_t> numbers(static_cast<size_t>(size_), kNotInSystem);
+  for (size_t i = 0; i < free_.size(); ++i) {
+    numbers[static_cast<size_t>(free_[i])] = static_cast<int32_t>(i);
+  }
+  return numbers;
+}
+
+void DirichletSystem::ExtractBlocks(const SparseMatrix& K) {
+  const std::vector<int32_t> numbers = FreeNumbers();
+  free_free_ = ExtractBlock(K, numbers, num_free(), free_, BlockPart::kLowerTriangle);
+  free_prescribed_ = ExtractBlock(K, numbers, num_free(), prescribed_, BlockPart::kWhole);
+}
+
+absl::Status DirichletSystem::Refactorize(const SparseMatrix& K) {
+  if (K.rows() != size_ || K.nonZeros() != entries_) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("matrix has ", K.rows(), " rows with ", K.nonZeros(),
+                     " entries where the one before had ", size_, " with ", entries_));
+  }
+  ExtractBlocks(K);
+  return free_.empty() ? absl::OkStatus() : cholesky_->Factorize(free_free_);
 }
 
 absl::StatusOr<Eigen::MatrixXd> DirichletSystem::Solve(const Eigen::MatrixXd& rhs,

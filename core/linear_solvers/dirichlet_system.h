@@ -33,7 +33,7 @@ using FactorAdmission = std::function<absl::Status(int64_t factor_bytes)>;
 // K x = b with prescribed values at some unknowns (Liao et al. 2009, Eq. 7): rows and columns of
 // prescribed unknowns are eliminated, the free block is factorised once.
 //
-// Thread-safe once it is made.
+// Thread-safe once it is made, but for Refactorize.
 class DirichletSystem {
  public:
   struct Options {
@@ -55,6 +55,12 @@ class DirichletSystem {
   static absl::StatusOr<std::unique_ptr<DirichletSystem>> Create(
       const SparseMatrix& K, const std::vector<int32_t>& prescribed, const Options& options,
       const Cancellation& cancellation = {});
+
+  // Factorises another K of the same pattern in place of the one before; the analysis stays. Not
+  // while another thread uses the system. Errors: InvalidArgument (another number of unknowns or
+  // entries), FailedPrecondition (not positive definite), ResourceExhausted; nothing may be solved
+  // then before another call has succeeded.
+  absl::Status Refactorize(const SparseMatrix& K);
 
   // Solves for k right-hand sides in one pass. `rhs` is n by k (rows of prescribed unknowns are not
   // read) or has no rows, which stands for zero; `values` is #prescribed by k, in the order of
@@ -97,8 +103,12 @@ class DirichletSystem {
  private:
   DirichletSystem() = default;
 
-  // Constant after Create.
+  std::vector<int32_t> FreeNumbers() const;
+  void ExtractBlocks(const SparseMatrix& K);
+
+  // Constant after Create, but for Refactorize.
   Eigen::Index size_ = 0;
+  Eigen::Index entries_ = 0;  // of K
   int unknowns_per_node_ = 1;
   std::vector<int32_t> free_;        // rising
   std::vector<int32_t> prescribed_;  // rising

@@ -197,7 +197,13 @@ absl::StatusOr<Deformation> Session::Deform(DeformationModel model,
     }
     deformer = found->second.deformer;
   }
-  return deformer->Deform(poses, control);
+  // A search that stalls takes a second factor, which goes with the answer.
+  TF_ASSIGN_OR_RETURN(MemoryReservation room, budget_->Reserve(0, "session"));
+  DeformControl with_room = control;
+  with_room.admission = [&room](int64_t bytes) {
+    return room.Resize(room.bytes() + bytes, "second factor of a search");
+  };
+  return deformer->Deform(poses, with_room);
 }
 
 absl::StatusOr<std::optional<PreparedAnswer>> Session::Respond(const ResponseClaim& claim,

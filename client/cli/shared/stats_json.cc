@@ -5,6 +5,7 @@
 
 #include <cstdio>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
 #include "client/cli/shared/version.h"
@@ -46,6 +47,27 @@ OrderedJson QualityToJson(const PredictionStats& stats) {
           {"harmonic_max", stats.preparation.harmonic_max}};
 }
 
+// To follow what was not reached: begins with a colon, or is empty.
+std::string WhyItGaveUp(const SolveSummary& solve) {
+  std::string why;
+  switch (solve.gave_up) {
+    case GaveUp::kNo:
+    case GaveUp::kBlocked:  // the obstacle says it all
+      break;
+    case GaveUp::kIterations:
+      why = ": the iterations ran out";
+      break;
+    case GaveUp::kNoRoom:
+      why = ": no memory for the second factor that it needs";
+      break;
+    case GaveUp::kArithmetic:
+      why = ": no step makes it better";
+      break;
+  }
+  return solve.obstacle.empty() ? why
+                                : absl::StrCat(why, why.empty() ? ": " : "; ", solve.obstacle);
+}
+
 }  // namespace
 
 PredictionStats StatsOf(const PlanProblem& problem) {
@@ -71,11 +93,15 @@ OrderedJson StatsToJson(const PredictionStats& stats) {
                       {"counts", CountsToJson(stats)},
                       {"seconds", SecondsToJson(stats)},
                       {"iterations", stats.solve.iterations},
+                      {"newton_steps", stats.solve.newton_steps},
                       {"residual", stats.solve.residual},
                       {"converged", stats.solve.converged},
                       {"changes_mm", stats.solve.changes_mm},
                       {"energies_nj", stats.solve.energies_nj},
                       {"load", stats.solve.load},
+                      {"gave_up", GaveUpName(stats.solve.gave_up)},
+                      {"obstacle", stats.solve.obstacle},
+                      {"second_factor_bytes", stats.solve.second_factor_bytes},
                       {"solver_threads", stats.solver_threads},
                       {"bytes_held", stats.preparation.bytes_held},
                       {"quality", QualityToJson(stats)}};
@@ -96,14 +122,15 @@ void PrintOutcome(const std::string& out, const PredictionStats& stats) {
                   quality.worst_tet, quality.min_volume_ratio);
   }
   if (stats.solve.load < 1) {
-    absl::FPrintF(stderr,
-                  "warning: only %.0f %% of the movement was reached; the file holds that state\n",
-                  100 * stats.solve.load);
+    absl::FPrintF(
+        stderr, "warning: only %.0f %% of the movement was reached%s; the file holds that state\n",
+        100 * stats.solve.load, WhyItGaveUp(stats.solve));
   } else if (!stats.solve.converged) {
-    absl::FPrintF(stderr,
-                  "warning: not converged after %d iterations (residual %.2g); the file holds the "
-                  "best state\n",
-                  stats.solve.iterations, stats.solve.residual);
+    absl::FPrintF(
+        stderr,
+        "warning: not converged after %d iterations (residual %.2g)%s; the file holds the "
+        "best state\n",
+        stats.solve.iterations, stats.solve.residual, WhyItGaveUp(stats.solve));
   }
 }
 

@@ -53,6 +53,37 @@ TEST(DirichletSystemTest, AgreesWithADenseSolveOfTheWholeSystem) {
   }
 }
 
+TEST(DirichletSystemTest, AnotherMatrixOfThePatternTakesThePlaceOfTheFirst) {
+  const TetMesh bar = testing::Bar({3, 3, 5}, 1.0, 0.2);
+  const SparseMatrix first = CotangentLaplacian(bar, Eigen::VectorXd::Ones(bar.num_tets()));
+  const SparseMatrix second =
+      CotangentLaplacian(bar, Eigen::VectorXd::LinSpaced(bar.num_tets(), 1, 9));
+  const std::vector<int32_t> prescribed = {0, 3, 17, 40};
+  const Eigen::MatrixXd rhs = Eigen::MatrixXd::Random(first.rows(), 2);
+  const Eigen::MatrixXd values = Eigen::MatrixXd::Random(4, 2);
+  for (const auto backend : {CholeskyBackend::kCholmod, CholeskyBackend::kEigen}) {
+    ASSERT_OK_AND_ASSIGN(const auto system,
+                         DirichletSystem::Create(first, prescribed, {backend, {}}));
+    // One that cannot be factorised in between leaves no trace.
+    const SparseMatrix negative = -first;
+    EXPECT_THAT(system->Refactorize(negative), StatusIs(absl::StatusCode::kFailedPrecondition,
+                                                        HasSubstr("not positive definite")));
+    ASSERT_THAT(system->Refactorize(second), IsOk());
+    ASSERT_OK_AND_ASSIGN(const Eigen::MatrixXd solution, system->Solve(rhs, values));
+    const Eigen::MatrixXd oracle = DenseOracle(second, prescribed, rhs, values);
+    EXPECT_LT((solution - oracle).norm(), 1e-11 * oracle.norm());
+  }
+}
+
+TEST(DirichletSystemTest, AMatrixOfAnotherPatternIsRefused) {
+  const SparseMatrix K = BarLaplacian();
+  const TetMesh larger = testing::Bar({3, 3, 6});
+  ASSERT_OK_AND_ASSIGN(const auto system, DirichletSystem::Create(K, {5, 50}, {}));
+  EXPECT_THAT(
+      system->Refactorize(CotangentLaplacian(larger, Eigen::VectorXd::Ones(larger.num_tets()))),
+      StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("entries")));
+}
+
 TEST(DirichletSystemTest, EmptyRightHandSideStandsForZero) {
   const SparseMatrix K = BarLaplacian();
   const Eigen::MatrixXd values = Eigen::MatrixXd::Random(2, 2);
