@@ -104,6 +104,25 @@ TEST_F(SessionTest, AnswersAsTheModelDoes) {
   }
 }
 
+TEST_F(SessionTest, TheSecondFactorOfASearchIsOfTheBudgetAndGivenBackWithTheAnswer) {
+  SessionRecord record = BarRecord(*bar_);
+  record.model = DeformationModel::kNeoHookean;
+  ASSERT_OK_AND_ASSIGN(const auto session, Create(record));
+  // Pushed so far together that L-BFGS alone stalls.
+  HandlePose pose;
+  pose.translation_mm = {2, 0, -4};
+  const int64_t reserved = budget_.reserved_bytes();
+  {
+    ASSERT_OK_AND_ASSIGN(const MemoryReservation rest,
+                         budget_.Reserve(budget_.limit_bytes() - reserved, "all the rest"));
+    ASSERT_OK_AND_ASSIGN(const Deformation without, session->Deform(record.model, {pose}, {}));
+    EXPECT_EQ(without.summary.newton_steps, 0);
+  }
+  ASSERT_OK_AND_ASSIGN(const Deformation answer, session->Deform(record.model, {pose}, {}));
+  EXPECT_GT(answer.summary.newton_steps, 0);
+  EXPECT_EQ(budget_.reserved_bytes(), reserved);
+}
+
 TEST_F(SessionTest, AUniformStiffnessIsAnArrayOfIt) {
   SessionRecord record = BarRecord(*bar_);
   ASSERT_OK_AND_ASSIGN(const auto by_array, Create(record));
