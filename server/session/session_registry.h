@@ -5,10 +5,7 @@
 
 #include <chrono>
 #include <functional>
-#include <map>
 #include <memory>
-#include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,7 +21,9 @@
 #include "server/session/mesh_catalog.h"
 #include "server/session/pose_commits.h"
 #include "server/session/session.h"
+#include "server/session/session_endings.h"
 #include "server/session/session_maker.h"
+#include "server/session/session_makings.h"
 #include "server/session/session_progress.h"
 #include "server/session/session_table.h"
 #include "server/session/session_updates.h"
@@ -44,13 +43,9 @@ class SessionRegistry {
   using SessionCallback = std::function<void(absl::StatusOr<std::shared_ptr<Session>>)>;
   using StatusCallback = std::function<void(absl::Status)>;
 
-  // What happens to a session, for those who follow it without using it.
-  enum class Event { kEvicted, kRestored, kDeleted };
-  using Observer = std::function<void(const std::string& id, Event event)>;
-
-  // What was used within this time is not evicted: a server that would take sessions from those who
-  // work with them refuses instead.
-  static constexpr std::chrono::seconds kInUse{10};
+  using Event = SessionEvent;
+  using Observer = SessionObserver;
+  static constexpr std::chrono::seconds kInUse = SessionEndings::kInUse;
 
   // A session as it is kept, and itself while it is in memory.
   struct View {
@@ -95,11 +90,11 @@ class SessionRegistry {
 
   // Answers those callers of Create and Open at once with Cancelled who came with this flag and
   // still wait; what is made for nobody else stops at its next stage.
-  void CancelWait(const CancelFlag& cancelled);
+  void CancelWait(const CancelFlag& cancelled) { makings_.CancelWait(cancelled); }
 
   // Takes back one claim of a caller who never saw the answer of Create. The session ends with its
   // last claim.
-  void Abandon(const std::shared_ptr<Session>& session);
+  void Abandon(const std::shared_ptr<Session>& session) { endings_.Abandon(session); }
 
   // In memory only. Errors: NotFound.
   absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& id);
@@ -130,15 +125,15 @@ class SessionRegistry {
 
   // Calls `done` when the memory of the session is free and its record is gone. Errors: NotFound,
   // those of SessionStore::Delete.
-  void Delete(const std::string& id, const StatusCallback& done);
+  void Delete(const std::string& id, const StatusCallback& done) { endings_.Delete(id, done); }
 
   // Evicts sessions that are not in use, those first that were used longest ago, until `enough` or
   // none is left. Returns how many.
-  int Evict(const std::function<bool()>& enough);
+  int Evict(const std::function<bool()>& enough) { return endings_.Evict(enough); }
 
   // Ends the sessions that were idle for longer than the TTL, records and all: for stores in
   // memory, whose meshes nobody else keeps. Returns how many.
-  int RemoveIdle();
+  int RemoveIdle() { return endings_.RemoveIdle(); }
 
   // What was used after `since`, or is held by an open stream: sessions, and what they are made of.
   struct Use {
@@ -148,14 +143,16 @@ class SessionRegistry {
   Use UsedSince(Clock::TimePoint since) const;
   // Ends those of the sessions that were not used since, and that no stream holds, records and all.
   // Returns how many.
-  int RemoveUnused(const std::vector<std::string>& ids, Clock::TimePoint since);
+  int RemoveUnused(const std::vector<std::string>& ids, Clock::TimePoint since) {
+    return endings_.RemoveUnused(ids, since);
+  }
   // In memory or not.
   bool Knows(const std::string& id) const;
 
   // Takes the mesh out of the catalog, where that can have it again for no session: while it goes
   // no session of it is begun. Blocks on the disk. Errors: FailedPrecondition (sessions are made
   // from it, are being made or are not deleted to the end), those of MeshCatalog::Remove.
-  absl::Status RemoveMesh(const std::string& sha256) ABSL_LOCKS_EXCLUDED(mutex_);
+  absl::Status RemoveMesh(const std::string& sha256) { return endings_.RemoveMesh(sha256); }
 
   // Nothing is posted to the pool any longer: what the store answers from now on finds nobody who
   // waits. Call it before the pool ends, and end the store's calls before the registry.
@@ -169,78 +166,24 @@ class SessionRegistry {
   WorkerPool& pool() { return *pool_; }
 
  private:
-  using MakingPtr = SessionTable::MakingPtr;
-
-  // What became of a call when it arrived.
-  struct Admission {
-    absl::Status refusal;
-    std::shared_ptr<Session> existing;
-    MakingPtr started;
-    std::optional<SessionProgress> joined;  // how far a making is that was under way
-  };
-
-  Admission AdmitCreate(const SessionRecord& record, const SessionWaiter& waiter)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  Admission AdmitOpen(const std::string& id, const SessionWaiter& waiter)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // False when no session and no making has the request id.
-  bool JoinEarlierRequest(const RequestKey& key, const SessionWaiter& waiter, Admission* admission)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // Of a mesh that is to be made into a session. Errors: NotFound.
-  absl::Status CheckKept(const std::string& mesh_sha256) const
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  int CountMadeFromLocked(const std::string& mesh_sha256) const
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // Errors: ResourceExhausted.
-  absl::Status CheckRoom() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  bool Full() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // Tries to have room for one more session in memory.
-  void MakeRoom() ABSL_LOCKS_EXCLUDED(mutex_);
-
-  static void Join(const MakingPtr& making, const SessionWaiter& waiter, Admission* admission);
-
-  void StartCreation(const MakingPtr& making, const SessionRecord& record,
-                     const std::shared_ptr<const StoredMesh>& mesh);
-  void StartRestore(const MakingPtr& making);
-  // All who wait for it, at any time.
-  SessionCaller CallerOf(const MakingPtr& making);
-  // False when all who waited had cancelled, and then somebody came: it is to be made again.
-  bool FinishCreation(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
-      ABSL_LOCKS_EXCLUDED(mutex_);
   // Puts an updated session into its place. Errors: NotFound.
   absl::Status Replace(const SessionMaker::Made& remade, bool other_handles)
-      ABSL_LOCKS_EXCLUDED(mutex_);
-  void FinishRestore(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
-      ABSL_LOCKS_EXCLUDED(mutex_);
-  void EndUnused(const std::vector<std::pair<std::string, KnownSession>>& removed)
-      ABSL_LOCKS_EXCLUDED(mutex_);
-  // Ends a session that was taken out, and its record.
-  void End(const std::shared_ptr<Session>& session, const StatusCallback& done)
-      ABSL_LOCKS_EXCLUDED(mutex_);
-  // Takes the record of a session that has ended out of the store; then its id is free again.
-  void Forget(const std::string& id, StatusCallback done) ABSL_LOCKS_EXCLUDED(mutex_);
-  // Whoever takes a session forgets it in the end.
-  std::optional<KnownSession> Take(const std::string& id) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  std::shared_ptr<Session> Loaded(const std::string& id) ABSL_LOCKS_EXCLUDED(mutex_);
+      ABSL_LOCKS_EXCLUDED(sessions_.mutex);
+  std::shared_ptr<Session> Loaded(const std::string& id) ABSL_LOCKS_EXCLUDED(sessions_.mutex);
 
   // Constant.
-  const ServiceLimits limits_;
   WorkerPool* const pool_;
   SessionStore* const store_;
-  MeshCatalog* const catalog_;
   const Clock* const clock_;
   Observer observer_ = [](const std::string& /*id*/, Event /*event*/) {};
 
-  // Self-synchronised.
+  // Self-synchronised. Sessions end before what they were made with.
   SessionMaker maker_;
+  SharedSessionTable sessions_;
+  SessionEndings endings_;
+  SessionMakings makings_;
   PoseCommits commits_;
   SessionUpdates updates_;
-
-  mutable Mutex mutex_;
-  SessionTable table_ ABSL_GUARDED_BY(mutex_);
-  // Id: mesh of those that are taken out, but still in the store.
-  std::map<std::string, std::string> ending_ ABSL_GUARDED_BY(mutex_);
-  std::multiset<std::string> meshes_on_their_way_out_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace tissueform

@@ -55,6 +55,7 @@ std::optional<KnownSession> SessionTable::Take(const std::string& id) {
   auto node = known_.extract(id);
   if (node.empty()) return std::nullopt;
   session_of_request_.erase(node.mapped().key.request_id);
+  ending_.emplace(id, node.mapped().mesh_sha256);
   return std::move(node.mapped());
 }
 
@@ -135,6 +136,9 @@ std::vector<std::string> SessionTable::InUse(Clock::TimePoint since) const {
 }
 
 int SessionTable::CountMadeFrom(const std::string& mesh_sha256) const {
+  const auto ending =
+      std::count_if(ending_.begin(), ending_.end(),
+                    [&mesh_sha256](const auto& entry) { return entry.second == mesh_sha256; });
   const auto known = std::count_if(known_.begin(), known_.end(), [&mesh_sha256](const auto& entry) {
     return entry.second.mesh_sha256 == mesh_sha256;
   });
@@ -142,7 +146,7 @@ int SessionTable::CountMadeFrom(const std::string& mesh_sha256) const {
       std::count_if(makings_.begin(), makings_.end(), [&mesh_sha256](const MakingPtr& making) {
         return !making->restores && making->mesh_sha256 == mesh_sha256;
       });
-  return static_cast<int>(known + new_ones);
+  return static_cast<int>(known + new_ones + ending);
 }
 
 size_t SessionTable::num_loaded_in_table() const {

@@ -8,11 +8,13 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
 
+#include "core/base/mutex.h"
 #include "server/session/clock.h"
 #include "server/session/session.h"
 #include "server/session/session_progress.h"
@@ -63,8 +65,8 @@ struct KnownSession {
   std::shared_ptr<const StoredMesh> mesh;       // while there is none: what could not be read again
 };
 
-// Which sessions there are, which are being made, and who waits for them. No threads, no store:
-// its owner guards it and acts.
+// Which sessions there are, which are being made, who waits for them, and which are on their way
+// out. No threads, no store: those who share it (SharedSessionTable) guard it and act.
 class SessionTable {
  public:
   using MakingPtr = std::shared_ptr<SessionMaking>;
@@ -80,8 +82,24 @@ class SessionTable {
 
   // REQUIRES: the id is not known.
   void Add(const std::string& id, KnownSession known);
-  // Empty when it is not known.
+  // Empty when it is not known. Whoever takes a session ends it; until that is told by Ended its id
+  // is not free.
   std::optional<KnownSession> Take(const std::string& id);
+  // One that has been made and never was in the table: as if taken.
+  void TakeUnknown(const std::string& id, const std::string& mesh_sha256) {
+    ending_.emplace(id, mesh_sha256);
+  }
+  void Ended(const std::string& id) { ending_.erase(id); }
+  bool IsEnding(const std::string& id) const { return ending_.contains(id); }
+
+  // Between the two nobody should begin a session of that mesh.
+  void BeginRemoval(const std::string& mesh_sha256) { leaving_meshes_.insert(mesh_sha256); }
+  void EndRemoval(const std::string& mesh_sha256) {
+    leaving_meshes_.erase(leaving_meshes_.find(mesh_sha256));
+  }
+  bool IsLeaving(const std::string& mesh_sha256) const {
+    return leaving_meshes_.contains(mesh_sha256);
+  }
 
   MakingPtr StartMaking(std::string id, RequestKey key, std::string mesh_sha256, bool restores,
                         SessionWaiter waiter);
@@ -102,7 +120,7 @@ class SessionTable {
   // False of one that is not known.
   bool IsInUse(const std::string& id, Clock::TimePoint since) const;
 
-  // And those that are being made.
+  // Also those that are being made and those that are ending.
   int CountMadeFrom(const std::string& mesh_sha256) const;
 
   // In memory, or on the way there.
@@ -116,6 +134,13 @@ class SessionTable {
   std::map<std::string, KnownSession> known_;              // by id
   std::map<std::string, std::string> session_of_request_;  // request id: id
   std::vector<MakingPtr> makings_;
+  std::map<std::string, std::string> ending_;  // id: mesh
+  std::multiset<std::string> leaving_meshes_;
+};
+
+struct SharedSessionTable {
+  mutable Mutex mutex;
+  SessionTable table ABSL_GUARDED_BY(mutex);
 };
 
 }  // namespace tissueform
