@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <fcntl.h>
 #include <filesystem>
 #include <unistd.h>
@@ -221,6 +222,7 @@ absl::StatusOr<int64_t> UploadStore::Begin(const UploadAnnouncement& announcemen
     }
     TF_RETURN_IF_ERROR(Remove(*known));
   }
+  TF_RETURN_IF_ERROR(MakeRoom(announcement.total_bytes));
   {
     MutexLock lock(mutex_);
     if (parts_.size() >= static_cast<size_t>(limits_.max_parts)) {
@@ -340,23 +342,49 @@ absl::Status UploadStore::Remove(const std::shared_ptr<Part>& part) {
   return durable_ ? SyncFolder(folder_) : absl::OkStatus();
 }
 
-absl::StatusOr<int> UploadStore::RemoveOlderThan(int64_t before_s) {
-  std::vector<std::shared_ptr<Part>> old;
+std::vector<std::shared_ptr<UploadStore::Part>> UploadStore::OlderThan(int64_t before_s) {
+  std::vector<std::pair<int64_t, std::shared_ptr<Part>>> old;
   {
     MutexLock lock(mutex_);
     for (const auto& [sha256, part] : parts_) {
       struct stat status {};
       const std::string path = absl::StrCat(folder_, "/", sha256, kPartSuffix);
-      if (stat(path.c_str(), &status) == 0 && status.st_mtime < before_s) old.push_back(part);
+      if (stat(path.c_str(), &status) == 0 && status.st_mtime < before_s) {
+        old.emplace_back(status.st_mtime, part);
+      }
     }
   }
+  std::sort(old.begin(), old.end());
+  std::vector<std::shared_ptr<Part>> parts;
+  parts.reserve(old.size());
+  for (auto& [changed_s, part] : old) parts.push_back(std::move(part));
+  return parts;
+}
+
+absl::StatusOr<int> UploadStore::RemoveOlderThan(int64_t before_s) {
   int removed = 0;
-  for (const std::shared_ptr<Part>& part : old) {
+  for (const std::shared_ptr<Part>& part : OlderThan(before_s)) {
     const absl::Status status = Remove(part);
     if (!status.ok() && !absl::IsNotFound(status)) return status;
     removed += status.ok() ? 1 : 0;
   }
   return removed;
+}
+
+bool UploadStore::HasRoom(int64_t bytes) {
+  MutexLock lock(mutex_);
+  return parts_.size() < static_cast<size_t>(limits_.max_parts) &&
+         bytes_ + bytes <= limits_.max_bytes;
+}
+
+absl::Status UploadStore::MakeRoom(int64_t bytes) {
+  if (HasRoom(bytes)) return absl::OkStatus();
+  for (const std::shared_ptr<Part>& part : OlderThan(time(nullptr) - limits_.spared.count())) {
+    const absl::Status status = Remove(part);
+    if (!status.ok() && !absl::IsNotFound(status)) return status;
+    if (HasRoom(bytes)) break;
+  }
+  return absl::OkStatus();  // what there is no room for is refused where it does not fit
 }
 
 }  // namespace tissueform

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -28,6 +29,9 @@ struct UploadAnnouncement {
 struct UploadLimits {
   int64_t max_bytes = int64_t{8} << 30;  // received of all parts together
   int max_parts = 256;
+  // Where a new part finds no place, those go, the oldest first, to which nothing has come for so
+  // long: else whoever breaks off 256 uploads keeps all others out for a day.
+  std::chrono::seconds spared{600};
   // Bytes that have come since a part was synced and so long ago are synced with the next ones, so
   // that of an upload over a slow line little is lost with the server.
   std::chrono::milliseconds sync_every{2'000};
@@ -100,6 +104,11 @@ class UploadStore {
   absl::StatusOr<std::shared_ptr<Part>> Find(const std::string& sha256);
   absl::StatusOr<std::shared_ptr<Part>> Make(const UploadAnnouncement& announcement);
   absl::Status Remove(const std::shared_ptr<Part>& part);
+  // Those that have not changed since then (unix seconds), the oldest first. Looks at the disk.
+  std::vector<std::shared_ptr<Part>> OlderThan(int64_t before_s);
+  absl::Status MakeRoom(int64_t bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(begin_mutex_);
+  // Whether there is a place for one more part that is to grow so large.
+  bool HasRoom(int64_t bytes);
   absl::Status ReserveBytes(int64_t bytes);
 
   const std::string folder_;

@@ -286,8 +286,11 @@ TEST_F(RestartTest, WithoutItsFolderTheServerKeepsNothingSaysSoAndAnswersOn) {
   const BarProblem other(2);
   SessionRequest request = bar_.Request(session.mesh());
   request.session_id = "another-session-of-this-test";
+  UploadOptions impatient;
+  impatient.give_up_after = std::chrono::milliseconds(100);
   for (const absl::Status& refused :
-       {client->UploadMesh(other.mesh, {}).status(), client->CreateSession(request).status(),
+       {client->UploadMesh(other.mesh, {}, impatient).status(),
+        client->CreateSession(request).status(),
         client->predictions().Create(session.name(), TopPose(SomePose(1))).status()}) {
     EXPECT_THAT(refused, StatusIs(absl::StatusCode::kUnavailable));
     EXPECT_EQ(ReasonOf(refused), ReasonName(ErrorReason::kUnavailable));

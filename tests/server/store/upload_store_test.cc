@@ -202,6 +202,32 @@ TEST_F(UploadStoreTest, OldPartsAreRemovedAndFreshOnesStay) {
   EXPECT_EQ(Files(), 2);
 }
 
+TEST_F(UploadStoreTest, WhereThereIsNoPlaceTheOldestGoAndWhatWasLatelySentStays) {
+  Reopen({.max_parts = 3});
+  const std::string oldest = RecordOf(SamplePayload(2)).sha256;
+  const std::string older = RecordOf(SamplePayload(3)).sha256;
+  for (int number = 1; number <= 3; ++number) {
+    ASSERT_THAT(store_->Begin(AnnouncementOf(SamplePayload(number))), IsOk());
+  }
+  const auto touch = [this](const std::string& name, int64_t at_s) {
+    const timespec times[2] = {{at_s, 0}, {at_s, 0}};
+    return utimensat(AT_FDCWD, (folder_ / "uploads/" + name + ".part").c_str(), times, 0);
+  };
+  ASSERT_THAT(store_->Append(older, 0, "0123456789"), IsOk());
+  ASSERT_EQ(touch(oldest, 1000), 0);
+  ASSERT_EQ(touch(older, 2000), 0);
+  EXPECT_THAT(store_->Begin(AnnouncementOf(SamplePayload(4))), IsOk());
+  EXPECT_THAT(store_->Committed(oldest), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_THAT(store_->Committed(older), IsOk());
+  // A place there is, but not for its bytes.
+  Reopen({.max_bytes = AnnouncementOf(SamplePayload(5)).total_bytes + 9, .max_parts = 4});
+  ASSERT_EQ(touch(older, 2000), 0);
+  EXPECT_THAT(store_->Begin(AnnouncementOf(SamplePayload(5))), IsOk());
+  EXPECT_THAT(store_->Committed(older), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_THAT(store_->Committed(RecordOf(SamplePayload(1)).sha256), IsOk());
+  EXPECT_EQ(Files(), 6);
+}
+
 TEST_F(UploadStoreTest, OfTwoStreamsThatSendTheSameBytesOneIsRefused) {
   ASSERT_THAT(store_->Begin(announcement_), IsOk());
   std::vector<absl::Status> results(4);
