@@ -87,8 +87,8 @@ absl::Status FrameBenchmark::Prepare(int threads) {
 absl::Status FrameBenchmark::MakeResponse() {
   if (kind_ == Kind::kElastic) {
     LinearElasticResponseOptions options;
-    // So small that all digits are read, and still above the bound of their rounding.
-    options.tolerance_mm = 1e-5 * Diagonal(bar_.mesh);
+    // The bound counts everything at its worst, so that answers are nearer than a millionth.
+    options.tolerance_mm = 1e-6 * Diagonal(bar_.mesh);
     TF_ASSIGN_OR_RETURN(response_, CreateLinearElasticResponse(preparation_, skin_, options));
     return absl::OkStatus();
   }

@@ -79,7 +79,10 @@ std::vector<NamedPose> NamedPoses(const PlanProblem& problem) {
 // The server refuses a stream that asks for what its model does not have
 // (SharedPreparation::CreateResponse has the same rule): who asks first, as here, can do without.
 bool HasPreparedAnswers(const DeformerOptions& options) {
-  if (options.model == DeformationModel::kLinearElastic) return true;
+  if (options.model == DeformationModel::kLinearElastic ||
+      options.model == DeformationModel::kNeoHookean) {
+    return true;
+  }
   return options.model == DeformationModel::kGradientField &&
          options.gradient_field.rotation == RotationMode::kPropagated &&
          options.gradient_field.guidance == Guidance::kCotangent;

@@ -53,6 +53,8 @@ struct SolveSummary {
   // Found by prepared answers (VertexResponse), and how far it may then lie from the direct one.
   bool prepared = false;
   double error_bound_mm = 0;
+  // The same of models whose error nobody can bound: an estimate, and error_bound_mm is 0.
+  double error_estimate_mm = 0;
 };
 
 struct Deformation {

@@ -3,11 +3,15 @@
 
 #include "core/prepared_answers/linear_elastic_response.h"
 
+#include <cmath>
 #include <utility>
+
+#include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
 #include "core/deformation/deformation_checks.h"
 #include "core/prepared_answers/panel_response.h"
+#include "core/prepared_answers/pose_samples.h"
 
 namespace tissueform {
 namespace {
@@ -17,28 +21,51 @@ Eigen::Index NumColumns(const MeshPreparation& preparation) {
          static_cast<Eigen::Index>(preparation.constraints().handles().size());
 }
 
+Eigen::MatrixXd CoefficientsOf(const ElasticSystem& elastic,
+                               const std::vector<std::vector<HandlePose>>& samples) {
+  Eigen::MatrixXd coefficients(elastic.response_columns().cols(),
+                               static_cast<Eigen::Index>(samples.size()));
+  for (size_t s = 0; s < samples.size(); ++s) {
+    coefficients.col(static_cast<Eigen::Index>(s)) = elastic.Coefficients(samples[s]);
+  }
+  return coefficients;
+}
+
+// Moves have no range: a sixth of the mesh, which is 3 cm on a head, beside those of turns about a
+// far pivot. What is wider is covered as far as the digits go that these need.
+ColumnUses UsesOf(const MeshPreparation& preparation, const ElasticSystem& elastic,
+                  double max_rotation_rad) {
+  constexpr int kSamples = 400;
+  const double size_mm = preparation.mesh().BoundingBoxDiagonal();
+  const std::vector<Eigen::Vector3d> centroids = HandleCentroids(preparation);
+  const PoseRange typical{.rotation_rad = 0.5 * max_rotation_rad,
+                          .scale_change = 0.02,
+                          .translation_mm = 0.05 * size_mm,
+                          .pivot_offset_mm = 0.1 * size_mm};
+  const PoseRange widest{.rotation_rad = max_rotation_rad,
+                         .scale_change = 0.1,
+                         .translation_mm = 0.15 * size_mm,
+                         .pivot_offset_mm = 0.35 * size_mm};
+  return {.factors = 1,
+          .typical = CoefficientsOf(elastic, SamplePoses(centroids, typical, kSamples)),
+          .widest = CoefficientsOf(elastic, SamplePoses(centroids, widest, kSamples))};
+}
+
 class LinearElasticResponse : public VertexResponse {
  public:
   LinearElasticResponse(std::shared_ptr<MeshPreparation> preparation, const ElasticSystem& elastic,
-                        const std::vector<int32_t>& vertices, double tolerance_mm)
+                        const std::vector<int32_t>& vertices,
+                        const LinearElasticResponseOptions& options)
       : preparation_(std::move(preparation)),
         elastic_(elastic),
-        tolerance_mm_(tolerance_mm),
+        tolerance_mm_(options.tolerance_mm),
         panel_(preparation_->mesh().positions()(vertices, Eigen::all),
-               PanelResponse::Rows::kCoordinates, NumColumns(*preparation_)) {
-    Eigen::VectorXd chosen(3 * panel_.num_vertices());
-    for (Eigen::Index column = 0; column < panel_.num_columns(); ++column) {
-      for (size_t i = 0; i < vertices.size(); ++i) {
-        chosen.segment<3>(3 * static_cast<Eigen::Index>(i)) =
-            elastic_.response_columns().col(column).segment<3>(3 * Eigen::Index{vertices[i]});
-      }
-      panel_.SetColumn(column, chosen);
-    }
-  }
+               PanelResponse::Rows::kCoordinates,
+               RowsOfVertices(elastic_.response_columns(), vertices),
+               UsesOf(*preparation_, elastic_, options.max_rotation_rad), options.tolerance_mm) {}
 
   double ErrorBoundMm(absl::Span<const HandlePose> poses) const override {
-    // Nothing is truncated: 12 columns make every affine motion of a handle.
-    return panel_.Choose(elastic_.Coefficients(poses), tolerance_mm_).bound_mm;
+    return Choose(poses).bound_mm;
   }
 
   bool Covers(absl::Span<const HandlePose> poses) const override {
@@ -46,24 +73,28 @@ class LinearElasticResponse : public VertexResponse {
   }
 
   void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) const override {
-    const Eigen::VectorXd coefficients = elastic_.Coefficients(poses);
-    panel_.Evaluate(coefficients, panel_.Choose(coefficients, tolerance_mm_), positions);
+    panel_.Evaluate(Choose(poses), positions);
   }
 
   std::optional<double> Answer(absl::Span<const HandlePose> poses,
                                FloatPositions* positions) const override {
-    const Eigen::VectorXd coefficients = elastic_.Coefficients(poses);
-    const PanelResponse::Reading reading = panel_.Choose(coefficients, tolerance_mm_);
+    const PanelResponse::Reading reading = Choose(poses);
     if (!(reading.bound_mm <= tolerance_mm_)) return std::nullopt;
-    panel_.Evaluate(coefficients, reading, positions);
+    panel_.Evaluate(reading, positions);
     return reading.bound_mm;
   }
 
   Eigen::Index num_vertices() const override { return panel_.num_vertices(); }
   int num_terms() const override { return static_cast<int>(panel_.num_columns()); }
+  int num_terms_before() const override { return static_cast<int>(panel_.num_columns_before()); }
   int64_t bytes_held() const override { return panel_.bytes_held(); }
 
  private:
+  // Nothing is truncated: 12 columns make every affine motion of a handle.
+  PanelResponse::Reading Choose(absl::Span<const HandlePose> poses) const {
+    return panel_.Choose(elastic_.Coefficients(poses), tolerance_mm_);
+  }
+
   const std::shared_ptr<MeshPreparation> preparation_;  // owns elastic_
   const ElasticSystem& elastic_;
   const double tolerance_mm_;
@@ -81,6 +112,10 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateLinearElasticResponse(
     const std::shared_ptr<MeshPreparation>& preparation, const std::vector<int32_t>& vertices,
     const LinearElasticResponseOptions& options, const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(CheckTolerance(options.tolerance_mm));
+  if (!std::isfinite(options.max_rotation_rad) || options.max_rotation_rad <= 0) {
+    return absl::InvalidArgumentError(absl::StrCat("max_rotation_rad is ", options.max_rotation_rad,
+                                                   "; it must be a positive number"));
+  }
   TF_RETURN_IF_ERROR(CheckChosenVertices(vertices, preparation->mesh().num_vertices()));
   TF_RETURN_IF_ERROR(cancellation.Check());
   if (options.admission) {
@@ -88,10 +123,9 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateLinearElasticResponse(
         LinearElasticResponseBytes(*preparation, static_cast<Eigen::Index>(vertices.size()))));
   }
   TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic(cancellation));
-  // Copied, not solved for: too short to be counted.
+  // Turned, not solved for: too short to be counted.
   TellProgress(options.observer, PreparationStage::kAnswers);
-  return std::make_unique<LinearElasticResponse>(preparation, *elastic, vertices,
-                                                 options.tolerance_mm);
+  return std::make_unique<LinearElasticResponse>(preparation, *elastic, vertices, options);
 }
 
 }  // namespace tissueform

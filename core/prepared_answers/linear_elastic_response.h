@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <numbers>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -18,19 +19,21 @@ namespace tissueform {
 
 struct LinearElasticResponseOptions {
   double tolerance_mm = 0.01;  // of any chosen vertex against the direct solve
-  // May be empty. Called with the bytes that the response will hold before any of them is
-  // allocated.
-  FactorAdmission admission;
+  // Of every handle: as many digits of the columns are kept as such poses need.
+  double max_rotation_rad = 30.0 * std::numbers::pi / 180.0;
+  // May be empty. Called with the bytes that the response needs at most, while it is made and
+  // later, before any of them is allocated.
+  FactorAdmission admission = nullptr;
   PreparationObserver observer = nullptr;  // may be empty; told of the columns
 };
 
-// Bytes of a response of so many vertices; 12 columns a handle.
+// Bytes that a response of so many vertices needs at most, while it is made; 12 columns a handle.
 int64_t LinearElasticResponseBytes(const MeshPreparation& preparation, Eigen::Index num_vertices);
 
 // Linear elasticity at `vertices` (any order), from the columns of ElasticSystem. The model is
-// linear in the displacement of a handle, which any pose makes from 12 columns, so there is no
-// prepared range and nothing is truncated: the bound is that of single precision, which grows with
-// the poses' motion.
+// linear in the displacement of a handle, which any pose makes from 12 columns, so nothing is
+// truncated and there is no sharp range: the bound is that of what the compression cut and of the
+// digits that are kept, and grows with the poses' motion.
 //
 // Factorises the elastic system if no model has done so. bytes_held() are its own
 // columns; it keeps the preparation, which knows the coefficients.

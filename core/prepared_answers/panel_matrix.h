@@ -15,35 +15,42 @@ namespace tissueform {
 // fits the processor is chosen when the program starts.
 //
 // Entries are fixed-point numbers of 32 bits, each column by its own largest one. Upper and lower
-// halves lie apart: a product for which 16 bits are enough reads half of the bytes. That is twice
-// as fast where it counts, after a pause: between the frames of one drag at 30 Hz a processor
-// sleeps and loses what its caches held (measured: 0.35 ms in place of 0.09 for 2.6 MB).
+// halves lie apart, and lower ones are read, and kept, of the last columns only: of those that
+// matter most. Reading half of the bytes is twice as fast where it counts, after a pause: between
+// the frames of one drag at 30 Hz a processor sleeps and loses what its caches held.
 class PanelMatrix {
  public:
   static constexpr int kPanelRows = 32;
 
-  // How much of the entries a product reads.
-  enum class Digits { kUpperHalf, kAll };
-
-  PanelMatrix(Eigen::Index rows, Eigen::Index cols);
+  // The last `full_cols` columns have all digits, the others their upper half.
+  PanelMatrix(Eigen::Index rows, Eigen::Index cols, Eigen::Index full_cols);
 
   // REQUIRES: finite values.
   void SetColumn(Eigen::Index column, const Eigen::Ref<const Eigen::VectorXd>& values);
 
-  // product = this * factors, #rows by factors.cols(), row-major, in single precision, without the
-  // columns before `first`. Columns are added in their order. REQUIRES: factors has cols() rows and
-  // 1 or 3 columns.
-  void Multiply(const Eigen::MatrixXd& factors, Eigen::Index first, Digits digits,
-                float* product) const;
+  // How much of the columns a product reads.
+  struct Reading {
+    Eigen::Index first = 0;       // those before it are left out
+    Eigen::Index first_full = 0;  // from it on with all digits
+  };
+
+  // product = this * factors, #rows by factors.cols(), row-major, in single precision. Columns are
+  // added in their order. REQUIRES: factors has cols() rows and 1 or 3 columns; cols() -
+  // full_cols()
+  // <= first_full <= cols(), and first <= first_full.
+  void Multiply(const Eigen::MatrixXd& factors, const Reading& reading, float* product) const;
 
   // Entries whose upper half alone is read lie at most half of this from what they are; all digits
   // lose less than single precision does.
   double upper_step(Eigen::Index column) const { return steps_[column] * kUpper; }
+  // The same for a column with that largest entry.
+  static double UpperStepOf(double largest);
 
   Eigen::Index rows() const { return rows_; }
   Eigen::Index cols() const { return cols_; }
-  int64_t bytes_held() const { return BytesNeeded(rows_, cols_); }
-  static int64_t BytesNeeded(Eigen::Index rows, Eigen::Index cols);
+  Eigen::Index full_cols() const { return full_cols_; }
+  int64_t bytes_held() const { return BytesNeeded(rows_, cols_, full_cols_); }
+  static int64_t BytesNeeded(Eigen::Index rows, Eigen::Index cols, Eigen::Index full_cols);
 
  private:
   static constexpr int32_t kUpper = 1 << 16;  // steps in one of the upper half
@@ -55,9 +62,10 @@ class PanelMatrix {
 
   Eigen::Index rows_;
   Eigen::Index cols_;
+  Eigen::Index full_cols_;
   std::vector<double> steps_;  // what the last bit of a column stands for
   std::vector<Panel> upper_;   // column c of panel p lies at p * cols + c
-  std::vector<Panel> lower_;
+  std::vector<Panel> lower_;   // the i-th full column at p * full_cols + i
 };
 
 }  // namespace tissueform

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -13,6 +14,7 @@
 #include "core/deformation/deformation_checks.h"
 #include "core/deformation/harmonic_fields.h"
 #include "core/prepared_answers/panel_response.h"
+#include "core/prepared_answers/pose_samples.h"
 #include "core/prepared_answers/rotation_expansion.h"
 #include "core/prepared_answers/term_responses.h"
 
@@ -74,19 +76,25 @@ ResponseBasisPlan PlanOfDegree(int degree, size_t num_handles, Eigen::Index num_
 class ResponseBasis : public VertexResponse {
  public:
   ResponseBasis(const ResponseBasisPlan& plan, const ResponseBasisOptions& options,
-                const SimplexDomain& domain, const Positions& rest)
+                const SimplexDomain& domain, Eigen::Index num_vertices)
       : options_(options),
         num_polynomials_(
             SimplexPolynomials::NumTerms(static_cast<int>(domain.dimension()), plan.degree)),
         degree_(plan.degree),
         domain_(domain),
         expansion_(domain, plan.degree + kGuardDegrees),
-        panel_(rest, PanelResponse::Rows::kVertices, plan.num_terms) {}
+        columns_(num_vertices, plan.num_terms) {}
 
   absl::Status Prepare(const std::vector<int32_t>& vertices, MeshPreparation* preparation,
                        const Cancellation& cancellation) {
     TF_RETURN_IF_ERROR(PrepareHandles(vertices, preparation, cancellation));
-    return PreparePolynomials(vertices, preparation, cancellation);
+    TF_RETURN_IF_ERROR(PreparePolynomials(vertices, preparation, cancellation));
+    TF_RETURN_IF_ERROR(cancellation.Check());
+    panel_.emplace(preparation->mesh().positions()(vertices, Eigen::all),
+                   PanelResponse::Rows::kVertices, columns_, UsesOf(*preparation),
+                   options_.tolerance_mm);
+    columns_.resize(0, 0);
+    return absl::OkStatus();
   }
 
   double ErrorBoundMm(absl::Span<const HandlePose> poses) const override {
@@ -98,8 +106,7 @@ class ResponseBasis : public VertexResponse {
   }
 
   void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) const override {
-    const PlannedAnswer plan = Plan(poses);
-    panel_.Evaluate(plan.factors, plan.reading, positions);
+    panel_->Evaluate(Plan(poses).reading, positions);
   }
 
   std::optional<double> Answer(absl::Span<const HandlePose> poses,
@@ -107,27 +114,27 @@ class ResponseBasis : public VertexResponse {
     if (!InRange(poses)) return std::nullopt;
     const PlannedAnswer plan = Plan(poses);
     if (!(plan.bound_mm <= options_.tolerance_mm)) return std::nullopt;
-    panel_.Evaluate(plan.factors, plan.reading, positions);
+    panel_->Evaluate(plan.reading, positions);
     return plan.bound_mm;
   }
 
-  Eigen::Index num_vertices() const override { return panel_.num_vertices(); }
-  int num_terms() const override { return static_cast<int>(panel_.num_columns()); }
+  Eigen::Index num_vertices() const override { return panel_->num_vertices(); }
+  int num_terms() const override { return static_cast<int>(panel_->num_columns()); }
+  int num_terms_before() const override { return static_cast<int>(panel_->num_columns_before()); }
   int64_t bytes_held() const override {
-    return panel_.bytes_held() + expansion_.bytes_held() +
+    return panel_->bytes_held() + expansion_.bytes_held() +
            (guard_gains_.size() + 3 * static_cast<Eigen::Index>(origins_.size())) *
                static_cast<int64_t>(sizeof(double));
   }
 
  private:
-  // Of poses: what the columns are multiplied with, and how much of them is read.
+  // Of poses.
   struct PlannedAnswer {
-    Eigen::MatrixXd factors;  // #columns by 3
     PanelResponse::Reading reading;
     double bound_mm = 0;  // with what the expansion leaves out
   };
 
-  // Small ones first: high degrees before low ones, handles last.
+  Eigen::Index num_columns() const { return ColumnOfHandle(origins_.size()); }
   Eigen::Index ColumnOfPolynomial(Eigen::Index n) const { return 3 * (num_polynomials_ - 1 - n); }
   Eigen::Index ColumnOfHandle(size_t h) const {
     return 3 * num_polynomials_ + kColumnsPerHandle * static_cast<Eigen::Index>(h);
@@ -137,7 +144,7 @@ class ResponseBasis : public VertexResponse {
   int64_t NumSolved() const {
     const Eigen::Index measured =
         SimplexPolynomials::NumTerms(expansion_.polynomials().dimension(), degree_ + 1);
-    return panel_.num_columns() + 3 * (measured - num_polynomials_);
+    return columns_.cols() + 3 * (measured - num_polynomials_);
   }
   void TellSolved(int64_t columns) const {
     TellProgress(options_.observer, PreparationStage::kAnswers, columns, NumSolved());
@@ -155,10 +162,10 @@ class ResponseBasis : public VertexResponse {
       TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd X,
                           HandleResponse(static_cast<int>(h), origins_.back(), preparation));
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
-        panel_.SetColumn(ColumnOfHandle(h) + axis, X(vertices, axis));
+        columns_.col(ColumnOfHandle(h) + axis) = X(vertices, axis);
       }
-      panel_.SetColumn(ColumnOfHandle(h) + 3,
-                       laplacian->harmonic(vertices, static_cast<Eigen::Index>(h)));
+      columns_.col(ColumnOfHandle(h) + 3) =
+          laplacian->harmonic(vertices, static_cast<Eigen::Index>(h));
     }
     return absl::OkStatus();
   }
@@ -185,7 +192,7 @@ class ResponseBasis : public VertexResponse {
           continue;
         }
         for (Eigen::Index axis = 0; axis < 3; ++axis) {
-          panel_.SetColumn(ColumnOfPolynomial(n) + axis, chosen.col(axis));
+          columns_.col(ColumnOfPolynomial(n) + axis) = chosen.col(axis);
         }
       }
     }
@@ -201,19 +208,46 @@ class ResponseBasis : public VertexResponse {
     });
   }
 
+  ColumnUses UsesOf(const MeshPreparation& preparation) const {
+    constexpr int kSamples = 300;
+    const double size_mm = preparation.mesh().BoundingBoxDiagonal();
+    PoseRange range{.rotation_rad = options_.max_rotation_rad,
+                    .scale_change = options_.max_scale_change,
+                    .translation_mm = 0.05 * size_mm,
+                    .pivot_offset_mm = 0.1 * size_mm};
+    const std::vector<Eigen::Vector3d> centroids = HandleCentroids(preparation);
+    ColumnUses uses{.factors = 3, .typical = {}, .widest = {}};
+    uses.typical = FactorsOf(SamplePoses(centroids, range, kSamples));
+    // Moves have no range: a sixth of the mesh, which is 3 cm on a head, beside those of turns
+    // about a far pivot. Farther ones are covered as far as the digits go that these need.
+    range.translation_mm = 0.15 * size_mm;
+    range.pivot_offset_mm = 0.9 * size_mm;
+    uses.widest = FactorsOf(SamplePoses(centroids, range, kSamples));
+    return uses;
+  }
+
+  Eigen::MatrixXd FactorsOf(const std::vector<std::vector<HandlePose>>& samples) const {
+    Eigen::MatrixXd factors(num_columns(), 3 * static_cast<Eigen::Index>(samples.size()));
+    for (size_t s = 0; s < samples.size(); ++s) {
+      factors.middleCols<3>(3 * static_cast<Eigen::Index>(s)) =
+          Factors(samples[s], expansion_.Expand(samples[s]));
+    }
+    return factors;
+  }
+
   PlannedAnswer Plan(absl::Span<const HandlePose> poses) const {
     const ExpansionCoefficients coefficients = expansion_.Expand(poses);
     PlannedAnswer plan;
-    plan.factors = Factors(poses, coefficients);
     const double truncation_mm = TruncationBoundMm(poses, coefficients);
-    plan.reading = panel_.Choose(plan.factors, options_.tolerance_mm - truncation_mm);
+    plan.reading =
+        panel_->Choose(Factors(poses, coefficients), options_.tolerance_mm - truncation_mm);
     plan.bound_mm = truncation_mm + plan.reading.bound_mm;
     return plan;
   }
 
   Eigen::MatrixXd Factors(absl::Span<const HandlePose> poses,
                           const ExpansionCoefficients& coefficients) const {
-    Eigen::MatrixXd factors(panel_.num_columns(), 3);
+    Eigen::MatrixXd factors(num_columns(), 3);
     for (Eigen::Index n = 0; n < num_polynomials_; ++n) {
       // Row-major C seen column-major is its transpose.
       factors.middleRows<3>(ColumnOfPolynomial(n)) =
@@ -249,7 +283,8 @@ class ResponseBasis : public VertexResponse {
   const int degree_;
   const SimplexDomain domain_;
   const RotationExpansion expansion_;  // with the guard degrees
-  PanelResponse panel_;
+  Eigen::MatrixXd columns_;            // of the chosen vertices; empty after Prepare
+  std::optional<PanelResponse> panel_;
   std::vector<Eigen::Vector3d> origins_;  // o_h
   // Largest displacement that a polynomial of degree degree_ + 1 gives a chosen vertex, each; and
   // that any one does, mm.
@@ -294,7 +329,7 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponseBasis(
   auto basis = std::make_unique<ResponseBasis>(
       plan, options,
       EnclosingSimplex(SampleAtBarycentres(preparation->elements().cells, laplacian->harmonic)),
-      preparation->mesh().positions()(vertices, Eigen::all));
+      static_cast<Eigen::Index>(vertices.size()));
   TF_RETURN_IF_ERROR(basis->Prepare(vertices, preparation.get(), cancellation));
   return basis;
 }

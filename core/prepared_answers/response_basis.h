@@ -22,16 +22,17 @@ struct ResponseBasisOptions {
   // The prepared range, of every handle by itself.
   double max_rotation_rad = 30.0 * std::numbers::pi / 180.0;
   double max_scale_change = 0.1;  // |s - 1|
-  // May be empty. Called with the bytes that the basis will hold before any of them is allocated.
-  FactorAdmission admission;
+  // May be empty. Called with the bytes that the basis needs at most, while it is made and later,
+  // before any of them is allocated.
+  FactorAdmission admission = nullptr;
   PreparationObserver observer = nullptr;  // may be empty; told of the columns
 };
 
 // What a basis will be, known from the tolerance and the prepared range before anything is built.
 struct ResponseBasisPlan {
   int degree = 0;     // largest total degree of the polynomials
-  int num_terms = 0;  // columns: 3 for every polynomial and 4 for every handle
-  int64_t bytes = 0;  // within 10 % of what the basis will hold
+  int num_terms = 0;  // columns: 3 for every polynomial and 4 for every handle, to be compressed
+  int64_t bytes = 0;  // that making the basis takes at most
 };
 
 // A basis of more polynomials than this is refused: it would be slower than the direct solve.
@@ -52,7 +53,8 @@ absl::StatusOr<ResponseBasisPlan> PlanResponseBasis(const MeshPreparation& prepa
 //
 // The bound is the sum of what the polynomials of the next degree would add, measured with their
 // own responses; of the degree after that and of the remainder, with the largest responses that
-// were measured; and of rounding to single precision.
+// were measured; of what the compression of the columns cut (ColumnCompression); and of rounding to
+// single precision.
 //
 // Factorises the Laplacian if no model has done so. Holds the columns only, not the preparation.
 //

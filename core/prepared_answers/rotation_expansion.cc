@@ -9,6 +9,8 @@
 
 #include <Eigen/LU>
 
+#include "core/prepared_answers/small_product.h"
+
 namespace tissueform {
 namespace {
 
@@ -18,7 +20,8 @@ struct Blend {
   double scale = 1;
 };
 
-Blend BlendAt(absl::Span<const HandlePose> poses, const Eigen::VectorXd& u) {
+Blend BlendAt(absl::Span<const HandlePose> poses,
+              const Eigen::Ref<const Eigen::VectorXd, 0, Eigen::InnerStride<>>& u) {
   Blend blend;
   for (size_t h = 0; h < poses.size(); ++h) {
     const double value = u[static_cast<Eigen::Index>(h)];
@@ -59,11 +62,11 @@ RotationExpansion::RotationExpansion(const SimplexDomain& domain, int degree)
 ExpansionCoefficients RotationExpansion::Expand(absl::Span<const HandlePose> poses) const {
   ExpansionCoefficients at_nodes(nodes_.rows(), 9);
   for (Eigen::Index node = 0; node < nodes_.rows(); ++node) {
-    const Blend blend = BlendAt(poses, nodes_.row(node));
+    const Blend blend = BlendAt(poses, nodes_.row(node).transpose());
     Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(at_nodes.row(node).data()) =
         blend.scale * RotationMatrix(blend.rotation_vector) - Eigen::Matrix3d::Identity();
   }
-  return interpolation_ * at_nodes;
+  return MultiplySmall(interpolation_, at_nodes);
 }
 
 double RotationExpansion::RemainderBound(absl::Span<const HandlePose> poses, int degree) const {

@@ -29,6 +29,9 @@ class VertexResponse {
   // REQUIRES: one legal pose per handle.
   virtual double ErrorBoundMm(absl::Span<const HandlePose> poses) const = 0;
 
+  // Whether what is called a bound here is an estimate: of models whose error nobody can bound.
+  virtual bool error_is_estimate() const { return false; }
+
   // Whether the bound is within the tolerance that was asked for, and the poses within the prepared
   // range. Otherwise use the direct solve.
   virtual bool Covers(absl::Span<const HandlePose> poses) const = 0;
@@ -42,7 +45,8 @@ class VertexResponse {
                                        FloatPositions* positions) const = 0;
 
   virtual Eigen::Index num_vertices() const = 0;
-  virtual int num_terms() const = 0;  // columns of the product, all handles together
+  virtual int num_terms() const = 0;         // columns of the product, all handles together
+  virtual int num_terms_before() const = 0;  // before they were compressed to the tolerance
   virtual int64_t bytes_held() const = 0;
 };
 

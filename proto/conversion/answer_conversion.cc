@@ -17,6 +17,7 @@ v1::SolveSummary ToProto(const SolveSummary& summary) {
   proto.set_load(summary.load);
   proto.set_prepared(summary.prepared);
   proto.set_error_bound_mm(summary.error_bound_mm);
+  proto.set_error_estimate_mm(summary.error_estimate_mm);
   return proto;
 }
 
@@ -32,6 +33,7 @@ SolveSummary ToSolveSummary(const v1::SolveSummary& proto) {
   summary.load = proto.load();
   summary.prepared = proto.prepared();
   summary.error_bound_mm = proto.error_bound_mm();
+  summary.error_estimate_mm = proto.error_estimate_mm();
   return summary;
 }
 

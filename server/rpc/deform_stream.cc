@@ -14,6 +14,13 @@
 #include "server/store/store_errors.h"
 
 namespace tissueform {
+namespace {
+
+// After so long without a newer pose an estimate is worked out. Longer than poses of a drag are
+// apart; shorter would take a processor from other drags for answers that nobody waits for.
+constexpr std::chrono::milliseconds kRest{150};
+
+}  // namespace
 
 DeformStreamReactor::DeformStreamReactor(CallScope scope, const ServiceLimits& limits,
                                          SessionRegistry* registry, DeformStreams* streams,
@@ -92,9 +99,12 @@ void DeformStreamReactor::OnDone() {
     streams_->Remove(this);
     timer_->Cancel(deadline_);
   }
+  DeadlineTimer::Id rest;
   {
     MutexLock lock(mutex_);  // whoever called Finish may still hold it
+    rest = rest_;
   }
+  timer_->Cancel(rest);
   delete this;
 }
 
@@ -227,8 +237,12 @@ void DeformStreamReactor::Advance() {
   if (!outcome_.has_value() && flow_.has_value()) {
     WriteNext();
     if (to_commit_.has_value() && !committing_) StartCommit();
+    const bool at_rest = std::chrono::steady_clock::now() >= estimated_at_ + kRest;
     if (flow_->StartSolve()) {
       StartAnswer();
+    } else if (flow_->StartRefinement(at_rest)) {
+      configuration_->session->strand().Post(
+          Lane::kIterations, [this, configuration = configuration_] { Refine(*configuration); });
     } else if (flow_->Done() && !write_in_flight_ && !committing_ && notices_.empty()) {
       End(absl::OkStatus());
     }
@@ -332,12 +346,51 @@ void DeformStreamReactor::SolveNewest(const StreamConfiguration& configuration,
   FinishAnswer(*configuration.session, std::move(pose), std::move(answer));
 }
 
+void DeformStreamReactor::Refine(const StreamConfiguration& configuration) {
+  std::optional<WaitingPose> pose;
+  {
+    MutexLock lock(mutex_);
+    if (!outcome_.has_value()) pose = flow_->TakeRefinement();
+  }
+  absl::StatusOr<std::optional<AnswerFrame>> answer = std::optional<AnswerFrame>();
+  if (pose.has_value()) {
+    // Early answers begin with the linear one, which is worse than the estimate that is there.
+    answer = SolvePose(configuration, *pose, [this](const MakeFrame& /*make_frame*/) {
+      MutexLock lock(mutex_);
+      return !outcome_.has_value() && flow_->JudgeEarly() != FrameFlow::EarlyAnswer::kStop;
+    });
+  }
+  FinishAnswer(*configuration.session, std::move(pose), std::move(answer));
+}
+
+void DeformStreamReactor::WaitForRest() {
+  estimated_at_ = std::chrono::steady_clock::now();
+  if (rest_ != DeadlineTimer::Id()) return;  // looks when it ends how long the hand has rested
+  rest_ = timer_->Start(estimated_at_ + kRest, [this] { EndOfWait(); });
+}
+
+void DeformStreamReactor::EndOfWait() {
+  MutexLock lock(mutex_);
+  rest_ = DeadlineTimer::Id();
+  if (finished_ || !flow_->has_estimate()) return;
+  if (std::chrono::steady_clock::now() < estimated_at_ + kRest) {
+    rest_ = timer_->Start(estimated_at_ + kRest, [this] { EndOfWait(); });
+  } else {
+    Advance();
+  }
+}
+
 void DeformStreamReactor::FinishAnswer(const Session& session, std::optional<WaitingPose> pose,
                                        absl::StatusOr<std::optional<AnswerFrame>> answer) {
   MutexLock lock(mutex_);
   const bool left_memory = !answer.ok() && session.evicted();
   if (!answer.ok() && !left_memory) End(answer.status());
-  flow_->FinishSolve(answer.ok() ? *std::move(answer) : std::nullopt);
+  if (answer.ok() && answer->has_value() && (*answer)->refining) {
+    flow_->FinishEstimate(**std::move(answer), *std::move(pose));
+    WaitForRest();
+  } else {
+    flow_->FinishSolve(answer.ok() ? *std::move(answer) : std::nullopt);
+  }
   if (left_memory && !outcome_.has_value()) {
     if (pose.has_value()) flow_->PutBack(*std::move(pose));
     if (!session.updated()) {

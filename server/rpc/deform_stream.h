@@ -89,6 +89,11 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   void SolveNewest(const StreamConfiguration& configuration, std::optional<WaitingPose> pose)
       ABSL_LOCKS_EXCLUDED(mutex_);
   std::optional<WaitingPose> TakePose() ABSL_LOCKS_EXCLUDED(mutex_);
+  // On the session's strand: works out what an estimate has answered.
+  void Refine(const StreamConfiguration& configuration) ABSL_LOCKS_EXCLUDED(mutex_);
+  // An estimate was made: calls Advance when the hand has rested since for kRest.
+  void WaitForRest() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void EndOfWait() ABSL_LOCKS_EXCLUDED(mutex_);
   // `pose` is what `answer` answers.
   void FinishAnswer(const Session& session, std::optional<WaitingPose> pose,
                     absl::StatusOr<std::optional<AnswerFrame>> answer) ABSL_LOCKS_EXCLUDED(mutex_);
@@ -126,6 +131,8 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   std::deque<v1::DeformNotice> notices_ ABSL_GUARDED_BY(mutex_);  // wait for their write
   std::optional<WaitingPose> to_commit_ ABSL_GUARDED_BY(mutex_);  // the newest that is to be kept
   bool committing_ ABSL_GUARDED_BY(mutex_) = false;
+  std::chrono::steady_clock::time_point estimated_at_ ABSL_GUARDED_BY(mutex_);
+  DeadlineTimer::Id rest_ ABSL_GUARDED_BY(mutex_);  // Id(): nothing is waited for
   bool write_in_flight_ ABSL_GUARDED_BY(mutex_) = false;
   bool finished_ ABSL_GUARDED_BY(mutex_) = false;
   std::optional<absl::Status> outcome_ ABSL_GUARDED_BY(mutex_);  // set: nothing new is started

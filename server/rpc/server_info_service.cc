@@ -83,7 +83,7 @@ ServerInfoService::ServerInfoService(ServiceGate* gate, const NamedLimits& limit
   AddModel(v1::DEFORMATION_MODEL_GRADIENT_FIELD, false, true, &info_);
   AddModel(v1::DEFORMATION_MODEL_ARAP, true, false, &info_);
   AddModel(v1::DEFORMATION_MODEL_LINEAR_ELASTIC, false, true, &info_);
-  AddModel(v1::DEFORMATION_MODEL_NEO_HOOKEAN, true, false, &info_);
+  AddModel(v1::DEFORMATION_MODEL_NEO_HOOKEAN, true, true, &info_);
   AddEncodings(&info_);
 }
 

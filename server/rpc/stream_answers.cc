@@ -22,10 +22,13 @@ namespace {
 absl::Status ReadPrepared(const v1::PreparedAnswers& settings, ResponseRequest* request) {
   if (settings.has_tolerance_mm()) request->tolerance_mm = settings.tolerance_mm();
   if (settings.has_max_rotation()) request->max_rotation_rad = settings.max_rotation();
-  for (const double number : {request->tolerance_mm, request->max_rotation_rad}) {
+  if (settings.has_max_estimate_mm()) request->max_estimate_mm = settings.max_estimate_mm();
+  for (const double number :
+       {request->tolerance_mm, request->max_rotation_rad, request->max_estimate_mm}) {
     if (!std::isfinite(number) || number <= 0) {
       return absl::InvalidArgumentError(absl::StrCat(
-          "prepared.tolerance_mm and max_rotation must be positive numbers, not ", number));
+          "prepared.tolerance_mm, max_rotation and max_estimate_mm must be positive numbers, not ",
+          number));
     }
   }
   return absl::OkStatus();
@@ -134,8 +137,10 @@ absl::StatusOr<StreamBegin> PrepareAnswers(const StreamConfiguration& configurat
     TF_ASSIGN_OR_RETURN(begin.claim,
                         session.PrepareResponse(*configuration.response, cancellation));
     if (const auto shared = begin.claim->Get(); shared != nullptr) {
-      begin.started.mutable_started()->set_prepared_terms(shared->response->num_terms());
-      begin.started.mutable_started()->set_prepared_bytes(shared->response->bytes_held());
+      v1::DeformStarted* started = begin.started.mutable_started();
+      started->set_prepared_terms(shared->response->num_terms());
+      started->set_prepared_terms_before(shared->response->num_terms_before());
+      started->set_prepared_bytes(shared->response->bytes_held());
     }
   }
   return begin;
@@ -146,10 +151,12 @@ absl::StatusOr<std::optional<AnswerFrame>> AnswerFromPrepared(
   TF_ASSIGN_OR_RETURN(const std::optional<PreparedAnswer> answer,
                       configuration.session->Respond(claim, pose.poses));
   if (!answer.has_value()) return std::optional<AnswerFrame>();
-  return std::optional<AnswerFrame>(
+  AnswerFrame frame =
       FrameOf(pose, answer->summary,
               EncodePositions(answer->positions, configuration.choice, configuration.encoding,
-                              configuration.session->mesh().mesh.positions())));
+                              configuration.session->mesh().mesh.positions()));
+  frame.refining = answer->summary.error_estimate_mm > 0;
+  return std::optional<AnswerFrame>(std::move(frame));
 }
 
 absl::StatusOr<AnswerFrame> SolvePose(const StreamConfiguration& configuration,

@@ -25,6 +25,7 @@ absl::Status FrameFlow::Put(uint64_t sequence, std::vector<HandlePose> poses) {
   const int64_t coalesced_count = mailbox_.has_value() ? mailbox_->coalesced_count + 1 : 0;
   mailbox_ = {sequence, coalesced_count, std::move(poses)};
   last_sequence_ = sequence;
+  estimated_.reset();
   return absl::OkStatus();
 }
 
@@ -42,9 +43,19 @@ absl::Status FrameFlow::Acknowledge(uint64_t sequence, std::optional<int32_t> re
   return absl::OkStatus();
 }
 
-bool FrameFlow::StartSolve() {
+bool FrameFlow::MayStart() const {
   const bool has_credit = closed_ || unacked_.size() < max_unacked_;
-  if (busy_ || !mailbox_.has_value() || frame_.has_value() || !has_credit) return false;
+  return !busy_ && !frame_.has_value() && has_credit;
+}
+
+bool FrameFlow::StartSolve() {
+  if (!mailbox_.has_value() || !MayStart()) return false;
+  busy_ = true;
+  return true;
+}
+
+bool FrameFlow::StartRefinement(bool at_rest) {
+  if (!has_estimate() || mailbox_.has_value() || !(at_rest || closed_) || !MayStart()) return false;
   busy_ = true;
   return true;
 }
@@ -71,6 +82,13 @@ FrameFlow::EarlyAnswer FrameFlow::JudgeEarly() const {
 }
 
 void FrameFlow::OfferEarly(AnswerFrame frame) {
+  frame.refining = true;
+  Offer(std::move(frame));
+}
+
+void FrameFlow::FinishEstimate(AnswerFrame frame, WaitingPose pose) {
+  busy_ = false;
+  if (!mailbox_.has_value()) estimated_ = std::move(pose);
   frame.refining = true;
   Offer(std::move(frame));
 }

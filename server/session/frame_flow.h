@@ -69,6 +69,15 @@ class FrameFlow {
   // The answer, or nothing when there is none. One whose solve was given up (summary.cancelled) is
   // kept only when it is the first to its pose: better than none.
   void FinishSolve(std::optional<AnswerFrame> frame);
+  // An answer that is `refining`, and what it answers, to be worked out when no newer pose comes.
+  void FinishEstimate(AnswerFrame frame, WaitingPose pose);
+
+  // As StartSolve, for the pose of an estimate. Until the client has closed that is worth its while
+  // only when the hand rests: `at_rest`.
+  bool StartRefinement(bool at_rest);
+  // REQUIRES: StartRefinement was true.
+  std::optional<WaitingPose> TakeRefinement() { return std::exchange(estimated_, std::nullopt); }
+  bool has_estimate() const { return estimated_.has_value(); }
 
   // What to do with an answer that is not the last one to its pose.
   enum class EarlyAnswer {
@@ -85,12 +94,16 @@ class FrameFlow {
   // Something is prepared or solved.
   bool busy() const { return busy_; }
   // The client has closed and everything was answered and taken.
-  bool Done() const { return closed_ && !busy_ && !mailbox_.has_value() && !frame_.has_value(); }
+  bool Done() const {
+    return closed_ && !busy_ && !mailbox_.has_value() && !frame_.has_value() && !has_estimate();
+  }
 
  private:
   // Sequence of the pose and how often it was refined; frames go out in rising order.
   using FrameNumber = std::pair<uint64_t, int32_t>;
 
+  // Neither is something under way, nor does a frame wait, and there is a credit.
+  bool MayStart() const;
   // Frames of `sequence` made so far.
   int32_t CountFrames(uint64_t sequence) const;
   // A frame waits for its write; it replaces an earlier answer to the same pose that still waits.
@@ -100,7 +113,8 @@ class FrameFlow {
 
   std::optional<uint64_t> last_sequence_;
   std::optional<WaitingPose> mailbox_;
-  std::deque<FrameNumber> unacked_;  // frames made and not acknowledged, rising
+  std::optional<WaitingPose> estimated_;  // answered by an estimate only
+  std::deque<FrameNumber> unacked_;       // frames made and not acknowledged, rising
   std::optional<FrameNumber> last_frame_;
   std::optional<AnswerFrame> frame_;
   bool busy_ = false;

@@ -217,7 +217,8 @@ absl::StatusOr<std::optional<PreparedAnswer>> Session::Respond(const ResponseCla
   if (!bound_mm.has_value()) return std::optional<PreparedAnswer>();
   answer.summary.iterations = 0;
   answer.summary.prepared = true;
-  answer.summary.error_bound_mm = *bound_mm;
+  (shared->response->error_is_estimate() ? answer.summary.error_estimate_mm
+                                         : answer.summary.error_bound_mm) = *bound_mm;
   answer.summary.solve_seconds = stopwatch.Seconds();
   return std::optional<PreparedAnswer>(std::move(answer));
 }

@@ -13,6 +13,7 @@
 #include "core/base/status_macros.h"
 #include "core/mesh_payload/sha256.h"
 #include "core/prepared_answers/linear_elastic_response.h"
+#include "core/prepared_answers/neo_hookean_response.h"
 #include "core/prepared_answers/response_basis.h"
 
 namespace tissueform {
@@ -147,10 +148,21 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> SharedPreparation::CreateRespons
     const ResponseRequest& request, const GradientFieldOptions& gradient_field,
     const FactorAdmission& admission, const Cancellation& cancellation) {
   if (request.model == DeformationModel::kLinearElastic) {
-    return CreateLinearElasticResponse(
-        preparation_, request.vertices,
-        {.tolerance_mm = request.tolerance_mm, .admission = admission, .observer = Observer()},
-        cancellation);
+    return CreateLinearElasticResponse(preparation_, request.vertices,
+                                       {.tolerance_mm = request.tolerance_mm,
+                                        .max_rotation_rad = request.max_rotation_rad,
+                                        .admission = admission,
+                                        .observer = Observer()},
+                                       cancellation);
+  }
+  if (request.model == DeformationModel::kNeoHookean) {
+    return CreateNeoHookeanResponse(preparation_, request.vertices,
+                                    {.tolerance_mm = request.tolerance_mm,
+                                     .max_rotation_rad = request.max_rotation_rad,
+                                     .max_estimate_mm = request.max_estimate_mm,
+                                     .admission = admission,
+                                     .observer = Observer()},
+                                    cancellation);
   }
   if (request.model == DeformationModel::kGradientField &&
       gradient_field.rotation == RotationMode::kPropagated &&
@@ -162,10 +174,11 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> SharedPreparation::CreateRespons
                                 .observer = Observer()},
                                cancellation);
   }
-  return WithReason(absl::InvalidArgumentError(
-                        "only gradient_field with propagated rotations and cotangent guidance, and "
-                        "linear_elastic, have prepared answers; leave `prepared` out"),
-                    ErrorReason::kNoPreparedAnswers);
+  return WithReason(
+      absl::InvalidArgumentError(
+          "only gradient_field with propagated rotations and cotangent guidance, "
+          "linear_elastic and neo_hookean have prepared answers; leave `prepared` out"),
+      ErrorReason::kNoPreparedAnswers);
 }
 
 std::shared_ptr<const ProgressFeed::Follower> SharedPreparation::Follow(DeformationModel model,

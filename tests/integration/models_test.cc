@@ -119,6 +119,7 @@ TEST_F(ModelsTest, PreparedAnswersAreTheDirectOnesWithinTheirBound) {
         std::pair(v1::DEFORMATION_MODEL_LINEAR_ELASTIC, DeformationModel::kLinearElastic)}) {
     const auto stream = Open(asked, Prepared(1e-3, 0.5));
     EXPECT_GT(stream->started().prepared_terms(), 0);
+    EXPECT_LE(stream->started().prepared_terms(), stream->started().prepared_terms_before());
     EXPECT_GT(stream->started().prepared_bytes(), 0);
     for (int sequence = 1; sequence <= 3; ++sequence) {
       const HandlePose pose = Turn(0.15 * sequence);
@@ -134,6 +135,60 @@ TEST_F(ModelsTest, PreparedAnswersAreTheDirectOnesWithinTheirBound) {
     stream->CloseSending();
     EXPECT_THAT(stream->Finish(), IsOk());
   }
+}
+
+// The estimate at once, the converged answer when the hand rests.
+TEST_F(ModelsTest, NeoHookeanFollowsByEstimatesAndConvergesAtRest) {
+  const auto stream = Open(v1::DEFORMATION_MODEL_NEO_HOOKEAN, Prepared(1e-3, 0.5));
+  EXPECT_LT(stream->started().prepared_terms(), stream->started().prepared_terms_before());
+  for (int sequence = 1; sequence <= 3; ++sequence) {
+    const HandlePose pose = Turn(0.1 * sequence);
+    ASSERT_THAT(stream->SendPoses(sequence, TopPose(pose)), IsOk());
+    const Positions converged = Solve(DeformationModel::kNeoHookean, pose);
+    std::optional<v1::DeformFrame> frame = stream->Receive();
+    ASSERT_TRUE(frame.has_value());
+    EXPECT_TRUE(frame->refining());
+    EXPECT_TRUE(frame->summary().prepared());
+    EXPECT_EQ(frame->summary().error_bound_mm(), 0);
+    const double off = Distance(frame->positions(), converged);
+    EXPECT_LE(off, 2 * frame->summary().error_estimate_mm());
+    EXPECT_GT(off, 1e-4) << "this is no estimate";
+    ASSERT_THAT(stream->Ack(*frame), IsOk());
+    frame = stream->Receive();
+    ASSERT_TRUE(frame.has_value());
+    EXPECT_EQ(frame->sequence(), static_cast<uint64_t>(sequence));
+    EXPECT_EQ(frame->refinement(), 1);
+    EXPECT_FALSE(frame->refining());
+    EXPECT_FALSE(frame->summary().prepared());
+    EXPECT_LT(Distance(frame->positions(), converged), 1e-3);
+    ASSERT_THAT(stream->Ack(*frame), IsOk());
+  }
+  // A drag that ends does not wait for the rest.
+  ASSERT_THAT(stream->SendPoses(4, TopPose(Turn(0.1))), IsOk());
+  stream->CloseSending();
+  std::optional<v1::DeformFrame> frame = stream->Receive();
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_TRUE(frame->refining());
+  frame = stream->Receive();
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_FALSE(frame->refining());
+  EXPECT_FALSE(stream->Receive().has_value());
+  EXPECT_THAT(stream->Finish(), IsOk());
+}
+
+TEST_F(ModelsTest, APoseBeyondTheRangeOfNeoHookeansEstimateIsSolved) {
+  v1::PreparedAnswers prepared = Prepared(1e-3, 0.5);
+  prepared.set_max_estimate_mm(1e-2);
+  const auto stream = Open(v1::DEFORMATION_MODEL_NEO_HOOKEAN, prepared);
+  ASSERT_THAT(stream->SendPoses(1, TopPose(Turn(0.4))), IsOk());
+  std::optional<v1::DeformFrame> frame = stream->Receive();
+  while (frame.has_value() && frame->refining()) {
+    EXPECT_FALSE(frame->summary().prepared());
+    ASSERT_THAT(stream->Ack(*frame), IsOk());
+    frame = stream->Receive();
+  }
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_LT(Distance(frame->positions(), Solve(DeformationModel::kNeoHookean, Turn(0.4))), 1e-3);
 }
 
 TEST_F(ModelsTest, APoseBeyondThePreparedRangeIsAnsweredDirectly) {

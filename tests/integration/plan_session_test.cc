@@ -87,7 +87,7 @@ TEST_F(PlanSessionTest, StreamsArePreparedForTheModelsThatHavePreparedAnswers) {
         << static_cast<int>(options.model);
     prepared += HasPreparedAnswers(options) ? 1 : 0;
   }
-  EXPECT_EQ(prepared, 2);
+  EXPECT_EQ(prepared, 3);
 }
 
 }  // namespace

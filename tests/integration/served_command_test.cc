@@ -241,7 +241,7 @@ TEST_F(ServedCommandTest, ServerInfoAsTableAndAsJson) {
   ASSERT_EQ(ExitCodeOf(command + " > " + PathOf("table.txt")), 0);
   EXPECT_THAT(Read("table.txt"),
               AllOf(ContainsRegex("protocol +tissueform.v1"), ContainsRegex("max_sessions +17\n"),
-                    ContainsRegex("neo_hookean +yes +no\n")));
+                    ContainsRegex("neo_hookean +yes +yes\n"), ContainsRegex("arap +yes +no\n")));
   ASSERT_EQ(ExitCodeOf(command + " --json > " + PathOf("info.json")), 0);
   const Json info = Json::parse(Read("info.json"));
   EXPECT_EQ(info["limits"]["max_sessions"], 17);

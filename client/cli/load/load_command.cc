@@ -38,8 +38,8 @@ struct LoadCommandOptions {
 
 // Plans of the bundled head say gradient_field; what a drag is mostly asked for is elasticity.
 DeformationModel ModelOf(const std::string& name) {
-  return name == "gradient_field" ? DeformationModel::kGradientField
-                                  : DeformationModel::kLinearElastic;
+  if (name == "gradient_field") return DeformationModel::kGradientField;
+  return name == "neo_hookean" ? DeformationModel::kNeoHookean : DeformationModel::kLinearElastic;
 }
 
 absl::Status Run(const LoadCommandOptions& options) {
@@ -99,7 +99,7 @@ void AddOptions(CLI::App* command, LoadCommandOptions* options) {
       ->type_name("HOST:PORT");
   command->add_option("--plan", options->plan, "another plan than the bundled head");
   command->add_option("--model", options->model, "what answers the drags")
-      ->check(CLI::IsMember({"gradient_field", "linear_elastic"}))
+      ->check(CLI::IsMember({"gradient_field", "linear_elastic", "neo_hookean"}))
       ->capture_default_str();
   command->add_option("--sessions", load.sessions, "drags from prepared answers")
       ->check(CLI::Range(0, 4096))

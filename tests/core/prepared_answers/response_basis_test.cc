@@ -150,9 +150,9 @@ TEST_P(ResponseBasisTest, MemoryIsKnownBeforeItIsBuilt) {
   };
   ASSERT_OK_AND_ASSIGN(const auto basis, CreateResponseBasis(preparation, vertices, options));
   EXPECT_EQ(asked, plan.bytes);
-  EXPECT_EQ(basis->num_terms(), plan.num_terms);
-  EXPECT_NEAR(static_cast<double>(basis->bytes_held()), static_cast<double>(plan.bytes),
-              0.1 * static_cast<double>(plan.bytes));
+  EXPECT_EQ(basis->num_terms_before(), plan.num_terms);
+  EXPECT_LT(basis->num_terms(), plan.num_terms);
+  EXPECT_LT(basis->bytes_held(), plan.bytes);
 }
 
 std::string NameOfCase(const ::testing::TestParamInfo<ResponseBasisTest::ParamType>& test) {
@@ -271,7 +271,7 @@ TEST(ResponseBasisProgressTest, ColumnsAreCountedUpToTheLastAndTheWorkCanEndBetw
   const std::vector<int32_t> vertices = {0, 1, 2};
   ASSERT_OK_AND_ASSIGN(const auto basis, CreateResponseBasis(preparation, vertices, options));
   const int64_t all = steps.back();
-  EXPECT_GE(all, basis->num_terms()) << "those of the guard degree are measured, too";
+  EXPECT_GE(all, basis->num_terms_before()) << "those of the guard degree are measured, too";
   for (size_t i = 0; i < steps.size(); i += 2) {
     EXPECT_EQ(steps[i + 1], all);
     if (i > 0) {
@@ -299,7 +299,7 @@ TEST(ResponseBasisErrorTest, RefusalComesBeforeAnythingIsBuilt) {
   EXPECT_THAT(CreateResponseBasis(preparation, {1, 2}, options),
               StatusIs(absl::StatusCode::kResourceExhausted, "no room"));
   EXPECT_FALSE(preparation->has_laplacian());
-  EXPECT_THAT(CreateLinearElasticResponse(preparation, {1, 2}, {0.01, options.admission}),
+  EXPECT_THAT(CreateLinearElasticResponse(preparation, {1, 2}, {.admission = options.admission}),
               StatusIs(absl::StatusCode::kResourceExhausted, "no room"));
   EXPECT_FALSE(preparation->has_elastic());
 }
@@ -332,10 +332,11 @@ TEST(LinearElasticResponseTest, EqualsTheModelWithinItsBound) {
     ASSERT_OK_AND_ASSIGN(const auto direct, CreateLinearElasticDeformer(preparation));
     ASSERT_OK_AND_ASSIGN(const auto response,
                          CreateLinearElasticResponse(preparation, testing::AllVertices(mesh), {}));
-    EXPECT_EQ(response->num_terms(), 12 * num_handles);
-    EXPECT_EQ(response->bytes_held(),
+    EXPECT_EQ(response->num_terms_before(), 12 * num_handles);
+    EXPECT_LE(response->num_terms(), 12 * num_handles);
+    EXPECT_LT(response->bytes_held(),
               LinearElasticResponseBytes(*preparation, mesh.num_vertices()));
-    for (const double angle : {0.0, 0.2, 1.0, 6.0}) {
+    for (const double angle : {0.0, 0.2, 0.6, 1.0, 6.0}) {
       const auto poses = RandomPoses(num_handles, angle, 0.1, mesh.BoundingBoxDiagonal(), &random);
       FloatPositions positions;
       response->Evaluate(poses, &positions);
@@ -343,7 +344,10 @@ TEST(LinearElasticResponseTest, EqualsTheModelWithinItsBound) {
       const double error = LargestDistance(positions, expected.positions);
       EXPECT_LE(error, response->ErrorBoundMm(poses));
       EXPECT_LE(response->ErrorBoundMm(poses), 100 * error);
-      EXPECT_TRUE(response->Covers(poses));
+      // The digits of 30 degrees are enough for some more.
+      if (angle <= 0.6) {
+        EXPECT_TRUE(response->Covers(poses)) << angle;
+      }
     }
     FloatPositions rest;
     response->Evaluate(std::vector<HandlePose>(num_handles), &rest);

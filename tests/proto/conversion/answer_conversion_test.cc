@@ -23,6 +23,7 @@ TEST(AnswerConversionTest, ASummarySurvivesTheJourney) {
   summary.load = 0.75;
   summary.prepared = true;
   summary.error_bound_mm = 0.01;
+  summary.error_estimate_mm = 0.02;
   const SolveSummary back = ToSolveSummary(ToProto(summary));
   EXPECT_EQ(back.iterations, 3);
   EXPECT_FALSE(back.converged);
@@ -34,6 +35,7 @@ TEST(AnswerConversionTest, ASummarySurvivesTheJourney) {
   EXPECT_EQ(back.load, 0.75);
   EXPECT_TRUE(back.prepared);
   EXPECT_EQ(back.error_bound_mm, 0.01);
+  EXPECT_EQ(back.error_estimate_mm, 0.02);
 }
 
 TEST(AnswerConversionTest, QualitySurvivesTheJourney) {

@@ -210,7 +210,7 @@ TEST_F(PrepareSessionTest, AnswersOfTheStreamThatIsToComeAreMadeAndCounted) {
 }
 
 TEST_F(PrepareSessionTest, AnswersThatCannotBeMadeLeaveNoSession) {
-  v1::PrepareSessionRequest request = Creation(v1::DEFORMATION_MODEL_NEO_HOOKEAN);
+  v1::PrepareSessionRequest request = Creation(v1::DEFORMATION_MODEL_ARAP);
   request.mutable_stream()->mutable_prepared();
   const Outcome outcome = Run(request);
   EXPECT_EQ(outcome.status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);

@@ -122,6 +122,64 @@ TEST(FrameFlowTest, FramesThatWereNotMadeCannotBeAcknowledged) {
   EXPECT_THAT(flow.Acknowledge(1, 0), IsOk()) << "twice does no harm";
 }
 
+// Answers what waits by an estimate, and takes its frame. REQUIRES: StartSolve is true.
+AnswerFrame EstimateAndTake(FrameFlow* flow) {
+  EXPECT_TRUE(flow->StartSolve());
+  const std::optional<WaitingPose> pose = flow->TakePose();
+  flow->FinishEstimate(Answer(*pose), *pose);
+  return *flow->TakeFrame();
+}
+
+TEST(FrameFlowTest, AnEstimateIsWorkedOutWhenTheHandRests) {
+  FrameFlow flow(2);
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  EXPECT_FALSE(flow.StartRefinement(true)) << "there is no estimate";
+  const AnswerFrame estimate = EstimateAndTake(&flow);
+  EXPECT_TRUE(estimate.refining);
+  EXPECT_FALSE(flow.StartRefinement(false));
+  ASSERT_TRUE(flow.StartRefinement(true));
+  EXPECT_TRUE(flow.busy());
+  const std::optional<WaitingPose> pose = flow.TakeRefinement();
+  ASSERT_TRUE(pose.has_value());
+  EXPECT_EQ(pose->sequence, 1);
+  flow.FinishSolve(Answer(*pose));
+  const AnswerFrame worked_out = *flow.TakeFrame();
+  EXPECT_EQ(worked_out.sequence, 1);
+  EXPECT_EQ(worked_out.refinement, 1);
+  EXPECT_FALSE(worked_out.refining);
+  EXPECT_FALSE(flow.StartRefinement(true)) << "once";
+}
+
+TEST(FrameFlowTest, ANewerPoseTakesThePlaceOfAnEstimatesWork) {
+  FrameFlow flow(3);
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  EstimateAndTake(&flow);
+  ASSERT_THAT(flow.Put(2, {}), IsOk());
+  EXPECT_FALSE(flow.StartRefinement(true));
+  // One that comes while the estimate is made.
+  ASSERT_TRUE(flow.StartSolve());
+  const std::optional<WaitingPose> pose = flow.TakePose();
+  ASSERT_THAT(flow.Put(3, {}), IsOk());
+  flow.FinishEstimate(Answer(*pose), *pose);
+  EXPECT_FALSE(flow.has_estimate());
+  flow.TakeFrame();
+  EXPECT_EQ(EstimateAndTake(&flow).sequence, 3);
+}
+
+TEST(FrameFlowTest, WithoutCreditAnEstimateWaitsAndAClosedDragStillWorksItOut) {
+  FrameFlow flow(1);
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  EstimateAndTake(&flow);
+  EXPECT_FALSE(flow.StartRefinement(true)) << "its frame is not acknowledged";
+  flow.CloseSending();
+  EXPECT_FALSE(flow.Done());
+  ASSERT_TRUE(flow.StartRefinement(false)) << "nobody's hand is at work";
+  flow.FinishSolve(Answer(*flow.TakeRefinement()));
+  EXPECT_FALSE(flow.Done());
+  EXPECT_FALSE(flow.TakeFrame()->refining);
+  EXPECT_TRUE(flow.Done());
+}
+
 TEST(FrameFlowTest, SequencesMustRise) {
   FrameFlow flow(2);
   ASSERT_THAT(flow.Put(0, {}), IsOk());

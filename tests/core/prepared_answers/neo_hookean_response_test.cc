@@ -1,0 +1,175 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/prepared_answers/neo_hookean_response.h"
+
+#include <algorithm>
+#include <numbers>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "core/deformation/linear_elastic_deformer.h"
+#include "core/deformation/neo_hookean_deformer.h"
+#include "tests/testing/handle_problem.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::RandomNumbers;
+using testing::StatusIs;
+using ::tissueform::testing::kInvalid;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+TetMesh JitteredBar() { return testing::Bar({4, 4, 8}, 2.0, 0.2); }
+
+double LargestDistance(const FloatPositions& a, const Positions& b) {
+  return (a.cast<double>() - b).rowwise().norm().maxCoeff();
+}
+
+// A bar with handles, its prepared answers at all vertices and its converged ones.
+struct Prepared {
+  explicit Prepared(int num_handles, double tolerance = 1e-7, double columns_mm = 1e-6)
+      : mesh(JitteredBar()),
+        preparation(testing::PrepareMesh(mesh, num_handles)),
+        direct(*CreateNeoHookeanDeformer(preparation, {.tolerance = tolerance})),
+        response(*CreateNeoHookeanResponse(preparation, testing::AllVertices(mesh),
+                                           {.tolerance_mm = columns_mm, .max_estimate_mm = 100})) {}
+
+  // Handles turned about their middle and moved, `size` times 10 degrees and 1 mm, which is what
+  // 7 mm are to a head.
+  std::vector<HandlePose> Poses(double size, RandomNumbers* random) const {
+    std::vector<HandlePose> poses;
+    for (const HandleRegion& handle : preparation->constraints().handles()) {
+      HandlePose& pose = poses.emplace_back();
+      pose.pivot_mm = mesh.positions()(handle.vertices, Eigen::all).colwise().mean();
+      pose.rotation_vector = size * 10 * kDegree * random->Vector().normalized();
+      pose.translation_mm = size * random->Vector().normalized();
+    }
+    return poses;
+  }
+
+  double ErrorMm(const std::vector<HandlePose>& poses) const {
+    FloatPositions answer;
+    response->Evaluate(poses, &answer);
+    const Deformation converged = *direct->Deform(poses);
+    EXPECT_TRUE(converged.summary.converged);
+    return LargestDistance(answer, converged.positions);
+  }
+
+  TetMesh mesh;
+  std::shared_ptr<MeshPreparation> preparation;
+  std::unique_ptr<Deformer> direct;
+  std::unique_ptr<VertexResponse> response;
+};
+
+class NeoHookeanResponseTest : public ::testing::TestWithParam<int> {
+ protected:
+  RandomNumbers random_{11};
+};
+
+// What is left out is of third order: half the pose, an eighth of the error. The linear answer's
+// falls to a quarter only.
+TEST_P(NeoHookeanResponseTest, ErrorIsOfThirdOrderInThePose) {
+  Prepared prepared(GetParam());
+  ASSERT_OK_AND_ASSIGN(const auto linear, CreateLinearElasticDeformer(prepared.preparation));
+  for (int sample = 0; sample < 4; ++sample) {
+    const std::vector<HandlePose> poses = prepared.Poses(0.25, &random_);
+    std::vector<HandlePose> half;
+    for (const HandlePose& pose : poses) half.push_back(PartOfPose(pose, 0.5));
+    const double error = prepared.ErrorMm(poses);
+    EXPECT_NEAR(error / prepared.ErrorMm(half), 8, 1.5) << sample;
+    ASSERT_OK_AND_ASSIGN(const Deformation of_linear, linear->Deform(poses));
+    const Positions converged = prepared.direct->Deform(poses)->positions;
+    EXPECT_LT(error, 0.3 * (of_linear.positions - converged).rowwise().norm().maxCoeff());
+  }
+}
+
+TEST_P(NeoHookeanResponseTest, IdentityGivesRestAndHandlesGoWhereTheirPosesSay) {
+  Prepared prepared(GetParam());
+  FloatPositions answer;
+  prepared.response->Evaluate(std::vector<HandlePose>(GetParam()), &answer);
+  EXPECT_EQ(answer, prepared.mesh.positions().cast<float>());
+  const std::vector<HandlePose> poses = prepared.Poses(2, &random_);
+  prepared.response->Evaluate(poses, &answer);
+  const ConstraintSet& constraints = prepared.preparation->constraints();
+  for (size_t h = 0; h < poses.size(); ++h) {
+    for (const int32_t v : constraints.handles()[h].vertices) {
+      const Eigen::Vector3d expected =
+          ApplyPose(poses[h], prepared.mesh.positions().row(v).transpose());
+      EXPECT_LT((answer.row(v).transpose().cast<double>() - expected).norm(), 1e-4);
+    }
+  }
+}
+
+// An estimate, so it may be exceeded; of 300 random poses by few and by little.
+TEST_P(NeoHookeanResponseTest, EstimateIsSeldomExceeded) {
+  Prepared prepared(GetParam(), 1e-4, 1e-4);
+  int exceeded = 0;
+  double worst = 0;
+  double tightest = 1e9;
+  for (int sample = 0; sample < 300; ++sample) {
+    const std::vector<HandlePose> poses =
+        prepared.Poses(0.2 + 0.8 * std::abs(random_.Next()), &random_);
+    const double error = prepared.ErrorMm(poses);
+    const double estimate = prepared.response->ErrorBoundMm(poses);
+    exceeded += error > estimate ? 1 : 0;
+    worst = std::max(worst, error / estimate);
+    tightest = std::min(tightest, estimate / error);
+  }
+  EXPECT_LE(exceeded, 15);
+  EXPECT_LT(worst, 2);
+  EXPECT_LT(tightest, 5) << "an estimate that is always far too large says nothing";
+}
+
+INSTANTIATE_TEST_SUITE_P(Handles, NeoHookeanResponseTest, ::testing::Values(1, 2),
+                         [](const auto& test) { return "With" + std::to_string(test.param); });
+
+TEST(NeoHookeanResponseCoverTest, CoversItsRangeAndNoScale) {
+  const auto preparation = testing::PrepareMesh(JitteredBar(), 1);
+  ASSERT_OK_AND_ASSIGN(const auto response,
+                       CreateNeoHookeanResponse(preparation, {1, 5, 100},
+                                                {.max_rotation_rad = 0.3, .max_estimate_mm = 50}));
+  EXPECT_TRUE(response->error_is_estimate());
+  EXPECT_EQ(response->num_terms_before(), 12 + 21);
+  EXPECT_LT(response->num_terms(), 12 + 21);
+  EXPECT_LT(response->bytes_held(), NeoHookeanResponseBytes(*preparation, 3));
+  std::vector<HandlePose> poses(1);
+  EXPECT_TRUE(response->Covers(poses));
+  EXPECT_LT(response->ErrorBoundMm(poses), 1e-5) << "rest is exact";
+  poses[0].rotation_vector.z() = 0.3;
+  EXPECT_TRUE(response->Covers(poses));
+  poses[0].rotation_vector.z() = 0.301;
+  EXPECT_FALSE(response->Covers(poses));
+  poses[0] = {};
+  poses[0].scale = 1.01;
+  EXPECT_FALSE(response->Covers(poses));
+  // Within the range of turns, but so far that the series says nothing.
+  poses[0] = {};
+  poses[0].translation_mm.x() = 1000;
+  EXPECT_FALSE(response->Covers(poses));
+  FloatPositions positions;
+  EXPECT_FALSE(response->Answer(poses, &positions).has_value());
+}
+
+TEST(NeoHookeanResponseErrorTest, RefusalComesBeforeAnythingIsBuiltAndOptionsAreChecked) {
+  const auto preparation = testing::PrepareMesh(JitteredBar(), 1);
+  NeoHookeanResponseOptions options;
+  options.admission = [](int64_t) { return absl::ResourceExhaustedError("no room"); };
+  EXPECT_THAT(CreateNeoHookeanResponse(preparation, {1, 2}, options),
+              StatusIs(absl::StatusCode::kResourceExhausted, "no room"));
+  EXPECT_FALSE(preparation->has_elastic());
+  EXPECT_THAT(CreateNeoHookeanResponse(preparation, {}, {}),
+              StatusIs(kInvalid, HasSubstr("at least")));
+  EXPECT_THAT(CreateNeoHookeanResponse(preparation, {1}, {.max_estimate_mm = 0}),
+              StatusIs(kInvalid, HasSubstr("max_estimate_mm")));
+  EXPECT_THAT(CreateNeoHookeanResponse(preparation, {1}, {.tolerance_mm = -1}),
+              StatusIs(kInvalid, HasSubstr("tolerance_mm")));
+}
+
+}  // namespace
+}  // namespace tissueform
