@@ -111,9 +111,8 @@ Multiplication<Scalar> Best() {
 #endif
 
 template <typename Scalar>
-RowMajorMatrix<Scalar> Multiply(
-    const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& a,
-    const RowMajorMatrix<Scalar>& b) {
+RowMajorMatrix<Scalar> Multiply(const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& a,
+                                const RowMajorMatrix<Scalar>& b) {
   if (a.rows() < 2 * kLanes<Scalar>) return a * b;
   static const Multiplication<Scalar> kMultiply = Best<Scalar>();
   RowMajorMatrix<Scalar> product(a.rows(), b.cols());

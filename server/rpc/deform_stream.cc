@@ -388,9 +388,10 @@ void DeformStreamReactor::FinishAnswer(const Session& session, std::optional<Wai
   if (answer.ok() && answer->has_value() && (*answer)->refining) {
     flow_->FinishEstimate(**std::move(answer), *std::move(pose));
     WaitForRest();
-  } else {
-    flow_->FinishSolve(answer.ok() ? *std::move(answer) : std::nullopt);
+    Advance();
+    return;
   }
+  flow_->FinishSolve(answer.ok() ? *std::move(answer) : std::nullopt);
   if (left_memory && !outcome_.has_value()) {
     if (pose.has_value()) flow_->PutBack(*std::move(pose));
     if (!session.updated()) {
