@@ -23,14 +23,20 @@ constexpr double kUnitRoundoff = 5.97e-8;  // of singles
 // Sums of positive singles: what rounding may take from them.
 constexpr double kBoundRounding = 1 + 1e-4;
 
-// Lower L with L L^T the weighted covariance: typical uses are white in L^-1 f.
-Eigen::MatrixXd UsesRoot(const Eigen::MatrixXd& typical) {
+// How large the factors of every column are, by their root mean square.
+Eigen::VectorXd RowSizes(const Eigen::MatrixXd& uses) {
+  const auto count = static_cast<double>(std::max<Eigen::Index>(uses.cols(), 1));
+  return uses.rowwise().norm() / std::sqrt(count);
+}
+
+// Lower L with L L^T the weighted covariance: typical uses are white in L^-1 f. What no typical
+// pose uses counts for a thousandth of its widest use: so that the turning can be undone.
+Eigen::MatrixXd UsesRoot(const ColumnUses& uses) {
+  constexpr double kOfWidest = 1e-3;
+  const Eigen::MatrixXd& typical = uses.typical;
   const Eigen::Index columns = typical.rows();
-  Eigen::VectorXd sizes = typical.rowwise().norm() /
-                          std::sqrt(static_cast<double>(std::max<Eigen::Index>(typical.cols(), 1)));
-  const double largest = columns > 0 ? sizes.maxCoeff() : 0;
-  // A column that no typical pose uses is not thrown away.
-  sizes = sizes.cwiseMax(largest > 0 ? 1e-6 * largest : 1.0);
+  Eigen::VectorXd sizes = RowSizes(typical).cwiseMax(kOfWidest * RowSizes(uses.widest));
+  sizes = (sizes.array() > 0).select(sizes, 1.0);
   const Eigen::MatrixXd scaled = sizes.cwiseInverse().asDiagonal() * typical;
   Eigen::MatrixXd covariance = kUnusedVariance * Eigen::MatrixXd::Identity(columns, columns);
   covariance.selfadjointView<Eigen::Lower>().rankUpdate(
@@ -81,7 +87,7 @@ Eigen::Index CountBelow(const Eigen::MatrixXd& moves, double limit) {
 ColumnCompression::ColumnCompression(const Eigen::MatrixXd& columns, int rows_per_vertex,
                                      const ColumnUses& uses, double tolerance_mm) {
   const Eigen::Index count = columns.cols();
-  const Eigen::MatrixXd root = UsesRoot(uses.typical);
+  const Eigen::MatrixXd root = UsesRoot(uses);
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(count, count);
   gram.selfadjointView<Eigen::Lower>().rankUpdate(columns.transpose());
   gram = root.transpose() * gram.selfadjointView<Eigen::Lower>() * root;

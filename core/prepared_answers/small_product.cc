@@ -3,6 +3,9 @@
 
 #include "core/prepared_answers/small_product.h"
 
+#include <cstring>
+#include <type_traits>
+
 namespace tissueform {
 namespace {
 
@@ -20,30 +23,34 @@ struct Operands {
 constexpr int kBytes = 64;
 template <typename Scalar>
 constexpr int kLanes = kBytes / static_cast<int>(sizeof(Scalar));
-using Doubles = double __attribute__((vector_size(kBytes), aligned(sizeof(double)), may_alias));
-using Floats = float __attribute__((vector_size(kBytes), aligned(sizeof(float)), may_alias));
-template <typename Scalar>
-struct LanesOf {
-  using Type = Doubles;
-};
-template <>
-struct LanesOf<float> {
-  using Type = Floats;
-};
+using Doubles = double __attribute__((vector_size(kBytes)));
+using Floats = float __attribute__((vector_size(kBytes)));
+
+// From where no alignment is promised.
+inline __attribute__((always_inline)) void Load(const double* from, Doubles* lanes) {
+  std::memcpy(lanes, from, sizeof(*lanes));
+}
+inline __attribute__((always_inline)) void Load(const float* from, Floats* lanes) {
+  std::memcpy(lanes, from, sizeof(*lanes));
+}
 
 // Rows from `row` on, two registers of them, by kCols columns from `col` on.
 template <typename Scalar, int kCols>
 inline __attribute__((always_inline)) void MultiplyBlock(const Operands<Scalar>& of,
                                                          Eigen::Index row, Eigen::Index col) {
-  using Lanes = typename LanesOf<Scalar>::Type;
   constexpr int kWide = kLanes<Scalar>;
+  using Lanes = std::conditional_t<std::is_same_v<Scalar, double>, Doubles, Floats>;
   Lanes sums[2][kCols] = {};
+  Lanes first;
+  Lanes second;
   for (Eigen::Index j = 0; j < of.inner; ++j) {
-    const auto* const a = reinterpret_cast<const Lanes*>(of.a + j * of.rows + row);
+    const Scalar* const a = of.a + j * of.rows + row;
+    Load(a, &first);
+    Load(a + kWide, &second);
     const Scalar* const b = of.b + j * of.cols + col;
     for (int f = 0; f < kCols; ++f) {
-      sums[0][f] += a[0] * b[f];
-      sums[1][f] += a[1] * b[f];
+      sums[0][f] += first * b[f];
+      sums[1][f] += second * b[f];
     }
   }
   for (int half = 0; half < 2; ++half) {
