@@ -38,8 +38,8 @@ ColumnUses UsesOf(const MeshPreparation& preparation, const ElasticSystem& elast
   constexpr int kSamples = 400;
   const double size_mm = preparation.mesh().BoundingBoxDiagonal();
   const std::vector<Eigen::Vector3d> centroids = HandleCentroids(preparation);
-  const PoseRange typical{.rotation_rad = 0.5 * max_rotation_rad,
-                          .scale_change = 0.02,
+  const PoseRange typical{.rotation_rad = 0.3 * max_rotation_rad,
+                          .scale_change = 1e-3,  // bone keeps its size
                           .translation_mm = 0.05 * size_mm,
                           .pivot_offset_mm = 0.1 * size_mm};
   const PoseRange widest{.rotation_rad = max_rotation_rad,
