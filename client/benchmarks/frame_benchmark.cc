@@ -97,7 +97,7 @@ absl::Status FrameBenchmark::MakeResponse() {
   TF_ASSIGN_OR_RETURN(
       const ResponseBasisPlan plan,
       PlanResponseBasis(*preparation_, static_cast<Eigen::Index>(skin_.size()), options));
-  predicted_bytes_ = plan.bytes;
+  announced_bytes_ = plan.bytes;
   TF_ASSIGN_OR_RETURN(response_, CreateResponseBasis(preparation_, skin_, options));
   return absl::OkStatus();
 }
@@ -209,7 +209,7 @@ std::vector<BenchmarkRow> FrameBenchmark::Rows(const PartSeconds& medians) const
     BenchmarkRow preparation;
     preparation.work = Name("preparation");
     preparation.ours_seconds = medians.at(absl::StrCat(preparation.work, "/preparation"));
-    preparation.bytes = predicted_bytes_;
+    preparation.bytes = announced_bytes_;
     rows.push_back(preparation);
   }
   return rows;

@@ -61,7 +61,7 @@ class FrameBenchmark {
   Eigen::MatrixXd rhs_;     // of the back-substitution
   Eigen::MatrixXd values_;  // at the constrained unknowns
   FloatPositions frame_;
-  int64_t predicted_bytes_ = 0;
+  int64_t announced_bytes_ = 0;
   int frames_ = 0;
   size_t encoded_bytes_ = 0;
   std::vector<TimedWork> work_;
