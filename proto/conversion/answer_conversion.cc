@@ -4,6 +4,41 @@
 #include "proto/conversion/answer_conversion.h"
 
 namespace tissueform {
+namespace {
+
+v1::GaveUp ToProto(GaveUp gave_up) {
+  switch (gave_up) {
+    case GaveUp::kNo:
+      break;
+    case GaveUp::kIterations:
+      return v1::GAVE_UP_ITERATIONS;
+    case GaveUp::kNoRoom:
+      return v1::GAVE_UP_NO_ROOM;
+    case GaveUp::kArithmetic:
+      return v1::GAVE_UP_ARITHMETIC;
+    case GaveUp::kBlocked:
+      return v1::GAVE_UP_BLOCKED;
+  }
+  return v1::GAVE_UP_UNSPECIFIED;
+}
+
+// Of a reason that this program does not know yet nothing is said: `converged` tells the rest.
+GaveUp ToGaveUp(v1::GaveUp gave_up) {
+  switch (gave_up) {
+    case v1::GAVE_UP_ITERATIONS:
+      return GaveUp::kIterations;
+    case v1::GAVE_UP_NO_ROOM:
+      return GaveUp::kNoRoom;
+    case v1::GAVE_UP_ARITHMETIC:
+      return GaveUp::kArithmetic;
+    case v1::GAVE_UP_BLOCKED:
+      return GaveUp::kBlocked;
+    default:
+      return GaveUp::kNo;
+  }
+}
+
+}  // namespace
 
 v1::SolveSummary ToProto(const SolveSummary& summary) {
   v1::SolveSummary proto;
@@ -18,6 +53,10 @@ v1::SolveSummary ToProto(const SolveSummary& summary) {
   proto.set_prepared(summary.prepared);
   proto.set_error_bound_mm(summary.error_bound_mm);
   proto.set_error_estimate_mm(summary.error_estimate_mm);
+  proto.set_gave_up(ToProto(summary.gave_up));
+  proto.set_obstacle(summary.obstacle);
+  proto.set_newton_steps(summary.newton_steps);
+  proto.set_second_factor_bytes(summary.second_factor_bytes);
   return proto;
 }
 
@@ -34,6 +73,10 @@ SolveSummary ToSolveSummary(const v1::SolveSummary& proto) {
   summary.prepared = proto.prepared();
   summary.error_bound_mm = proto.error_bound_mm();
   summary.error_estimate_mm = proto.error_estimate_mm();
+  summary.gave_up = ToGaveUp(proto.gave_up());
+  summary.obstacle = proto.obstacle();
+  summary.newton_steps = proto.newton_steps();
+  summary.second_factor_bytes = proto.second_factor_bytes();
   return summary;
 }
 

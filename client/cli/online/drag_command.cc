@@ -18,12 +18,14 @@
 #include "client/cli/online/drag.h"
 #include "client/cli/online/session_wait.h"
 #include "client/cli/shared/companion.h"
+#include "client/cli/shared/stats_json.h"
 #include "client/cpp/plan_session.h"
 #include "client/cpp/reattaching_stream.h"
 #include "core/base/percentiles.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/planning/plan_io.h"
+#include "proto/conversion/answer_conversion.h"
 
 namespace tissueform {
 namespace {
@@ -47,7 +49,19 @@ struct DragTotals {
   std::vector<double> latencies_ms;
   SteadyClock::time_point detached_at;
   double longest_away_seconds = 0;
+  int64_t not_reached = 0;  // final answers that had not converged
+  std::string last_not_reached;
 };
+
+void Note(const v1::DeformFrame& frame, double latency_ms, DragTotals* totals) {
+  totals->latencies_ms.push_back(latency_ms);
+  const SolveSummary summary = ToSolveSummary(frame.summary());
+  if (frame.refining() || summary.cancelled || summary.prepared) return;
+  if (std::string text = NotReachedText(summary); !text.empty()) {
+    ++totals->not_reached;
+    totals->last_not_reached = std::move(text);
+  }
+}
 
 // Tells what happens to the connection, on the receiving thread.
 ReattachingStream::Options StreamOptions(const PlanProblem& problem,
@@ -111,6 +125,10 @@ void PrintTotals(const ReattachingStream& drag, const SendTimes& send_times,
     absl::PrintF("; committed up to pose %d", *committed);
   }
   absl::PrintF("\n");
+  if (totals.not_reached > 0) {
+    absl::FPrintF(stderr, "warning: %d answers are not what was asked for; the last: %s\n",
+                  totals.not_reached, totals.last_not_reached);
+  }
 }
 
 absl::Status Drag(TissueformClient* client, const PlanProblem& problem,
@@ -133,7 +151,7 @@ absl::Status Drag(TissueformClient* client, const PlanProblem& problem,
       [&] { Send(drag.get(), NamedPoses(problem), options, since_start, &send_times, ended); });
   while (std::optional<v1::DeformFrame> frame = drag->Receive()) {
     drag->Ack(*frame);
-    totals.latencies_ms.push_back(1e3 * since_start.Seconds() - send_times.Get(frame->sequence()));
+    Note(*frame, 1e3 * since_start.Seconds() - send_times.Get(frame->sequence()), &totals);
     if (interrupted) drag->Cancel();
   }
   ended = true;

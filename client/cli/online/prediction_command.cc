@@ -24,12 +24,14 @@
 #include "client/cli/shared/companion.h"
 #include "client/cli/shared/option_checks.h"
 #include "client/cli/shared/report_parts.h"
+#include "client/cli/shared/stats_json.h"
 #include "client/cpp/plan_session.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
+#include "proto/conversion/answer_conversion.h"
 
 namespace tissueform {
 namespace {
@@ -102,6 +104,8 @@ absl::Status Create(const PredictionOptions& options) {
                ModelText(prediction.model()), prediction.vertex_count(),
                prediction.quality().max_displacement_mm(),
                prediction.quality().inverted_tet_count(), "the server keeps it");
+  const std::string not_reached = NotReachedText(ToSolveSummary(prediction.summary()));
+  if (!not_reached.empty()) absl::FPrintF(stderr, "warning: %s\n", not_reached);
   return absl::OkStatus();
 }
 

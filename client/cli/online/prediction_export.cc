@@ -20,6 +20,7 @@
 #include "core/mesh/tet_topology.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "core/mesh_io/triangle_mesh_io.h"
+#include "proto/conversion/answer_conversion.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "proto/conversion/model_conversion.h"
 
@@ -141,7 +142,12 @@ OrderedJson ProvenanceJson(const v1::Prediction& prediction) {
   json["solve"] = {{"seconds", summary.solve_seconds()},
                    {"iterations", summary.iterations()},
                    {"converged", summary.converged()},
-                   {"residual", summary.residual()}};
+                   {"residual", summary.residual()},
+                   {"newton_steps", summary.newton_steps()},
+                   {"load", summary.load()},
+                   {"gave_up", GaveUpName(ToSolveSummary(summary).gave_up)},
+                   {"obstacle", summary.obstacle()},
+                   {"second_factor_bytes", summary.second_factor_bytes()}};
   const v1::DeformationQuality& quality = prediction.quality();
   json["quality"] = {{"inverted_tets", quality.inverted_tet_count()},
                      {"min_volume_ratio", quality.min_volume_ratio()},

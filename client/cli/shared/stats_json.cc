@@ -110,6 +110,16 @@ OrderedJson StatsToJson(const PredictionStats& stats) {
   return json;
 }
 
+std::string NotReachedText(const SolveSummary& solve) {
+  if (solve.load < 1) {
+    return absl::StrFormat("only %.0f %% of the movement was reached%s", 100 * solve.load,
+                           WhyItGaveUp(solve));
+  }
+  if (solve.converged) return "";
+  return absl::StrFormat("not converged after %d iterations (residual %.2g)%s", solve.iterations,
+                         solve.residual, WhyItGaveUp(solve));
+}
+
 void PrintOutcome(const std::string& out, const PredictionStats& stats) {
   const DeformationQuality& quality = stats.quality;
   absl::PrintF("%s: %d vertices, largest displacement %.3f mm, volume x %.4f, %d inverted tets\n",
@@ -121,16 +131,9 @@ void PrintOutcome(const std::string& out, const PredictionStats& stats) {
                   "use neo_hookean\n",
                   quality.worst_tet, quality.min_volume_ratio);
   }
-  if (stats.solve.load < 1) {
-    absl::FPrintF(
-        stderr, "warning: only %.0f %% of the movement was reached%s; the file holds that state\n",
-        100 * stats.solve.load, WhyItGaveUp(stats.solve));
-  } else if (!stats.solve.converged) {
-    absl::FPrintF(
-        stderr,
-        "warning: not converged after %d iterations (residual %.2g)%s; the file holds the "
-        "best state\n",
-        stats.solve.iterations, stats.solve.residual, WhyItGaveUp(stats.solve));
+  if (const std::string text = NotReachedText(stats.solve); !text.empty()) {
+    absl::FPrintF(stderr, "warning: %s; the file holds %s state\n", text,
+                  stats.solve.load < 1 ? "that" : "the best");
   }
 }
 

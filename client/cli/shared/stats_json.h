@@ -40,6 +40,9 @@ PredictionStats StatsOf(const PlanProblem& problem);
 // Keys in the order in which docs/plan-format.md lists them; with version and notice.
 nlohmann::ordered_json StatsToJson(const PredictionStats& stats);
 
+// What of the answer was not reached, and why, without a full stop; empty where all was.
+std::string NotReachedText(const SolveSummary& solve);
+
 // One line on stdout, and a warning on stderr where tets are inverted or the answer is not what was
 // asked for.
 void PrintOutcome(const std::string& out, const PredictionStats& stats);

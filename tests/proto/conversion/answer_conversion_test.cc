@@ -24,6 +24,9 @@ TEST(AnswerConversionTest, ASummarySurvivesTheJourney) {
   summary.prepared = true;
   summary.error_bound_mm = 0.01;
   summary.error_estimate_mm = 0.02;
+  summary.obstacle = "chin would have to pass through jaw";
+  summary.newton_steps = 2;
+  summary.second_factor_bytes = 5;
   const SolveSummary back = ToSolveSummary(ToProto(summary));
   EXPECT_EQ(back.iterations, 3);
   EXPECT_FALSE(back.converged);
@@ -36,6 +39,24 @@ TEST(AnswerConversionTest, ASummarySurvivesTheJourney) {
   EXPECT_TRUE(back.prepared);
   EXPECT_EQ(back.error_bound_mm, 0.01);
   EXPECT_EQ(back.error_estimate_mm, 0.02);
+  EXPECT_EQ(back.obstacle, "chin would have to pass through jaw");
+  EXPECT_EQ(back.newton_steps, 2);
+  EXPECT_EQ(back.second_factor_bytes, 5);
+}
+
+TEST(AnswerConversionTest, EveryReasonToGiveUpSurvivesTheJourney) {
+  for (const GaveUp reason :
+       {GaveUp::kNo, GaveUp::kIterations, GaveUp::kNoRoom, GaveUp::kArithmetic, GaveUp::kBlocked}) {
+    SolveSummary summary;
+    summary.gave_up = reason;
+    EXPECT_EQ(ToSolveSummary(ToProto(summary)).gave_up, reason) << GaveUpName(reason);
+  }
+}
+
+TEST(AnswerConversionTest, AReasonOfALaterServerIsNone) {
+  v1::SolveSummary proto;
+  proto.set_gave_up(static_cast<v1::GaveUp>(99));
+  EXPECT_EQ(ToSolveSummary(proto).gave_up, GaveUp::kNo);
 }
 
 TEST(AnswerConversionTest, QualitySurvivesTheJourney) {
