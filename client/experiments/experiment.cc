@@ -10,6 +10,7 @@
 #include "client/experiments/materials_experiment.h"
 #include "client/experiments/solver_times_experiment.h"
 #include "client/experiments/twist_experiment.h"
+#include "client/experiments/uncertainty_experiment.h"
 #include "client/experiments/update_experiment.h"
 
 namespace tissueform {
@@ -26,6 +27,9 @@ const std::vector<Experiment>& AllExperiments() {
       {"table1", "times of the factorisation and of three solves", RunSolverTimesExperiment},
       {"accuracy", "all models against CalculiX, and locking (minutes; only when named; needs ccx)",
        RunAccuracyExperiment, true},
+      {"uncertainty",
+       "the band from stiffness on two heads against sampling in full (minutes; only when named)",
+       RunUncertaintyExperiment, true},
   };
   return *kExperiments;
 }

@@ -3,7 +3,11 @@
 
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -52,6 +56,16 @@ struct StiffnessByCellData {
 };
 using StiffnessChoice = std::variant<UniformStiffness, StiffnessFromCellData, StiffnessByCellData>;
 
+// Ranges of the material (version 2): factors as in MaterialUncertainty::Tissue.
+struct FactorByCellData {
+  std::string name;
+  std::vector<std::pair<int64_t, double>> factor_of_value;
+};
+struct PlannedUncertainty {
+  std::variant<double, FactorByCellData> youngs_modulus_factor_95 = 1.0;  // a number: of all
+  std::optional<std::array<double, 2>> poisson_ratio_95;
+};
+
 struct PlannedHandle {
   std::string name;
   VertexSelector region;
@@ -67,6 +81,7 @@ struct Plan {
   std::vector<PlannedHandle> handles;
   DeformationModel model = DeformationModel::kGradientField;
   GradientFieldOptions gradient_field;  // what the plan says; the rest keeps its defaults
+  std::optional<PlannedUncertainty> uncertainty;
 };
 
 }  // namespace tissueform

@@ -38,19 +38,45 @@ VertexSelector ToSelector(const Json& json) {
   return {std::move(parts)};
 }
 
+// {"LABEL": NUMBER, ...}
+absl::StatusOr<std::vector<std::pair<int64_t, double>>> ToLabelled(const Json& json,
+                                                                   const char* pointer) {
+  std::vector<std::pair<int64_t, double>> labelled;
+  for (const auto& [label, number] : json.items()) {
+    int64_t value = 0;
+    if (!absl::SimpleAtoi(label, &value)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("label ", label, " at ", pointer, " is larger than 64 bits hold"));
+    }
+    labelled.emplace_back(value, number.get<double>());
+  }
+  return labelled;
+}
+
 absl::StatusOr<StiffnessChoice> ToStiffness(const Json& json) {
   if (json.contains("uniform")) return UniformStiffness{json.at("uniform")};
   if (json.contains("cell_data")) return StiffnessFromCellData{json.at("cell_data")};
   StiffnessByCellData by_label{json.at("by_cell_data"), {}};
-  for (const auto& [label, pa] : json.at("values").items()) {
-    int64_t value = 0;
-    if (!absl::SimpleAtoi(label, &value)) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("label ", label, " at /stiffness/values is larger than 64 bits hold"));
-    }
-    by_label.pa_of_value.emplace_back(value, pa.get<double>());
-  }
+  TF_ASSIGN_OR_RETURN(by_label.pa_of_value, ToLabelled(json.at("values"), "/stiffness/values"));
   return by_label;
+}
+
+absl::StatusOr<PlannedUncertainty> ToUncertainty(const Json& json) {
+  PlannedUncertainty uncertainty;
+  const Json factor = json.value("youngs_modulus_factor_95", Json(1.0));
+  if (factor.is_number()) {
+    uncertainty.youngs_modulus_factor_95 = factor.get<double>();
+  } else {
+    FactorByCellData by_label{factor.at("by_cell_data"), {}};
+    TF_ASSIGN_OR_RETURN(
+        by_label.factor_of_value,
+        ToLabelled(factor.at("values"), "/uncertainty/youngs_modulus_factor_95/values"));
+    uncertainty.youngs_modulus_factor_95 = std::move(by_label);
+  }
+  if (json.contains("poisson_ratio_95")) {
+    uncertainty.poisson_ratio_95 = json.at("poisson_ratio_95").get<std::array<double, 2>>();
+  }
+  return uncertainty;
 }
 
 PlannedHandle ToHandle(const Json& json) {
@@ -83,6 +109,9 @@ absl::StatusOr<Plan> ToPlan(const Json& json, const std::string& folder) {
   plan.fixed = ToSelector(json.at("fixed"));
   for (const Json& handle : json.at("handles")) plan.handles.push_back(ToHandle(handle));
   TF_RETURN_IF_ERROR(ReadModel(json, &plan));
+  if (json.contains("uncertainty")) {
+    TF_ASSIGN_OR_RETURN(plan.uncertainty, ToUncertainty(json.at("uncertainty")));
+  }
   return plan;
 }
 

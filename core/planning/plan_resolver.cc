@@ -1,6 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -11,6 +12,7 @@
 #include "core/planning/plan_io.h"
 #include "core/planning/selector.h"
 #include "core/planning/stiffness.h"
+#include "core/planning/tissue_ranges.h"
 #include "core/problem/plan_problem.h"
 
 namespace tissueform {
@@ -74,6 +76,8 @@ absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, TetMeshFile file) {
   TF_RETURN_IF_ERROR(CheckUsable(plan.mesh_path, file.mesh));
   TF_ASSIGN_OR_RETURN(Eigen::VectorXd stiffness,
                       ResolveStiffness(plan.stiffness, file.mesh.num_tets(), file.cell_data));
+  TF_ASSIGN_OR_RETURN(std::optional<MaterialUncertainty> uncertainty,
+                      ResolveUncertainty(plan, stiffness, file.cell_data));
   TF_ASSIGN_OR_RETURN(ConstraintSet constraints, ResolveRegions(plan, file));
   TF_ASSIGN_OR_RETURN(std::vector<HandlePose> poses, ResolvePoses(plan));
   TF_ASSIGN_OR_RETURN(std::shared_ptr<const TetMesh> mesh,
@@ -90,7 +94,8 @@ absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, TetMeshFile file) {
                      .stiffness = std::move(stiffness),
                      .constraints = std::move(constraints),
                      .poses = std::move(poses),
-                     .deformer = std::move(deformer)};
+                     .deformer = std::move(deformer),
+                     .uncertainty = std::move(uncertainty)};
 }
 
 }  // namespace tissueform

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -14,6 +15,7 @@
 #include "core/deformation/create_deformer.h"
 #include "core/mesh/attribute.h"
 #include "core/mesh/tet_mesh.h"
+#include "core/uncertainty/material_uncertainty.h"
 
 namespace tissueform {
 
@@ -41,6 +43,7 @@ struct PlanProblem {
   ConstraintSet constraints;
   std::vector<HandlePose> poses;  // one per handle of `constraints`
   DeformerOptions deformer;
+  std::optional<MaterialUncertainty> uncertainty;  // what the plan says is not known
 };
 
 }  // namespace tissueform

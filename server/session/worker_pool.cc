@@ -16,7 +16,7 @@ namespace {
 // is a factor of 1.25 in shares of a processor, and a thread of a higher share that wakes up takes
 // the processor at once. The last lane keeps a ninth of one beside frames that never end, so that
 // preparations end, and with them the locks that they hold for a moment.
-constexpr std::array<int, kLanes> kNiceness = {0, 2, 5, 5, 10};
+constexpr std::array<int, kNumLanes> kNiceness = {0, 2, 5, 5, 10};
 
 // Only ever downwards, which needs no privilege. Where the system refuses it all lanes are equal.
 void BecomeNicer(int steps) {
@@ -28,8 +28,8 @@ void BecomeNicer(int steps) {
 }  // namespace
 
 WorkerPool::WorkerPool(int num_threads) {
-  threads_.reserve(kLanes * num_threads);
-  for (size_t lane = 0; lane < kLanes; ++lane) {
+  threads_.reserve(kNumLanes * num_threads);
+  for (size_t lane = 0; lane < kNumLanes; ++lane) {
     for (int i = 0; i < num_threads; ++i) {
       threads_.emplace_back([this, lane] { Work(static_cast<Lane>(lane)); });
     }

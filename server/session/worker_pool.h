@@ -24,7 +24,7 @@ enum class Lane {
   kStore,       // waits for the disk
   kBatch,       // factorisations, checks of meshes: seconds
 };
-inline constexpr size_t kLanes = 5;
+inline constexpr size_t kNumLanes = 5;
 
 // The threads that do all numerical work. Jobs of a lane start in the order of posting.
 //
@@ -51,7 +51,7 @@ class WorkerPool {
   void Work(Lane lane);
 
   Mutex mutex_;
-  std::array<Queue, kLanes> queues_ ABSL_GUARDED_BY(mutex_);
+  std::array<Queue, kNumLanes> queues_ ABSL_GUARDED_BY(mutex_);
   // Queued or running, in all lanes: a job may post to another lane while the pool ends.
   int unfinished_ ABSL_GUARDED_BY(mutex_) = 0;
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;

@@ -27,7 +27,8 @@ class PlanSessionTest : public ServiceTest {
             .stiffness = bar.stiffness,
             .constraints = bar.constraints,
             .poses = {SomePose(3)},
-            .deformer = {}};
+            .deformer = {},
+            .uncertainty = {}};
   }
 };
 

@@ -119,7 +119,7 @@ TEST_F(ServedCommandTest, RunEqualsDeformUpToFloat32) {
   EXPECT_TRUE(fs::exists(PathOf("run.json")));
 }
 
-TEST_F(ServedCommandTest, RunTellsTheReactionsThatDeformTells) {
+TEST_F(ServedCommandTest, RunTellsTheReactionsAndTheBandThatDeformTells) {
   ASSERT_OK_AND_ASSIGN(
       const std::unique_ptr<ServerProcess> server,
       ServerProcess::Start(ProgramPath("tissueform-server"),
@@ -128,16 +128,20 @@ TEST_F(ServedCommandTest, RunTellsTheReactionsThatDeformTells) {
   Json plan = Json::parse(bundled);
   plan["mesh"] = SourcePath("tests/data/plans/bar/bar.vtu");
   plan["model"] = "neo_hookean";
+  plan["version"] = 2;
+  plan["uncertainty"]["youngs_modulus_factor_95"] = 2;
   std::ofstream(PathOf("plan.json")) << plan;
-  const auto elastic = [&](const std::string& command, const std::string& name) {
+  const auto stats = [&](const std::string& command, const std::string& name) {
     const std::string words = ProgramPath("tissueform") + " " + command + " " +
                               PathOf("plan.json") + " --allow-outside --out " +
                               PathOf(name + ".vtu") + " --stats " + PathOf(name + ".json");
     EXPECT_EQ(ExitCodeOf(words), 0);
-    return Json::parse(Read(name + ".json")).at("elastic");
+    return Json::parse(Read(name + ".json"));
   };
-  const Json served = elastic("run --server " + server->address(), "run");
-  const Json alone = elastic("deform", "deform");
+  const Json of_run = stats("run --server " + server->address(), "run");
+  const Json of_deform = stats("deform", "deform");
+  const Json& served = of_run.at("elastic");
+  const Json& alone = of_deform.at("elastic");
   const auto force = [](const Json& of) {
     const auto numbers = of["handles"][0]["force_n"].get<std::array<double, 3>>();
     return Eigen::Vector3d(numbers.data());
@@ -147,6 +151,10 @@ TEST_F(ServedCommandTest, RunTellsTheReactionsThatDeformTells) {
   EXPECT_NEAR(served["strain_energy_mj"].get<double>(), energy, 1e-4 * energy);
   EXPECT_LT((force(served) - force(alone)).norm(), 1e-4 * force(alone).norm());
   EXPECT_NE(FindAttribute(ReadTetMesh(PathOf("run.vtu"))->point_data, "reaction_force_n"), nullptr);
+  const auto band = [](const Json& of) {
+    return of.at("material_uncertainty")["places"][0]["max_mm"].get<double>();
+  };
+  EXPECT_NEAR(band(of_run), band(of_deform), 1e-3 * band(of_deform));
 }
 
 TEST_F(ServedCommandTest, RunWithoutServerFailsAndWritesNothing) {

@@ -3,8 +3,10 @@
 
 #include "client/cli/compare/compare_files.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +15,7 @@
 #include "absl/strings/str_format.h"
 
 #include "client/cli/shared/report_parts.h"
+#include "client/cli/shared/uncertainty_results.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/attribute.h"
@@ -23,9 +26,19 @@ namespace {
 
 using OrderedJson = nlohmann::ordered_json;
 
+// How many vertices of B lie within what A says of its material's uncertainty.
+struct WithinBand {
+  int64_t vertices = 0;  // for which A has a band: free ones
+  int64_t within = 0;
+  double largest_beyond_mm = 0;
+
+  double share() const { return static_cast<double>(within) / static_cast<double>(vertices); }
+};
+
 struct FileComparison {
   std::vector<RegionDistances> whole;   // "all", "skin"
   std::vector<RegionDistances> labels;  // named by their value of the point array
+  std::optional<WithinBand> within_band;
 };
 
 absl::Status CheckOutputs(const CompareOptions& options) {
@@ -63,6 +76,24 @@ absl::StatusOr<std::vector<ComparedRegion>> LabelledRegions(const TetMeshFile& f
   return regions;
 }
 
+// Nothing where A tells of no band.
+absl::StatusOr<std::optional<WithinBand>> CountWithinBand(const TetMeshFile& a,
+                                                          const Eigen::VectorXd& distances) {
+  if (FindAttribute(a.point_data, kMaterialUncertaintyArray) == nullptr) return std::nullopt;
+  TF_ASSIGN_OR_RETURN(const std::vector<double> band,
+                      FindScalars(a.point_data, kMaterialUncertaintyArray, "point"));
+  WithinBand count;
+  for (size_t v = 0; v < band.size(); ++v) {
+    if (!(band[v] > 0)) continue;
+    ++count.vertices;
+    const double beyond = distances[static_cast<Eigen::Index>(v)] - band[v];
+    if (beyond <= 0) ++count.within;
+    count.largest_beyond_mm = std::max(count.largest_beyond_mm, beyond);
+  }
+  if (count.vertices == 0) return std::nullopt;
+  return count;
+}
+
 // "2" -> "anatomy = 2"
 std::vector<RegionDistances> AllRows(const CompareOptions& options,
                                      const FileComparison& comparison) {
@@ -77,6 +108,14 @@ void PrintJson(const CompareOptions& options, const FileComparison& comparison) 
   OrderedJson json = {{"a", options.a}, {"b", options.b}};
   for (const auto& [name, distances] : comparison.whole) {
     json[name == "all" ? "overall" : name] = DistancesToJson(distances);
+  }
+  if (comparison.within_band) {
+    const WithinBand& band = *comparison.within_band;
+    json["within_material_uncertainty"] = {{"notice", kMaterialUncertaintyNotice},
+                                           {"vertices", band.vertices},
+                                           {"within", band.within},
+                                           {"share", band.share()},
+                                           {"largest_beyond_mm", band.largest_beyond_mm}};
   }
   if (!options.by.empty()) {
     json["by"] = options.by;
@@ -101,6 +140,13 @@ absl::Status Report(const CompareOptions& options, const FileComparison& compari
     absl::PrintF("distance in mm between vertices of %s and %s\n", options.a, options.b);
     PrintDistanceHeadline();
     PrintDistances(rows);
+    if (comparison.within_band) {
+      const WithinBand& band = *comparison.within_band;
+      absl::PrintF(
+          "B lies within A's material uncertainty (%s) at %.1f %% of the %d free vertices, "
+          "elsewhere up to %.3g mm beyond\n",
+          kMaterialUncertaintyNotice, 100 * band.share(), band.vertices, band.largest_beyond_mm);
+    }
   }
   return absl::OkStatus();
 }
@@ -113,7 +159,8 @@ absl::Status CompareFiles(const CompareOptions& options) {
   TF_ASSIGN_OR_RETURN(const TetMeshFile b, ReadFiniteMesh(options.b));
   TF_ASSIGN_OR_RETURN(const Eigen::VectorXd distances,
                       VertexDistances(a.mesh.positions(), b.mesh.positions()));
-  FileComparison comparison{DistancesByRegion(distances, WholeAndSkin(a.mesh)), {}};
+  FileComparison comparison{DistancesByRegion(distances, WholeAndSkin(a.mesh)), {}, {}};
+  TF_ASSIGN_OR_RETURN(comparison.within_band, CountWithinBand(a, distances));
   if (!options.by.empty()) {
     TF_ASSIGN_OR_RETURN(const std::vector<ComparedRegion> labels, LabelledRegions(a, options));
     comparison.labels = DistancesByRegion(distances, labels);

@@ -110,7 +110,8 @@ absl::StatusOr<PredictionMesh> ReadMeshOf(const v1::Prediction& prediction,
                          .stiffness = {},
                          .constraints = std::move(constraints),
                          .poses = {},
-                         .deformer = {}}};
+                         .deformer = {},
+                         .uncertainty = {}}};
 }
 
 absl::Status WriteSkin(const std::string& path, const PlanProblem& problem,

@@ -54,22 +54,30 @@ absl::StatusOr<PlanProblem> ResolveWithProgress(const Plan& plan, double* second
   return problem;
 }
 
+absl::StatusOr<Deformation> Solve(Deformer* deformer, absl::Span<const HandlePose> poses) {
+  const StageProgress progress("solving");
+  return deformer->Deform(poses);
+}
+
 // Fills `stats` as far as preparing and solving know it.
 absl::StatusOr<Positions> Predict(const PlanProblem& problem, PredictionStats* stats) {
+  std::shared_ptr<MeshPreparation> preparation;
   std::unique_ptr<Deformer> deformer;
   {
     // One unless told otherwise: more make a large factorisation faster, but the last digits of the
     // answer depend on how many there are (docs/performance.md).
     const BlasThreadsScope factorising(stats->solver_threads);
     const StageProgress progress("preparing the deformer");
-    TF_ASSIGN_OR_RETURN(deformer, CreateDeformer(*problem.mesh, problem.stiffness,
-                                                 problem.constraints, problem.deformer));
+    TF_ASSIGN_OR_RETURN(
+        preparation, MeshPreparation::Create(*problem.mesh, problem.stiffness, problem.constraints,
+                                             problem.deformer.preparation));
+    TF_ASSIGN_OR_RETURN(deformer, CreateDeformer(preparation, problem.deformer));
   }
-  const StageProgress progress("solving");
-  TF_ASSIGN_OR_RETURN(Deformation deformation, deformer->Deform(problem.poses));
+  TF_ASSIGN_OR_RETURN(Deformation deformation, Solve(deformer.get(), problem.poses));
   stats->preparation = deformer->preparation();
   stats->solve = deformation.summary;
   stats->quality = MeasureDeformation(*problem.mesh, deformation.positions);
+  stats->band = FindMaterialBandOrWarn(problem, deformation.positions, std::move(preparation));
   return std::move(deformation.positions);
 }
 
@@ -83,7 +91,8 @@ absl::Status RunDeform(const DeformOptions& options) {
   stats.solver_threads = options.solver_threads;
   stats.read_seconds = read_seconds;
   TF_ASSIGN_OR_RETURN(const Positions deformed, Predict(problem, &stats));
-  TF_RETURN_IF_ERROR(WriteResult(options.out, plan, problem, deformed));
+  TF_RETURN_IF_ERROR(
+      WriteResult(options.out, plan, problem, deformed, stats.band ? &*stats.band : nullptr));
   if (!options.stats.empty()) {
     stats.elastic = SummarizeElastic(problem, deformed);
     TF_RETURN_IF_ERROR(WriteStats(options.stats, stats));

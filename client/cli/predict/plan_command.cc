@@ -24,6 +24,17 @@ std::string DescribePose(const HandlePose& pose) {
                          pose.translation_mm.norm(), degrees, pose.scale);
 }
 
+void PrintUncertainty(const MaterialUncertainty& uncertainty) {
+  for (const MaterialUncertainty::Tissue& tissue : uncertainty.tissues) {
+    absl::PrintF("  uncertain  %s: stiffness x 1/%.4g to x %.4g in 95 of 100 cases\n", tissue.name,
+                 tissue.factor_95, tissue.factor_95);
+  }
+  if (const auto& range = uncertainty.poisson_ratio_95) {
+    absl::PrintF("  uncertain  Poisson's ratio: %.4g to %.4g in 95 of 100 cases\n", (*range)[0],
+                 (*range)[1]);
+  }
+}
+
 void PrintPlan(const std::string& path, const Plan& plan, const PlanProblem& problem) {
   absl::PrintF("plan   %s\n", path);
   absl::PrintF("  mesh       %s: %d vertices, %d tets, %s\n", plan.mesh_path,
@@ -31,6 +42,7 @@ void PrintPlan(const std::string& path, const Plan& plan, const PlanProblem& pro
                plan.coordinate_system == CoordinateSystem::kRas ? "RAS" : "LPS");
   absl::PrintF("  stiffness  %.6g to %.6g Pa\n", problem.stiffness.minCoeff(),
                problem.stiffness.maxCoeff());
+  if (problem.uncertainty) PrintUncertainty(*problem.uncertainty);
   absl::PrintF("  fixed      %d vertices\n", problem.constraints.fixed().size());
   for (size_t h = 0; h < plan.handles.size(); ++h) {
     const HandleRegion& region = problem.constraints.handles()[h];

@@ -37,7 +37,7 @@ std::vector<Attribute> WithoutOld(std::vector<Attribute> arrays,
 }  // namespace
 
 absl::Status WriteResult(const std::string& path, const Plan& plan, const PlanProblem& problem,
-                         const Positions& deformed) {
+                         const Positions& deformed, const MaterialBand* band) {
   std::error_code ignored;
   if (std::filesystem::equivalent(path, plan.mesh_path, ignored)) {
     return absl::FailedPreconditionError(
@@ -53,13 +53,16 @@ absl::Status WriteResult(const std::string& path, const Plan& plan, const PlanPr
   const PrincipalValues strains = PrincipalGreenStrains(ElementsOf(*problem.mesh), deformed,
                                                         problem.deformer.preparation.threads);
   TF_ASSIGN_OR_RETURN(TetMesh mesh, TetMesh::Create(std::move(written), problem.mesh->tets()));
-  TetMeshFile file{std::move(mesh),
-                   WithoutOld(problem.point_data, {kDisplacementArray, kReactionForceArray}),
-                   WithoutOld(problem.cell_data,
-                              {kPrincipalStrainArray, kVonMisesStressArray, kEnergyDensityArray})};
+  TetMeshFile file{
+      std::move(mesh),
+      WithoutOld(problem.point_data, {kDisplacementArray, kReactionForceArray,
+                                      kMaterialUncertaintyArray, kMaterialUncertaintyNormalArray}),
+      WithoutOld(problem.cell_data,
+                 {kPrincipalStrainArray, kVonMisesStressArray, kEnergyDensityArray})};
   file.point_data.push_back(RowsArray(kDisplacementArray, displacement));
   file.cell_data.push_back(RowsArray(kPrincipalStrainArray, strains));
   AddElasticArrays(problem, deformed, &file);
+  if (band != nullptr) AddMaterialBand(*band, &file);
   return WriteTetMesh(path, file);
 }
 

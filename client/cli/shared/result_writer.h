@@ -7,6 +7,7 @@
 
 #include "absl/status/status.h"
 
+#include "client/cli/shared/uncertainty_results.h"
 #include "core/base/types.h"
 #include "core/planning/plan.h"
 #include "core/problem/plan_problem.h"
@@ -21,12 +22,13 @@ inline constexpr char kPrincipalStrainArray[] = "principal_strain";
 
 // Writes OUT.vtu: the plan's mesh with its points at `deformed` (#V by 3, LPS), written in the
 // plan's own coordinate system; a point array displacement_mm of three doubles; the cell array
-// principal_strain; of the elastic models those of elastic_results.h; all arrays of the plan's
-// mesh, except that arrays of these names are replaced.
+// principal_strain; of the elastic models those of elastic_results.h, and those of
+// uncertainty_results.h where `band` is not null; all arrays of the plan's mesh, except that arrays
+// of these names are replaced.
 //
 // Errors: FailedPrecondition when `path` is the plan's own mesh; Internal when a position is not
 // finite; those of WriteTetMesh.
 absl::Status WriteResult(const std::string& path, const Plan& plan, const PlanProblem& problem,
-                         const Positions& deformed);
+                         const Positions& deformed, const MaterialBand* band = nullptr);
 
 }  // namespace tissueform

@@ -106,6 +106,7 @@ OrderedJson StatsToJson(const PredictionStats& stats) {
                       {"bytes_held", stats.preparation.bytes_held},
                       {"quality", QualityToJson(stats)}};
   if (stats.elastic) json["elastic"] = ElasticToJson(*stats.elastic);
+  if (stats.band) json["material_uncertainty"] = MaterialBandToJson(*stats.band);
   json["notice"] = kNotMedicalDeviceNotice;
   return json;
 }
@@ -125,6 +126,7 @@ void PrintOutcome(const std::string& out, const PredictionStats& stats) {
   absl::PrintF("%s: %d vertices, largest displacement %.3f mm, volume x %.4f, %d inverted tets\n",
                out, stats.vertices, quality.max_displacement_mm, quality.total_volume_ratio,
                quality.inverted_tets);
+  if (stats.band) absl::PrintF("%s\n", MaterialBandText(*stats.band));
   if (quality.inverted_tets > 0) {
     absl::FPrintF(stderr,
                   "warning: tets are inverted, the worst is tet %d (volume x %.3g); move less, or "

@@ -10,6 +10,7 @@
 #include "nlohmann/json.hpp"
 
 #include "client/cli/shared/elastic_results.h"
+#include "client/cli/shared/uncertainty_results.h"
 #include "core/deformation/deformation_quality.h"
 #include "core/deformation/deformer.h"
 #include "core/problem/plan_problem.h"
@@ -32,6 +33,7 @@ struct PredictionStats {
   SolveSummary solve;
   DeformationQuality quality;
   std::optional<ElasticSummary> elastic;  // of the elastic models
+  std::optional<MaterialBand> band;       // where the plan gives ranges of the material
 };
 
 // The counts, model and mode of a problem; the rest is left for the caller to fill.

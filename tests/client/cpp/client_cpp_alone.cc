@@ -25,7 +25,8 @@ absl::StatusOr<PlanProblem> BarProblem() {
                      .stiffness = Eigen::VectorXd::Constant(num_tets, 15e3),
                      .constraints = std::move(ends),
                      .poses = {{.translation_mm = {0, -1, 0}}},
-                     .deformer = {}};
+                     .deformer = {},
+                     .uncertainty = {}};
 }
 
 absl::Status Drag(const std::string& address) {

@@ -62,7 +62,8 @@ TEST(BadPlanTest, WrongTypeIsNamedWithTheRightOne) {
 }
 
 TEST(BadPlanTest, FixedWordsOfTheFormatAreDemanded) {
-  EXPECT_THAT(Parse(PlanWith("/version", 2)), IsRefused("wrong value at /version: 2 must be 1"));
+  EXPECT_THAT(Parse(PlanWith("/version", 3)),
+              IsRefused("wrong value at /version: 3 must be 1 to 2"));
   EXPECT_THAT(Parse(PlanWith("/format", "plan")), IsRefused("wrong value at /format"));
   EXPECT_THAT(Parse(PlanWith("/unit", "cm")),
               IsRefused("wrong value at /unit: \"cm\" must be \"mm\""));
@@ -70,6 +71,30 @@ TEST(BadPlanTest, FixedWordsOfTheFormatAreDemanded) {
               IsRefused("must be \"LPS\" or \"RAS\""));
   EXPECT_THAT(Parse(PlanWith("/model", "spring")),
               IsRefused("\"spring\" must be \"gradient_field\" or"));
+}
+
+TEST(BadPlanTest, RangesOfTheMaterialThatAreNoneAreRefused) {
+  const auto with = [](const nlohmann::json& uncertainty) {
+    nlohmann::json plan = PlanWith("/uncertainty", uncertainty);
+    plan["version"] = 2;
+    return Parse(plan);
+  };
+  EXPECT_THAT(Parse(PlanWith("/uncertainty", {{"youngs_modulus_factor_95", 2}})),
+              IsRefused("key \"uncertainty\" at / came with version 2 of the format"));
+  EXPECT_THAT(with({{"youngs_modulus_factor_95", 2}}), IsOk());
+  EXPECT_THAT(with(nlohmann::json::object()), IsRefused("/uncertainty"));
+  for (const double factor : {-2.0, 0.0, 0.5, 11.0}) {
+    EXPECT_THAT(with({{"youngs_modulus_factor_95", factor}}),
+                IsRefused("/uncertainty/youngs_modulus_factor_95"));
+    EXPECT_THAT(with({{"youngs_modulus_factor_95",
+                       {{"by_cell_data", "part"}, {"values", {{"1", factor}}}}}}),
+                IsRefused("/uncertainty/youngs_modulus_factor_95"));
+  }
+  EXPECT_THAT(with({{"poisson_ratio_95", {0.4, 0.5}}}),
+              IsRefused("/uncertainty/poisson_ratio_95/1: 0.5"));
+  EXPECT_THAT(with({{"poisson_ratio_95", {-0.1, 0.4}}}),
+              IsRefused("/uncertainty/poisson_ratio_95/0: -0.1"));
+  EXPECT_THAT(with({{"poisson_ratio_95", {0.4}}}), IsRefused("/uncertainty/poisson_ratio_95"));
 }
 
 TEST(BadPlanTest, NumbersOutOfRangeAreRefused) {

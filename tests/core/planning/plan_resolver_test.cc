@@ -3,9 +3,11 @@
 
 #include <filesystem>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <vector>
 
+#include "core/base/status_macros.h"
 #include "core/deformation/create_deformer.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "core/planning/plan_io.h"
@@ -244,6 +246,68 @@ TEST(CoordinatesTest, BoxKeepsMinBelowMax) {
   const SelectBox box = SwapToOrFromLps(CoordinateSystem::kRas, SelectBox{{1, 2, 3}, {4, 5, 6}});
   EXPECT_EQ(box.min_mm, Eigen::Vector3d(-4, -5, 3));
   EXPECT_EQ(box.max_mm, Eigen::Vector3d(-1, -2, 6));
+}
+
+class TissueRangesTest : public PlanResolverTest {
+ protected:
+  absl::StatusOr<MaterialUncertainty> Ranges(const nlohmann::json& uncertainty,
+                                             const nlohmann::json& stiffness = {
+                                                 {"cell_data", "pa"}}) {
+    nlohmann::json plan = PlanWith("/uncertainty", uncertainty);
+    plan["version"] = 2;
+    plan["stiffness"] = stiffness;
+    TF_ASSIGN_OR_RETURN(PlanProblem problem, Resolve(plan));
+    return *std::move(problem.uncertainty);
+  }
+};
+
+TEST_F(TissueRangesTest, FactorsGoByLabelsInTheirOrder) {
+  ASSERT_OK_AND_ASSIGN(
+      const MaterialUncertainty ranges,
+      Ranges({{"youngs_modulus_factor_95",
+               {{"by_cell_data", "part"}, {"values", {{"2", 1.5}, {"1", 3}, {"7", 2}}}}},
+              {"poisson_ratio_95", {0.4, 0.49}}}));
+  ASSERT_THAT(ranges.tissues, SizeIs(2));
+  EXPECT_EQ(ranges.tissues[0].name, "part 1");
+  EXPECT_EQ(ranges.tissues[0].factor_95, 3);
+  EXPECT_EQ(ranges.tissues[1].name, "part 2");
+  EXPECT_EQ(ranges.tissues[1].factor_95, 1.5);
+  EXPECT_EQ(ranges.tissue_of_tet.front(), 0);
+  EXPECT_EQ(ranges.tissue_of_tet.back(), 1);
+  EXPECT_EQ(ranges.poisson_ratio_95->at(1), 0.49);
+}
+
+TEST_F(TissueRangesTest, OneFactorIsThatOfEveryTissueByItself) {
+  const nlohmann::json twice = {{"youngs_modulus_factor_95", 2}};
+  ASSERT_OK_AND_ASSIGN(
+      MaterialUncertainty ranges,
+      Ranges(twice, {{"by_cell_data", "part"}, {"values", {{"1", 9000}, {"2", 9000}}}}));
+  EXPECT_THAT(ranges.tissues, SizeIs(2));
+  EXPECT_EQ(ranges.tissues[1].factor_95, 2);
+  std::vector<double> pa(static_cast<size_t>(bar_.num_tets()), 2000);
+  pa.front() = 5000;
+  WriteMesh(bar_, pa);
+  ASSERT_OK_AND_ASSIGN(ranges, Ranges(twice));
+  ASSERT_THAT(ranges.tissues, SizeIs(2));
+  EXPECT_EQ(ranges.tissues[1].name, "5000 Pa");
+  EXPECT_EQ(ranges.tissue_of_tet.front(), 1);
+}
+
+TEST_F(TissueRangesTest, WhatDoesNotFitTheMeshIsNamed) {
+  EXPECT_THAT(
+      Ranges({{"youngs_modulus_factor_95", {{"by_cell_data", "part"}, {"values", {{"1", 2}}}}}}),
+      IsRefused("has part = 2, for which no factor is given; add it to values"));
+  EXPECT_THAT(
+      Ranges({{"youngs_modulus_factor_95", {{"by_cell_data", "kind"}, {"values", {{"1", 2}}}}}}),
+      IsRefused("uncertainty/youngs_modulus_factor_95: "));
+  EXPECT_THAT(Ranges({{"poisson_ratio_95", {0.3, 0.4}}}),
+              IsRefused("[0.3, 0.4] must be rising and hold poisson_ratio, which is 0.45"));
+  EXPECT_THAT(Ranges({{"poisson_ratio_95", {0.49, 0.4}}}), IsRefused("must be rising"));
+  std::vector<double> pa(static_cast<size_t>(bar_.num_tets()));
+  std::iota(pa.begin(), pa.end(), 1000);
+  WriteMesh(bar_, pa);
+  EXPECT_THAT(Ranges({{"youngs_modulus_factor_95", 2}}),
+              IsRefused("more than 16 kinds of tissue; name a cell array of labels"));
 }
 
 }  // namespace

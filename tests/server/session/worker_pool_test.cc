@@ -76,7 +76,7 @@ TEST(StrandTest, JobsOfDifferentLanesStillRunOneAtATimeInOrder) {
     WorkerPool pool(2);
     Strand strand(&pool);
     for (int i = 0; i < 200; ++i) {
-      strand.Post(static_cast<Lane>(i % kLanes), [&order, i] { order.push_back(i); });
+      strand.Post(static_cast<Lane>(i % kNumLanes), [&order, i] { order.push_back(i); });
     }
   }
   ASSERT_EQ(order.size(), 200);

@@ -72,7 +72,8 @@ TEST(FaceMovementTest, FreeSkinIsTheBoundaryWithoutTheHeldVertices) {
                   .stiffness = {},
                   .constraints = BarEnds(Bar({2, 2, 3})),
                   .poses = {},
-                  .deformer = {}};
+                  .deformer = {},
+                  .uncertainty = {}};
   std::vector<int32_t> expected;
   for (int32_t v = 9; v < 27; ++v) {
     if (v % 9 != 4) expected.push_back(v);

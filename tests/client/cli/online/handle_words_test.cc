@@ -21,7 +21,8 @@ std::string WordsOf(const HandlePose& pose) {
                        .stiffness = {},
                        .constraints = BarEnds(Bar({1, 1, 2})),
                        .poses = {pose},
-                       .deformer = {}});
+                       .deformer = {},
+                       .uncertainty = {}});
 }
 
 std::string WordsOfMove(double x, double y, double z) {

@@ -92,6 +92,73 @@ TEST_F(DeformTest, EveryModelWritesStrainsAndKeepsTheHandleWhereItIsPut) {
   }
 }
 
+TEST_F(DeformTest, RangesOfThePlanGiveElasticResultsABand) {
+  nlohmann::json plan = BarPlan();
+  plan["version"] = 2;
+  plan["mesh"] = TestDataPath("plans/bar/bar.vtu");
+  plan["uncertainty"] = {{"youngs_modulus_factor_95", 2}, {"poisson_ratio_95", {0.4, 0.49}}};
+  Write("plan.json", plan.dump());
+  for (const std::string model : {"linear_elastic", "neo_hookean", "gradient_field"}) {
+    const ProcessResult run = Run({"deform", "plan.json", "--allow-outside", "--out",
+                                   model + ".vtu", "--model", model, "--stats", "stats.json"});
+    ASSERT_EQ(run.exit_code, 0);
+    const auto stats = nlohmann::json::parse(Read("stats.json"));
+    ASSERT_OK_AND_ASSIGN(const TetMeshFile result, ReadTetMesh(Path(model + ".vtu")));
+    const bool is_elastic = model != "gradient_field";
+    EXPECT_EQ(stats.contains("material_uncertainty"), is_elastic);
+    const Attribute* band = FindAttribute(result.point_data, "material_uncertainty_p95_mm");
+    const Attribute* along = FindAttribute(result.point_data, "material_uncertainty_normal_p95_mm");
+    ASSERT_EQ(band != nullptr && along != nullptr, is_elastic);
+    if (!is_elastic) {
+      EXPECT_THAT(run.err, HasSubstr("only linear_elastic and neo_hookean"));
+      continue;
+    }
+    constexpr const char* kNotice = "stiffness only; excludes model and surgical error";
+    EXPECT_THAT(run.out, HasSubstr(kNotice));
+    EXPECT_EQ(stats["material_uncertainty"]["notice"], kNotice);
+    const std::vector<double> sizes = ToDoubles(*band);
+    const auto& place = stats["material_uncertainty"]["places"][0];
+    EXPECT_EQ(place["name"], "surface");
+    EXPECT_LE(place["max_mm"].get<double>(), *std::max_element(sizes.begin(), sizes.end()));
+    EXPECT_GT(place["max_mm"].get<double>(), 0.01);
+    EXPECT_EQ(*std::max_element(sizes.begin(), sizes.begin() + 25), 0) << "fixed";
+    EXPECT_EQ(stats["material_uncertainty"]["causes"].back()["name"], "Poisson's ratio");
+  }
+}
+
+TEST_F(DeformTest, CompareCountsWhatLiesWithinTheBand) {
+  nlohmann::json plan = BarPlan();
+  plan["version"] = 2;
+  plan["mesh"] = TestDataPath("plans/bar/bar.vtu");
+  plan["model"] = "linear_elastic";
+  plan["uncertainty"] = {{"youngs_modulus_factor_95", 2}};
+  Write("plan.json", plan.dump());
+  ASSERT_THAT(Run({"deform", "plan.json", "--allow-outside", "--out", "a.vtu"}), Succeeds());
+  ASSERT_OK_AND_ASSIGN(TetMeshFile b, ReadTetMesh(Path("a.vtu")));
+  const std::vector<double> band =
+      ToDoubles(*FindAttribute(b.point_data, "material_uncertainty_p95_mm"));
+  // Every second free vertex just beyond its band, the others just within.
+  Positions moved = b.mesh.positions();
+  int free = 0;
+  int within = 0;
+  for (size_t v = 0; v < band.size(); ++v) {
+    if (band[v] == 0) continue;
+    const bool is_within = free++ % 2 == 0;
+    within += is_within ? 1 : 0;
+    moved(static_cast<Eigen::Index>(v), 1) += is_within ? 0.999 * band[v] : 1.001 * band[v];
+  }
+  ASSERT_OK_AND_ASSIGN(b.mesh, TetMesh::Create(moved, b.mesh.tets()));
+  ASSERT_THAT(WriteTetMesh(Path("b.vtu"), b), IsOk());
+  const ProcessResult run = Run({"compare", "a.vtu", "b.vtu", "--json"});
+  ASSERT_THAT(run, Succeeds());
+  const auto count = nlohmann::json::parse(run.out)["within_material_uncertainty"];
+  EXPECT_EQ(count["vertices"], free);
+  EXPECT_EQ(count["within"], within);
+  EXPECT_NEAR(count["largest_beyond_mm"].get<double>(),
+              0.001 * *std::max_element(band.begin(), band.end()), 1e-5);
+  EXPECT_THAT(Run({"compare", "a.vtu", "b.vtu"}).out, HasSubstr("excludes model and surgical"));
+}
+
 TEST_F(DeformTest, ElasticResultsTellWhatHoldsTheTissueAndWhatItStores) {
   ASSERT_OK_AND_ASSIGN(const TetMeshFile rest, ReadTetMesh(TestDataPath("plans/bar/bar.vtu")));
   for (const std::string model : {"linear_elastic", "neo_hookean"}) {

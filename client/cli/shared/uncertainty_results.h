@@ -1,0 +1,73 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "nlohmann/json.hpp"
+
+#include "core/base/types.h"
+#include "core/deformation/mesh_preparation.h"
+#include "core/mesh_io/tet_mesh_io.h"
+#include "core/problem/plan_problem.h"
+#include "core/uncertainty/uncertainty_band.h"
+
+namespace tissueform {
+
+// The band of uncertainty that results of linear_elastic and neo_hookean have where the plan gives
+// ranges of its material, in files, statistics and lines for people.
+
+// Point arrays.
+inline constexpr char kMaterialUncertaintyArray[] = "material_uncertainty_p95_mm";
+inline constexpr char kMaterialUncertaintyNormalArray[] = "material_uncertainty_normal_p95_mm";
+// Goes with every number and picture of it.
+inline constexpr char kMaterialUncertaintyNotice[] =
+    "stiffness only; excludes model and surgical error";
+
+struct MaterialBand {
+  // Of the free vertices of a place on the skin, "surface" first: all free ones of the mesh's.
+  struct Place {
+    std::string name;
+    Eigen::Index vertices = 0;
+    double mean_mm = 0;
+    double p95_mm = 0;  // over the vertices, each of which has a 95th percentile
+    double max_mm = 0;
+  };
+  // What one tissue alone brings about, or Poisson's ratio: in first order, over the last place.
+  struct Cause {
+    std::string name;
+    double mean_mm = 0;
+  };
+  UncertaintyBand band;
+  std::vector<Place> places;  // more than one where the mesh names places; "face" last
+  std::vector<Cause> causes;
+};
+
+// Nothing where the plan gives no ranges or the model is not elastic. `deformed` is #V by 3, LPS.
+// `preparation` of the problem, or null: then one is made, which costs a factorisation.
+//
+// Errors: FailedPrecondition where `deformed` is no stable equilibrium; those of MeshPreparation.
+absl::StatusOr<std::optional<MaterialBand>> FindMaterialBand(
+    const PlanProblem& problem, const Positions& deformed,
+    std::shared_ptr<MeshPreparation> preparation);
+
+// The same with progress on stderr, and a warning there in place of a band that cannot be had.
+std::optional<MaterialBand> FindMaterialBandOrWarn(const PlanProblem& problem,
+                                                   const Positions& deformed,
+                                                   std::shared_ptr<MeshPreparation> preparation);
+
+// Adds both arrays.
+void AddMaterialBand(const MaterialBand& band, TetMeshFile* file);
+
+// With the notice; lengths in mm.
+nlohmann::ordered_json MaterialBandToJson(const MaterialBand& band);
+
+// One line without its end.
+std::string MaterialBandText(const MaterialBand& band);
+
+}  // namespace tissueform
