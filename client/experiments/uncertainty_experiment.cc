@@ -148,8 +148,7 @@ absl::Status Draw(const Study& study, const Positions& positions, const Eigen::V
                   const ExperimentOptions& options) {
   const BoundarySurface skin = BoundaryOf(study.problem.mesh);
   const Eigen::VectorXd of_face = band_mm(study.face);
-  const double high =
-      std::ceil(100 * Percentile({of_face.begin(), of_face.end()}, 98)) / 100;
+  const double high = std::ceil(100 * Percentile({of_face.begin(), of_face.end()}, 98)) / 100;
   std::vector<Scene> row;
   for (const View& view : study.problem.views) {
     SurfaceLayer layer;
@@ -165,8 +164,8 @@ absl::Status Draw(const Study& study, const Positions& positions, const Eigen::V
     scene.view = view;
     row.push_back(std::move(scene));
   }
-  Figure figure(absl::StrCat(study.problem.title,
-                             ": stiffness only; excludes model and surgical error"));
+  Figure figure(
+      absl::StrCat(study.problem.title, ": stiffness only; excludes model and surgical error"));
   figure.AddRow(560, std::move(row));
   return figure.WritePng(options.Path(
       absl::StrCat("uncertainty_", study.problem.name, "_", study.model.name, ".png")));
@@ -208,7 +207,8 @@ absl::Status RunUncertaintyExperiment(const ExperimentOptions& options) {
     }
     for (const Model& model : models) {
       for (const double factor : model.factors) {
-        const Study study{problem,        model,         factor, RangesOf(problem.stiffness, factor),
+        const Study study{problem,        model,
+                          factor,         RangesOf(problem.stiffness, factor),
                           face->vertices, options.threads};
         TF_RETURN_IF_ERROR(Run(study, options, &table));
       }

@@ -9,8 +9,8 @@
 
 namespace tissueform {
 
-// The band of uncertainty from stiffness (core/uncertainty) on the bundled heads against sampling in
-// full: every sample of a Latin hypercube solved with stiffnesses and a factor of its own.
+// The band of uncertainty from stiffness (core/uncertainty) on the bundled heads against sampling
+// in full: every sample of a Latin hypercube solved with stiffnesses and a factor of its own.
 // uncertainty.csv, and a picture a head and model of the band at factor 2.
 absl::Status RunUncertaintyExperiment(const ExperimentOptions& options);
 
