@@ -7,6 +7,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/mesh_payload/mesh_payload.h"
+#include "proto/conversion/material_conversion.h"
 #include "proto/conversion/mesh_conversion.h"
 
 namespace tissueform {
@@ -86,6 +87,16 @@ bool HasPreparedAnswers(const DeformerOptions& options) {
   return options.model == DeformationModel::kGradientField &&
          options.gradient_field.rotation == RotationMode::kPropagated &&
          options.gradient_field.guidance == Guidance::kCotangent;
+}
+
+v1::PreparedAnswers PreparedAnswersOf(const PlanProblem& problem) {
+  v1::PreparedAnswers prepared;
+  const bool is_elastic = problem.deformer.model == DeformationModel::kLinearElastic ||
+                          problem.deformer.model == DeformationModel::kNeoHookean;
+  if (problem.uncertainty && is_elastic) {
+    *prepared.mutable_ranges() = ToProto(*problem.uncertainty);
+  }
+  return prepared;
 }
 
 }  // namespace tissueform

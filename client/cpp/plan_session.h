@@ -58,4 +58,9 @@ std::vector<NamedPose> NamedPoses(const PlanProblem& problem);
 // deform_service.proto), so that frames of a stream need not be solved for one by one.
 bool HasPreparedAnswers(const DeformerOptions& options);
 
+// Prepared answers with the usual tolerances, and with the plan's ranges of the material where it
+// gives some and its model can tell of them: then frames hold uncertainty_p95_mm. REQUIRES:
+// HasPreparedAnswers(problem.deformer).
+v1::PreparedAnswers PreparedAnswersOf(const PlanProblem& problem);
+
 }  // namespace tissueform

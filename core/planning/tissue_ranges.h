@@ -17,9 +17,6 @@ namespace tissueform {
 // Cell array of the meshes that `tissueform plan build` writes: the kind of tissue of each tet.
 inline constexpr char kTissueArray[] = "tissue";
 
-// More kinds of tissue are refused: each costs back-substitutions, and each pair of them.
-inline constexpr int kMaxTissues = 16;
-
 // The ranges of a plan put upon its mesh; nothing where it gives none. `stiffness` is #T, Pa. One
 // factor for all is that of every kind of tissue by itself: the labels of the plan's stiffness
 // where it goes by labels, else those of the cell array kTissueArray, else the values of stiffness

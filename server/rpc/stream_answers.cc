@@ -13,6 +13,7 @@
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/answer_conversion.h"
+#include "proto/conversion/material_conversion.h"
 #include "proto/conversion/model_conversion.h"
 #include "proto/conversion/session_conversion.h"
 
@@ -37,8 +38,22 @@ absl::Status ReadPrepared(const v1::PreparedAnswers& settings, ResponseRequest* 
 // REQUIRES: the rest of the configuration is read.
 absl::StatusOr<ResponseRequest> ReadResponse(const v1::PreparedAnswers& settings,
                                              const StreamConfiguration& configuration) {
-  ResponseRequest request{.model = configuration.model, .vertices = configuration.choice.vertices};
+  ResponseRequest request;
+  request.model = configuration.model;
+  request.vertices = configuration.choice.vertices;
   TF_RETURN_IF_ERROR(ReadPrepared(settings, &request));
+  if (settings.has_ranges()) {
+    const Session& session = *configuration.session;
+    TF_ASSIGN_OR_RETURN(request.ranges,
+                        ToMaterialUncertainty(settings.ranges(), session.mesh().mesh.num_tets(),
+                                              session.poisson_ratio()));
+    if (configuration.model != DeformationModel::kLinearElastic &&
+        configuration.model != DeformationModel::kNeoHookean) {
+      return absl::InvalidArgumentError(
+          "prepared.ranges are of linear_elastic and neo_hookean; choose one of them, or leave "
+          "them out");
+    }
+  }
   if (configuration.choice.all) {
     request.vertices.resize(configuration.session->mesh().mesh.num_vertices());
     std::iota(request.vertices.begin(), request.vertices.end(), 0);
@@ -156,6 +171,7 @@ absl::StatusOr<std::optional<AnswerFrame>> AnswerFromPrepared(
               EncodePositions(answer->positions, configuration.choice, configuration.encoding,
                               configuration.session->mesh().mesh.positions()));
   frame.refining = answer->summary.error_estimate_mm > 0;
+  frame.band = FloatBytes(answer->band_mm);
   return std::optional<AnswerFrame>(std::move(frame));
 }
 
@@ -181,6 +197,7 @@ v1::DeformResponse ToProto(AnswerFrame frame) {
   *proto->mutable_summary() = ToProto(frame.summary);
   *proto->mutable_positions() = std::move(frame.positions);
   proto->set_step_mm(frame.step_mm);
+  *proto->mutable_uncertainty_p95_mm() = std::move(frame.band);
   return response;
 }
 

@@ -33,6 +33,7 @@ struct AnswerFrame {
   SolveSummary summary;
   std::string positions;  // as they are sent
   double step_mm = 0;     // of their encoding, where it has one
+  std::string band = {};  // DeformFrame.uncertainty_p95_mm
 };
 
 // What may be solved and sent next in a drag: a mailbox for the newest pose, and credits for the

@@ -137,8 +137,15 @@ absl::StatusOr<std::shared_ptr<const SharedResponse>> SharedPreparation::Prepare
   absl::StatusOr<std::unique_ptr<VertexResponse>> response =
       CreateResponse(request, gradient_field, admission, cancellation);
   TF_RETURN_IF_ERROR(response.status());
-  TF_RETURN_IF_ERROR(shared->reservation.Resize((*response)->bytes_held(), "prepared answers"));
   shared->response = *std::move(response);
+  int64_t bytes = shared->response->bytes_held();
+  if (request.ranges.has_value()) {
+    TF_ASSIGN_OR_RETURN(shared->band,
+                        BandColumns::Create(preparation_, *request.ranges, request.vertices,
+                                            admission, cancellation));
+    bytes += shared->band->bytes_held();
+  }
+  TF_RETURN_IF_ERROR(shared->reservation.Resize(bytes, "prepared answers"));
   responses_.push_front(std::move(shared));
   Settle();
   return responses_.front();

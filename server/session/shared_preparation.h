@@ -8,6 +8,7 @@
 #include <list>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,8 @@
 #include "core/deformation/mesh_preparation.h"
 #include "core/mesh/tet_mesh.h"
 #include "core/prepared_answers/vertex_response.h"
+#include "core/uncertainty/band_columns.h"
+#include "core/uncertainty/material_uncertainty.h"
 #include "server/session/memory_budget.h"
 #include "server/session/session_progress.h"
 #include "server/session/worker_pool.h"
@@ -34,7 +37,8 @@ struct ResponseRequest {
   std::vector<int32_t> vertices;
   double tolerance_mm = 0.01;
   double max_rotation_rad = 0.5236;
-  double max_estimate_mm = 2;  // of neo_hookean
+  double max_estimate_mm = 2;                      // of neo_hookean
+  std::optional<MaterialUncertainty> ranges = {};  // of the elastic models: a band is wanted, too
 
   friend bool operator==(const ResponseRequest&, const ResponseRequest&) = default;
 };
@@ -44,6 +48,7 @@ struct SharedResponse {
   ResponseRequest request;
   MemoryReservation reservation;  // given back after the response is gone
   std::unique_ptr<const VertexResponse> response;
+  std::unique_ptr<const BandColumns> band;  // null where no ranges were given
 };
 
 // The operators, factors and prepared answers of one mesh, one stiffness and one constraint set,

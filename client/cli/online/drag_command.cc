@@ -19,6 +19,7 @@
 #include "client/cli/online/session_wait.h"
 #include "client/cli/shared/companion.h"
 #include "client/cli/shared/stats_json.h"
+#include "client/cli/shared/uncertainty_text.h"
 #include "client/cpp/plan_session.h"
 #include "client/cpp/reattaching_stream.h"
 #include "core/base/percentiles.h"
@@ -26,6 +27,7 @@
 #include "core/base/stopwatch.h"
 #include "core/planning/plan_io.h"
 #include "proto/conversion/answer_conversion.h"
+#include "proto/conversion/material_conversion.h"
 
 namespace tissueform {
 namespace {
@@ -51,10 +53,16 @@ struct DragTotals {
   double longest_away_seconds = 0;
   int64_t not_reached = 0;  // final answers that had not converged
   std::string last_not_reached;
+  double largest_band_mm = 0;  // of all frames and vertices
 };
 
 void Note(const v1::DeformFrame& frame, double latency_ms, DragTotals* totals) {
   totals->latencies_ms.push_back(latency_ms);
+  const std::string& bytes = frame.uncertainty_p95_mm();
+  if (const auto band = FloatsFromBytes(bytes, static_cast<Eigen::Index>(bytes.size() / 4));
+      band.ok() && band->size() > 0) {
+    totals->largest_band_mm = std::max(totals->largest_band_mm, double{band->maxCoeff()});
+  }
   const SolveSummary summary = ToSolveSummary(frame.summary());
   if (frame.refining() || summary.cancelled || summary.prepared) return;
   if (std::string text = NotReachedText(summary); !text.empty()) {
@@ -68,7 +76,7 @@ ReattachingStream::Options StreamOptions(const PlanProblem& problem,
                                          const DragCommandOptions& options, DragTotals* totals) {
   ReattachingStream::Options stream;
   stream.stream.vertices.kind = AnswerVertices::Kind::kSkin;
-  if (HasPreparedAnswers(problem.deformer)) stream.stream.prepared.emplace();
+  if (HasPreparedAnswers(problem.deformer)) stream.stream.prepared = PreparedAnswersOf(problem);
   stream.give_up_after =
       std::chrono::milliseconds(static_cast<int64_t>(1e3 * options.give_up_seconds));
   stream.stream.on_notice = [](const v1::DeformNotice& notice) {
@@ -125,6 +133,9 @@ void PrintTotals(const ReattachingStream& drag, const SendTimes& send_times,
     absl::PrintF("; committed up to pose %d", *committed);
   }
   absl::PrintF("\n");
+  if (totals.largest_band_mm > 0) {
+    absl::PrintF("%s\n", LargestBandText(totals.largest_band_mm));
+  }
   if (totals.not_reached > 0) {
     absl::FPrintF(stderr, "warning: %d answers are not what was asked for; the last: %s\n",
                   totals.not_reached, totals.last_not_reached);

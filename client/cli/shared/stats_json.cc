@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "client/cli/shared/uncertainty_text.h"
 #include "client/cli/shared/version.h"
 #include "core/base/atomic_file.h"
 #include "core/mesh_io/tet_mesh_io.h"

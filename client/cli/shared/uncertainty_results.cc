@@ -18,8 +18,6 @@
 namespace tissueform {
 namespace {
 
-using OrderedJson = nlohmann::ordered_json;
-
 bool IsElastic(const PlanProblem& problem) {
   return problem.deformer.model == DeformationModel::kLinearElastic ||
          problem.deformer.model == DeformationModel::kNeoHookean;
@@ -140,32 +138,6 @@ std::optional<MaterialBand> FindMaterialBandOrWarn(const PlanProblem& problem,
 void AddMaterialBand(const MaterialBand& band, TetMeshFile* file) {
   file->point_data.push_back(ScalarArray(kMaterialUncertaintyArray, band.band.size_mm));
   file->point_data.push_back(ScalarArray(kMaterialUncertaintyNormalArray, band.band.normal_mm));
-}
-
-OrderedJson MaterialBandToJson(const MaterialBand& band) {
-  OrderedJson json = {{"notice", kMaterialUncertaintyNotice},
-                      {"places", OrderedJson::array()},
-                      {"causes", OrderedJson::array()}};
-  for (const MaterialBand::Place& place : band.places) {
-    json["places"].push_back({{"name", place.name},
-                              {"vertices", place.vertices},
-                              {"mean_mm", place.mean_mm},
-                              {"p95_mm", place.p95_mm},
-                              {"max_mm", place.max_mm}});
-  }
-  for (const MaterialBand::Cause& cause : band.causes) {
-    json["causes"].push_back({{"name", cause.name}, {"mean_mm", cause.mean_mm}});
-  }
-  return json;
-}
-
-std::string MaterialBandText(const MaterialBand& band) {
-  if (band.places.empty()) return "material uncertainty: no vertex of the surface is free";
-  const MaterialBand::Place& place = band.places.back();
-  return absl::StrFormat(
-      "material uncertainty (%s): in 95 of 100 cases within %.3f mm on the %s on average, %.3f mm "
-      "where it is largest",
-      kMaterialUncertaintyNotice, place.mean_mm, place.name, place.max_mm);
 }
 
 }  // namespace tissueform

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "nlohmann/json.hpp"
 
 #include "core/base/types.h"
 #include "core/deformation/mesh_preparation.h"
@@ -20,7 +19,7 @@
 namespace tissueform {
 
 // The band of uncertainty that results of linear_elastic and neo_hookean have where the plan gives
-// ranges of its material, in files, statistics and lines for people.
+// ranges of its material (uncertainty_text.h tells it).
 
 // Point arrays.
 inline constexpr char kMaterialUncertaintyArray[] = "material_uncertainty_p95_mm";
@@ -63,11 +62,5 @@ std::optional<MaterialBand> FindMaterialBandOrWarn(const PlanProblem& problem,
 
 // Adds both arrays.
 void AddMaterialBand(const MaterialBand& band, TetMeshFile* file);
-
-// With the notice; lengths in mm.
-nlohmann::ordered_json MaterialBandToJson(const MaterialBand& band);
-
-// One line without its end.
-std::string MaterialBandText(const MaterialBand& band);
 
 }  // namespace tissueform

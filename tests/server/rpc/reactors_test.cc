@@ -11,14 +11,20 @@
 #include "gtest/gtest.h"
 #include "spdlog/spdlog.h"
 
+#include "core/uncertainty/band_columns.h"
+#include "proto/conversion/material_conversion.h"
 #include "server/rpc/resource_conversion.h"
 #include "tests/server/rpc/reactors_fixture.h"
+#include "tests/testing/handle_problem.h"
+#include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 
 // The services without sockets: reactions come from a pool of threads that ThreadSanitizer sees
 // through.
 namespace tissueform::testing {
 namespace {
+
+using ::testing::HasSubstr;
 
 TEST_F(ReactorsTest, AStreamAnswersAndEnds) {
   FakeStream stream(reactions_.get());
@@ -68,6 +74,72 @@ TEST_F(ReactorsTest, AStreamGoesOnWhenItsSessionHadLeftMemory) {
     EXPECT_FALSE(stream.Receive().has_value());
     EXPECT_TRUE(stream.WaitUntilDone()->ok());
   }
+}
+
+class FrameBandTest : public ReactorsTest {
+ protected:
+  // Tissues in layers along x, so that they share what the handle pulls.
+  v1::DeformRequest WithRanges(v1::DeformationModel model) {
+    for (Eigen::Index t = 0; t < sample_.mesh.num_tets(); ++t) {
+      const double x = sample_.mesh.positions()(sample_.mesh.tets().row(t), 0).mean();
+      ranges_.tissue_of_tet.push_back(x < 1 ? 0 : 1);
+    }
+    ranges_.tissues = {{"", 2}, {"", 3}};
+    v1::DeformRequest request = Configuration(MakeSession());
+    request.mutable_configuration()->set_model(model);
+    *request.mutable_configuration()->mutable_prepared()->mutable_ranges() = ToProto(ranges_);
+    return request;
+  }
+
+  MaterialUncertainty ranges_;
+};
+
+TEST_F(FrameBandTest, FramesTellTheBandOfTheirPose) {
+  const v1::DeformRequest request = WithRanges(v1::DEFORMATION_MODEL_LINEAR_ELASTIC);
+  FakeStream stream(reactions_.get());
+  stream.Bind(deform_service_.Deform(nullptr));
+  stream.Send(request);
+  EXPECT_TRUE(stream.Receive()->has_started());
+  const Eigen::Index vertices = sample_.mesh.num_vertices();
+  ASSERT_OK_AND_ASSIGN(
+      const auto preparation,
+      MeshPreparation::Create(sample_.mesh, Eigen::VectorXd::Constant(sample_.mesh.num_tets(), 1e3),
+                              BarEnds(sample_.mesh), {}));
+  ASSERT_OK_AND_ASSIGN(
+      const auto columns,
+      BandColumns::Create(preparation, ranges_, testing::AllVertices(sample_.mesh), {}));
+  for (const uint64_t sequence : {32, 64}) {
+    stream.Send(Pose(sequence));
+    const auto response = stream.Receive();
+    ASSERT_TRUE(response.has_value() && response->has_frame());
+    ASSERT_OK_AND_ASSIGN(const Eigen::VectorXf band,
+                         FloatsFromBytes(response->frame().uncertainty_p95_mm(), vertices));
+    HandlePose pose;
+    pose.translation_mm.z() = static_cast<double>(sequence) / 64;
+    Eigen::VectorXf expected;
+    columns->Evaluate({pose}, &expected);
+    EXPECT_GT(expected.maxCoeff(), 1e-3F);
+    EXPECT_LT((band - expected).cwiseAbs().maxCoeff(), 1e-5F);
+    stream.Send(Ack(sequence));
+  }
+  stream.CloseSending();
+  EXPECT_FALSE(stream.Receive().has_value());
+  EXPECT_TRUE(stream.WaitUntilDone()->ok());
+}
+
+TEST_F(FrameBandTest, RangesThatDoNotFitTheSessionAreRefused) {
+  const auto refused = [&](const v1::DeformRequest& request, const char* why) {
+    FakeStream stream(reactions_.get());
+    stream.Bind(deform_service_.Deform(nullptr));
+    stream.Send(request);
+    const auto status = stream.WaitUntilDone();
+    EXPECT_EQ(status->error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+    EXPECT_THAT(status->error_message(), HasSubstr(why));
+  };
+  v1::DeformRequest request = WithRanges(v1::DEFORMATION_MODEL_GRADIENT_FIELD);
+  refused(request, "prepared.ranges are of linear_elastic and neo_hookean");
+  request.mutable_configuration()->mutable_prepared()->mutable_ranges()->set_tissues("?");
+  refused(request, "ranges.tissues has 1 bytes");
 }
 
 TEST_F(ReactorsTest, CommitsAreAnsweredEachOrByANewerOne) {

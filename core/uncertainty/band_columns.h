@@ -1,0 +1,51 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/types/span.h"
+
+#include "core/base/cancellation.h"
+#include "core/constraints/handle_pose.h"
+#include "core/deformation/mesh_preparation.h"
+#include "core/uncertainty/material_uncertainty.h"
+
+namespace tissueform {
+
+// The band of uncertainty of chosen vertices for any pose, as prepared answers give positions: by
+// linear elasticity and in first order (ExpandLinearElastic, FirstOrderBand), whose sensitivities
+// are 12 columns a handle for every variable, as the answer itself is. Single precision.
+//
+// Constant: any number of threads may ask at once.
+class BandColumns {
+ public:
+  // `vertices` are numbers of the mesh's. `admission`, which may be empty, is asked for what the
+  // columns take and what making them takes on top.
+  //
+  // Errors: those of ExpandLinearElastic, or what the admission says.
+  static absl::StatusOr<std::unique_ptr<BandColumns>> Create(
+      std::shared_ptr<MeshPreparation> preparation, const MaterialUncertainty& uncertainty,
+      const std::vector<int32_t>& vertices, const FactorAdmission& admission,
+      const Cancellation& cancellation = {});
+
+  // Of each vertex the 95th percentile of the distance in mm, resized. REQUIRES: one legal pose per
+  // handle.
+  void Evaluate(absl::Span<const HandlePose> poses, Eigen::VectorXf* band_mm) const;
+
+  int64_t bytes_held() const;
+
+ private:
+  BandColumns(std::shared_ptr<MeshPreparation> preparation, const ElasticSystem& elastic)
+      : preparation_(std::move(preparation)), elastic_(elastic) {}
+
+  const std::shared_ptr<MeshPreparation> preparation_;  // owns elastic_
+  const ElasticSystem& elastic_;
+  std::vector<Eigen::MatrixXf> columns_;  // of each variable 3 #vertices by 12 #handles
+};
+
+}  // namespace tissueform
