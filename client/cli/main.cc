@@ -10,6 +10,7 @@
 #include "client/cli/plan_build/plan_build_command.h"
 #include "client/cli/predict/deform_command.h"
 #include "client/cli/predict/plan_command.h"
+#include "client/cli/predict/plan_fit_command.h"
 #include "client/cli/shared/command_line.h"
 #include "client/cli/shared/companion.h"
 
@@ -23,6 +24,7 @@ int main(int argc, char** argv) {
     }
     CLI::App* plan = tissueform::AddPlanCommand(app, work);
     tissueform::AddPlanBuildCommand(*plan, work);
+    tissueform::AddPlanFitCommand(*plan, work);
     tissueform::AddDeformCommand(app, work);
     tissueform::AddCompanionCommand(app, tissueform::kRunCommand, words, work);
     tissueform::AddCompareCommand(app, work);

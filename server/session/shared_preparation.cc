@@ -12,9 +12,7 @@
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "core/mesh_payload/sha256.h"
-#include "core/prepared_answers/linear_elastic_response.h"
-#include "core/prepared_answers/neo_hookean_response.h"
-#include "core/prepared_answers/response_basis.h"
+#include "core/prepared_answers/create_response.h"
 
 namespace tissueform {
 namespace {
@@ -123,6 +121,13 @@ absl::StatusOr<std::shared_ptr<const SharedResponse>> SharedPreparation::Prepare
     responses_.splice(responses_.begin(), responses_, found);
     return responses_.front();
   }
+  if (!HasPreparedAnswers(request.model, gradient_field)) {
+    return WithReason(
+        absl::InvalidArgumentError(
+            "only gradient_field with propagated rotations and cotangent guidance, "
+            "linear_elastic and neo_hookean have prepared answers; leave `prepared` out"),
+        ErrorReason::kNoPreparedAnswers);
+  }
   feed_.Begin(TopicOf(request));
   const absl::Cleanup end_of_topic = [this] { feed_.End(); };
   // Before the new one is made, so that old and new need not fit together.
@@ -135,7 +140,14 @@ absl::StatusOr<std::shared_ptr<const SharedResponse>> SharedPreparation::Prepare
     return shared->reservation.Resize(shared->reservation.bytes() + bytes, "prepared answers");
   };
   absl::StatusOr<std::unique_ptr<VertexResponse>> response =
-      CreateResponse(request, gradient_field, admission, cancellation);
+      CreateResponse(preparation_, request.vertices,
+                     {.model = request.model,
+                      .tolerance_mm = request.tolerance_mm,
+                      .max_rotation_rad = request.max_rotation_rad,
+                      .max_estimate_mm = request.max_estimate_mm,
+                      .admission = admission,
+                      .observer = Observer()},
+                     cancellation);
   TF_RETURN_IF_ERROR(response.status());
   shared->response = *std::move(response);
   int64_t bytes = shared->response->bytes_held();
@@ -149,43 +161,6 @@ absl::StatusOr<std::shared_ptr<const SharedResponse>> SharedPreparation::Prepare
   responses_.push_front(std::move(shared));
   Settle();
   return responses_.front();
-}
-
-absl::StatusOr<std::unique_ptr<VertexResponse>> SharedPreparation::CreateResponse(
-    const ResponseRequest& request, const GradientFieldOptions& gradient_field,
-    const FactorAdmission& admission, const Cancellation& cancellation) {
-  if (request.model == DeformationModel::kLinearElastic) {
-    return CreateLinearElasticResponse(preparation_, request.vertices,
-                                       {.tolerance_mm = request.tolerance_mm,
-                                        .max_rotation_rad = request.max_rotation_rad,
-                                        .admission = admission,
-                                        .observer = Observer()},
-                                       cancellation);
-  }
-  if (request.model == DeformationModel::kNeoHookean) {
-    return CreateNeoHookeanResponse(preparation_, request.vertices,
-                                    {.tolerance_mm = request.tolerance_mm,
-                                     .max_rotation_rad = request.max_rotation_rad,
-                                     .max_estimate_mm = request.max_estimate_mm,
-                                     .admission = admission,
-                                     .observer = Observer()},
-                                    cancellation);
-  }
-  if (request.model == DeformationModel::kGradientField &&
-      gradient_field.rotation == RotationMode::kPropagated &&
-      gradient_field.guidance == Guidance::kCotangent) {
-    return CreateResponseBasis(preparation_, request.vertices,
-                               {.tolerance_mm = request.tolerance_mm,
-                                .max_rotation_rad = request.max_rotation_rad,
-                                .admission = admission,
-                                .observer = Observer()},
-                               cancellation);
-  }
-  return WithReason(
-      absl::InvalidArgumentError(
-          "only gradient_field with propagated rotations and cotangent guidance, "
-          "linear_elastic and neo_hookean have prepared answers; leave `prepared` out"),
-      ErrorReason::kNoPreparedAnswers);
 }
 
 std::shared_ptr<const ProgressFeed::Follower> SharedPreparation::Follow(DeformationModel model,

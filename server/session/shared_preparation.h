@@ -101,9 +101,6 @@ class SharedPreparation {
   int64_t bytes_held() const { return bytes_held_; }
 
  private:
-  absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponse(
-      const ResponseRequest& request, const GradientFieldOptions& gradient_field,
-      const FactorAdmission& admission, const Cancellation& cancellation);
   PreparationObserver Observer();
   // What a model takes that is still to be made, the factor apart.
   int64_t BytesBesideFactor(const DeformerOptions& options) const;

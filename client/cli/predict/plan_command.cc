@@ -73,7 +73,8 @@ CLI::App* AddPlanCommand(CLI::App& app, CommandWork* work) {
   plan->footer(
       "Examples:\n"
       "  tissueform plan build --ct series/ --recipe recipe.json --out head\n"
-      "  tissueform plan check head/plan.json");
+      "  tissueform plan check head/plan.json\n"
+      "  tissueform plan fit head/plan.json --targets chin.json --out head/fitted.json");
 
   auto options = std::make_shared<PlanCheckOptions>();
   CLI::App* check =

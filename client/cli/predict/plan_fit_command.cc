@@ -1,0 +1,247 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/predict/plan_fit_command.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+#include "client/cli/predict/plan_fit_report.h"
+#include "client/cli/shared/option_checks.h"
+#include "client/cli/shared/report_parts.h"
+#include "client/cli/shared/stage_progress.h"
+#include "core/base/atomic_file.h"
+#include "core/base/parallel_for.h"
+#include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
+#include "core/json/json_file.h"
+#include "core/linear_solvers/blas_threads.h"
+#include "core/planning/fit_targets.h"
+#include "core/planning/model_names.h"
+#include "core/planning/plan_io.h"
+#include "core/prepared_answers/create_response.h"
+
+namespace tissueform {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Far below what a target means, and near enough that the first answer of the full model is the
+// last but one.
+constexpr double kPreparedToleranceMm = 0.002;
+
+struct PlanFitOptions {
+  std::string plan;
+  PlanReadOptions reading;
+  std::string targets;
+  std::string out;
+  std::string model;
+  int threads = AvailableProcessors();
+  bool overwrite = false;
+  bool accept_misses = false;
+  bool json = false;
+};
+
+// A plan is somebody's work: unlike a result it is not replaced because its name was given again.
+absl::Status CheckOut(const PlanFitOptions& options) {
+  if (options.out.empty()) return absl::OkStatus();
+  TF_RETURN_IF_ERROR(CheckWritable(options.out));
+  std::error_code ignored;
+  for (const std::string& input : {options.plan, options.targets}) {
+    if (fs::equivalent(options.out, input, ignored)) {
+      return absl::FailedPreconditionError(
+          absl::StrCat("--out ", options.out, " would replace what is read; name another file"));
+    }
+  }
+  if (fs::exists(options.out, ignored) && !options.overwrite) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("--out ", options.out, " exists; name another file, or give --overwrite"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckModel(const Plan& plan) {
+  if (!HasPreparedAnswers(plan.model, plan.gradient_field)) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "model ", ModelName(plan.model),
+        plan.model == DeformationModel::kGradientField
+            ? " with these settings (only propagated rotations, cotangent guidance)"
+            : "",
+        " has no prepared answers to fit with; give --model linear_elastic, neo_hookean, or a "
+        "plan of gradient_field"));
+  }
+  const bool is_scaled = std::any_of(plan.handles.begin(), plan.handles.end(),
+                                     [](const PlannedHandle& h) { return h.pose.scale != 1; });
+  if (is_scaled && plan.model == DeformationModel::kNeoHookean) {
+    return absl::InvalidArgumentError(
+        "a handle of the plan is scaled, for which neo_hookean has no prepared answers; give "
+        "--model linear_elastic or gradient_field");
+  }
+  return absl::OkStatus();
+}
+
+struct PreparedFit {
+  std::shared_ptr<MeshPreparation> preparation;
+  std::unique_ptr<Deformer> deformer;
+  std::unique_ptr<VertexResponse> response;
+};
+
+absl::StatusOr<PreparedFit> Prepare(const PlanProblem& plan, const FitProblem& problem) {
+  const BlasThreadsScope factorising(1);
+  const StageProgress progress("preparing answers");
+  PreparedFit prepared;
+  TF_ASSIGN_OR_RETURN(prepared.preparation,
+                      MeshPreparation::Create(*plan.mesh, plan.stiffness, plan.constraints,
+                                              plan.deformer.preparation));
+  TF_ASSIGN_OR_RETURN(prepared.deformer, CreateDeformer(prepared.preparation, plan.deformer));
+  ResponseOptions options{.model = plan.deformer.model,
+                          .tolerance_mm = kPreparedToleranceMm,
+                          .max_rotation_rad = LargestFitRotation(problem)};
+  for (const HandlePose& pose : problem.poses) {
+    options.max_scale_change = std::max(options.max_scale_change, std::abs(pose.scale - 1));
+  }
+  absl::StatusOr<std::unique_ptr<VertexResponse>> response =
+      CreateResponse(prepared.preparation, FitVertices(problem), options);
+  if (!response.ok()) {
+    return absl::Status(response.status().code(),
+                        absl::StrCat("no answers can be prepared for these bounds: ",
+                                     response.status().message(),
+                                     "; narrow the bounds of the rotations"));
+  }
+  prepared.response = *std::move(response);
+  return prepared;
+}
+
+// How the fitted plan names the mesh from its own folder.
+std::string MeshFrom(const std::string& out, const std::string& mesh) {
+  std::error_code ignored;
+  const fs::path folder = fs::weakly_canonical(fs::absolute(out, ignored), ignored).parent_path();
+  const fs::path file = fs::weakly_canonical(fs::absolute(mesh, ignored), ignored);
+  const fs::path relative = file.lexically_relative(folder);
+  return (relative.empty() ? file : relative).string();
+}
+
+absl::Status WriteFittedPlan(const PlanFitOptions& options, const Plan& plan,
+                             const PlanProblem& resolved, const FitProblem& problem,
+                             const PlanFit& fit) {
+  if (options.out.empty()) return absl::OkStatus();
+  std::vector<HandlePose> poses;
+  for (const HandlePose& pose : fit.poses) {
+    poses.push_back(SwapToOrFromLps(resolved.written_in, pose));
+  }
+  std::vector<bool> changed(poses.size(), false);
+  for (const FitUnknown& unknown : problem.unknowns) changed[unknown.handle] = true;
+  TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(options.plan, "plan", kMaxPlanBytes));
+  const std::string mesh = MeshFrom(options.out, plan.mesh_path);
+  TF_ASSIGN_OR_RETURN(const std::string fitted, PlanWithPoses(text, mesh, poses, changed));
+  TF_RETURN_IF_ERROR(WriteFileAtomically(options.out, fitted));
+  if (!fs::path(mesh).empty() && (*fs::path(mesh).begin() == ".." || fs::path(mesh).is_absolute())) {
+    absl::FPrintF(stderr,
+                  "note: the mesh of %s lies outside its folder; it is run with --allow-outside\n",
+                  options.out);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status RunPlanFit(const PlanFitOptions& options) {
+  TF_RETURN_IF_ERROR(CheckOut(options));
+  TF_ASSIGN_OR_RETURN(Plan plan, ReadPlan(options.plan, options.reading));
+  if (!options.model.empty()) {
+    TF_ASSIGN_OR_RETURN(plan.model, ModelFromName(options.model));
+  }
+  TF_RETURN_IF_ERROR(CheckModel(plan));
+  TF_ASSIGN_OR_RETURN(PlanProblem resolved, ResolvePlan(plan));
+  resolved.deformer.preparation.threads = options.threads;
+  TF_ASSIGN_OR_RETURN(const FitRequest request, ReadFitTargets(options.targets, resolved));
+  absl::StatusOr<FitProblem> problem =
+      ResolveFit(request, *resolved.mesh, resolved.constraints, resolved.poses);
+  if (!problem.ok()) {
+    return absl::Status(problem.status().code(), absl::StrCat("targets ", options.targets, ": ",
+                                                              problem.status().message()));
+  }
+  Stopwatch stopwatch;
+  TF_ASSIGN_OR_RETURN(const PreparedFit prepared, Prepare(resolved, *problem));
+  const double prepare_seconds = stopwatch.Restart();
+  PlanFit fit;
+  {
+    const StageProgress progress("fitting");
+    TF_ASSIGN_OR_RETURN(
+        fit, FitPlan(*problem, *resolved.mesh, resolved.constraints, *prepared.response,
+                     {.full_model = prepared.deformer.get(), .cancellation = {}}));
+  }
+  const FitReport report{.plan_path = options.plan,
+                         .targets_path = options.targets,
+                         .out_path = options.out,
+                         .model = ModelName(plan.model),
+                         .plan = &resolved,
+                         .problem = &*problem,
+                         .fit = &fit,
+                         .prepare_seconds = prepare_seconds,
+                         .fit_seconds = stopwatch.Seconds()};
+  TF_RETURN_IF_ERROR(WriteFittedPlan(options, plan, resolved, *problem, fit));
+  PrintReport(options.json, FitReportText(report), FitReportJson(report));
+  if (!fit.converged || !fit.model_converged) {
+    absl::FPrintF(stderr, "warning: %s\n",
+                  fit.model_converged ? "the search has not converged; the best is told"
+                                      : "the model has not converged at the poses found");
+  }
+  return options.accept_misses ? absl::OkStatus() : CheckReached(report);
+}
+
+constexpr char kFooter[] =
+    "TARGETS.json says what points of the skin are to do and what bone may do for it, in mm and "
+    "degrees, in\nthe plan's axes:\n"
+    "  {\"format\": \"tissueform-targets\", \"version\": 1, \"unit\": \"mm\", "
+    "\"coordinate_system\": \"LPS\",\n"
+    "   \"targets\": [{\"name\": \"chin\", \"place\": \"chin\", \"direction\": \"forward\", "
+    "\"movement_mm\": 5}],\n"
+    "   \"moving\": [{\"handle\": \"mandible\", \"translation_mm\": {\"y\": [-10, 5], \"z\": [-3, "
+    "3]},\n"
+    "               \"rotation_vector_deg\": {\"x\": [-5, 5]}}],\n"
+    "   \"symmetric\": true}\n"
+    "A target is a named place, or a point on the skin (\"point_mm\"); it is to go along a "
+    "direction, by a\nvector (\"displacement_mm\") or to a position (\"position_mm\"). What is not "
+    "listed does not move. All\nkeys: docs/plan-fitting.md.\n\n"
+    "Told are: what was reached (by the full model), what cannot be reached and by how much, which "
+    "bounds\nhold, and how well the targets determine every number.\n\n"
+    "Examples:\n"
+    "  tissueform plan fit head/plan.json --targets chin.json\n"
+    "  tissueform plan fit head/plan.json --targets chin.json --out head/fitted.json\n"
+    "  tissueform deform head/fitted.json --out after.vtu\n"
+    "Exit codes: 0 done, 1 the work failed or a target is not reached (the plan is written all the "
+    "same), 2 wrong use.";
+
+}  // namespace
+
+void AddPlanFitCommand(CLI::App& app, CommandWork* work) {
+  auto options = std::make_shared<PlanFitOptions>();
+  CLI::App* fit =
+      app.add_subcommand("fit", "find the poses of the bone that give the face that is wanted");
+  fit->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
+  fit->add_option("--targets", options->targets, "what is wanted and what may move, see below")
+      ->required();
+  fit->add_option("--out", options->out, "plan with the poses that were found to write");
+  fit->add_option("--model", options->model, "use this model instead of the plan's")
+      ->check(CLI::IsMember(KnownModelNames()));
+  fit->add_option("--threads", options->threads,
+                  "threads to prepare with; the answer does not depend on it")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  fit->add_flag("--overwrite", options->overwrite, "let --out replace an older file");
+  fit->add_flag("--accept-misses", options->accept_misses,
+                "end with 0 also when a target is not reached; the report still says so");
+  fit->add_flag("--json", options->json, "print all of it as JSON");
+  AddAllowOutside(fit, &options->reading);
+  fit->footer(kFooter);
+  fit->callback([options, work] { *work = [options] { return RunPlanFit(*options); }; });
+}
+
+}  // namespace tissueform

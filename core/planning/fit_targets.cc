@@ -1,0 +1,182 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/planning/fit_targets.h"
+
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "nlohmann/json.hpp"
+
+#include "core/base/status_macros.h"
+#include "core/json/json_file.h"
+#include "core/json/json_schema.h"
+#include "core/json/json_text.h"
+#include "core/planning/json_values.h"
+#include "core/planning/plan_schema.h"
+#include "core/planning/skin_places.h"
+
+namespace tissueform {
+namespace {
+
+using Eigen::Vector3d;
+using Json = nlohmann::json;
+
+const JsonSchema& Schema() {
+  static const JsonSchema* const schema = new JsonSchema(FitTargetsSchemaText());
+  return *schema;
+}
+
+// What follows reads a text that has passed the schema: keys and types are as they must be.
+
+// In LPS; of the patient.
+Vector3d NamedDirection(const std::string& name) {
+  if (name == "forward") return {0, -1, 0};
+  if (name == "backward") return {0, 1, 0};
+  if (name == "up") return {0, 0, 1};
+  if (name == "down") return {0, 0, -1};
+  return {name == "left" ? 1.0 : -1.0, 0, 0};
+}
+
+Vector3d ToDirection(const Json& json, CoordinateSystem axes) {
+  if (json.is_array()) return VectorFromJson(json);
+  return SignsToLps(axes).cwiseProduct(NamedDirection(json.get<std::string>()));
+}
+
+std::optional<Vector3d> OptionalVector(const Json& json, const char* key) {
+  if (!json.contains(key)) return std::nullopt;
+  return VectorFromJson(json.at(key));
+}
+
+absl::StatusOr<std::vector<int32_t>> FindVertices(const Json& json, const PlanProblem& problem) {
+  TF_ASSIGN_OR_RETURN(const std::vector<SkinPlace> places, SkinPlaces(problem.point_data));
+  const std::string name = json.at("place");
+  const SkinPlace* place = FindPlace(places, name);
+  if (place == nullptr) {
+    if (places.empty()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("the mesh has no places (no point array skin_region), so none called \"",
+                       name, "\"; give point_mm"));
+    }
+    return absl::InvalidArgumentError(absl::StrCat(
+        "the mesh has no place \"", name, "\"; it has ",
+        absl::StrJoin(places, ", ", [](std::string* out, const SkinPlace& known) {
+          out->append(known.name);
+        })));
+  }
+  if (json.value("at", "mean") == "mean") return place->vertices;
+  return std::vector<int32_t>{ForemostVertex(problem.mesh->positions(), place->vertices)};
+}
+
+absl::StatusOr<FitTargetRequest> ToTarget(const Json& json, const PlanProblem& problem) {
+  if (json.contains("place") == json.contains("point_mm")) {
+    return absl::InvalidArgumentError("it must have one of point_mm and place");
+  }
+  if (json.contains("at") && !json.contains("place")) {
+    return absl::InvalidArgumentError("\"at\" is for a place; leave it out");
+  }
+  if (json.contains("direction") != json.contains("movement_mm")) {
+    return absl::InvalidArgumentError("direction and movement_mm belong together; give both");
+  }
+  FitTargetRequest target;
+  target.name = json.at("name");
+  target.point_mm = OptionalVector(json, "point_mm");
+  target.position_mm = OptionalVector(json, "position_mm");
+  target.displacement_mm = OptionalVector(json, "displacement_mm");
+  if (json.contains("place")) {
+    TF_ASSIGN_OR_RETURN(target.vertices, FindVertices(json, problem));
+  }
+  if (json.contains("direction")) {
+    target.direction = ToDirection(json.at("direction"), problem.written_in);
+    target.movement_mm = json.at("movement_mm");
+  }
+  target.weight = json.value("weight", 1.0);
+  return target;
+}
+
+std::array<FitFreedom::Range, 3> ToRanges(const Json& json, const char* key, double unit) {
+  std::array<FitFreedom::Range, 3> ranges;
+  if (!json.contains(key)) return ranges;
+  for (const auto& [axis, bounds] : json.at(key).items()) {
+    ranges[static_cast<size_t>(axis[0] - 'x')] = {bounds.at(0).get<double>() * unit,
+                                                  bounds.at(1).get<double>() * unit};
+  }
+  return ranges;
+}
+
+FitFreedom ToFreedom(const Json& json) {
+  constexpr double kDegree = std::numbers::pi / 180;
+  return {.handle = json.at("handle"),
+          .rotation = ToRanges(json, "rotation_vector_deg", kDegree),
+          .translation = ToRanges(json, "translation_mm", 1),
+          .pivot_mm = OptionalVector(json, "pivot_mm")};
+}
+
+absl::StatusOr<FitRequest> ToRequest(const Json& json, const PlanProblem& problem) {
+  const std::string of_plan = problem.written_in == CoordinateSystem::kRas ? "RAS" : "LPS";
+  if (json.at("coordinate_system") != of_plan) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("its coordinate_system is ", json.at("coordinate_system").get<std::string>(),
+                     " and the plan's is ", of_plan, "; write the targets in the plan's"));
+  }
+  FitRequest request;
+  request.axes = problem.written_in;
+  for (const Json& target : json.at("targets")) {
+    absl::StatusOr<FitTargetRequest> made = ToTarget(target, problem);
+    if (!made.ok()) {
+      return absl::Status(made.status().code(),
+                          absl::StrCat("target \"", target.at("name").get<std::string>(),
+                                       "\": ", made.status().message()));
+    }
+    request.targets.push_back(*std::move(made));
+  }
+  for (const Json& moving : json.at("moving")) request.moving.push_back(ToFreedom(moving));
+  request.symmetric = json.value("symmetric", false);
+  request.less_movement = json.value("less_movement", request.less_movement);
+  request.tolerance_mm = json.value("tolerance_mm", request.tolerance_mm);
+  TF_RETURN_IF_ERROR(CheckFitRequest(request));
+  return request;
+}
+
+absl::StatusOr<FitRequest> ParseUnnamed(const std::string& text, const PlanProblem& problem) {
+  TF_ASSIGN_OR_RETURN(const Json json, ParseJsonStrictly(text));
+  TF_RETURN_IF_ERROR(Schema().Check(json));
+  try {
+    return ToRequest(json, problem);
+  } catch (const std::exception& exception) {
+    return absl::InvalidArgumentError(absl::StrCat("cannot be read: ", exception.what()));
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<FitRequest> ParseFitTargets(std::string_view json, const std::string& name,
+                                           const PlanProblem& problem) {
+  absl::StatusOr<FitRequest> request = ParseUnnamed(std::string(json), problem);
+  if (request.ok()) return request;
+  return absl::Status(request.status().code(),
+                      absl::StrCat("targets ", name, ": ", request.status().message()));
+}
+
+absl::StatusOr<FitRequest> ReadFitTargets(const std::string& path, const PlanProblem& problem) {
+  TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(path, "targets", kMostTargetsBytes));
+  return ParseFitTargets(text, path, problem);
+}
+
+absl::StatusOr<std::string> PlanWithPoses(std::string_view plan, const std::string& mesh,
+                                          absl::Span<const HandlePose> poses,
+                                          const std::vector<bool>& changed) {
+  TF_ASSIGN_OR_RETURN(Json json, ParseJsonStrictly(std::string(plan)));
+  json["mesh"] = mesh;
+  for (size_t h = 0; h < poses.size(); ++h) {
+    if (changed[h]) json["handles"][h]["pose"] = ToJson(poses[h]);
+  }
+  json["version"] = LowestPlanVersion(json);
+  TF_RETURN_IF_ERROR(CheckAgainstPlanSchema(json));
+  return json.dump(2) + "\n";
+}
+
+}  // namespace tissueform

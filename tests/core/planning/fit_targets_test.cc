@@ -1,0 +1,178 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/planning/fit_targets.h"
+
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "nlohmann/json.hpp"
+
+#include "core/mesh/skin_region.h"
+#include "core/planning/plan_io.h"
+#include "tests/core/planning/plan_text.h"
+#include "tests/testing/handle_problem.h"
+#include "tests/testing/status_matchers.h"
+#include "tests/testing/test_paths.h"
+
+namespace tissueform {
+namespace {
+
+using Eigen::Vector3d;
+using Json = nlohmann::json;
+using testing::kInvalid;
+using testing::StatusIs;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+// A bar whose sides are a chin and a lower lip.
+PlanProblem BarProblem(CoordinateSystem axes) {
+  const TetMesh bar = testing::Bar({4, 4, 8}, 2.0);
+  std::vector<uint8_t> region(static_cast<size_t>(bar.num_vertices()), 0);
+  for (Eigen::Index v = 0; v < bar.num_vertices(); ++v) {
+    if (bar.positions()(v, 1) == 0) {
+      region[static_cast<size_t>(v)] =
+          static_cast<uint8_t>(bar.positions()(v, 2) < 8 ? SkinRegion::kChin
+                                                         : SkinRegion::kLowerLip);
+    }
+  }
+  return {.mesh = std::make_shared<const TetMesh>(bar),
+          .point_data = {{"skin_region", 1, region}},
+          .cell_data = {},
+          .written_in = axes,
+          .stiffness = {},
+          .constraints = testing::StackedHandles(bar, 1),
+          .poses = std::vector<HandlePose>(1),
+          .deformer = {}};
+}
+
+Json Targets() {
+  return Json::parse(R"({
+    "format": "tissueform-targets", "version": 1, "unit": "mm", "coordinate_system": "LPS",
+    "targets": [{"name": "side", "point_mm": [0, 4, 8], "displacement_mm": [1, 2, 3]}],
+    "moving": [{"handle": "handle 0", "translation_mm": {"y": [-2, 3]},
+                "rotation_vector_deg": {"x": [-45, 90]}, "pivot_mm": [1, 2, 3]}]})");
+}
+
+absl::StatusOr<FitRequest> Parse(const Json& json,
+                                 CoordinateSystem axes = CoordinateSystem::kLps) {
+  return ParseFitTargets(json.dump(), "t.json", BarProblem(axes));
+}
+
+Json With(const std::string& pointer, const Json& value) {
+  Json json = Targets();
+  json[Json::json_pointer(pointer)] = value;
+  return json;
+}
+
+TEST(FitTargetsTest, NumbersBecomeRadiansAndDefaultsAreThoseOfTheSchema) {
+  ASSERT_OK_AND_ASSIGN(const FitRequest request, Parse(Targets()));
+  const FitFreedom& moving = request.moving.at(0);
+  EXPECT_DOUBLE_EQ((*moving.rotation[0])[0], -std::numbers::pi / 4);
+  EXPECT_DOUBLE_EQ((*moving.rotation[0])[1], std::numbers::pi / 2);
+  EXPECT_EQ(*moving.translation[1], (std::array{-2.0, 3.0}));
+  EXPECT_FALSE(moving.translation[0].has_value());
+  EXPECT_EQ(moving.pivot_mm, Vector3d(1, 2, 3));
+  EXPECT_EQ(request.targets.at(0).displacement_mm, Vector3d(1, 2, 3));
+  const Json schema = Json::parse(FitTargetsSchemaText());
+  EXPECT_EQ(request.less_movement, schema["properties"]["less_movement"]["default"]);
+  EXPECT_EQ(request.tolerance_mm, schema["properties"]["tolerance_mm"]["default"]);
+  EXPECT_EQ(kMostFitTargets, schema["properties"]["targets"]["maxItems"]);
+}
+
+TEST(FitTargetsTest, PlacesAreTheirVerticesOrTheForemostOne) {
+  Json json = With("/targets/0", {{"name", "chin"},
+                                  {"place", "chin"},
+                                  {"direction", "forward"},
+                                  {"movement_mm", 5}});
+  ASSERT_OK_AND_ASSIGN(const FitRequest mean, Parse(json));
+  EXPECT_EQ(mean.targets.at(0).vertices.size(), 20);
+  EXPECT_EQ(mean.targets.at(0).direction, Vector3d(0, -1, 0));
+  json["targets"][0]["at"] = "foremost";
+  ASSERT_OK_AND_ASSIGN(const FitRequest foremost, Parse(json));
+  EXPECT_EQ(foremost.targets.at(0).vertices.size(), 1);
+  // Forward is forward in all axes.
+  json["coordinate_system"] = "RAS";
+  ASSERT_OK_AND_ASSIGN(const FitRequest ras, Parse(json, CoordinateSystem::kRas));
+  EXPECT_EQ(ras.targets.at(0).direction, Vector3d(0, 1, 0));
+}
+
+TEST(FitTargetsTest, ExampleOfTheDocsIsRead) {
+  Json example;
+  std::ifstream(testing::SourcePath("docs/examples/fit/chin_forward_5mm.json")) >> example;
+  ASSERT_OK_AND_ASSIGN(const FitRequest request, Parse(example));
+  EXPECT_TRUE(request.symmetric);
+  EXPECT_EQ(request.moving.size(), 2);
+}
+
+TEST(FitTargetsTest, MistakesAreNamedInOneLine) {
+  const auto refused = [](const Json& json, const std::string& why) {
+    EXPECT_THAT(Parse(json), StatusIs(kInvalid, AllOf(HasSubstr("targets t.json: "),
+                                                      HasSubstr(why))));
+  };
+  refused(With("/colour", 1), "unknown key \"colour\"");
+  refused(With("/version", 7), "version");
+  refused(With("/targets/0/point_mm", {1, 2}), "/targets/0/point_mm");
+  refused(With("/targets/0/weight", 0), "/targets/0/weight");
+  refused(With("/moving/0/translation_mm/y", {3, -2}), "bounds of its translation along y cross");
+  refused(With("/coordinate_system", "RAS"), "its coordinate_system is RAS and the plan's is LPS");
+  refused(With("/targets/0/place", "chin"), "it must have one of point_mm and place");
+  refused(With("/targets/0/at", "mean"), "\"at\" is for a place");
+  refused(With("/targets/0/movement_mm", 3), "direction and movement_mm belong together");
+  refused(With("/targets/0/position_mm", {1, 2, 3}), "what is wanted in one way");
+  Json place = Targets();
+  place["targets"][0].erase("point_mm");
+  place["targets"][0]["place"] = "ear";
+  refused(place, "target \"side\": the mesh has no place \"ear\"; it has lower_lip, chin, face");
+  PlanProblem bare = BarProblem(CoordinateSystem::kLps);
+  bare.point_data.clear();
+  EXPECT_THAT(ParseFitTargets(place.dump(), "t.json", bare),
+              StatusIs(kInvalid, HasSubstr("no point array skin_region")));
+}
+
+TEST(FitTargetsTest, TextsThatAreNoJsonOrNoNumbersAreRefused) {
+  const PlanProblem problem = BarProblem(CoordinateSystem::kLps);
+  std::string text = Targets().dump();
+  EXPECT_THAT(ParseFitTargets(text + "x", "t.json", problem),
+              StatusIs(kInvalid, HasSubstr("not valid JSON")));
+  for (const char* number : {"NaN", "1e999"}) {
+    std::string bad = text;
+    bad.replace(bad.find("-45"), 3, number);
+    EXPECT_THAT(ParseFitTargets(bad, "t.json", problem), StatusIs(kInvalid)) << number;
+  }
+}
+
+TEST(FitTargetsTest, FilesThatAreMissingOrTooLargeAreRefused) {
+  const PlanProblem problem = BarProblem(CoordinateSystem::kLps);
+  EXPECT_THAT(ReadFitTargets("/nowhere/t.json", problem),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("targets file /nowhere/t.json")));
+  const std::string path = ::testing::TempDir() + "/large_targets.json";
+  std::ofstream(path) << std::string(kMostTargetsBytes + 1, ' ');
+  EXPECT_THAT(ReadFitTargets(path, problem), StatusIs(absl::StatusCode::kResourceExhausted));
+  std::filesystem::remove(path);
+}
+
+TEST(FitTargetsTest, PlanWithPosesKeepsAllElse) {
+  const Json plan = Json::parse(testing::GoodPlan().dump());
+  HandlePose pose;
+  pose.translation_mm = {1, 2, 3};
+  std::vector<HandlePose> poses(plan["handles"].size(), pose);
+  std::vector<bool> changed(poses.size(), false);
+  changed[0] = true;
+  ASSERT_OK_AND_ASSIGN(const std::string text,
+                       PlanWithPoses(plan.dump(), "other/mesh.vtu", poses, changed));
+  ASSERT_OK_AND_ASSIGN(const Plan read, ParsePlan(text, "", "fitted.json"));
+  EXPECT_EQ(read.handles[0].pose.translation_mm, Vector3d(1, 2, 3));
+  Json written = Json::parse(text);
+  EXPECT_EQ(written["mesh"], "other/mesh.vtu");
+  written["mesh"] = plan["mesh"];
+  written["handles"][0]["pose"] = plan["handles"][0]["pose"];
+  EXPECT_EQ(written, plan);
+}
+
+}  // namespace
+}  // namespace tissueform
