@@ -39,8 +39,8 @@ absl::StatusOr<std::string> ReadJsonText(const std::string& path, absl::string_v
     text.append(block, 0, static_cast<size_t>(stream.gcount()));
   }
   if (text.size() > most_bytes) {
-    return absl::ResourceExhaustedError(absl::StrCat(what, " ", path, " has more than ", most_bytes,
-                                                     " bytes; that is no ", what));
+    return absl::ResourceExhaustedError(
+        absl::StrCat(what, " ", path, " has more than ", most_bytes, " bytes; that is no ", what));
   }
   if (!stream.eof()) {
     return absl::PermissionDeniedError(

@@ -80,7 +80,7 @@ class BoxProgram {
       const Held bound = bounds_[static_cast<size_t>(i)];
       const double pull = bound == Held::kAtLower   ? -slope[i]
                           : bound == Held::kAtUpper ? slope[i]
-                                                         : 0;
+                                                    : 0;
       if (pull > strongest && lower_[i] < upper_[i]) {
         strongest = pull;
         released = i;

@@ -8,7 +8,6 @@
 #include <numeric>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 
 namespace tissueform {
@@ -21,9 +20,6 @@ using Eigen::VectorXd;
 // An unknown that moves more than a third of what the strongest one does belongs to a direction's
 // name.
 constexpr double kMainShare = 1.0 / 3;
-// Cosine of rows that are called parallel: targets a few mm apart on one lip are, the two ends of a
-// chin are not.
-constexpr double kParallel = 0.97;
 
 std::vector<size_t> MainUnknowns(const VectorXd& movement_of_unknowns) {
   std::vector<size_t> order(static_cast<size_t>(movement_of_unknowns.size()));
@@ -37,20 +33,6 @@ std::vector<size_t> MainUnknowns(const VectorXd& movement_of_unknowns) {
 }
 
 }  // namespace
-
-Eigen::Matrix<double, 6, 6> MovementRoot(const TetMesh& mesh, const std::vector<int32_t>& vertices,
-                                         const Eigen::Vector3d& pivot_mm) {
-  Eigen::Matrix<double, 6, 6> mean = Eigen::Matrix<double, 6, 6>::Zero();
-  for (const int32_t v : vertices) {
-    const Eigen::Vector3d arm = mesh.positions().row(v).transpose() - pivot_mm;
-    Eigen::Matrix<double, 3, 6> moves;       // w x arm + t
-    moves << 0, arm.z(), -arm.y(), 1, 0, 0,  //
-        -arm.z(), 0, arm.x(), 0, 1, 0,       //
-        arm.y(), -arm.x(), 0, 0, 0, 1;
-    mean += moves.transpose() * moves / static_cast<double>(vertices.size());
-  }
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>>(mean).operatorSqrt();
-}
 
 // In the coordinates z = C' x, C C' = M the movement of the free unknowns, 1 is 1 mm of bone
 // whatever moves. There J = U S V', the regularised answer is V diag(s / (s^2 + l^2)) U' of what is
@@ -101,44 +83,6 @@ FitQuality MeasureFitQuality(const MatrixXd& jacobian, const MatrixXd& movement,
         MainUnknowns(direction.shares.cwiseProduct(movement.colwise().norm().transpose()));
   }
   return quality;
-}
-
-std::vector<std::pair<size_t, size_t>> FindContradictions(const FitProblem& problem,
-                                                          const MatrixXd& jacobian,
-                                                          const VectorXd& misses_mm) {
-  struct Row {
-    size_t target;
-    Index row;
-  };
-  std::vector<Row> missed;
-  Index row = 0;
-  for (size_t t = 0; t < problem.targets.size(); ++t) {
-    const Index rows = problem.targets[t].along.rows();
-    const double miss = misses_mm.segment(row, rows).norm();
-    for (Index k = 0; k < rows; ++k, ++row) {
-      // Those of its three that it is missed by, not the ones that are met beside them.
-      if (miss > problem.tolerance_mm && std::abs(misses_mm[row]) > miss / 2) {
-        missed.push_back({t, row});
-      }
-    }
-  }
-  std::vector<std::pair<size_t, size_t>> pairs;
-  for (size_t i = 0; i < missed.size(); ++i) {
-    for (size_t j = i + 1; j < missed.size(); ++j) {
-      if (missed[i].target == missed[j].target) continue;
-      const VectorXd a = jacobian.row(missed[i].row);
-      const VectorXd b = jacobian.row(missed[j].row);
-      const double product = a.dot(b);
-      const bool is_parallel = std::abs(product) > kParallel * a.norm() * b.norm();
-      const bool pulls_apart = product * misses_mm[missed[i].row] * misses_mm[missed[j].row] < 0;
-      const std::pair pair(missed[i].target, missed[j].target);
-      if (is_parallel && pulls_apart &&
-          std::find(pairs.begin(), pairs.end(), pair) == pairs.end()) {
-        pairs.push_back(pair);
-      }
-    }
-  }
-  return pairs;
 }
 
 }  // namespace tissueform

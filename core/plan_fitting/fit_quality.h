@@ -4,21 +4,13 @@
 #pragma once
 
 #include <cstddef>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "core/mesh/tet_mesh.h"
 #include "core/plan_fitting/bounded_least_squares.h"
-#include "core/plan_fitting/fit_problem.h"
 
 namespace tissueform {
-
-// How much bone moves, to first order: with q the six numbers of a handle's pose (rotation vector
-// in rad, translation in mm), |S q|^2 is the mean of the squared displacements of its vertices.
-Eigen::Matrix<double, 6, 6> MovementRoot(const TetMesh& mesh, const std::vector<int32_t>& vertices,
-                                         const Eigen::Vector3d& pivot_mm);
 
 // How well the targets tell one unknown. What is said of bounds: an unknown that one holds is not
 // asked about, and the others are told as if it were known.
@@ -49,11 +41,5 @@ struct FitQuality {
 // movement of bone; `bounds`: those that hold an unknown.
 FitQuality MeasureFitQuality(const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& movement,
                              const std::vector<ActiveBound>& bounds, double less_movement);
-
-// Pairs of targets that ask the same of the bone and want different things: rows that are nearly
-// parallel, missed to opposite sides, both by more than the tolerance.
-std::vector<std::pair<size_t, size_t>> FindContradictions(const FitProblem& problem,
-                                                          const Eigen::MatrixXd& jacobian,
-                                                          const Eigen::VectorXd& misses_mm);
 
 }  // namespace tissueform

@@ -51,9 +51,9 @@ absl::Status CheckTarget(const FitTargetRequest& target) {
     return Refuse(what, "a number is NaN or infinite; give finite ones");
   }
   if (!(target.weight > 0 && target.weight <= kMostTargetWeight)) {
-    return Refuse(what, absl::StrCat("its weight is ", target.weight,
-                                     "; it must be above 0 and at most ", kMostTargetWeight,
-                                     "; leave out a target that does not count"));
+    return Refuse(what,
+                  absl::StrCat("its weight is ", target.weight, "; it must be above 0 and at most ",
+                               kMostTargetWeight, "; leave out a target that does not count"));
   }
   return CheckWish(target, what);
 }
@@ -72,8 +72,7 @@ absl::Status CheckRanges(const std::array<FitFreedom::Range, 3>& ranges, const R
   for (size_t axis = 0; axis < ranges.size(); ++axis) {
     if (!ranges[axis].has_value()) continue;
     const auto [lower, upper] = *ranges[axis];
-    const std::string number =
-        absl::StrCat(kind.name, absl::string_view("xyz").substr(axis, 1));
+    const std::string number = absl::StrCat(kind.name, absl::string_view("xyz").substr(axis, 1));
     if (!std::isfinite(lower) || !std::isfinite(upper)) {
       return Refuse(what, absl::StrCat("a bound of its ", number, " is NaN or infinite"));
     }
@@ -103,8 +102,8 @@ absl::Status CheckSettings(const FitRequest& request) {
                                                    "; it must be at least 0 and at most 1"));
   }
   if (!(request.tolerance_mm > 0 && std::isfinite(request.tolerance_mm))) {
-    return absl::InvalidArgumentError(absl::StrCat("tolerance_mm is ", request.tolerance_mm,
-                                                   "; it must be a positive number"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("tolerance_mm is ", request.tolerance_mm, "; it must be a positive number"));
   }
   return absl::OkStatus();
 }

@@ -16,7 +16,6 @@
 #include "core/json/json_schema.h"
 #include "core/json/json_text.h"
 #include "core/planning/json_values.h"
-#include "core/planning/plan_schema.h"
 #include "core/planning/skin_places.h"
 
 namespace tissueform {
@@ -63,9 +62,8 @@ absl::StatusOr<std::vector<int32_t>> FindVertices(const Json& json, const PlanPr
     }
     return absl::InvalidArgumentError(absl::StrCat(
         "the mesh has no place \"", name, "\"; it has ",
-        absl::StrJoin(places, ", ", [](std::string* out, const SkinPlace& known) {
-          out->append(known.name);
-        })));
+        absl::StrJoin(places, ", ",
+                      [](std::string* out, const SkinPlace& known) { out->append(known.name); })));
   }
   if (json.value("at", "mean") == "mean") return place->vertices;
   return std::vector<int32_t>{ForemostVertex(problem.mesh->positions(), place->vertices)};
@@ -164,19 +162,6 @@ absl::StatusOr<FitRequest> ParseFitTargets(std::string_view json, const std::str
 absl::StatusOr<FitRequest> ReadFitTargets(const std::string& path, const PlanProblem& problem) {
   TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(path, "targets", kMostTargetsBytes));
   return ParseFitTargets(text, path, problem);
-}
-
-absl::StatusOr<std::string> PlanWithPoses(std::string_view plan, const std::string& mesh,
-                                          absl::Span<const HandlePose> poses,
-                                          const std::vector<bool>& changed) {
-  TF_ASSIGN_OR_RETURN(Json json, ParseJsonStrictly(std::string(plan)));
-  json["mesh"] = mesh;
-  for (size_t h = 0; h < poses.size(); ++h) {
-    if (changed[h]) json["handles"][h]["pose"] = ToJson(poses[h]);
-  }
-  json["version"] = LowestPlanVersion(json);
-  TF_RETURN_IF_ERROR(CheckAgainstPlanSchema(json));
-  return json.dump(2) + "\n";
 }
 
 }  // namespace tissueform

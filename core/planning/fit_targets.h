@@ -7,9 +7,7 @@
 #include <string_view>
 
 #include "absl/status/statusor.h"
-#include "absl/types/span.h"
 
-#include "core/constraints/handle_pose.h"
 #include "core/plan_fitting/fit_request.h"
 #include "core/problem/plan_problem.h"
 
@@ -21,8 +19,9 @@ inline constexpr size_t kMostTargetsBytes = size_t{1} << 20;
 // The text of docs/targets.schema.json.
 const char* FitTargetsSchemaText();
 
-// Reads a file of targets (docs/plan-fitting.md) for a plan that has been put upon its mesh: checked
-// against the published schema, which is built into the program; places are looked up in the mesh.
+// Reads a file of targets (docs/plan-fitting.md) for a plan that has been put upon its mesh:
+// checked against the published schema, which is built into the program; places are looked up in
+// the mesh.
 //
 // Errors: NotFound (no such file), ResourceExhausted (larger than kMostTargetsBytes),
 // InvalidArgument: not JSON, unknown key, wrong type, value out of range (by JSON pointer); other
@@ -33,14 +32,5 @@ absl::StatusOr<FitRequest> ReadFitTargets(const std::string& path, const PlanPro
 // The same for a text; `name` stands for the file in messages.
 absl::StatusOr<FitRequest> ParseFitTargets(std::string_view json, const std::string& name,
                                            const PlanProblem& problem);
-
-// A plan's text with these poses (in its own axes, one a handle) in place of its own, for those
-// handles that `changed` marks; all else stays, but for the mesh, which is named from another
-// folder: `mesh` takes its place. The rest of a plan's text is not read again.
-//
-// REQUIRES: `plan` has passed ParsePlan.
-absl::StatusOr<std::string> PlanWithPoses(std::string_view plan, const std::string& mesh,
-                                          absl::Span<const HandlePose> poses,
-                                          const std::vector<bool>& changed);
 
 }  // namespace tissueform

@@ -14,6 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "client/cli/predict/plan_fit_json.h"
 #include "client/cli/predict/plan_fit_report.h"
 #include "client/cli/shared/option_checks.h"
 #include "client/cli/shared/report_parts.h"
@@ -25,6 +26,7 @@
 #include "core/json/json_file.h"
 #include "core/linear_solvers/blas_threads.h"
 #include "core/planning/fit_targets.h"
+#include "core/planning/fitted_plan.h"
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
 #include "core/prepared_answers/create_response.h"
@@ -111,10 +113,10 @@ absl::StatusOr<PreparedFit> Prepare(const PlanProblem& plan, const FitProblem& p
   absl::StatusOr<std::unique_ptr<VertexResponse>> response =
       CreateResponse(prepared.preparation, FitVertices(problem), options);
   if (!response.ok()) {
-    return absl::Status(response.status().code(),
-                        absl::StrCat("no answers can be prepared for these bounds: ",
-                                     response.status().message(),
-                                     "; narrow the bounds of the rotations"));
+    return absl::Status(
+        response.status().code(),
+        absl::StrCat("no answers can be prepared for these bounds: ", response.status().message(),
+                     "; narrow the bounds of the rotations"));
   }
   prepared.response = *std::move(response);
   return prepared;
@@ -143,7 +145,8 @@ absl::Status WriteFittedPlan(const PlanFitOptions& options, const Plan& plan,
   const std::string mesh = MeshFrom(options.out, plan.mesh_path);
   TF_ASSIGN_OR_RETURN(const std::string fitted, PlanWithPoses(text, mesh, poses, changed));
   TF_RETURN_IF_ERROR(WriteFileAtomically(options.out, fitted));
-  if (!fs::path(mesh).empty() && (*fs::path(mesh).begin() == ".." || fs::path(mesh).is_absolute())) {
+  if (!fs::path(mesh).empty() &&
+      (*fs::path(mesh).begin() == ".." || fs::path(mesh).is_absolute())) {
     absl::FPrintF(stderr,
                   "note: the mesh of %s lies outside its folder; it is run with --allow-outside\n",
                   options.out);
@@ -173,9 +176,9 @@ absl::Status RunPlanFit(const PlanFitOptions& options) {
   PlanFit fit;
   {
     const StageProgress progress("fitting");
-    TF_ASSIGN_OR_RETURN(
-        fit, FitPlan(*problem, *resolved.mesh, resolved.constraints, *prepared.response,
-                     {.full_model = prepared.deformer.get(), .cancellation = {}}));
+    TF_ASSIGN_OR_RETURN(fit,
+                        FitPlan(*problem, *resolved.mesh, resolved.constraints, *prepared.response,
+                                {.full_model = prepared.deformer.get(), .cancellation = {}}));
   }
   const FitReport report{.plan_path = options.plan,
                          .targets_path = options.targets,

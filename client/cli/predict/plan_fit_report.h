@@ -6,7 +6,6 @@
 #include <string>
 
 #include "absl/status/status.h"
-#include "nlohmann/json.hpp"
 
 #include "core/plan_fitting/fit_problem.h"
 #include "core/plan_fitting/plan_fit.h"
@@ -29,7 +28,6 @@ struct FitReport {
 
 // Numbers in mm and degrees, in the axes of the plan.
 std::string FitReportText(const FitReport& report);
-nlohmann::ordered_json FitReportJson(const FitReport& report);
 
 // FailedPrecondition in one line when a target is missed by more than the tolerance: those that
 // contradict each other, with both misses; otherwise the one that is missed most.

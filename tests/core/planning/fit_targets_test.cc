@@ -13,6 +13,7 @@
 #include "nlohmann/json.hpp"
 
 #include "core/mesh/skin_region.h"
+#include "core/planning/fitted_plan.h"
 #include "core/planning/plan_io.h"
 #include "tests/core/planning/plan_text.h"
 #include "tests/testing/handle_problem.h"
@@ -24,10 +25,10 @@ namespace {
 
 using Eigen::Vector3d;
 using Json = nlohmann::json;
-using testing::kInvalid;
-using testing::StatusIs;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using testing::kInvalid;
+using testing::StatusIs;
 
 // A bar whose sides are a chin and a lower lip.
 PlanProblem BarProblem(CoordinateSystem axes) {
@@ -35,9 +36,8 @@ PlanProblem BarProblem(CoordinateSystem axes) {
   std::vector<uint8_t> region(static_cast<size_t>(bar.num_vertices()), 0);
   for (Eigen::Index v = 0; v < bar.num_vertices(); ++v) {
     if (bar.positions()(v, 1) == 0) {
-      region[static_cast<size_t>(v)] =
-          static_cast<uint8_t>(bar.positions()(v, 2) < 8 ? SkinRegion::kChin
-                                                         : SkinRegion::kLowerLip);
+      region[static_cast<size_t>(v)] = static_cast<uint8_t>(
+          bar.positions()(v, 2) < 8 ? SkinRegion::kChin : SkinRegion::kLowerLip);
     }
   }
   return {.mesh = std::make_shared<const TetMesh>(bar),
@@ -47,7 +47,8 @@ PlanProblem BarProblem(CoordinateSystem axes) {
           .stiffness = {},
           .constraints = testing::StackedHandles(bar, 1),
           .poses = std::vector<HandlePose>(1),
-          .deformer = {}};
+          .deformer = {},
+          .uncertainty = {}};
 }
 
 Json Targets() {
@@ -58,8 +59,7 @@ Json Targets() {
                 "rotation_vector_deg": {"x": [-45, 90]}, "pivot_mm": [1, 2, 3]}]})");
 }
 
-absl::StatusOr<FitRequest> Parse(const Json& json,
-                                 CoordinateSystem axes = CoordinateSystem::kLps) {
+absl::StatusOr<FitRequest> Parse(const Json& json, CoordinateSystem axes = CoordinateSystem::kLps) {
   return ParseFitTargets(json.dump(), "t.json", BarProblem(axes));
 }
 
@@ -85,10 +85,9 @@ TEST(FitTargetsTest, NumbersBecomeRadiansAndDefaultsAreThoseOfTheSchema) {
 }
 
 TEST(FitTargetsTest, PlacesAreTheirVerticesOrTheForemostOne) {
-  Json json = With("/targets/0", {{"name", "chin"},
-                                  {"place", "chin"},
-                                  {"direction", "forward"},
-                                  {"movement_mm", 5}});
+  Json json =
+      With("/targets/0",
+           {{"name", "chin"}, {"place", "chin"}, {"direction", "forward"}, {"movement_mm", 5}});
   ASSERT_OK_AND_ASSIGN(const FitRequest mean, Parse(json));
   EXPECT_EQ(mean.targets.at(0).vertices.size(), 20);
   EXPECT_EQ(mean.targets.at(0).direction, Vector3d(0, -1, 0));
@@ -111,8 +110,8 @@ TEST(FitTargetsTest, ExampleOfTheDocsIsRead) {
 
 TEST(FitTargetsTest, MistakesAreNamedInOneLine) {
   const auto refused = [](const Json& json, const std::string& why) {
-    EXPECT_THAT(Parse(json), StatusIs(kInvalid, AllOf(HasSubstr("targets t.json: "),
-                                                      HasSubstr(why))));
+    EXPECT_THAT(Parse(json),
+                StatusIs(kInvalid, AllOf(HasSubstr("targets t.json: "), HasSubstr(why))));
   };
   refused(With("/colour", 1), "unknown key \"colour\"");
   refused(With("/version", 7), "version");

@@ -80,9 +80,9 @@ TEST_F(PlanFitTest, DeformOfTheFittedPlanDoesWhatWasWanted) {
                           {"displacement_mm", {1.5, -1, 0.5}}}};
   const ProcessResult result = Fit({"--out", "fitted.json"});
   EXPECT_THAT(result, Succeeds());
-  EXPECT_THAT(result.out, AllOf(HasSubstr("top translation_x_mm"), HasSubstr("wrote fitted.json"),
-                                HasSubstr("more freedoms than targets"),
-                                HasSubstr("not a medical device")));
+  EXPECT_THAT(result.out,
+              AllOf(HasSubstr("top translation_x_mm"), HasSubstr("wrote fitted.json"),
+                    HasSubstr("more freedoms than targets"), HasSubstr("not a medical device")));
   EXPECT_LT((Displacement("fitted.json", kVertex) - Vector3d(1.5, -1, 0.5)).norm(), 0.01);
 }
 
@@ -118,9 +118,9 @@ TEST_F(PlanFitTest, ContradictoryTargetsAreBothTold) {
   other["name"] = "same side";
   other["movement_mm"] = -2;
   targets_["targets"].push_back(other);
-  EXPECT_THAT(Fit(), FailsWith(1, AllOf(HasSubstr("\"side\" by 2.0"),
-                                        HasSubstr("\"same side\" by 2.0"),
-                                        HasSubstr("which contradict each other"))));
+  EXPECT_THAT(Fit(),
+              FailsWith(1, AllOf(HasSubstr("\"side\" by 2.0"), HasSubstr("\"same side\" by 2.0"),
+                                 HasSubstr("which contradict each other"))));
 }
 
 TEST_F(PlanFitTest, NothingIsReplacedUnasked) {
@@ -175,10 +175,10 @@ TEST_F(PlanFitTest, KnownPoseOfABundledHeadIsFoundAgain) {
   ASSERT_OK_AND_ASSIGN(const std::vector<SkinPlace> places, SkinPlaces(before.point_data));
   targets_["targets"] = Json::array();
   for (const SkinPlace& place : places) {
-    const Vector3d moved = (after.mesh.positions() - before.mesh.positions())(place.vertices,
-                                                                              Eigen::all)
-                               .colwise()
-                               .mean();
+    const Vector3d moved =
+        (after.mesh.positions() - before.mesh.positions())(place.vertices, Eigen::all)
+            .colwise()
+            .mean();
     targets_["targets"].push_back({{"name", place.name},
                                    {"place", place.name},
                                    {"displacement_mm", {moved.x(), moved.y(), moved.z()}}});
