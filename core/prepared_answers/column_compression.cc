@@ -29,22 +29,6 @@ Eigen::VectorXd RowSizes(const Eigen::MatrixXd& uses) {
   return uses.rowwise().norm() / std::sqrt(count);
 }
 
-// Lower L with L L^T the weighted covariance: typical uses are white in L^-1 f. What no typical
-// pose uses counts for a thousandth of its widest use: so that the turning can be undone.
-Eigen::MatrixXd UsesRoot(const ColumnUses& uses) {
-  constexpr double kOfWidest = 1e-3;
-  const Eigen::MatrixXd& typical = uses.typical;
-  const Eigen::Index columns = typical.rows();
-  Eigen::VectorXd sizes = RowSizes(typical).cwiseMax(kOfWidest * RowSizes(uses.widest));
-  sizes = (sizes.array() > 0).select(sizes, 1.0);
-  const Eigen::MatrixXd scaled = sizes.cwiseInverse().asDiagonal() * typical;
-  Eigen::MatrixXd covariance = kUnusedVariance * Eigen::MatrixXd::Identity(columns, columns);
-  covariance.selfadjointView<Eigen::Lower>().rankUpdate(
-      scaled, 1.0 / static_cast<double>(std::max<Eigen::Index>(typical.cols(), 1)));
-  const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance);
-  return sizes.asDiagonal() * Eigen::MatrixXd(cholesky.matrixL());
-}
-
 // Of every column: the largest displacement that it gives a vertex.
 Eigen::VectorXd Gains(const Eigen::MatrixXd& columns, int rows_per_vertex) {
   Eigen::VectorXd gains = Eigen::VectorXd::Zero(columns.cols());
@@ -83,6 +67,20 @@ Eigen::Index CountBelow(const Eigen::MatrixXd& moves, double limit) {
 }
 
 }  // namespace
+
+Eigen::MatrixXd UsesRoot(const ColumnUses& uses) {
+  constexpr double kOfWidest = 1e-3;
+  const Eigen::MatrixXd& typical = uses.typical;
+  const Eigen::Index columns = typical.rows();
+  Eigen::VectorXd sizes = RowSizes(typical).cwiseMax(kOfWidest * RowSizes(uses.widest));
+  sizes = (sizes.array() > 0).select(sizes, 1.0);
+  const Eigen::MatrixXd scaled = sizes.cwiseInverse().asDiagonal() * typical;
+  Eigen::MatrixXd covariance = kUnusedVariance * Eigen::MatrixXd::Identity(columns, columns);
+  covariance.selfadjointView<Eigen::Lower>().rankUpdate(
+      scaled, 1.0 / static_cast<double>(std::max<Eigen::Index>(typical.cols(), 1)));
+  const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance);
+  return sizes.asDiagonal() * Eigen::MatrixXd(cholesky.matrixL());
+}
 
 ColumnCompression::ColumnCompression(const Eigen::MatrixXd& columns, int rows_per_vertex,
                                      const ColumnUses& uses, double tolerance_mm) {

@@ -20,6 +20,10 @@ struct ColumnUses {
   Eigen::MatrixXd widest;   // what they must answer within the tolerance
 };
 
+// Lower L with L L^T the uses' covariance: typical uses are white in L^-1 f. What no typical use
+// needs counts for a thousandth of its widest use: so that the turning can be undone.
+Eigen::MatrixXd UsesRoot(const ColumnUses& uses);
+
 // Columns that hardly differ, or that poses use together only, said by fewer:
 //   columns * f = kept * (map * f) + cut * (cut_map * f)   for every f, to rounding,
 // where [kept cut] are the columns turned to their principal axes under the weight of their uses

@@ -25,7 +25,7 @@ struct ResponseOptions {
   double tolerance_mm = 0.01;
   double max_rotation_rad = 30.0 * std::numbers::pi / 180.0;
   double max_scale_change = 0.1;  // of gradient_field, |s - 1|
-  double max_estimate_mm = 2;     // of neo_hookean
+  double max_estimate_mm = 5;     // of neo_hookean
   FactorAdmission admission = nullptr;
   PreparationObserver observer = nullptr;
 };

@@ -10,22 +10,34 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/percentiles.h"
 #include "core/base/status_macros.h"
 #include "core/deformation/deformation_checks.h"
 #include "core/deformation/neo_hookean_deformer.h"
 #include "core/elasticity/neo_hookean_expansion.h"
+#include "core/prepared_answers/clustered_columns.h"
 #include "core/prepared_answers/panel_response.h"
+#include "core/prepared_answers/pose_numbers.h"
 #include "core/prepared_answers/pose_samples.h"
+#include "core/prepared_answers/third_order_estimate.h"
 
 namespace tissueform {
 namespace {
 
-constexpr Eigen::Index kNumbersPerHandle = 6;  // rotation vector, translation
 // Pairs that are solved for in one pass over the factor.
 constexpr Eigen::Index kPairsPerPass = 24;
-// Of the converged answers that the estimate is measured by, and what is put on top of the worst.
+// Of the converged answers that the estimate is measured by, and what is put on top of their
+// median: the 99th percentile of random poses. (The worst of a few says less: one pose of the
+// bundled head had 4 times the median.)
 constexpr int kMostCalibrationIterations = 60;
-constexpr double kEstimateAllowance = 1.5;
+constexpr double kEstimateAllowance = 2.5;
+// More for every handle beside the first: what lies between two of them differs more from pose to
+// pose. Bars with one, two and three handles need 1.9, 2.4 and 3.7.
+constexpr double kAllowancePerHandle = 0.75;
+// The same of what compression does to uses that were tried.
+constexpr double kCutAllowance = 1.25;
+// Where the series itself errs by so many mm the columns may err by twice the tolerance.
+constexpr double kEstimateThatDoublesMm = 0.5;
 
 Eigen::Index NumHandles(const MeshPreparation& preparation) {
   return static_cast<Eigen::Index>(preparation.constraints().handles().size());
@@ -51,12 +63,6 @@ absl::Status CheckOptions(const NeoHookeanResponseOptions& options) {
   return absl::OkStatus();
 }
 
-Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& w) {
-  Eigen::Matrix3d cross;
-  cross << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
-  return cross;
-}
-
 double LargestMove(const Eigen::Ref<const Eigen::VectorXd>& column) {
   return column.size() == 0 ? 0 : column.reshaped(3, column.size() / 3).colwise().norm().maxCoeff();
 }
@@ -78,13 +84,12 @@ class NeoHookeanResponse : public VertexResponse {
     TF_RETURN_IF_ERROR(PrepareSecondOrder(vertices, cancellation, &columns));
     TF_RETURN_IF_ERROR(Calibrate(vertices, columns, cancellation));
     TF_RETURN_IF_ERROR(cancellation.Check());
-    panel_.emplace(preparation_->mesh().positions()(vertices, Eigen::all),
-                   PanelResponse::Rows::kCoordinates, columns, Uses(), options_.tolerance_mm);
+    Compress(preparation_->mesh().positions()(vertices, Eigen::all), columns);
     return absl::OkStatus();
   }
 
   double ErrorBoundMm(absl::Span<const HandlePose> poses) const override {
-    return Plan(poses).error_mm;
+    return UseOf(poses).error_mm;
   }
   bool error_is_estimate() const override { return true; }
 
@@ -93,60 +98,40 @@ class NeoHookeanResponse : public VertexResponse {
   }
 
   void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) const override {
-    panel_->Evaluate(Plan(poses).reading, positions);
+    columns_->Evaluate(UseOf(poses).factors, positions);
   }
 
   std::optional<double> Answer(absl::Span<const HandlePose> poses,
                                FloatPositions* positions) const override {
     if (!InRange(poses)) return std::nullopt;
-    const PlannedAnswer plan = Plan(poses);
-    if (!(plan.error_mm <= options_.max_estimate_mm)) return std::nullopt;
-    panel_->Evaluate(plan.reading, positions);
-    return plan.error_mm;
+    const Use use = UseOf(poses);
+    if (!(use.error_mm <= options_.max_estimate_mm)) return std::nullopt;
+    columns_->Evaluate(use.factors, positions);
+    return use.error_mm;
   }
 
-  Eigen::Index num_vertices() const override { return panel_->num_vertices(); }
-  int num_terms() const override { return static_cast<int>(panel_->num_columns()); }
-  int num_terms_before() const override { return static_cast<int>(panel_->num_columns_before()); }
-  int64_t bytes_held() const override {
-    return panel_->bytes_held() +
-           (first_gains_.size() + pair_gains_.size()) * static_cast<int64_t>(sizeof(double));
-  }
+  Eigen::Index num_vertices() const override { return columns_->num_vertices(); }
+  int num_terms() const override { return static_cast<int>(columns_->num_columns()); }
+  int num_terms_before() const override { return static_cast<int>(columns_->num_columns_before()); }
+  int64_t bytes_held() const override { return columns_->bytes_held() + estimate_->bytes_held(); }
 
  private:
-  struct PlannedAnswer {
-    PanelResponse::Reading reading;
-    double error_mm = 0;  // estimated, with the bound of the columns
+  // What the columns are multiplied with, and what that leaves out.
+  struct Use {
+    Eigen::VectorXd factors;
+    double series_mm = 0;  // estimated
+    double error_mm = 0;   // with what was cut of the columns, and rounding
   };
 
-  // Six numbers a handle. Not the angle itself but its sine: what R - I is odd in, so that the
-  // columns of u1, which hold R - I whole, and these agree to third order either way.
-  Eigen::VectorXd Numbers(absl::Span<const HandlePose> poses) const {
-    Eigen::VectorXd numbers(kNumbersPerHandle * static_cast<Eigen::Index>(poses.size()));
-    for (size_t h = 0; h < poses.size(); ++h) {
-      const Eigen::Matrix3d R = RotationMatrix(poses[h].rotation_vector);
-      const Eigen::Vector3d& centroid = centroids_[h];
-      auto own =
-          numbers.segment<kNumbersPerHandle>(kNumbersPerHandle * static_cast<Eigen::Index>(h));
-      own.head<3>() =
-          0.5 * Eigen::Vector3d(R(2, 1) - R(1, 2), R(0, 2) - R(2, 0), R(1, 0) - R(0, 1));
-      own.tail<3>() = ApplyPose(poses[h], centroid) - centroid;
-    }
-    return numbers;
-  }
-
-  // Of poses: what the columns are multiplied with.
-  Eigen::VectorXd Factors(absl::Span<const HandlePose> poses,
-                          const Eigen::VectorXd& numbers) const {
-    Eigen::VectorXd factors(NumColumns(*preparation_));
-    factors.head(NumFirst(*preparation_)) = elastic_.Coefficients(poses);
-    Eigen::Index pair = NumFirst(*preparation_);
-    for (Eigen::Index a = 0; a < numbers.size(); ++a) {
-      for (Eigen::Index b = a; b < numbers.size(); ++b) {
-        factors[pair++] = (a == b ? 1 : 2) * numbers[a] * numbers[b];
-      }
-    }
-    return factors;
+  Use UseOf(absl::Span<const HandlePose> poses) const {
+    const Eigen::VectorXd numbers = PoseNumbers(poses, centroids_);
+    const Eigen::VectorXd products = PairProducts(numbers);
+    Use use;
+    use.factors.resize(NumColumns(*preparation_));
+    use.factors << elastic_.Coefficients(poses), products;
+    use.series_mm = estimate_->Mm(products);
+    use.error_mm = use.series_mm + rounding_mm_ + cut_per_mm_ * estimate_->FirstOrderMm(numbers);
+    return use;
   }
 
   // Displacements, a unit of each number: of all vertices, 3 #V by #numbers.
@@ -173,14 +158,10 @@ class NeoHookeanResponse : public VertexResponse {
   absl::Status PrepareSecondOrder(const std::vector<int32_t>& vertices,
                                   const Cancellation& cancellation, Eigen::MatrixXd* columns) {
     const Eigen::MatrixXd fields = LinearFields();
-    first_gains_.resize(fields.cols());
-    const Eigen::MatrixXd chosen = RowsOfVertices(fields, vertices);
-    for (Eigen::Index f = 0; f < fields.cols(); ++f) first_gains_[f] = LargestMove(chosen.col(f));
     const Eigen::MatrixXd forces =
         SecondOrderForces(preparation_->elements(), preparation_->stiffness(),
                           preparation_->options().poisson_ratio, fields);
     const Eigen::Index pairs = forces.cols();
-    pair_gains_.resize(pairs);
     const Eigen::MatrixXd at_rest = Eigen::MatrixXd::Zero(
         3 * static_cast<Eigen::Index>(preparation_->constraints().constrained().size()),
         kPairsPerPass);
@@ -191,27 +172,60 @@ class NeoHookeanResponse : public VertexResponse {
       TF_ASSIGN_OR_RETURN(
           const Eigen::MatrixXd second,
           elastic_.Solve(-forces.middleCols(first, count), at_rest.leftCols(count)));
-      auto own = columns->middleCols(NumFirst(*preparation_) + first, count);
-      own = RowsOfVertices(second, vertices);
-      for (Eigen::Index c = 0; c < count; ++c) pair_gains_[first + c] = LargestMove(own.col(c));
+      columns->middleCols(NumFirst(*preparation_) + first, count) =
+          RowsOfVertices(second, vertices);
     }
     TellProgress(options_.observer, PreparationStage::kAnswers, pairs, pairs);
+    estimate_.emplace(RowsOfVertices(fields, vertices), columns->rightCols(pairs),
+                      preparation_->mesh().BoundingBoxDiagonal());
     return absl::OkStatus();
   }
 
-  ColumnUses Uses() const {
-    constexpr int kSamples = 600;
+  // Turned for typical poses; what is cut and how many digits are kept is judged by others, of
+  // which some move by a sixth of the mesh, as far as that is covered.
+  void Compress(const Positions& rest, const Eigen::MatrixXd& columns) {
+    constexpr int kTypical = 600;
+    constexpr int kTried = 100;  // of each kind
     const double size_mm = preparation_->mesh().BoundingBoxDiagonal();
     PoseRange range{.rotation_rad = options_.max_rotation_rad,
                     .scale_change = 0,
                     .translation_mm = 0.05 * size_mm,
                     .pivot_offset_mm = 0.05 * size_mm};
-    ColumnUses uses{.factors = 1, .typical = {}, .widest = {}};
-    uses.typical = FactorsOf(CoveredSamples(range, kSamples));
+    ClusteredColumns::Uses uses;
+    uses.typical = FactorsOf(CoveredSamples(range, kTypical));
+    std::vector<std::vector<HandlePose>> tried =
+        CoveredSamples({options_.max_rotation_rad / 3, 0, 0.03 * size_mm, 0.02 * size_mm}, kTried);
     range.translation_mm = 0.15 * size_mm;
     range.pivot_offset_mm = 0.15 * size_mm;
-    uses.widest = FactorsOf(CoveredSamples(range, kSamples));
-    return uses;
+    for (std::vector<HandlePose>& poses : CoveredSamples(range, kTried)) {
+      tried.push_back(std::move(poses));
+    }
+    uses.tried = FactorsOf(tried);
+    uses.room_mm.resize(uses.tried.cols());
+    for (size_t s = 0; s < tried.size(); ++s) {
+      uses.room_mm[static_cast<Eigen::Index>(s)] =
+          options_.tolerance_mm * (1 + UseOf(tried[s]).series_mm / kEstimateThatDoublesMm);
+    }
+    columns_.emplace(rest, columns, uses);
+    MeasureCut(rest, columns, tried);
+  }
+
+  void MeasureCut(const Positions& rest, const Eigen::MatrixXd& columns,
+                  const std::vector<std::vector<HandlePose>>& tried) {
+    // Of the rest positions and of the sum: single precision's half unit of each.
+    constexpr double kRoundings = 2 * 5.97e-8;
+    rounding_mm_ = kRoundings * rest.rowwise().norm().maxCoeff();
+    double worst = 0;
+    FloatPositions answer;
+    for (const std::vector<HandlePose>& poses : tried) {
+      const Use use = UseOf(poses);
+      columns_->Evaluate(use.factors, &answer);
+      const Positions off = answer.cast<double>() - rest -
+                            (columns * use.factors).reshaped<Eigen::RowMajor>(rest.rows(), 3);
+      const double moved = estimate_->FirstOrderMm(PoseNumbers(poses, centroids_));
+      if (moved > 0) worst = std::max(worst, off.rowwise().norm().maxCoeff() / moved);
+    }
+    cut_per_mm_ = kCutAllowance * worst;
   }
 
   // Those that are not covered are made smaller until they are: nobody asks for the rest.
@@ -219,7 +233,7 @@ class NeoHookeanResponse : public VertexResponse {
     constexpr double kSmaller = 0.8;
     std::vector<std::vector<HandlePose>> samples = SamplePoses(centroids_, range, count);
     for (std::vector<HandlePose>& poses : samples) {
-      while (third_order_factor_ * ThirdOrderMm(Numbers(poses)) > options_.max_estimate_mm) {
+      while (UseOf(poses).series_mm > options_.max_estimate_mm) {
         for (HandlePose& pose : poses) pose = PartOfPose(pose, kSmaller);
       }
     }
@@ -229,7 +243,7 @@ class NeoHookeanResponse : public VertexResponse {
   Eigen::MatrixXd FactorsOf(const std::vector<std::vector<HandlePose>>& samples) const {
     Eigen::MatrixXd factors(NumColumns(*preparation_), static_cast<Eigen::Index>(samples.size()));
     for (size_t s = 0; s < samples.size(); ++s) {
-      factors.col(static_cast<Eigen::Index>(s)) = Factors(samples[s], Numbers(samples[s]));
+      factors.col(static_cast<Eigen::Index>(s)) = UseOf(samples[s]).factors;
     }
     return factors;
   }
@@ -239,28 +253,6 @@ class NeoHookeanResponse : public VertexResponse {
     return std::all_of(poses.begin(), poses.end(), [this](const HandlePose& pose) {
       return pose.rotation_vector.norm() <= options_.max_rotation_rad * kSlack && pose.scale == 1;
     });
-  }
-
-  // Before it is calibrated: |u2|^2 / |u1|, with what the numbers can move at most in place of what
-  // they do.
-  double ThirdOrderMm(const Eigen::VectorXd& numbers) const {
-    const double first = first_gains_.dot(numbers.cwiseAbs());
-    double second = 0;
-    Eigen::Index pair = 0;
-    for (Eigen::Index a = 0; a < numbers.size(); ++a) {
-      for (Eigen::Index b = a; b < numbers.size(); ++b) {
-        second += (a == b ? 1 : 2) * std::abs(numbers[a] * numbers[b]) * pair_gains_[pair++];
-      }
-    }
-    return first > 0 ? second * second / first : 0;
-  }
-
-  PlannedAnswer Plan(absl::Span<const HandlePose> poses) const {
-    const Eigen::VectorXd numbers = Numbers(poses);
-    PlannedAnswer plan;
-    plan.reading = panel_->Choose(Factors(poses, numbers), options_.tolerance_mm);
-    plan.error_mm = third_order_factor_ * ThirdOrderMm(numbers) + plan.reading.bound_mm;
-    return plan;
   }
 
   // Against what the model converges to. `columns`: of the chosen vertices.
@@ -274,35 +266,40 @@ class NeoHookeanResponse : public VertexResponse {
     control.on_progress = [&cancellation](const Deformation& /*so_far*/) {
       return cancellation.Check().ok();
     };
-    const double size_mm = preparation_->mesh().BoundingBoxDiagonal();
-    std::optional<double> worst;
-    // A small turn, a small move and both, since the series does not fall alike for them: 2 mm on a
-    // head. So small that converging takes some ten iterations each, and large enough for the third
-    // order to stand above the columns' and the search's own errors.
-    const double turn_rad = std::min(options_.max_rotation_rad, std::numbers::pi / 60);
-    const double move_mm = size_mm / 100;
-    for (const auto& [rotation_rad, translation_mm] :
-         {std::pair(turn_rad, 0.0), std::pair(0.0, move_mm), std::pair(turn_rad, move_mm)}) {
-      const PoseRange range{.rotation_rad = rotation_rad,
-                            .scale_change = 0,
-                            .translation_mm = translation_mm,
-                            .pivot_offset_mm = 0};
-      const std::vector<HandlePose> poses = SamplePoses(centroids_, range, 2).back();
+    std::vector<double> ratios;
+    for (const std::vector<HandlePose>& poses : CalibrationPoses()) {
       TF_ASSIGN_OR_RETURN(const Deformation converged, deformer->Deform(poses, control));
       TF_RETURN_IF_ERROR(cancellation.Check());
       if (!converged.summary.converged) continue;  // nothing is learnt from it
-      const Eigen::VectorXd numbers = Numbers(poses);
-      const Eigen::VectorXd answer = columns * Factors(poses, numbers);
+      const Use use = UseOf(poses);
       const Positions displacements =
           (converged.positions - preparation_->mesh().positions())(vertices, Eigen::all);
-      const double error = LargestMove(answer - displacements.reshaped<Eigen::RowMajor>());
-      const double third_order = ThirdOrderMm(numbers);
-      if (third_order > 0) worst = std::max(worst.value_or(0), error / third_order);
+      const double error =
+          LargestMove(columns * use.factors - displacements.reshaped<Eigen::RowMajor>());
+      if (use.series_mm > 0) ratios.push_back(error / use.series_mm);
     }
-    // Where nothing converged all is as bad as it can be: the series as if it fell no faster than
-    // its bounds do.
-    third_order_factor_ = worst.has_value() ? kEstimateAllowance * *worst : 1;
+    // Where nothing converged it is taken for as bad as on the worst body that was tried.
+    constexpr double kWorstScale = 50;
+    const double allowance =
+        kEstimateAllowance +
+        kAllowancePerHandle * static_cast<double>(NumHandles(*preparation_) - 1);
+    estimate_->set_scale(allowance * (ratios.empty() ? kWorstScale : Percentile(ratios, 50)));
     return absl::OkStatus();
+  }
+
+  // A small turn, a small move and some of both, since the series does not fall alike for them:
+  // 2 mm on a head. So small that converging takes some ten iterations each, and large enough for
+  // the third order to stand above the columns' and the search's own errors.
+  std::vector<std::vector<HandlePose>> CalibrationPoses() const {
+    constexpr int kOfBoth = 3;
+    const double turn_rad = std::min(options_.max_rotation_rad, std::numbers::pi / 60);
+    const double move_mm = preparation_->mesh().BoundingBoxDiagonal() / 100;
+    std::vector<std::vector<HandlePose>> poses = {
+        SamplePoses(centroids_, {turn_rad, 0, 0, 0}, 2).back(),
+        SamplePoses(centroids_, {0, 0, move_mm, 0}, 2).back()};
+    const auto both = SamplePoses(centroids_, {turn_rad, 0, move_mm, 0}, 2 * kOfBoth);
+    for (size_t s = 1; s < both.size(); s += 2) poses.push_back(both[s]);  // those at the edge
+    return poses;
   }
 
   // Constant after Prepare.
@@ -310,11 +307,10 @@ class NeoHookeanResponse : public VertexResponse {
   const ElasticSystem& elastic_;
   const NeoHookeanResponseOptions options_;
   const std::vector<Eigen::Vector3d> centroids_;
-  std::optional<PanelResponse> panel_;
-  // Largest displacement of a chosen vertex, a unit of every number, and of every pair of them.
-  Eigen::VectorXd first_gains_;
-  Eigen::VectorXd pair_gains_;
-  double third_order_factor_ = 0;
+  std::optional<ThirdOrderEstimate> estimate_;
+  std::optional<ClusteredColumns> columns_;
+  double cut_per_mm_ = 0;  // of the first order
+  double rounding_mm_ = 0;
 };
 
 }  // namespace
@@ -325,8 +321,7 @@ int64_t NeoHookeanResponseBytes(const MeshPreparation& preparation, Eigen::Index
   const int64_t of_all = 3 * preparation.mesh().num_vertices() *
                          (pairs + kPairsPerPass + kNumbersPerHandle * NumHandles(preparation));
   return of_all * static_cast<int64_t>(sizeof(double)) +
-         PanelResponse::BytesNeeded(num_vertices, PanelResponse::Rows::kCoordinates,
-                                    NumColumns(preparation));
+         ClusteredColumns::BytesNeeded(num_vertices, NumColumns(preparation));
 }
 
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateNeoHookeanResponse(

@@ -37,7 +37,7 @@ struct ResponseRequest {
   std::vector<int32_t> vertices;
   double tolerance_mm = 0.01;
   double max_rotation_rad = 0.5236;
-  double max_estimate_mm = 2;                      // of neo_hookean
+  double max_estimate_mm = 5;                      // of neo_hookean
   std::optional<MaterialUncertainty> ranges = {};  // of the elastic models: a band is wanted, too
 
   friend bool operator==(const ResponseRequest&, const ResponseRequest&) = default;

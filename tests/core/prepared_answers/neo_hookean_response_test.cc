@@ -10,6 +10,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/base/percentiles.h"
 #include "core/deformation/linear_elastic_deformer.h"
 #include "core/deformation/neo_hookean_deformer.h"
 #include "tests/testing/handle_problem.h"
@@ -106,27 +107,57 @@ TEST_P(NeoHookeanResponseTest, IdentityGivesRestAndHandlesGoWhereTheirPosesSay) 
   }
 }
 
-// An estimate, so it may be exceeded; of 300 random poses by few and by little.
+// Checked over 1,000 random poses: an estimate, so it may be exceeded, in one of a hundred.
 TEST_P(NeoHookeanResponseTest, EstimateIsSeldomExceeded) {
   Prepared prepared(GetParam(), 1e-4, 1e-4);
   int exceeded = 0;
   double worst = 0;
-  double tightest = 1e9;
-  for (int sample = 0; sample < 300; ++sample) {
+  std::vector<double> estimates;  // in units of the error
+  // Three handles leave a third of a millimetre between two: farther poses do not converge.
+  const double size = GetParam() == 3 ? 0.5 : 1;
+  for (int sample = 0; sample < 1000; ++sample) {
     const std::vector<HandlePose> poses =
-        prepared.Poses(0.2 + 0.8 * std::abs(random_.Next()), &random_);
+        prepared.Poses(size * (0.2 + 0.8 * std::abs(random_.Next())), &random_);
     const double error = prepared.ErrorMm(poses);
     const double estimate = prepared.response->ErrorBoundMm(poses);
     exceeded += error > estimate ? 1 : 0;
     worst = std::max(worst, error / estimate);
-    tightest = std::min(tightest, estimate / error);
+    estimates.push_back(estimate / error);
   }
-  EXPECT_LE(exceeded, 15);
+  RecordProperty("exceeded", exceeded);
+  RecordProperty("median", std::to_string(Percentile(estimates, 50)));
+  EXPECT_LE(exceeded, 10);
   EXPECT_LT(worst, 2);
-  EXPECT_LT(tightest, 5) << "an estimate that is always far too large says nothing";
+  EXPECT_LT(Percentile(estimates, 50), 8) << "an estimate that is far too large says nothing";
 }
 
-INSTANTIATE_TEST_SUITE_P(Handles, NeoHookeanResponseTest, ::testing::Values(1, 2),
+// Over 1,000 random poses, most of them none that the cut was judged by: what the answer of few
+// columns and digits lies from that of all is what the estimate has been raised by.
+TEST_P(NeoHookeanResponseTest, CompressionPutsOffByNoMoreThanIsSaid) {
+  const Prepared fine(GetParam());
+  ASSERT_OK_AND_ASSIGN(const auto coarse,
+                       CreateNeoHookeanResponse(fine.preparation, testing::AllVertices(fine.mesh),
+                                                {.tolerance_mm = 0.002, .max_estimate_mm = 100}));
+  EXPECT_LT(coarse->num_terms(), fine.response->num_terms());
+  EXPECT_LT(coarse->bytes_held(), fine.response->bytes_held());
+  FloatPositions answer;
+  FloatPositions of_all;
+  int exceeded = 0;
+  double tightest = 1e9;
+  for (int sample = 0; sample < 1000; ++sample) {
+    const std::vector<HandlePose> poses = fine.Poses(std::abs(random_.Next()), &random_);
+    coarse->Evaluate(poses, &answer);
+    fine.response->Evaluate(poses, &of_all);
+    const double off = LargestDistance(answer, of_all.cast<double>());
+    const double said = coarse->ErrorBoundMm(poses) - fine.response->ErrorBoundMm(poses);
+    exceeded += off > said + 1e-5 ? 1 : 0;
+    tightest = std::min(tightest, said / off);
+  }
+  EXPECT_LE(exceeded, 10);
+  EXPECT_LT(tightest, 6) << "what is said is far too large for every pose";
+}
+
+INSTANTIATE_TEST_SUITE_P(Handles, NeoHookeanResponseTest, ::testing::Values(1, 2, 3),
                          [](const auto& test) { return "With" + std::to_string(test.param); });
 
 TEST(NeoHookeanResponseCoverTest, CoversItsRangeAndNoScale) {

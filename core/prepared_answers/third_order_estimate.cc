@@ -1,0 +1,77 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/prepared_answers/third_order_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <utility>
+#include <vector>
+
+namespace tissueform {
+namespace {
+
+// Products with more would take as long as what they estimate.
+constexpr size_t kProbes = 64;
+
+// The vertex that a column moves most, and how far.
+std::pair<Eigen::Index, double> LargestMove(const Eigen::Ref<const Eigen::VectorXd>& column) {
+  Eigen::Index vertex = 0;
+  if (column.size() == 0) return {vertex, 0};
+  const double square =
+      column.reshaped(3, column.size() / 3).colwise().squaredNorm().maxCoeff(&vertex);
+  return {vertex, std::sqrt(square)};
+}
+
+Eigen::VectorXd Gains(const Eigen::MatrixXd& columns) {
+  Eigen::VectorXd gains(columns.cols());
+  for (Eigen::Index c = 0; c < columns.cols(); ++c) gains[c] = LargestMove(columns.col(c)).second;
+  return gains;
+}
+
+// Those that single columns move most, by how much of any.
+std::vector<Eigen::Index> MostMoved(const Eigen::MatrixXd& columns) {
+  std::map<Eigen::Index, double> moved;
+  for (Eigen::Index c = 0; c < columns.cols(); ++c) {
+    const auto [vertex, move] = LargestMove(columns.col(c));
+    moved[vertex] = std::max(moved[vertex], move);
+  }
+  std::vector<std::pair<double, Eigen::Index>> order;
+  order.reserve(moved.size());
+  for (const auto& [vertex, move] : moved) order.emplace_back(move, vertex);
+  std::sort(order.begin(), order.end(), std::greater<>());
+  if (order.size() > kProbes) order.resize(kProbes);
+  std::vector<Eigen::Index> vertices;
+  vertices.reserve(order.size());
+  for (const auto& [move, vertex] : order) vertices.push_back(vertex);
+  return vertices;
+}
+
+}  // namespace
+
+ThirdOrderEstimate::ThirdOrderEstimate(const Eigen::MatrixXd& first, const Eigen::MatrixXd& second,
+                                       double size_mm)
+    : size_mm_(size_mm), first_gains_(Gains(first)), second_gains_(Gains(second)) {
+  const std::vector<Eigen::Index> vertices = MostMoved(second);
+  probes_.resize(3 * static_cast<Eigen::Index>(vertices.size()), second.cols());
+  for (size_t p = 0; p < vertices.size(); ++p) {
+    probes_.middleRows<3>(3 * static_cast<Eigen::Index>(p)) =
+        second.middleRows<3>(3 * vertices[p]).cast<float>();
+  }
+}
+
+double ThirdOrderEstimate::UnscaledMm(const Eigen::VectorXd& products) const {
+  const Eigen::VectorXf moves = probes_ * products.cast<float>();
+  const double together = LargestMove(moves.cast<double>()).second;
+  const double single = second_gains_.cwiseProduct(products).norm();
+  return std::pow(together * single, 0.75) / std::sqrt(size_mm_);
+}
+
+int64_t ThirdOrderEstimate::bytes_held() const {
+  return probes_.size() * static_cast<int64_t>(sizeof(float)) +
+         (first_gains_.size() + second_gains_.size()) * static_cast<int64_t>(sizeof(double));
+}
+
+}  // namespace tissueform
