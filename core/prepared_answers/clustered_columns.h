@@ -16,7 +16,7 @@ namespace tissueform {
 //   displacements of cluster k = columns_k * (map_k * f),
 // columns_k the columns of its vertices turned to their principal axes under the weight of typical
 // uses (as ColumnCompression does for all vertices at once). Of 207 columns over the skin of a head
-// with three handles a cluster of 128 vertices needs some 25.
+// with three handles a cluster of 128 vertices needs 17 on average.
 //
 // What is cut is judged by uses that are tried, not by a bound, which adds up what the many small
 // columns do as if they all did it at once: for answers that are estimates themselves.
