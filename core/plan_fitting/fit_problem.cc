@@ -56,7 +56,7 @@ class Resolver {
       const auto& names = problem_.handle_names;
       const auto found = std::find(names.begin(), names.end(), freedom.handle);
       if (found == names.end()) {
-        return absl::InvalidArgumentError(absl::StrCat("moving handle \"", freedom.handle,
+        return absl::InvalidArgumentError(absl::StrCat("free handle \"", freedom.handle,
                                                        "\": the plan has no such handle; it has ",
                                                        absl::StrJoin(names, ", ")));
       }

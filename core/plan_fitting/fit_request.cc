@@ -31,8 +31,7 @@ absl::Status CheckWish(const FitTargetRequest& target, const std::string& what) 
                      (target.direction.has_value() ? 1 : 0);
   if (wishes != 1) {
     return Refuse(what,
-                  "it must say what is wanted in one way: position_mm, displacement_mm, or "
-                  "direction with movement_mm");
+                  "it must say what is wanted in one way: move_mm, along with by_mm, or to_mm");
   }
   if (target.direction.has_value() && target.direction->isZero(0)) {
     return Refuse(what, "its direction has no length");
@@ -90,7 +89,7 @@ absl::Status CheckRanges(const std::array<FitFreedom::Range, 3>& ranges, const R
 }
 
 absl::Status CheckFreedom(const FitFreedom& freedom) {
-  const std::string what = absl::StrCat("moving handle \"", freedom.handle, "\"");
+  const std::string what = absl::StrCat("free handle \"", freedom.handle, "\"");
   if (!IsFinite(freedom.pivot_mm)) return Refuse(what, "its pivot_mm is NaN or infinite");
   TF_RETURN_IF_ERROR(CheckRanges(freedom.rotation, kRotation, what));
   return CheckRanges(freedom.translation, kTranslation, what);
@@ -131,7 +130,7 @@ absl::Status CheckFitRequest(const FitRequest& request) {
   for (const FitFreedom& freedom : request.moving) {
     TF_RETURN_IF_ERROR(CheckFreedom(freedom));
     if (!handles.insert(freedom.handle).second) {
-      return Refuse(absl::StrCat("moving handle \"", freedom.handle, "\""),
+      return Refuse(absl::StrCat("free handle \"", freedom.handle, "\""),
                     "it is listed twice; put its bounds together");
     }
   }

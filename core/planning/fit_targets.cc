@@ -3,6 +3,7 @@
 
 #include "core/planning/fit_targets.h"
 
+#include <algorithm>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -15,7 +16,9 @@
 #include "core/json/json_file.h"
 #include "core/json/json_schema.h"
 #include "core/json/json_text.h"
+#include "core/mesh/tet_topology.h"
 #include "core/planning/json_values.h"
+#include "core/planning/selector.h"
 #include "core/planning/skin_places.h"
 
 namespace tissueform {
@@ -50,9 +53,9 @@ std::optional<Vector3d> OptionalVector(const Json& json, const char* key) {
   return VectorFromJson(json.at(key));
 }
 
-absl::StatusOr<std::vector<int32_t>> FindVertices(const Json& json, const PlanProblem& problem) {
+absl::StatusOr<std::vector<int32_t>> VerticesOfPlace(const Json& at, const PlanProblem& problem) {
   TF_ASSIGN_OR_RETURN(const std::vector<SkinPlace> places, SkinPlaces(problem.point_data));
-  const std::string name = json.at("place");
+  const std::string name = at.at("place");
   const SkinPlace* place = FindPlace(places, name);
   if (place == nullptr) {
     if (places.empty()) {
@@ -65,42 +68,62 @@ absl::StatusOr<std::vector<int32_t>> FindVertices(const Json& json, const PlanPr
         absl::StrJoin(places, ", ",
                       [](std::string* out, const SkinPlace& known) { out->append(known.name); })));
   }
-  if (json.value("at", "mean") == "mean") return place->vertices;
+  if (!at.value("foremost", false)) return place->vertices;
   return std::vector<int32_t>{ForemostVertex(problem.mesh->positions(), place->vertices)};
 }
 
+// Of a selector those that are skin.
+absl::StatusOr<std::vector<int32_t>> SelectedSkin(const Json& at, const PlanProblem& problem) {
+  Positions positions = problem.mesh->positions();
+  SwapToOrFromLps(problem.written_in, &positions);
+  TF_ASSIGN_OR_RETURN(
+      std::vector<int32_t> vertices,
+      ResolveSelector(SelectorFromJson(at), {positions, problem.point_data}, "\"at\""));
+  const std::vector<int32_t> surface = BoundaryVertices(*problem.mesh);
+  std::erase_if(vertices, [&surface](int32_t vertex) {
+    return !std::binary_search(surface.begin(), surface.end(), vertex);
+  });
+  if (!vertices.empty()) return vertices;
+  return absl::InvalidArgumentError("\"at\" selects no vertex of the surface");
+}
+
+absl::Status ReadPoint(const Json& at, const PlanProblem& problem, FitTargetRequest* target) {
+  target->point_mm = OptionalVector(at, "point_mm");
+  if (target->point_mm) return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(target->vertices, at.contains("place") ? VerticesOfPlace(at, problem)
+                                                             : SelectedSkin(at, problem));
+  return absl::OkStatus();
+}
+
 absl::StatusOr<FitTargetRequest> ToTarget(const Json& json, const PlanProblem& problem) {
-  if (json.contains("place") == json.contains("point_mm")) {
-    return absl::InvalidArgumentError("it must have one of point_mm and place");
-  }
-  if (json.contains("at") && !json.contains("place")) {
-    return absl::InvalidArgumentError("\"at\" is for a place; leave it out");
-  }
-  if (json.contains("direction") != json.contains("movement_mm")) {
-    return absl::InvalidArgumentError("direction and movement_mm belong together; give both");
+  if (json.contains("along") != json.contains("by_mm")) {
+    return absl::InvalidArgumentError("along and by_mm belong together; give both");
   }
   FitTargetRequest target;
-  target.name = json.at("name");
-  target.point_mm = OptionalVector(json, "point_mm");
-  target.position_mm = OptionalVector(json, "position_mm");
-  target.displacement_mm = OptionalVector(json, "displacement_mm");
-  if (json.contains("place")) {
-    TF_ASSIGN_OR_RETURN(target.vertices, FindVertices(json, problem));
-  }
-  if (json.contains("direction")) {
-    target.direction = ToDirection(json.at("direction"), problem.written_in);
-    target.movement_mm = json.at("movement_mm");
+  TF_RETURN_IF_ERROR(ReadPoint(json.at("at"), problem, &target));
+  target.position_mm = OptionalVector(json, "to_mm");
+  target.displacement_mm = OptionalVector(json, "move_mm");
+  if (json.contains("along")) {
+    target.direction = ToDirection(json.at("along"), problem.written_in);
+    target.movement_mm = json.at("by_mm");
   }
   target.weight = json.value("weight", 1.0);
   return target;
 }
 
+// Names are left out where there is one of a place.
+std::string NameOf(const Json& target, size_t index) {
+  const std::string number = absl::StrCat("target ", index + 1);
+  return target.value("name", target.at("at").value("place", number));
+}
+
 std::array<FitFreedom::Range, 3> ToRanges(const Json& json, const char* key, double unit) {
   std::array<FitFreedom::Range, 3> ranges;
   if (!json.contains(key)) return ranges;
-  for (const auto& [axis, bounds] : json.at(key).items()) {
-    ranges[static_cast<size_t>(axis[0] - 'x')] = {bounds.at(0).get<double>() * unit,
-                                                  bounds.at(1).get<double>() * unit};
+  for (size_t axis = 0; axis < ranges.size(); ++axis) {
+    const Json& bounds = json.at(key).at(axis);
+    if (bounds.is_null()) continue;
+    ranges[axis] = {bounds.at(0).get<double>() * unit, bounds.at(1).get<double>() * unit};
   }
   return ranges;
 }
@@ -123,15 +146,16 @@ absl::StatusOr<FitRequest> ToRequest(const Json& json, const PlanProblem& proble
   FitRequest request;
   request.axes = problem.written_in;
   for (const Json& target : json.at("targets")) {
+    const std::string name = NameOf(target, request.targets.size());
     absl::StatusOr<FitTargetRequest> made = ToTarget(target, problem);
     if (!made.ok()) {
       return absl::Status(made.status().code(),
-                          absl::StrCat("target \"", target.at("name").get<std::string>(),
-                                       "\": ", made.status().message()));
+                          absl::StrCat("target \"", name, "\": ", made.status().message()));
     }
+    made->name = name;
     request.targets.push_back(*std::move(made));
   }
-  for (const Json& moving : json.at("moving")) request.moving.push_back(ToFreedom(moving));
+  for (const Json& free : json.at("free")) request.moving.push_back(ToFreedom(free));
   request.symmetric = json.value("symmetric", false);
   request.less_movement = json.value("less_movement", request.less_movement);
   request.tolerance_mm = json.value("tolerance_mm", request.tolerance_mm);

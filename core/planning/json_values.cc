@@ -43,4 +43,20 @@ nlohmann::json ToJson(const HandlePose& pose) {
       {"scale", pose.scale}};
 }
 
+VertexSelector SelectorFromJson(const nlohmann::json& json) {
+  if (json.contains("vertices")) {
+    return {SelectVertices{json.at("vertices").get<std::vector<int64_t>>()}};
+  }
+  if (json.contains("point_data")) {
+    return {SelectByPointData{json.at("point_data"), json.at("equals")}};
+  }
+  if (json.contains("box_mm")) {
+    const nlohmann::json& box = json.at("box_mm");
+    return {SelectBox{VectorFromJson(box.at("min")), VectorFromJson(box.at("max"))}};
+  }
+  SelectUnion parts;
+  for (const nlohmann::json& part : json.at("union")) parts.of.push_back(SelectorFromJson(part));
+  return {std::move(parts)};
+}
+
 }  // namespace tissueform

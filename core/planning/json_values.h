@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "core/constraints/handle_pose.h"
+#include "core/planning/plan.h"
 
 namespace tissueform {
 
@@ -15,6 +16,9 @@ namespace tissueform {
 // [x, y, z]
 Eigen::Vector3d VectorFromJson(const nlohmann::json& json);
 nlohmann::json ToJson(const Eigen::Vector3d& vector);
+
+// One of the selectors (docs/plan-format.md).
+VertexSelector SelectorFromJson(const nlohmann::json& json);
 
 // A pose of a handle (docs/plan-format.md); what is left out is the identity's.
 HandlePose PoseFromJson(const nlohmann::json& json);

@@ -22,22 +22,6 @@ using Json = nlohmann::json;
 
 // What follows reads a text that has passed the schema: keys and types are as they must be.
 
-VertexSelector ToSelector(const Json& json) {
-  if (json.contains("vertices")) {
-    return {SelectVertices{json.at("vertices").get<std::vector<int64_t>>()}};
-  }
-  if (json.contains("point_data")) {
-    return {SelectByPointData{json.at("point_data"), json.at("equals")}};
-  }
-  if (json.contains("box_mm")) {
-    const Json& box = json.at("box_mm");
-    return {SelectBox{VectorFromJson(box.at("min")), VectorFromJson(box.at("max"))}};
-  }
-  SelectUnion parts;
-  for (const Json& part : json.at("union")) parts.of.push_back(ToSelector(part));
-  return {std::move(parts)};
-}
-
 // {"LABEL": NUMBER, ...}
 absl::StatusOr<std::vector<std::pair<int64_t, double>>> ToLabelled(const Json& json,
                                                                    const char* pointer) {
@@ -80,7 +64,7 @@ absl::StatusOr<PlannedUncertainty> ToUncertainty(const Json& json) {
 }
 
 PlannedHandle ToHandle(const Json& json) {
-  return {json.at("name"), ToSelector(json.at("region")),
+  return {json.at("name"), SelectorFromJson(json.at("region")),
           PoseFromJson(json.value("pose", Json::object()))};
 }
 
@@ -106,7 +90,7 @@ absl::StatusOr<Plan> ToPlan(const Json& json, const std::string& folder) {
                        .string();
   TF_ASSIGN_OR_RETURN(plan.stiffness, ToStiffness(json.at("stiffness")));
   plan.poisson_ratio = json.value("poisson_ratio", 0.45);
-  plan.fixed = ToSelector(json.at("fixed"));
+  plan.fixed = SelectorFromJson(json.at("fixed"));
   for (const Json& handle : json.at("handles")) plan.handles.push_back(ToHandle(handle));
   TF_RETURN_IF_ERROR(ReadModel(json, &plan));
   if (json.contains("uncertainty")) {

@@ -45,6 +45,7 @@ struct PlanFitOptions {
   PlanReadOptions reading;
   std::string targets;
   std::string out;
+  std::string report;
   std::string model;
   int threads = AvailableProcessors();
   bool overwrite = false;
@@ -54,6 +55,7 @@ struct PlanFitOptions {
 
 // A plan is somebody's work: unlike a result it is not replaced because its name was given again.
 absl::Status CheckOut(const PlanFitOptions& options) {
+  if (!options.report.empty()) TF_RETURN_IF_ERROR(CheckWritable(options.report));
   if (options.out.empty()) return absl::OkStatus();
   TF_RETURN_IF_ERROR(CheckWritable(options.out));
   std::error_code ignored;
@@ -190,7 +192,11 @@ absl::Status RunPlanFit(const PlanFitOptions& options) {
                          .prepare_seconds = prepare_seconds,
                          .fit_seconds = stopwatch.Seconds()};
   TF_RETURN_IF_ERROR(WriteFittedPlan(options, plan, resolved, *problem, fit));
-  PrintReport(options.json, FitReportText(report), FitReportJson(report));
+  const auto json = FitReportJson(report);
+  if (!options.report.empty()) {
+    TF_RETURN_IF_ERROR(WriteFileAtomically(options.report, json.dump(2) + "\n"));
+  }
+  PrintReport(options.json, FitReportText(report), json);
   if (!fit.converged || !fit.model_converged) {
     absl::FPrintF(stderr, "warning: %s\n",
                   fit.model_converged ? "the search has not converged; the best is told"
@@ -204,15 +210,14 @@ constexpr char kFooter[] =
     "degrees, in\nthe plan's axes:\n"
     "  {\"format\": \"tissueform-targets\", \"version\": 1, \"unit\": \"mm\", "
     "\"coordinate_system\": \"LPS\",\n"
-    "   \"targets\": [{\"name\": \"chin\", \"place\": \"chin\", \"direction\": \"forward\", "
-    "\"movement_mm\": 5}],\n"
-    "   \"moving\": [{\"handle\": \"mandible\", \"translation_mm\": {\"y\": [-10, 5], \"z\": [-3, "
-    "3]},\n"
-    "               \"rotation_vector_deg\": {\"x\": [-5, 5]}}],\n"
+    "   \"free\": [{\"handle\": \"mandible\", \"translation_mm\": [null, [-10, 5], [-3, 3]],\n"
+    "             \"rotation_vector_deg\": [[-5, 5], null, null]}],\n"
+    "   \"targets\": [{\"at\": {\"place\": \"chin\"}, \"along\": \"forward\", \"by_mm\": 5}],\n"
     "   \"symmetric\": true}\n"
-    "A target is a named place, or a point on the skin (\"point_mm\"); it is to go along a "
-    "direction, by a\nvector (\"displacement_mm\") or to a position (\"position_mm\"). What is not "
-    "listed does not move. All\nkeys: docs/plan-fitting.md.\n\n"
+    "A target is at a named place, at a point on the skin (\"point_mm\") or at vertices that a "
+    "selector names;\nit is to go by_mm along a direction, by a vector (\"move_mm\") or to a "
+    "position (\"to_mm\"). What is not\nfree, or null, does not move. All keys: "
+    "docs/plan-fitting.md.\n\n"
     "Told are: what was reached (by the full model), what cannot be reached and by how much, which "
     "bounds\nhold, and how well the targets determine every number.\n\n"
     "Examples:\n"
@@ -232,6 +237,8 @@ void AddPlanFitCommand(CLI::App& app, CommandWork* work) {
   fit->add_option("--targets", options->targets, "what is wanted and what may move, see below")
       ->required();
   fit->add_option("--out", options->out, "plan with the poses that were found to write");
+  fit->add_option("--report", options->report,
+                  "also write what is told, and more, to this JSON file");
   fit->add_option("--model", options->model, "use this model instead of the plan's")
       ->check(CLI::IsMember(KnownModelNames()));
   fit->add_option("--threads", options->threads,

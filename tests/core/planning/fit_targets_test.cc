@@ -54,9 +54,9 @@ PlanProblem BarProblem(CoordinateSystem axes) {
 Json Targets() {
   return Json::parse(R"({
     "format": "tissueform-targets", "version": 1, "unit": "mm", "coordinate_system": "LPS",
-    "targets": [{"name": "side", "point_mm": [0, 4, 8], "displacement_mm": [1, 2, 3]}],
-    "moving": [{"handle": "handle 0", "translation_mm": {"y": [-2, 3]},
-                "rotation_vector_deg": {"x": [-45, 90]}, "pivot_mm": [1, 2, 3]}]})");
+    "targets": [{"name": "side", "at": {"point_mm": [0, 4, 8]}, "move_mm": [1, 2, 3]}],
+    "free": [{"handle": "handle 0", "translation_mm": [null, [-2, 3], null],
+              "rotation_vector_deg": [[-45, 90], null, null], "pivot_mm": [1, 2, 3]}]})");
 }
 
 absl::StatusOr<FitRequest> Parse(const Json& json, CoordinateSystem axes = CoordinateSystem::kLps) {
@@ -87,17 +87,33 @@ TEST(FitTargetsTest, NumbersBecomeRadiansAndDefaultsAreThoseOfTheSchema) {
 TEST(FitTargetsTest, PlacesAreTheirVerticesOrTheForemostOne) {
   Json json =
       With("/targets/0",
-           {{"name", "chin"}, {"place", "chin"}, {"direction", "forward"}, {"movement_mm", 5}});
+           {{"at", {{"place", "chin"}}}, {"along", "forward"}, {"by_mm", 5}});
   ASSERT_OK_AND_ASSIGN(const FitRequest mean, Parse(json));
+  EXPECT_EQ(mean.targets.at(0).name, "chin");
   EXPECT_EQ(mean.targets.at(0).vertices.size(), 20);
   EXPECT_EQ(mean.targets.at(0).direction, Vector3d(0, -1, 0));
-  json["targets"][0]["at"] = "foremost";
+  json["targets"][0]["at"]["foremost"] = true;
   ASSERT_OK_AND_ASSIGN(const FitRequest foremost, Parse(json));
   EXPECT_EQ(foremost.targets.at(0).vertices.size(), 1);
   // Forward is forward in all axes.
   json["coordinate_system"] = "RAS";
   ASSERT_OK_AND_ASSIGN(const FitRequest ras, Parse(json, CoordinateSystem::kRas));
   EXPECT_EQ(ras.targets.at(0).direction, Vector3d(0, 1, 0));
+}
+
+TEST(FitTargetsTest, SelectorsNameVerticesOfTheSurfaceInThePlansAxes) {
+  Json json = With("/targets/0/at",
+                   {{"box_mm", {{"min", {3, 3, 7}}, {"max", {9, 5, 9}}}}});  // one inside, two not
+  json["targets"][0].erase("name");
+  ASSERT_OK_AND_ASSIGN(const FitRequest request, Parse(json));
+  EXPECT_EQ(request.targets.at(0).name, "target 1");
+  const TetMesh bar = testing::Bar({4, 4, 8}, 2.0);
+  ASSERT_EQ(request.targets.at(0).vertices.size(), 1);
+  EXPECT_EQ(bar.positions().row(request.targets.at(0).vertices[0]), Eigen::RowVector3d(8, 4, 8));
+  json["coordinate_system"] = "RAS";
+  json["targets"][0]["at"] = {{"box_mm", {{"min", {-9, -5, 7}}, {"max", {-7, -3, 9}}}}};
+  ASSERT_OK_AND_ASSIGN(const FitRequest ras, Parse(json, CoordinateSystem::kRas));
+  EXPECT_EQ(ras.targets.at(0).vertices, request.targets.at(0).vertices);
 }
 
 TEST(FitTargetsTest, ExampleOfTheDocsIsRead) {
@@ -115,17 +131,20 @@ TEST(FitTargetsTest, MistakesAreNamedInOneLine) {
   };
   refused(With("/colour", 1), "unknown key \"colour\"");
   refused(With("/version", 7), "version");
-  refused(With("/targets/0/point_mm", {1, 2}), "/targets/0/point_mm");
+  refused(With("/targets/0/at/point_mm", {1, 2}), "/targets/0/at");
   refused(With("/targets/0/weight", 0), "/targets/0/weight");
-  refused(With("/moving/0/translation_mm/y", {3, -2}), "bounds of its translation along y cross");
+  refused(With("/free/0/translation_mm/1", {3, -2}), "bounds of its translation along y cross");
+  refused(With("/free/0/translation_mm", {{1, 2}}), "/free/0/translation_mm");
   refused(With("/coordinate_system", "RAS"), "its coordinate_system is RAS and the plan's is LPS");
-  refused(With("/targets/0/place", "chin"), "it must have one of point_mm and place");
-  refused(With("/targets/0/at", "mean"), "\"at\" is for a place");
-  refused(With("/targets/0/movement_mm", 3), "direction and movement_mm belong together");
-  refused(With("/targets/0/position_mm", {1, 2, 3}), "what is wanted in one way");
+  refused(With("/targets/0/at/place", "chin"), "/targets/0/at");
+  refused(With("/targets/0/at/foremost", true), "/targets/0/at");
+  refused(With("/targets/0/by_mm", 3), "along and by_mm belong together");
+  refused(With("/targets/0/to_mm", {1, 2, 3}), "what is wanted in one way");
+  refused(With("/targets/0/at", {{"box_mm", {{"min", {3, 3, 7}}, {"max", {5, 5, 9}}}}}),
+          "\"at\" selects no vertex of the surface");
+  refused(With("/targets/0/at", {{"vertices", {9999}}}), "\"at\"");
   Json place = Targets();
-  place["targets"][0].erase("point_mm");
-  place["targets"][0]["place"] = "ear";
+  place["targets"][0]["at"] = {{"place", "ear"}};
   refused(place, "target \"side\": the mesh has no place \"ear\"; it has lower_lip, chin, face");
   PlanProblem bare = BarProblem(CoordinateSystem::kLps);
   bare.point_data.clear();

@@ -40,10 +40,10 @@ class PlanFitTest : public CliTest {
     Write("plan.json", ReadJson(TestDataPath("plans/bar/plan.json")).dump());
     targets_ = Json::parse(R"({
       "format": "tissueform-targets", "version": 1, "unit": "mm", "coordinate_system": "LPS",
-      "targets": [{"name": "side", "point_mm": [0, 10, 40], "direction": [1, 0, 0],
-                   "movement_mm": 2}],
-      "moving": [{"handle": "top", "translation_mm": {"x": [-6, 6], "y": [-6, 6], "z": [-6, 6]},
-                  "rotation_vector_deg": {"x": [-10, 10], "y": [-10, 10], "z": [-10, 10]}}]})");
+      "free": [{"handle": "top", "translation_mm": [[-6, 6], [-6, 6], [-6, 6]],
+                "rotation_vector_deg": [[-10, 10], [-10, 10], [-10, 10]]}],
+      "targets": [{"name": "side", "at": {"point_mm": [0, 10, 40]}, "along": [1, 0, 0],
+                   "by_mm": 2}]})");
   }
 
   ProcessResult Fit(std::vector<std::string> more = {}) {
@@ -76,8 +76,8 @@ TEST_F(PlanFitTest, DeformOfTheFittedPlanDoesWhatWasWanted) {
   const TetMeshFile bar = *ReadTetMesh(Path("bar.vtu"));
   const Vector3d rest = bar.mesh.positions().row(kVertex);
   targets_["targets"] = {{{"name", "rim"},
-                          {"point_mm", {rest.x(), rest.y(), rest.z()}},
-                          {"displacement_mm", {1.5, -1, 0.5}}}};
+                          {"at", {{"point_mm", {rest.x(), rest.y(), rest.z()}}}},
+                          {"move_mm", {1.5, -1, 0.5}}}};
   const ProcessResult result = Fit({"--out", "fitted.json"});
   EXPECT_THAT(result, Succeeds());
   EXPECT_THAT(result.out,
@@ -102,7 +102,7 @@ TEST_F(PlanFitTest, JsonTellsAllWithUnitsAndNotice) {
 }
 
 TEST_F(PlanFitTest, TargetsThatAreNotReachedEndWithOneAndThePlanIsWritten) {
-  targets_["targets"][0]["movement_mm"] = 30;
+  targets_["targets"][0]["by_mm"] = 30;
   EXPECT_THAT(Fit({"--out", "fitted.json"}),
               FailsWith(1, AllOf(HasSubstr("1 of 1 targets cannot be reached: missed most is "
                                            "\"side\" by "),
@@ -116,7 +116,7 @@ TEST_F(PlanFitTest, TargetsThatAreNotReachedEndWithOneAndThePlanIsWritten) {
 TEST_F(PlanFitTest, ContradictoryTargetsAreBothTold) {
   Json other = targets_["targets"][0];
   other["name"] = "same side";
-  other["movement_mm"] = -2;
+  other["by_mm"] = -2;
   targets_["targets"].push_back(other);
   EXPECT_THAT(Fit(),
               FailsWith(1, AllOf(HasSubstr("\"side\" by 2.0"), HasSubstr("\"same side\" by 2.0"),
@@ -134,16 +134,16 @@ TEST_F(PlanFitTest, NothingIsReplacedUnasked) {
 }
 
 TEST_F(PlanFitTest, BadTargetsAreOneLineAndNothingIsWritten) {
-  EXPECT_THAT(FitWith("/targets/0/point_mm", {-9, 10, 40}),
+  EXPECT_THAT(FitWith("/targets/0/at/point_mm", {-9, 10, 40}),
               FailsWith(1, AllOf(HasSubstr("targets.json: target \"side\""),
                                  HasSubstr(" mm off the skin"))));
-  EXPECT_THAT(FitWith("/moving/0/handle", "jaw"), FailsWith(1, HasSubstr("it has top")));
+  EXPECT_THAT(FitWith("/free/0/handle", "jaw"), FailsWith(1, HasSubstr("it has top")));
   EXPECT_THAT(FitWith("/targets/0/weight", 0), FailsWith(1, HasSubstr("/targets/0/weight")));
-  EXPECT_THAT(FitWith("/moving/0/translation_mm/x", {2, 1}), FailsWith(1, HasSubstr("cross")));
-  EXPECT_THAT(FitWith("/moving/0/rotation_vector_deg/x", {-1700, 1700}),
+  EXPECT_THAT(FitWith("/free/0/translation_mm/0", {2, 1}), FailsWith(1, HasSubstr("cross")));
+  EXPECT_THAT(FitWith("/free/0/rotation_vector_deg/0", {-1700, 1700}),
               FailsWith(1, HasSubstr("rotation about x go beyond 90 degrees")));
-  EXPECT_THAT(FitWith("/targets/0/movement_mm", "far"),
-              FailsWith(1, HasSubstr("/targets/0/movement_mm")));
+  EXPECT_THAT(FitWith("/targets/0/by_mm", "far"),
+              FailsWith(1, HasSubstr("/targets/0/by_mm")));
   EXPECT_THAT(Run({"plan", "fit", "plan.json", "--targets", "none.json"}),
               FailsWith(1, HasSubstr("targets file none.json does not exist")));
   EXPECT_THAT(Run({"plan", "fit", "plan.json"}), FailsWith(2, HasSubstr("--targets")));
@@ -180,10 +180,10 @@ TEST_F(PlanFitTest, KnownPoseOfABundledHeadIsFoundAgain) {
             .colwise()
             .mean();
     targets_["targets"].push_back({{"name", place.name},
-                                   {"place", place.name},
-                                   {"displacement_mm", {moved.x(), moved.y(), moved.z()}}});
+                                   {"at", {{"place", place.name}}},
+                                   {"move_mm", {moved.x(), moved.y(), moved.z()}}});
   }
-  targets_["moving"][0]["handle"] = "mandible";
+  targets_["free"][0]["handle"] = "mandible";
   targets_["less_movement"] = 1e-4;
   plan["handles"][0].erase("pose");
   Write("plan.json", plan.dump());
