@@ -159,7 +159,7 @@ TEST_F(FitProblemTest, BadFreedomsAreNamed) {
     request_ = sound;
   };
   refused([&] { freedom().handle = "nose"; },
-          "moving handle \"nose\": the plan has no such handle; it has handle 0, handle 1");
+          "free handle \"nose\": the plan has no such handle; it has handle 0, handle 1");
   refused([&] { request_.moving.push_back(freedom()); }, "it is listed twice");
   refused([&] { request_.moving.clear(); }, "nothing may move");
   refused(

@@ -85,9 +85,7 @@ TEST(FitTargetsTest, NumbersBecomeRadiansAndDefaultsAreThoseOfTheSchema) {
 }
 
 TEST(FitTargetsTest, PlacesAreTheirVerticesOrTheForemostOne) {
-  Json json =
-      With("/targets/0",
-           {{"at", {{"place", "chin"}}}, {"along", "forward"}, {"by_mm", 5}});
+  Json json = With("/targets/0", {{"at", {{"place", "chin"}}}, {"along", "forward"}, {"by_mm", 5}});
   ASSERT_OK_AND_ASSIGN(const FitRequest mean, Parse(json));
   EXPECT_EQ(mean.targets.at(0).name, "chin");
   EXPECT_EQ(mean.targets.at(0).vertices.size(), 20);

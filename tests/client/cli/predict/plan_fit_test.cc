@@ -142,8 +142,7 @@ TEST_F(PlanFitTest, BadTargetsAreOneLineAndNothingIsWritten) {
   EXPECT_THAT(FitWith("/free/0/translation_mm/0", {2, 1}), FailsWith(1, HasSubstr("cross")));
   EXPECT_THAT(FitWith("/free/0/rotation_vector_deg/0", {-1700, 1700}),
               FailsWith(1, HasSubstr("rotation about x go beyond 90 degrees")));
-  EXPECT_THAT(FitWith("/targets/0/by_mm", "far"),
-              FailsWith(1, HasSubstr("/targets/0/by_mm")));
+  EXPECT_THAT(FitWith("/targets/0/by_mm", "far"), FailsWith(1, HasSubstr("/targets/0/by_mm")));
   EXPECT_THAT(Run({"plan", "fit", "plan.json", "--targets", "none.json"}),
               FailsWith(1, HasSubstr("targets file none.json does not exist")));
   EXPECT_THAT(Run({"plan", "fit", "plan.json"}), FailsWith(2, HasSubstr("--targets")));
