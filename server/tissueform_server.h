@@ -14,6 +14,7 @@
 #include "server/rpc/deform_service.h"
 #include "server/rpc/deform_streams.h"
 #include "server/rpc/mesh_service.h"
+#include "server/rpc/plan_service.h"
 #include "server/rpc/prediction_service.h"
 #include "server/rpc/server_info_service.h"
 #include "server/rpc/session_service.h"
@@ -84,6 +85,7 @@ class TissueformServer {
   SessionService session_service_;
   DeformService deform_service_;
   PredictionService prediction_service_;
+  PlanService plan_service_;
   ServerInfoService server_info_service_;
   // gRPC gets its connections from the listener, through the acceptor. The server comes last: what
   // it is given goes to the acceptor of a server that lives.

@@ -39,5 +39,7 @@ TriangleIndices BoundaryFacets(const TetMesh& mesh);
 
 // The distinct vertices of BoundaryFacets, rising: the "skin" of a mesh.
 std::vector<int32_t> BoundaryVertices(const TetMesh& mesh);
+// The same where the facets are there already.
+std::vector<int32_t> VerticesOf(const TriangleIndices& facets);
 
 }  // namespace tissueform

@@ -9,8 +9,6 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "core/mesh/tet_topology.h"
-
 namespace tissueform {
 namespace {
 
@@ -50,19 +48,6 @@ Vector3d NearestShares(const Vector3d& p, const Vector3d& a, const Vector3d& b, 
   return {over_bc / whole, over_ac / whole, over_ab / whole};
 }
 
-bool IsInTissue(const TetMesh& mesh, const Vector3d& place) {
-  const Positions& positions = mesh.positions();
-  for (Index t = 0; t < mesh.num_tets(); ++t) {
-    const auto corner = [&](int k) -> Vector3d { return positions.row(mesh.tets()(t, k)); };
-    const Vector3d last = corner(3);
-    Eigen::Matrix3d edges;
-    edges << corner(0) - last, corner(1) - last, corner(2) - last;
-    const Vector3d shares = edges.inverse() * (place - last);
-    if (shares.minCoeff() >= 0 && shares.sum() <= 1) return true;
-  }
-  return false;
-}
-
 }  // namespace
 
 Vector3d PositionOf(const MeshPoint& point, const Positions& positions) {
@@ -78,10 +63,11 @@ MeshPoint MeanOfVertices(const std::vector<int32_t>& vertices) {
           std::vector<double>(vertices.size(), 1.0 / static_cast<double>(vertices.size()))};
 }
 
-SkinFacets::SkinFacets(const TetMesh& mesh, const ConstraintSet& constraints) : mesh_(mesh) {
+SkinFacets::SkinFacets(const TetMesh& mesh, const TriangleIndices& boundary,
+                       const ConstraintSet& constraints)
+    : mesh_(mesh) {
   std::vector<char> is_constrained(static_cast<size_t>(mesh.num_vertices()), 0);
   for (const int32_t v : constraints.constrained()) is_constrained[static_cast<size_t>(v)] = 1;
-  const TriangleIndices boundary = BoundaryFacets(mesh);
   std::vector<Index> skin;
   for (Index f = 0; f < boundary.rows(); ++f) {
     const bool is_bone = is_constrained[static_cast<size_t>(boundary(f, 0))] != 0 &&
@@ -116,8 +102,20 @@ NearestSkin SkinFacets::Nearest(const Vector3d& place) const {
     nearest.point = {{facets_(f, 0), facets_(f, 1), facets_(f, 2)},
                      {shares[0], shares[1], shares[2]}};
   }
-  nearest.in_tissue = IsInTissue(mesh_, place);
   return nearest;
+}
+
+bool SkinFacets::IsInTissue(const Vector3d& place) const {
+  const Positions& positions = mesh_.positions();
+  for (Index t = 0; t < mesh_.num_tets(); ++t) {
+    const auto corner = [&](int k) -> Vector3d { return positions.row(mesh_.tets()(t, k)); };
+    const Vector3d last = corner(3);
+    Eigen::Matrix3d edges;
+    edges << corner(0) - last, corner(1) - last, corner(2) - last;
+    const Vector3d shares = edges.inverse() * (place - last);
+    if (shares.minCoeff() >= 0 && shares.sum() <= 1) return true;
+  }
+  return false;
 }
 
 }  // namespace tissueform

@@ -32,7 +32,8 @@ struct StoredMesh {
   std::string sha256;
   TetMesh mesh;
   std::vector<CellArray> cell_arrays;
-  std::vector<int32_t> skin;  // BoundaryVertices
+  TriangleIndices skin_facets;  // BoundaryFacets
+  std::vector<int32_t> skin;    // their vertices, rising
 
   // Null when the mesh has no array of that name.
   const CellArray* FindCellArray(absl::string_view name) const;
