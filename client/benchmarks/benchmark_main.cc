@@ -35,7 +35,8 @@ absl::StatusOr<FrameBenchmarkList> FrameBenchmarks(const TestBar& bar, int threa
   std::vector<FrameBenchmark::Kind> kinds = {FrameBenchmark::Kind::kBasis};
   if (bar.number != kLargeBar) {
     kinds.insert(kinds.end(),
-                 {FrameBenchmark::Kind::kBasisThreeHandles, FrameBenchmark::Kind::kElastic});
+                 {FrameBenchmark::Kind::kBasisThreeHandles, FrameBenchmark::Kind::kElastic,
+                  FrameBenchmark::Kind::kNeoHookean});
   }
   FrameBenchmarkList benchmarks;
   for (const FrameBenchmark::Kind kind : kinds) {
