@@ -128,8 +128,8 @@ absl::Status FrameBenchmark::CheckAnswer() {
   response_->Evaluate(poses_, &frame_);
   const double off =
       (frame_.cast<double>() - direct(skin_, Eigen::all)).rowwise().norm().maxCoeff();
-  const double allowed = kind_ == Kind::kNeoHookean ? response_->ErrorBoundMm(poses_)
-                                                    : 1e-6 * Diagonal(bar_.mesh);
+  const double allowed =
+      kind_ == Kind::kNeoHookean ? response_->ErrorBoundMm(poses_) : 1e-6 * Diagonal(bar_.mesh);
   if (off > allowed) {
     return absl::InternalError(absl::StrCat("a prepared answer is off by ", off, " mm"));
   }

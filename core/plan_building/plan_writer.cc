@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 #include <filesystem>
+#include <optional>
+#include <string>
 #include <system_error>
 #include <utility>
 
@@ -17,6 +19,7 @@
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
 #include "core/planning/plan_schema.h"
+#include "core/planning/tissue_ranges.h"
 
 namespace tissueform {
 namespace {
@@ -28,6 +31,24 @@ constexpr char kAnatomyArray[] = "anatomy";
 constexpr char kStiffnessArray[] = "youngs_modulus_pa";
 
 Json Equals(size_t label) { return {{"point_data", kAnatomyArray}, {"equals", label}}; }
+
+// How far the tissues are known, where the table says it: by their places in it.
+std::optional<FactorByCellData> FactorsOf(const StiffnessTable& table) {
+  if (table.front().factor_95 == 0) return std::nullopt;
+  FactorByCellData factors{.name = kTissueArray, .factor_of_value = {}};
+  for (size_t t = 0; t < table.size(); ++t) {
+    factors.factor_of_value.emplace_back(static_cast<int64_t>(t), table[t].factor_95);
+  }
+  return factors;
+}
+
+Json UncertaintyJson(const FactorByCellData& factors) {
+  Json values = Json::object();
+  for (const auto& [value, factor] : factors.factor_of_value) {
+    values[std::to_string(value)] = factor;
+  }
+  return {{"youngs_modulus_factor_95", {{"by_cell_data", factors.name}, {"values", values}}}};
+}
 
 std::string PlanJson(const PlanBuild& build) {
   Json plan = {{"format", "tissueform-plan"},
@@ -42,6 +63,9 @@ std::string PlanJson(const PlanBuild& build) {
     plan["handles"].push_back({{"name", build.segments[s].cut.name},
                                {"region", Equals(kFirstSegment + s)},
                                {"pose", ToJson(build.segments[s].pose)}});
+  }
+  if (const auto factors = FactorsOf(build.recipe.tissues)) {
+    plan["uncertainty"] = UncertaintyJson(*factors);
   }
   plan["version"] = LowestPlanVersion(plan);
   return plan.dump(2) + "\n";
@@ -66,6 +90,9 @@ Plan PlanOf(const PlanBuild& build) {
                             .pose = PoseFromJson(ToJson(build.segments[s].pose))});
   }
   plan.model = build.recipe.model;
+  if (const auto factors = FactorsOf(build.recipe.tissues)) {
+    plan.uncertainty.emplace().youngs_modulus_factor_95 = *factors;
+  }
   return plan;
 }
 
@@ -76,7 +103,7 @@ TetMeshFile MeshFile(const PlanBuild& build) {
                          {"skin_region", 1, build.regions.skin_region}},
           .cell_data = {{"mean_hu", 1, stiffness.mean_hu},
                         {"voxels", 1, stiffness.voxels},
-                        {"tissue", 1, stiffness.tissue},
+                        {kTissueArray, 1, stiffness.tissue},
                         {kStiffnessArray, 1, stiffness.youngs_modulus_pa}}};
 }
 

@@ -141,7 +141,8 @@ absl::StatusOr<StiffnessTable> ToTissues(const Json& json) {
     table.push_back({.name = tissue.at("name"),
                      .hu_below = tissue.value("hu_below", std::numeric_limits<double>::infinity()),
                      .youngs_modulus_pa = tissue.at("youngs_modulus_pa"),
-                     .source = tissue.value("source", "")});
+                     .source = tissue.value("source", ""),
+                     .factor_95 = tissue.value("youngs_modulus_factor_95", 0.0)});
   }
   TF_RETURN_IF_ERROR(CheckStiffnessTable(table));
   return table;
@@ -214,6 +215,7 @@ Json TissueToJson(const TissueClass& tissue) {
                {"youngs_modulus_pa", tissue.youngs_modulus_pa},
                {"source", tissue.source}};
   if (std::isfinite(tissue.hu_below)) json["hu_below"] = tissue.hu_below;
+  if (tissue.factor_95 != 0) json["youngs_modulus_factor_95"] = tissue.factor_95;
   return json;
 }
 

@@ -143,8 +143,16 @@ TEST(RecipeTest, Version1HasTheDefaultsOfLaterKeysAndRefusesThem) {
   ASSERT_OK_AND_ASSIGN(const Recipe recipe, Parse(""));
   EXPECT_EQ(recipe.ct.join_series, JoinSeries::kAuto);
   EXPECT_TRUE(recipe.metal.correct);
-  EXPECT_THAT(RecipeToJson(recipe), HasSubstr("\"version\": 1"));
+  // The tissues' defaults tell how far they are known, which version 1 cannot.
+  EXPECT_THAT(RecipeToJson(recipe), HasSubstr("\"version\": 2"));
+  constexpr char kTissues[] = R"("tissues": [{"name": "all", "youngs_modulus_pa": 20000}])";
+  ASSERT_OK_AND_ASSIGN(const Recipe known, Parse(kTissues));
+  EXPECT_THAT(RecipeToJson(known), HasSubstr("\"version\": 1"));
   EXPECT_THAT(Parse(R"("metal": "off")"), StatusIs(kInvalid, HasSubstr("version")));
+  EXPECT_THAT(
+      Parse(
+          R"("tissues": [{"name": "all", "youngs_modulus_pa": 2e4, "youngs_modulus_factor_95": 2}])"),
+      StatusIs(kInvalid, HasSubstr("version")));
 }
 
 TEST(RecipeTest, TwoSegmentsOfOneNameAreRefused) {
