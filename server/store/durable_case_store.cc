@@ -21,7 +21,7 @@ absl::StatusOr<CaseRecord> FindCase(Database& database, const std::string& sha25
   Database::Query query = database.Prepare(TF_SELECT_CASES "WHERE sha256 = ?");
   TF_ASSIGN_OR_RETURN(const bool found, query.Bind(sha256).Step());
   if (!found) return NoCase(sha256);
-  return ReadCase(query);
+  return ReadCaseRow(query);
 }
 
 absl::Status TouchCase(Database& database, const std::string& sha256, int64_t now_s) {
@@ -50,7 +50,7 @@ absl::StatusOr<CaseRecord> KeepCaseRow(Database& database, const CaseRecord& rec
     return FindCase(database, record.sha256);
   }
   TF_RETURN_IF_ERROR(CheckRoom(database, most));
-  const std::string bytes = Seal(SerializeCase(record));
+  const std::string bytes = Seal(SerializeCaseRecord(record));
   // In place of a row that cannot be read.
   TF_RETURN_IF_ERROR(database
                          .Prepare("INSERT OR REPLACE INTO cases (sha256, owner, record, "
@@ -154,7 +154,7 @@ absl::StatusOr<CaseStore::Page> DurableCaseStore::List(const ListRequest& reques
         database.Prepare(TF_SELECT_CASES "WHERE sha256 > ? AND (? OR owner = ?) ORDER BY sha256");
     const std::string owner = request.owner.value_or("");
     query.Bind(request.after).Bind(int64_t{!request.owner.has_value()}).Bind(owner);
-    return ReadPage<Page>(&query, request.limit, ReadCase,
+    return ReadPage<Page>(&query, request.limit, ReadCaseRow,
                           [](const CaseRecord& record) { return record.sha256; });
   });
 }

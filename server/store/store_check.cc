@@ -132,7 +132,7 @@ absl::Status CheckCases(Database& database, const BlobStore& blobs, const DataFo
                         Claims* claims, std::vector<DamagedItem>* damaged) {
   TF_ASSIGN_OR_RETURN(const std::vector<BadRow> rows,
                       BadRows(database, TF_SELECT_CASES, 1, 3, [&](const Database::Query& row) {
-                        const absl::StatusOr<CaseRecord> record = ReadCase(row);
+                        const absl::StatusOr<CaseRecord> record = ReadCaseRow(row);
                         if (record.ok()) {
                           (*claims)[record->sha256] =
                               CheckBlobSize(blobs, record->sha256, record->total_bytes);

@@ -124,7 +124,7 @@ absl::StatusOr<PredictionRow> ParsePrediction(absl::string_view bytes) {
   return row;
 }
 
-std::string SerializeCase(const CaseRecord& record) {
+std::string SerializeCaseRecord(const CaseRecord& record) {
   store::v1::CaseRecord proto;
   proto.set_sha256(record.sha256);
   proto.set_owner(record.owner);
@@ -134,7 +134,7 @@ std::string SerializeCase(const CaseRecord& record) {
   return proto.SerializeAsString();
 }
 
-absl::StatusOr<CaseRecord> ParseCase(absl::string_view bytes) {
+absl::StatusOr<CaseRecord> ParseCaseRecord(absl::string_view bytes) {
   store::v1::CaseRecord proto;
   if (!Parse(bytes, &proto)) return Damaged("a case's record", "its bytes are none");
   CaseRecord record{.sha256 = proto.sha256(),

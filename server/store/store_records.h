@@ -34,8 +34,8 @@ std::string SerializePrediction(const PredictionRow& row);
 absl::StatusOr<PredictionRow> ParsePrediction(absl::string_view bytes);
 
 // Without last_used_s, which changes.
-std::string SerializeCase(const CaseRecord& record);
-absl::StatusOr<CaseRecord> ParseCase(absl::string_view bytes);
+std::string SerializeCaseRecord(const CaseRecord& record);
+absl::StatusOr<CaseRecord> ParseCaseRecord(absl::string_view bytes);
 
 // InvalidArgument when a mesh of this shape cannot have that name and size.
 absl::Status CheckAnnouncement(const UploadAnnouncement& announcement);

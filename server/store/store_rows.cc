@@ -61,9 +61,9 @@ absl::StatusOr<PredictionRow> ReadPrediction(const Database::Query& row) {
   return prediction;
 }
 
-absl::StatusOr<CaseRecord> ReadCase(const Database::Query& row) {
+absl::StatusOr<CaseRecord> ReadCaseRow(const Database::Query& row) {
   TF_ASSIGN_OR_RETURN(const absl::string_view bytes, Unseal(row.Bytes(3)));
-  TF_ASSIGN_OR_RETURN(CaseRecord record, ParseCase(bytes));
+  TF_ASSIGN_OR_RETURN(CaseRecord record, ParseCaseRecord(bytes));
   if (record.sha256 != row.Text(1) || record.owner != row.Text(2)) {
     return Damaged("a case's record", "it is that of another");
   }

@@ -30,7 +30,7 @@ absl::StatusOr<SessionRecord> ReadSessionAtRest(const Database::Query& row);
 absl::StatusOr<SessionRecord> ReadSession(const Database::Query& row);
 absl::StatusOr<MeshRecord> ReadMesh(const Database::Query& row);
 absl::StatusOr<PredictionRow> ReadPrediction(const Database::Query& row);
-absl::StatusOr<CaseRecord> ReadCase(const Database::Query& row);
+absl::StatusOr<CaseRecord> ReadCaseRow(const Database::Query& row);
 
 // Removes the blob when no row claims it.
 absl::Status RemoveUnclaimed(Database& database, BlobStore& blobs, const std::string& sha256);
