@@ -11,6 +11,7 @@
 #include "grpcpp/server_builder.h"
 
 #include "server/rpc/call_scope.h"
+#include "server/rpc/case_service.h"
 #include "server/rpc/deform_service.h"
 #include "server/rpc/deform_streams.h"
 #include "server/rpc/mesh_service.h"
@@ -86,6 +87,7 @@ class TissueformServer {
   DeformService deform_service_;
   PredictionService prediction_service_;
   PlanService plan_service_;
+  CaseService case_service_;
   ServerInfoService server_info_service_;
   // gRPC gets its connections from the listener, through the acceptor. The server comes last: what
   // it is given goes to the acceptor of a server that lives.

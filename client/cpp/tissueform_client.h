@@ -13,6 +13,7 @@
 #include "absl/types/span.h"
 #include "grpcpp/channel.h"
 
+#include "client/cpp/case_calls.h"
 #include "client/cpp/deform_stream.h"
 #include "client/cpp/mesh_upload.h"
 #include "client/cpp/prediction_calls.h"
@@ -98,6 +99,9 @@ class TissueformClient {
   // Answers that the server keeps.
   PredictionCalls& predictions() { return predictions_; }
 
+  // What planners open.
+  CaseCalls& cases() { return cases_; }
+
  private:
   TissueformClient(const std::shared_ptr<grpc::Channel>& channel, const Options& options);
 
@@ -109,6 +113,7 @@ class TissueformClient {
   const std::unique_ptr<v1::DeformService::Stub> deform_;
   const std::unique_ptr<v1::ServerInfoService::Stub> server_info_;
   PredictionCalls predictions_;
+  CaseCalls cases_;
 };
 
 }  // namespace tissueform

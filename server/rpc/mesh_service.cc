@@ -15,9 +15,11 @@ namespace tissueform {
 
 grpc::ServerReadReactor<v1::UploadMeshRequest>* MeshService::UploadMesh(
     grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) {
-  return new MeshUploadStream(
-      CallScope(context, "MeshService.UploadMesh", CallKind::kNewWork, gate_), limits_, catalog_,
-      uploads_, pool_, timer_, response);
+  auto* call =
+      new MeshUploadStream(CallScope(context, "MeshService.UploadMesh", CallKind::kNewWork, gate_),
+                           limits_, catalog_, uploads_, pool_, timer_, response);
+  call->Start();
+  return call;
 }
 
 grpc::ServerUnaryReactor* MeshService::Run(grpc::CallbackServerContext* context,
