@@ -34,7 +34,8 @@ class ClusteredColumns {
   // room of any use that is tried. Entries have 16 bits where that is enough for it, else 32.
   ClusteredColumns(const Positions& rest, const Eigen::MatrixXd& columns, const Uses& uses);
 
-  // rest + columns * factors, to what was cut and to digits; resized.
+  // rest + columns * factors, to what was cut and to digits, in the first num_vertices() rows;
+  // resized where there are fewer.
   void Evaluate(const Eigen::VectorXd& factors, FloatPositions* positions) const;
 
   Eigen::Index num_vertices() const { return rest_.rows(); }

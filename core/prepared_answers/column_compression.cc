@@ -87,7 +87,7 @@ ColumnCompression::ColumnCompression(const Eigen::MatrixXd& columns, int rows_pe
   const Eigen::Index count = columns.cols();
   const Eigen::MatrixXd root = UsesRoot(uses);
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(count, count);
-  gram.selfadjointView<Eigen::Lower>().rankUpdate(columns.transpose());
+  if (columns.rows() > 0) gram.selfadjointView<Eigen::Lower>().rankUpdate(columns.transpose());
   gram = root.transpose() * gram.selfadjointView<Eigen::Lower>() * root;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(gram);
 

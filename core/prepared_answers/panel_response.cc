@@ -120,9 +120,9 @@ PanelResponse::Reading PanelResponse::Choose(const Eigen::MatrixXd& factors,
 }
 
 void PanelResponse::Evaluate(const Reading& reading, FloatPositions* positions) const {
-  positions->resize(rest_.rows(), 3);
+  if (positions->rows() < rest_.rows()) positions->resize(rest_.rows(), 3);
   panels_.Multiply(reading.factors, reading.columns, positions->data());
-  *positions += rest_;
+  positions->topRows(rest_.rows()) += rest_;
 }
 
 double PanelResponse::RoundingBoundMm(const Eigen::VectorXd& sizes) const {

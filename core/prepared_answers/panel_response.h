@@ -46,7 +46,7 @@ class PanelResponse {
   // for kCoordinates.
   Reading Choose(const Eigen::MatrixXd& factors, double tolerance_mm) const;
 
-  // rest + columns * factors.
+  // rest + columns * factors, in the first num_vertices() rows; resized where there are fewer.
   void Evaluate(const Reading& reading, FloatPositions* positions) const;
 
   Eigen::Index num_vertices() const { return rest_.rows(); }

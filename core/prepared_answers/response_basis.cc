@@ -13,6 +13,7 @@
 #include "core/base/status_macros.h"
 #include "core/deformation/deformation_checks.h"
 #include "core/deformation/harmonic_fields.h"
+#include "core/prepared_answers/chosen_vertices.h"
 #include "core/prepared_answers/panel_response.h"
 #include "core/prepared_answers/pose_samples.h"
 #include "core/prepared_answers/rotation_expansion.h"
@@ -76,21 +77,23 @@ ResponseBasisPlan PlanOfDegree(int degree, size_t num_handles, Eigen::Index num_
 class ResponseBasis : public VertexResponse {
  public:
   ResponseBasis(const ResponseBasisPlan& plan, const ResponseBasisOptions& options,
-                const SimplexDomain& domain, Eigen::Index num_vertices)
+                const SimplexDomain& domain, ChosenVertices chosen)
       : options_(options),
         num_polynomials_(
             SimplexPolynomials::NumTerms(static_cast<int>(domain.dimension()), plan.degree)),
         degree_(plan.degree),
         domain_(domain),
         expansion_(domain, plan.degree + kGuardDegrees),
-        columns_(num_vertices, plan.num_terms) {}
+        chosen_(std::move(chosen)),
+        columns_(chosen_.num_free(), plan.num_terms) {}
 
-  absl::Status Prepare(const std::vector<int32_t>& vertices, MeshPreparation* preparation,
+  // `free`: those of the chosen vertices.
+  absl::Status Prepare(const std::vector<int32_t>& free, MeshPreparation* preparation,
                        const Cancellation& cancellation) {
-    TF_RETURN_IF_ERROR(PrepareHandles(vertices, preparation, cancellation));
-    TF_RETURN_IF_ERROR(PreparePolynomials(vertices, preparation, cancellation));
+    TF_RETURN_IF_ERROR(PrepareHandles(free, preparation, cancellation));
+    TF_RETURN_IF_ERROR(PreparePolynomials(free, preparation, cancellation));
     TF_RETURN_IF_ERROR(cancellation.Check());
-    panel_.emplace(preparation->mesh().positions()(vertices, Eigen::all),
+    panel_.emplace(preparation->mesh().positions()(free, Eigen::all),
                    PanelResponse::Rows::kVertices, columns_, UsesOf(*preparation),
                    options_.tolerance_mm);
     columns_.resize(0, 0);
@@ -106,7 +109,7 @@ class ResponseBasis : public VertexResponse {
   }
 
   void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) const override {
-    panel_->Evaluate(Plan(poses).reading, positions);
+    Write(poses, Plan(poses), positions);
   }
 
   std::optional<double> Answer(absl::Span<const HandlePose> poses,
@@ -114,15 +117,15 @@ class ResponseBasis : public VertexResponse {
     if (!InRange(poses)) return std::nullopt;
     const PlannedAnswer plan = Plan(poses);
     if (!(plan.bound_mm <= options_.tolerance_mm)) return std::nullopt;
-    panel_->Evaluate(plan.reading, positions);
+    Write(poses, plan, positions);
     return plan.bound_mm;
   }
 
-  Eigen::Index num_vertices() const override { return panel_->num_vertices(); }
+  Eigen::Index num_vertices() const override { return chosen_.size(); }
   int num_terms() const override { return static_cast<int>(panel_->num_columns()); }
   int num_terms_before() const override { return static_cast<int>(panel_->num_columns_before()); }
   int64_t bytes_held() const override {
-    return panel_->bytes_held() + expansion_.bytes_held() +
+    return panel_->bytes_held() + chosen_.bytes_held() + expansion_.bytes_held() +
            (guard_gains_.size() + 3 * static_cast<Eigen::Index>(origins_.size())) *
                static_cast<int64_t>(sizeof(double));
   }
@@ -150,7 +153,7 @@ class ResponseBasis : public VertexResponse {
     TellProgress(options_.observer, PreparationStage::kAnswers, columns, NumSolved());
   }
 
-  absl::Status PrepareHandles(const std::vector<int32_t>& vertices, MeshPreparation* preparation,
+  absl::Status PrepareHandles(const std::vector<int32_t>& free, MeshPreparation* preparation,
                               const Cancellation& cancellation) {
     TF_ASSIGN_OR_RETURN(const PreparedLaplacian* laplacian, preparation->Laplacian());
     const std::vector<HandleRegion>& handles = preparation->constraints().handles();
@@ -162,17 +165,16 @@ class ResponseBasis : public VertexResponse {
       TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd X,
                           HandleResponse(static_cast<int>(h), origins_.back(), preparation));
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
-        columns_.col(ColumnOfHandle(h) + axis) = X(vertices, axis);
+        columns_.col(ColumnOfHandle(h) + axis) = X(free, axis);
       }
-      columns_.col(ColumnOfHandle(h) + 3) =
-          laplacian->harmonic(vertices, static_cast<Eigen::Index>(h));
+      columns_.col(ColumnOfHandle(h) + 3) = laplacian->harmonic(free, static_cast<Eigen::Index>(h));
     }
     return absl::OkStatus();
   }
 
-  // Columns up to degree_, gains one degree further. Of every pass only the chosen rows are kept.
-  absl::Status PreparePolynomials(const std::vector<int32_t>& vertices,
-                                  MeshPreparation* preparation, const Cancellation& cancellation) {
+  // Columns up to degree_, gains one degree further. Of every pass only the free rows are kept.
+  absl::Status PreparePolynomials(const std::vector<int32_t>& free, MeshPreparation* preparation,
+                                  const Cancellation& cancellation) {
     const SimplexPolynomials& polynomials = expansion_.polynomials();
     const Eigen::Index measured =
         SimplexPolynomials::NumTerms(polynomials.dimension(), degree_ + 1);
@@ -184,8 +186,8 @@ class ResponseBasis : public VertexResponse {
       TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd responses,
                           TermResponses(domain_, polynomials, first, count, preparation));
       for (Eigen::Index n = first; n < first + count; ++n) {
-        const Positions chosen = responses.middleCols<3>(3 * (n - first))(vertices, Eigen::all);
-        const double gain = chosen.rowwise().norm().maxCoeff();
+        const Positions chosen = responses.middleCols<3>(3 * (n - first))(free, Eigen::all);
+        const double gain = free.empty() ? 0 : chosen.rowwise().norm().maxCoeff();
         largest_gain_ = std::max(largest_gain_, gain);
         if (n >= num_polynomials_) {
           guard_gains_[n - num_polynomials_] = gain;
@@ -241,8 +243,15 @@ class ResponseBasis : public VertexResponse {
     const double truncation_mm = TruncationBoundMm(poses, coefficients);
     plan.reading =
         panel_->Choose(Factors(poses, coefficients), options_.tolerance_mm - truncation_mm);
-    plan.bound_mm = truncation_mm + plan.reading.bound_mm;
+    plan.bound_mm = std::max(truncation_mm + plan.reading.bound_mm, chosen_.RoundingBoundMm(poses));
     return plan;
+  }
+
+  void Write(absl::Span<const HandlePose> poses, const PlannedAnswer& plan,
+             FloatPositions* positions) const {
+    positions->resize(chosen_.size(), 3);
+    panel_->Evaluate(plan.reading, positions);
+    chosen_.Complete(poses, positions);
   }
 
   Eigen::MatrixXd Factors(absl::Span<const HandlePose> poses,
@@ -283,11 +292,12 @@ class ResponseBasis : public VertexResponse {
   const int degree_;
   const SimplexDomain domain_;
   const RotationExpansion expansion_;  // with the guard degrees
-  Eigen::MatrixXd columns_;            // of the chosen vertices; empty after Prepare
+  const ChosenVertices chosen_;
+  Eigen::MatrixXd columns_;  // of the free ones; empty after Prepare
   std::optional<PanelResponse> panel_;
   std::vector<Eigen::Vector3d> origins_;  // o_h
-  // Largest displacement that a polynomial of degree degree_ + 1 gives a chosen vertex, each; and
-  // that any one does, mm.
+  // Largest displacement that a polynomial of degree degree_ + 1 gives one of the free ones, each;
+  // and that any one does, mm.
   Eigen::VectorXd guard_gains_;
   double largest_gain_ = 0;
 };
@@ -326,11 +336,13 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponseBasis(
     TF_RETURN_IF_ERROR(options.admission(plan.bytes));
   }
   TF_ASSIGN_OR_RETURN(const PreparedLaplacian* laplacian, preparation->Laplacian(cancellation));
+  ChosenVertices chosen(preparation->mesh().positions(), preparation->constraints(), vertices);
+  const std::vector<int32_t> free = chosen.FreeAmong(vertices);
   auto basis = std::make_unique<ResponseBasis>(
       plan, options,
       EnclosingSimplex(SampleAtBarycentres(preparation->elements().cells, laplacian->harmonic)),
-      static_cast<Eigen::Index>(vertices.size()));
-  TF_RETURN_IF_ERROR(basis->Prepare(vertices, preparation.get(), cancellation));
+      std::move(chosen));
+  TF_RETURN_IF_ERROR(basis->Prepare(free, preparation.get(), cancellation));
   return basis;
 }
 

@@ -33,6 +33,7 @@ Eigen::VectorXd Gains(const Eigen::MatrixXd& columns) {
 
 // Those that single columns move most, by how much of any.
 std::vector<Eigen::Index> MostMoved(const Eigen::MatrixXd& columns) {
+  if (columns.rows() == 0) return {};
   std::map<Eigen::Index, double> moved;
   for (Eigen::Index c = 0; c < columns.cols(); ++c) {
     const auto [vertex, move] = LargestMove(columns.col(c));
@@ -63,6 +64,7 @@ ThirdOrderEstimate::ThirdOrderEstimate(const Eigen::MatrixXd& first, const Eigen
 }
 
 double ThirdOrderEstimate::UnscaledMm(const Eigen::VectorXd& products) const {
+  if (probes_.rows() == 0) return 0;
   const Eigen::VectorXf moves = probes_ * products.cast<float>();
   const double together = LargestMove(moves.cast<double>()).second;
   const double single = second_gains_.cwiseProduct(products).norm();

@@ -16,6 +16,8 @@ namespace tissueform {
 // Answers of a linear-in-its-columns model at chosen vertices without a back-substitution: a small
 // dense product of prepared columns with coefficients that depend on the poses only (the response
 // basis of the gradient field, the 12 columns a handle of linear elasticity). Single precision.
+// Only free vertices have columns; fixed ones rest, and those of handles are where the poses put
+// them (ChosenVertices).
 //
 // Constant: any number of threads may ask at once.
 class VertexResponse {
