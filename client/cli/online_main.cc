@@ -3,6 +3,7 @@
 //
 // The companion of `tissueform` that speaks with servers.
 
+#include "client/cli/cases/case_command.h"
 #include "client/cli/load/load_command.h"
 #include "client/cli/online/demo_command.h"
 #include "client/cli/online/drag_command.h"
@@ -23,6 +24,7 @@ int main(int argc, char** argv) {
     tissueform::AddServerMeshCommand(app, work);
     tissueform::AddWatchCommand(app, work);
     tissueform::AddPredictionCommand(app, work);
+    tissueform::AddCaseCommand(app, work);
     tissueform::AddServerInfoCommand(app, work);
     tissueform::AddDemoCommand(app, work);
   });

@@ -1,0 +1,108 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/cases/case_pack_command.h"
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+
+#include "client/cli/cases/plan_case.h"
+#include "client/cli/shared/option_checks.h"
+#include "core/base/atomic_file.h"
+#include "core/base/software_version.h"
+#include "core/base/status_macros.h"
+#include "core/case_file/case_writer.h"
+#include "core/json/json_file.h"
+#include "core/mesh_payload/sha256.h"
+#include "core/planning/plan_io.h"
+
+namespace tissueform {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CasePackOptions {
+  std::string plan;
+  PlanReadOptions reading;
+  std::string out;
+  std::string title;
+  bool overwrite = false;
+};
+
+// What planners keep beside a case (names, predictions) refers to it by its digest: unlike a result
+// it is not replaced because its name was given again.
+absl::Status CheckCaseOut(const CasePackOptions& options) {
+  TF_RETURN_IF_ERROR(CheckWritable(options.out));
+  std::error_code ignored;
+  if (fs::exists(options.out, ignored) && !options.overwrite) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("--out ", options.out, " exists; name another file, or give --overwrite"));
+  }
+  return absl::OkStatus();
+}
+
+// Of the segments, for a folder may be named after a patient.
+std::string TitleOf(const CaseFile& contents) {
+  const auto add_label = [](std::string* text, const CaseHandle& h) { *text += h.label; };
+  return absl::StrJoin(contents.handles, ", ", add_label).substr(0, 256);
+}
+
+absl::Status PackCase(const CasePackOptions& options) {
+  TF_RETURN_IF_ERROR(CheckCaseOut(options));
+  TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(options.plan, "plan", kMaxPlanBytes));
+  TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan, options.reading));
+  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
+  CaseFile about;
+  about.title = options.title;
+  about.software = absl::StrCat("tissueform ", SoftwareVersion());
+  about.commit = SoftwareCommit();
+  about.created = absl::FormatTime("%Y-%m-%dT%H:%M:%SZ", absl::Now(), absl::UTCTimeZone());
+  about.plan_sha256 = Sha256Hex({text});
+  TF_ASSIGN_OR_RETURN(CaseFile contents, CaseOfPlan(problem, std::move(about)));
+  if (contents.title.empty()) contents.title = TitleOf(contents);
+  TF_ASSIGN_OR_RETURN(const std::string bytes, SerializeCase(contents));
+  TF_RETURN_IF_ERROR(WriteFileAtomically(options.out, bytes));
+  absl::PrintF("cases/%s\n", Sha256Hex({bytes}));
+  for (const CaseSurface& surface : contents.surfaces) {
+    absl::PrintF("%-10s %-16s %7d triangles\n", SurfaceKindName(surface.kind), surface.name,
+                 surface.triangles.rows());
+  }
+  absl::PrintF("%d handles, %d landmarks, head frame by %s, %.1f MB: %s\n", contents.handles.size(),
+               contents.landmarks.size(), contents.head_frame.source,
+               static_cast<double>(bytes.size()) * 1e-6, options.out);
+  return absl::OkStatus();
+}
+
+constexpr char kCasePackFooter[] =
+    "A case is one file with all that a planner needs: surfaces, mesh, session, poses, landmarks. "
+    "It is a\nbinary glTF 2.0 file, so that other programs show it, too; docs/case-format.md.\n\n"
+    "It shows the patient's face: treat it like the CT. Not a medical device.\n\n"
+    "Examples:\n"
+    "  tissueform case pack head/plan.json --out head.tfcase --title \"Lower jaw forward\"\n"
+    "Exit codes: 0 done, 1 the work failed, 2 wrong use.";
+
+}  // namespace
+
+void AddCasePackCommand(CLI::App& command, CommandWork* work) {
+  auto options = std::make_shared<CasePackOptions>();
+  CLI::App* pack = command.add_subcommand("pack", "make a case from a plan");
+  pack->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
+  pack->add_option("--out", options->out, "the case to write, NAME.tfcase")->required();
+  pack->add_option("--title", options->title,
+                   "what a planner shows as its name; left out: the segments");
+  pack->add_flag("--overwrite", options->overwrite, "let --out replace an older file");
+  AddAllowOutside(pack, &options->reading);
+  pack->footer(kCasePackFooter);
+  pack->callback([options, work] { *work = [options] { return PackCase(*options); }; });
+}
+
+}  // namespace tissueform
