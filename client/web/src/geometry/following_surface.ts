@@ -76,6 +76,20 @@ export class FollowingSurface {
     }
   }
 
+  /** Of the vectors that `vectors` has, three of each entry of the list, laid upon the surface: their lengths. */
+  spreadLengths(vectors: Float32Array, out: Float32Array): void {
+    const { moving, places, weights } = this;
+    out.fill(0);
+    for (let i = 0, k = 0; i < moving.length; ++i, k += 3) {
+      const a = 3 * places[k], b = 3 * places[k + 1], c = 3 * places[k + 2];
+      const u = weights[k], v = weights[k + 1], w = weights[k + 2];
+      const x = u * vectors[a] + v * vectors[b] + w * vectors[c];
+      const y = u * vectors[a + 1] + v * vectors[b + 1] + w * vectors[c + 1];
+      const z = u * vectors[a + 2] + v * vectors[b + 2] + w * vectors[c + 2];
+      out[moving[i]] = Math.sqrt(x * x + y * y + z * z);
+    }
+  }
+
   private updateNormals(): void {
     const { normals, touched, constant } = this;
     for (let i = 0, k = 0; i < touched.length; ++i, k += 3) {

@@ -4,7 +4,7 @@
 import type { CaseFile } from "../case/case_file";
 import type { HandleEntry } from "../case/manifest";
 import { History } from "./history";
-import { type MoveKey, NO_MOVE, type Pose, type SegmentMove, toMove, toPose } from "../geometry/pose";
+import { type MoveKey, NO_MOVE, type Pose, type SegmentMove, between, toMove, toPose } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
 
 /** A move for each handle, in the case's order. */
@@ -64,6 +64,18 @@ export class Plan {
 
   poses(moves: Moves = this.moves): Pose[] {
     return moves.map((move, index) => toPose(move, this.pivot(index), this.file.manifest.headFrame));
+  }
+
+  /** Nothing moves. */
+  restPoses(): Pose[] {
+    return this.poses(this.handles.map(() => ({ ...NO_MOVE })));
+  }
+
+  /** Between two poses of one segment: share 0 is `a`, 1 is `b`. */
+  poseBetween(handle: number, a: Pose, b: Pose, share: number): Pose {
+    const frame = this.file.manifest.headFrame;
+    const pivot = this.pivot(handle);
+    return toPose(between(toMove(a, pivot, frame), toMove(b, pivot, frame), share), pivot, frame);
   }
 
   onChange(listener: PlanListener): void {
