@@ -49,8 +49,8 @@ class CasesTest : public ServiceTest {
 TEST_F(CasesTest, ACaseOfManyChunksIsGivenOutAsItCame) {
   const std::string bytes = CaseOf(5'000'000);
   std::vector<int64_t> progress;
-  const UploadOptions options{
-      .on_progress = [&progress](int64_t sent, int64_t /*total*/) { progress.push_back(sent); }};
+  UploadOptions options;
+  options.on_progress = [&progress](int64_t sent, int64_t /*total*/) { progress.push_back(sent); };
   ASSERT_OK_AND_ASSIGN(const v1::Case made, calls().Upload(bytes, "head", options));
   EXPECT_EQ(made.name(), "cases/" + Sha256Hex({bytes}));
   EXPECT_EQ(made.title(), "head");
@@ -121,14 +121,13 @@ TEST(CaseRestartTest, AnAcknowledgedCaseIsThereAfterAKillAndAHalfOneIsSentAgain)
     ASSERT_OK_AND_ASSIGN(made, client->cases().Upload(bytes, "kept"));
     // Killed in the middle of the second: it is sent again to the server that comes back.
     bool killed = false;
-    const UploadOptions options{.on_progress =
-                                    [&](int64_t sent, int64_t total) {
-                                      if (killed || sent < total / 2) return;
-                                      killed = true;
-                                      EXPECT_THAT(server.Kill(), IsOk());
-                                      EXPECT_THAT(server.Start(), IsOk());
-                                    },
-                                .on_resumed = nullptr};
+    UploadOptions options;
+    options.on_progress = [&](int64_t sent, int64_t total) {
+      if (killed || sent < total / 2) return;
+      killed = true;
+      EXPECT_THAT(server.Kill(), IsOk());
+      EXPECT_THAT(server.Start(), IsOk());
+    };
     EXPECT_THAT(client->cases().Upload(half, "", options), IsOk());
     EXPECT_TRUE(killed);
   }
