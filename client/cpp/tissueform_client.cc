@@ -87,7 +87,11 @@ absl::StatusOr<v1::Mesh> TissueformClient::UploadMesh(const TetMesh& mesh,
                                                      mesh.num_tets(), " tets"));
     }
   }
-  const MeshPayloadView payload = ViewMeshPayload(mesh.positions(), mesh.tets(), cell_arrays);
+  return UploadMesh(ViewMeshPayload(mesh.positions(), mesh.tets(), cell_arrays), options);
+}
+
+absl::StatusOr<v1::Mesh> TissueformClient::UploadMesh(const MeshPayloadView& payload,
+                                                      const UploadOptions& options) {
   const std::string sha256 = payload.Sha256();
   // The name is the content: asking costs one round trip, and the same head again costs no more.
   const absl::StatusOr<v1::Mesh> known = GetMesh(MeshName(sha256));

@@ -62,6 +62,9 @@ class TissueformClient {
   absl::StatusOr<v1::Mesh> UploadMesh(const TetMesh& mesh,
                                       const std::vector<CellArray>& cell_arrays,
                                       const UploadOptions& options = {});
+  // The same of a payload as it is.
+  absl::StatusOr<v1::Mesh> UploadMesh(const MeshPayloadView& payload,
+                                      const UploadOptions& options = {});
   // How much of a mesh that is not complete has come to the server.
   absl::StatusOr<v1::QueryUploadResponse> QueryUpload(const std::string& name);
   absl::StatusOr<v1::Mesh> GetMesh(const std::string& name);

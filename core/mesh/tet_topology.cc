@@ -4,6 +4,7 @@
 #include "core/mesh/tet_topology.h"
 
 #include <algorithm>
+#include <cassert>
 #include <numeric>
 
 namespace tissueform {
@@ -124,6 +125,25 @@ TriangleIndices BoundaryFacets(const TetMesh& mesh) {
     }
   }
   return result;
+}
+
+// Facets come in the order of their tets, and no other tet has the same three vertices: one pass
+// over both finds each.
+std::vector<int32_t> TetsBehind(const TriangleIndices& facets, const TetMesh& mesh) {
+  const TetIndices& tets = mesh.tets();
+  std::vector<int32_t> behind;
+  behind.reserve(facets.rows());
+  for (int32_t t = 0; t < tets.rows(); ++t) {
+    for (const auto& local : kTetFacets) {
+      const auto next = static_cast<Eigen::Index>(behind.size());
+      if (next < facets.rows() && facets(next, 0) == tets(t, local[0]) &&
+          facets(next, 1) == tets(t, local[1]) && facets(next, 2) == tets(t, local[2])) {
+        behind.push_back(t);
+      }
+    }
+  }
+  assert(static_cast<Eigen::Index>(behind.size()) == facets.rows());
+  return behind;
 }
 
 std::vector<int32_t> BoundaryVertices(const TetMesh& mesh) {

@@ -62,6 +62,9 @@ class MeshCatalog {
   MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget, MeshStore* store = nullptr,
               const Clock* clock = Clock::System(), UnixClock unix_clock = SystemUnixSeconds);
 
+  // Where meshes take their memory from, and what is made of them should, too.
+  MemoryBudget* budget() const { return budget_; }
+
   // What is not in memory can be had again.
   bool keeps_meshes() const { return store_ != nullptr; }
 

@@ -21,9 +21,9 @@ namespace tissueform {
 
 // What is known of a case without reading it.
 struct CaseRecord {
-  std::string sha256;  // of the file
-  std::string owner;
-  std::string title;
+  std::string sha256 = {};  // of the file
+  std::string owner = {};
+  std::string title = {};
   int64_t total_bytes = 0;
   int64_t created_s = 0;    // unix seconds
   int64_t last_used_s = 0;  // never goes back

@@ -61,7 +61,8 @@ INSTANTIATE_TEST_SUITE_P(
                       Target{"volume_header", FuzzVolumeHeader}, Target{"recipe", FuzzRecipe},
                       Target{"medit", FuzzMeditLines}, Target{"displacements", FuzzDisplacements},
                       Target{"store_record", FuzzStoreRecord},
-                      Target{"deform_stream", FuzzDeformStream}),
+                      Target{"deform_stream", FuzzDeformStream},
+                      Target{"case_upload", FuzzCaseUpload}),
     [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

@@ -45,9 +45,13 @@ void FuzzMeditLines(const uint8_t* data, size_t size);
 // rpc and a reason, and no number of an answer is infinite or none.
 void FuzzDeformStream(const uint8_t* data, size_t size);
 
+// Messages of an UploadCase stream, and parts of cases that are read. What is kept must be what its
+// name says.
+void FuzzCaseUpload(const uint8_t* data, size_t size);
+
 // Rows of a store's database and announcements of uploads, the first byte says of what
-// (ParseRecord, ParsePoses, ParseMesh, ParseAnnouncement, ParsePrediction, Unseal): what is
-// accepted comes back from its own bytes.
+// (ParseRecord, ParsePoses, ParseMesh, ParseAnnouncement, ParsePrediction, Unseal,
+// ParseCaseRecord): what is accepted comes back from its own bytes.
 void FuzzStoreRecord(const uint8_t* data, size_t size);
 
 }  // namespace tissueform::fuzz

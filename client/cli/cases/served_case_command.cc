@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "client/cli/online/served_case_command.h"
+#include "client/cli/cases/served_case_command.h"
 
 #include <cstdint>
 #include <filesystem>
@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
@@ -19,12 +18,10 @@
 #include "client/cpp/tissueform_client.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
+#include "core/case_file/case_reader.h"
 
 namespace tissueform {
 namespace {
-
-// docs/case-format.md: what our programs take.
-constexpr int64_t kMaxCaseFileBytes = int64_t{512} << 20;
 
 struct ServedCaseOptions {
   std::string server;
@@ -35,25 +32,27 @@ struct ServedCaseOptions {
   std::string FullCase() const { return FullName("cases", name); }
 };
 
-absl::StatusOr<std::string> ReadCaseFile(const std::string& path) {
+// The file as it is: a case is named by its bytes.
+absl::StatusOr<std::string> ReadCaseBytes(const std::string& path) {
   std::error_code error;
   const uintmax_t size = std::filesystem::file_size(path, error);
   if (error) {
     return absl::NotFoundError(absl::StrCat("cannot read ", path, ": ", error.message()));
   }
-  if (size > static_cast<uintmax_t>(kMaxCaseFileBytes)) {
+  if (size > kMostCaseBytes) {
     return absl::ResourceExhaustedError(
-        absl::StrCat(path, " has ", size, " bytes; a case may have ", kMaxCaseFileBytes));
+        absl::StrCat(path, " has ", size, " bytes; a case may have ", kMostCaseBytes));
   }
   std::string bytes(size, '\0');
   std::ifstream stream(path, std::ios::binary);
   stream.read(bytes.data(), static_cast<std::streamsize>(size));
   if (!stream) return absl::UnavailableError(absl::StrCat("cannot read all of ", path));
-  if (!absl::StartsWith(bytes, "glTF")) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(path, " is no case; `tissueform case pack` makes one from a plan"));
-  }
   return bytes;
+}
+
+MeshPayloadView PayloadOf(const CaseMesh& mesh) {
+  return {.shape = {mesh.vertex_count, mesh.tet_count, mesh.cell_arrays},
+          .segments = {mesh.payload}};
 }
 
 void PrintCaseHead() { absl::PrintF("%-70s %10s %-20s %s\n", "case", "MB", "sent", "title"); }
@@ -65,13 +64,24 @@ void PrintCase(const v1::Case& found) {
 }
 
 absl::Status Publish(const ServedCaseOptions& options) {
-  TF_ASSIGN_OR_RETURN(const std::string bytes, ReadCaseFile(options.file));
+  TF_ASSIGN_OR_RETURN(const std::string bytes, ReadCaseBytes(options.file));
+  absl::StatusOr<CaseFile> contents = ParseCase(bytes);
+  if (!contents.ok()) {
+    return absl::Status(contents.status().code(),
+                        absl::StrCat(options.file, ": ", contents.status().message(),
+                                     "; `tissueform case pack` makes cases"));
+  }
   TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
   const Stopwatch stopwatch;
-  UploadLines lines([](const std::string& line) { absl::FPrintF(stderr, "%s\n", line); },
-                    [&stopwatch] { return stopwatch.Seconds(); });
+  const auto print = [](const std::string& line) { absl::FPrintF(stderr, "%s\n", line); };
+  const auto seconds = [&stopwatch] { return stopwatch.Seconds(); };
+  UploadLines mesh_lines(print, seconds);
+  // First, so that whoever sees the case can open it.
+  TF_RETURN_IF_ERROR(client->UploadMesh(PayloadOf(contents->mesh), mesh_lines.Options()).status());
+  UploadLines case_lines(print, seconds);
+  const std::string& title = options.title.empty() ? contents->title : options.title;
   TF_ASSIGN_OR_RETURN(const v1::Case published,
-                      client->cases().Upload(bytes, options.title, lines.Options()));
+                      client->cases().Upload(bytes, title, case_lines.Options()));
   PrintCaseHead();
   PrintCase(published);
   return absl::OkStatus();
@@ -102,9 +112,10 @@ absl::Status Delete(const ServedCaseOptions& options) {
 }
 
 constexpr char kPublishFooter[] =
-    "The server keeps the file as it is, under the SHA-256 of its bytes, and gives it to planners. "
-    "It shows the\npatient's face: treat it like the CT. The title is seen by all who reach the "
-    "server: no names.\n\n"
+    "The server keeps the file as it is, under the SHA-256 of its bytes, and gives it to planners; "
+    "it is also\ngiven the mesh in it, so that a planner that opens the case need not send it.\n\n"
+    "It shows the patient's face: treat it like the CT. Title and face are seen by all who reach "
+    "the server.\n\n"
     "Example:\n"
     "  tissueform case publish head.tfcase --title \"Lower jaw forward\" --server localhost:50051\n"
     "Exit codes: 0 done, 1 the work failed, 2 wrong use.";
@@ -126,7 +137,8 @@ void AddServedCaseCommands(CLI::App& command, CommandWork* work) {
   CLI::App* publish = add("publish", "give a case to a server, for planners to open", Publish);
   publish->add_option("FILE", options->file, "the case, NAME.tfcase (docs/case-format.md)")
       ->required();
-  publish->add_option("--title", options->title, "what lists call it");
+  publish->add_option("--title", options->title,
+                      "what lists call it; left out: the title in the file");
   publish->footer(kPublishFooter);
   add("list", "the cases of a server", List);
   add_name(add("show", "what a server knows of a case", Show));
