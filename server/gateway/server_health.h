@@ -16,7 +16,8 @@ namespace tissueform {
 // Which servers say SERVING by gRPC's health service, followed all the time. Thread-safe.
 class ServerHealth {
  public:
-  // Channels of their own, made with HealthServiceConfig: they are READY while their server says SERVING.
+  // Channels of their own, made with HealthServiceConfig: they are READY while their server says
+  // SERVING.
   explicit ServerHealth(std::vector<std::shared_ptr<grpc::Channel>> channels);
   // Takes up to kInterval.
   ~ServerHealth();
