@@ -1,0 +1,51 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+
+#include "server/gateway/gateway_counters.h"
+#include "server/gateway/gateway_options.h"
+#include "server/gateway/gateway_routes.h"
+#include "server/gateway/http_server.h"
+#include "server/gateway/server_pool.h"
+
+namespace tissueform {
+
+// A running gateway: the only place where its objects are joined.
+class Gateway {
+ public:
+  // Listens when it returns; servers need not be there yet.
+  //
+  // Errors: Unavailable, naming the address, when it cannot be listened on; those of
+  // WebFiles::Load.
+  static absl::StatusOr<std::unique_ptr<Gateway>> Start(const GatewayOptions& options);
+
+  // "http://127.0.0.1:8080", also when the options said port 0.
+  std::string Url() const;
+  int port() const { return http_->port(); }
+  const GatewayCounters& counters() const { return counters_; }
+  const ServerPool& pool() const { return pool_; }
+
+  // Ends in good order: nothing more is accepted, every call is told UNAVAILABLE, sockets get their
+  // end frame and close with 1001. Blocks until that is done, or its deadline. One thread, once.
+  void Drain() { http_->Drain(); }
+
+ private:
+  Gateway(const GatewayOptions& options, WebFiles files);
+
+  // Constant.
+  const GatewayOptions options_;
+
+  // Self-synchronised; each may use those before it, and is destroyed before them.
+  GatewayCounters counters_;
+  ServerPool pool_;
+  GatewayRoutes routes_;
+  std::unique_ptr<HttpServer> http_;
+};
+
+}  // namespace tissueform

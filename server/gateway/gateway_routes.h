@@ -1,0 +1,50 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/strings/string_view.h"
+
+#include "server/gateway/access_rules.h"
+#include "server/gateway/gateway_counters.h"
+#include "server/gateway/http_server.h"
+#include "server/gateway/server_pool.h"
+#include "server/gateway/web_files.h"
+
+namespace tissueform {
+
+// What is done with each request (docs/gateway.md): who may ask, which path is what.
+class GatewayRoutes final : public HttpHandler {
+ public:
+  // `pool` and `counters` must outlive it.
+  GatewayRoutes(AccessRules rules, WebFiles files, ServerPool* pool, GatewayCounters* counters);
+
+  HttpDecision Decide(const HttpHead& head) override;
+  std::shared_ptr<ReplySource> Stream(const HttpHead& head, std::string body,
+                                      std::shared_ptr<ReplyStream> reply) override;
+  std::shared_ptr<SocketUser> OpenSocket(std::shared_ptr<Socket> socket) override;
+  HttpReply ReplyWith(int status) override;
+
+ private:
+  HttpDecision Refuse(GatewayEvent event, int status);
+  HttpDecision DecideSocket(const HttpHead& head);
+  HttpDecision DecideCall(const HttpHead& head);
+  HttpDecision DecideFile(const HttpHead& head);
+  // What a browser asks before a page of another origin may make a call.
+  HttpDecision Preflight(const HttpHead& head);
+  // For pages of other origins that are allowed.
+  HttpFields OriginFields(const HttpHead& head) const;
+
+  // Constant.
+  const AccessRules rules_;
+  const WebFiles files_;
+
+  // Self-synchronised.
+  ServerPool* const pool_;
+  GatewayCounters* const counters_;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,88 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <csignal>
+#include <cstdio>
+#include <ctime>
+#include <string>
+
+#include "CLI/CLI.hpp"
+#include "grpc/support/log.h"
+#include "spdlog/sinks/stdout_color_sinks.h"
+#include "spdlog/spdlog.h"
+
+#include "server/gateway/gateway.h"
+#include "server/gateway/gateway_options.h"
+
+namespace {
+
+constexpr char kDescription[] =
+    "Gives browsers the planner's files and passes their calls on to tissueform-server: gRPC-Web "
+    "and WebSockets (docs/gateway.md). Keeps nothing.\n"
+    "Prints `listening on URL` on stdout when it is ready; logs go to stderr.\n"
+    "SIGTERM or SIGINT: tells every client, exit code 0.\n"
+    "Research software, not a medical device: not for diagnosis or treatment.";
+
+enum ExitCode : int { kExitDone = 0, kExitFailed = 1, kExitWrongUse = 2 };
+
+// Between two lines of the log that tell what was counted.
+constexpr time_t kTellSeconds = 60;
+
+sigset_t TerminationSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  return signals;
+}
+
+void ServeUntilSignal(const tissueform::Gateway& gateway) {
+  const sigset_t signals = TerminationSignals();
+  const timespec interval = {kTellSeconds, 0};
+  std::string told;
+  while (sigtimedwait(&signals, nullptr, &interval) < 0) {
+    std::string counts = gateway.counters().Text();
+    if (counts != told) spdlog::info("counts: {}", counts);
+    told = std::move(counts);
+  }
+}
+
+ExitCode Serve(const tissueform::GatewayOptions& options) {
+  const auto gateway = tissueform::Gateway::Start(options);
+  if (!gateway.ok()) {
+    std::fprintf(stderr, "tissueform-gateway: %s\n",
+                 std::string(gateway.status().message()).c_str());
+    return kExitFailed;
+  }
+  std::printf("listening on %s\n", (*gateway)->Url().c_str());
+  std::fflush(stdout);
+  ServeUntilSignal(**gateway);
+  (*gateway)->Drain();
+  spdlog::info("done; counts: {}", (*gateway)->counters().Text());
+  return kExitDone;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::signal(SIGPIPE, SIG_IGN);
+  // Before there are threads: they inherit it, and the signals wait for ServeUntilSignal.
+  const sigset_t signals = TerminationSignals();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  CLI::App app(kDescription, "tissueform-gateway");
+  tissueform::GatewayOptions options;
+  tissueform::AddGatewayOptions(app, &options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    std::fprintf(stderr, "tissueform-gateway: %s; see --help\n", error.what());
+    return kExitWrongUse;
+  }
+  spdlog::set_default_logger(spdlog::stderr_color_mt("tissueform-gateway"));
+  spdlog::set_level(spdlog::level::from_str(options.log_level));
+  // What clients and servers do wrong comes back as a status.
+  gpr_set_log_function([](gpr_log_func_args* args) { spdlog::debug("gRPC: {}", args->message); });
+  return Serve(options);
+}

@@ -1,0 +1,110 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/gateway/server_pool.h"
+
+#include <cstdint>
+
+#include "absl/strings/str_cat.h"
+#include "grpcpp/create_channel.h"
+#include "grpcpp/security/credentials.h"
+#include "grpcpp/support/channel_arguments.h"
+
+#include "server/gateway/stable_hash.h"
+
+namespace tissueform {
+namespace {
+
+constexpr int kKeepaliveMilliseconds = 25'000;
+constexpr int kKeepaliveTimeoutMilliseconds = 10'000;
+// A server that was started again is found soon.
+constexpr int kFirstBackoffMilliseconds = 100;
+constexpr int kLastBackoffMilliseconds = 1000;
+
+grpc::ChannelArguments Arguments(const GatewayLimits& limits) {
+  grpc::ChannelArguments arguments;
+  // Otherwise all channels to an address share one connection.
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMilliseconds);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMilliseconds);
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstBackoffMilliseconds);
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kFirstBackoffMilliseconds);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kLastBackoffMilliseconds);
+  arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
+  arguments.SetMaxReceiveMessageSize(static_cast<int>(limits.answer_bytes));
+  return arguments;
+}
+
+std::shared_ptr<grpc::Channel> Connect(const std::string& address,
+                                       const grpc::ChannelArguments& arguments) {
+  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+}
+
+std::vector<std::shared_ptr<grpc::Channel>> ConnectForHealth(
+    const std::vector<std::string>& addresses, const GatewayLimits& limits) {
+  grpc::ChannelArguments arguments = Arguments(limits);
+  arguments.SetServiceConfigJSON(ServerHealth::HealthServiceConfig());
+  std::vector<std::shared_ptr<grpc::Channel>> channels;
+  for (const std::string& address : addresses) channels.push_back(Connect(address, arguments));
+  return channels;
+}
+
+}  // namespace
+
+CallSlot::~CallSlot() {
+  if (pool_ == nullptr) return;
+  MutexLock lock(pool_->mutex_);
+  --channel_->calls;
+}
+
+ServerPool::ServerPool(const std::vector<std::string>& addresses, const GatewayLimits& limits)
+    : limits_(limits), addresses_(addresses), health_(ConnectForHealth(addresses, limits)) {
+  channels_.resize(addresses.size());
+}
+
+size_t ServerPool::Choose(absl::string_view session) const {
+  size_t chosen = 0;
+  bool any = false;
+  uint64_t highest = 0;
+  for (size_t i = 0; i < addresses_.size(); ++i) {
+    if (!health_.IsServing(i)) continue;
+    if (session.empty()) return i;
+    const uint64_t hash = StableHash(absl::StrCat(session, "\n", addresses_[i]));
+    if (any && hash <= highest) continue;
+    any = true;
+    chosen = i;
+    highest = hash;
+  }
+  return chosen;
+}
+
+absl::StatusOr<CallSlot> ServerPool::Take(absl::string_view session) {
+  const size_t server = Choose(session);
+  MutexLock lock(mutex_);
+  auto& channels = channels_[server];
+  for (auto& channel : channels) {
+    if (channel->calls >= limits_.calls_per_channel) continue;
+    ++channel->calls;
+    return CallSlot(this, channel.get());
+  }
+  if (static_cast<int>(channels.size()) >= limits_.channels_per_server) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("the gateway has ", limits_.calls_per_channel * limits_.channels_per_server,
+                     " calls open to this server, as many as it may; try again in a moment"));
+  }
+  auto channel = std::make_unique<ServerChannel>();
+  channel->channel = Connect(addresses_[server], Arguments(limits_));
+  channel->stub = std::make_unique<grpc::GenericStub>(channel->channel);
+  channel->calls = 1;
+  channels.push_back(std::move(channel));
+  return CallSlot(this, channels.back().get());
+}
+
+bool ServerPool::IsReady() const {
+  for (size_t i = 0; i < addresses_.size(); ++i) {
+    if (health_.IsServing(i)) return true;
+  }
+  return false;
+}
+
+}  // namespace tissueform

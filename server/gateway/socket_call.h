@@ -1,0 +1,69 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "google/protobuf/descriptor.h"
+
+#include "server/gateway/gateway_counters.h"
+#include "server/gateway/http_server.h"
+#include "server/gateway/server_pool.h"
+#include "server/gateway/socket_frames.h"
+#include "server/gateway/upstream_call.h"
+
+namespace tissueform {
+
+// One call over a WebSocket. One message is on its way in each direction, and one more of the
+// client's waits here: a client that is slow, or a server, slows the other and fills nothing.
+class SocketCall final : public SocketUser,
+                         public UpstreamUser,
+                         public std::enable_shared_from_this<SocketCall> {
+ public:
+  // `pool` and `counters` outlive it.
+  SocketCall(std::shared_ptr<Socket> socket, ServerPool* pool, GatewayCounters* counters)
+      : socket_(std::move(socket)), pool_(pool), counters_(counters) {}
+
+  void OnOpen() override;
+  void OnMessage(std::string message) override;
+  void OnBadMessage(SocketClose why) override;
+  void OnSilence() override;
+  void OnSent() override;
+  void OnGone() override;
+  void OnDrain() override;
+  void OnAnswer(const grpc::ByteBuffer& message) override;
+  void OnWritten() override;
+  void OnEnd(CallEnd end) override;
+
+ private:
+  void OnFrame(const SocketFrame& frame, std::string* message);
+  void Start(absl::string_view payload);
+  // To the server, or to wait until it takes it.
+  void Forward(std::string payload);
+  // The client has done something wrong.
+  void Fail(GatewayEvent event, const absl::Status& status, SocketClose close);
+  // Cancels the call where it has not ended, sends the end and closes.
+  void Finish(const CallEnd& end, SocketClose close);
+
+  // Constant until the socket is gone.
+  std::shared_ptr<Socket> socket_;
+  ServerPool* const pool_;
+  GatewayCounters* const counters_;
+  // The strand's.
+  std::shared_ptr<UpstreamCall> upstream_;
+  const google::protobuf::Descriptor* answer_type_ = nullptr;
+  bool started_ = false;
+  bool half_closed_ = false;
+  bool writing_ = false;  // to the server
+  std::optional<std::string> waiting_;
+  bool sending_ = false;  // to the client
+  bool finished_ = false;
+  std::string end_frame_;
+  SocketClose close_ = SocketClose::kNormal;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,87 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/gateway/upstream_call.h"
+
+#include <utility>
+
+#include "grpcpp/support/slice.h"
+
+#include "server/gateway/call_metadata.h"
+
+namespace tissueform {
+
+std::shared_ptr<UpstreamCall> UpstreamCall::Begin(CallSlot slot, const CallStart& start,
+                                                  std::shared_ptr<Strand> strand,
+                                                  std::shared_ptr<UpstreamUser> user) {
+  std::shared_ptr<UpstreamCall> call(
+      new UpstreamCall(std::move(slot), std::move(strand), std::move(user)));
+  call->self_ = call;
+  for (const auto& [name, value] : start.metadata) call->context_.AddMetadata(name, value);
+  if (start.timeout.has_value()) {
+    call->context_.set_deadline(
+        std::chrono::system_clock::now() +
+        std::chrono::duration_cast<std::chrono::system_clock::duration>(*start.timeout));
+  }
+  call->slot_.stub().PrepareBidiStreamingCall(&call->context_, start.method, {}, call.get());
+  // Reads and writes are begun outside of gRPC's callbacks: without it OnDone might come before.
+  call->AddHold();
+  call->StartCall();
+  return call;
+}
+
+UpstreamCall::UpstreamCall(CallSlot slot, std::shared_ptr<Strand> strand,
+                           std::shared_ptr<UpstreamUser> user)
+    : slot_(std::move(slot)), strand_(std::move(strand)), user_(std::move(user)) {}
+
+void UpstreamCall::Read() {
+  if (!released_) StartRead(&read_);
+}
+
+void UpstreamCall::Write(std::string message) {
+  if (released_) return;
+  const grpc::Slice slice(message);
+  written_ = grpc::ByteBuffer(&slice, 1);
+  StartWrite(&written_);
+}
+
+void UpstreamCall::HalfClose() {
+  if (!released_) StartWritesDone();
+}
+
+void UpstreamCall::Cancel() {
+  user_.reset();
+  if (released_) return;
+  context_.TryCancel();
+  Release();
+}
+
+void UpstreamCall::Release() {
+  if (released_) return;
+  released_ = true;
+  RemoveHold();
+}
+
+void UpstreamCall::OnReadDone(bool ok) {
+  strand_->Post([self = self_, ok] {
+    if (!ok) return self->Release();
+    if (const auto user = self->user_; user != nullptr) user->OnAnswer(self->read_);
+  });
+}
+
+void UpstreamCall::OnWriteDone(bool /*ok*/) {
+  strand_->Post([self = self_] {
+    if (const auto user = self->user_; user != nullptr) user->OnWritten();
+  });
+}
+
+void UpstreamCall::OnDone(const grpc::Status& status) {
+  CallEnd end = {.status = status, .trailers = AllowedTrailers(context_)};
+  // `this` may be gone before Post returns.
+  const std::shared_ptr<Strand> strand = strand_;
+  strand->Post([self = std::move(self_), end = std::move(end)]() mutable {
+    if (const auto user = std::move(self->user_); user != nullptr) user->OnEnd(std::move(end));
+  });
+}
+
+}  // namespace tissueform

@@ -1,0 +1,60 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+
+#include "server/gateway/gateway_counters.h"
+#include "server/gateway/http_server.h"
+#include "server/gateway/server_pool.h"
+#include "server/gateway/upstream_call.h"
+
+namespace tissueform {
+
+// One call over gRPC-Web, from a request whose body has come. The next message is read from the
+// server when the last one was taken by the client.
+class WebCall final : public ReplySource,
+                      public UpstreamUser,
+                      public std::enable_shared_from_this<WebCall> {
+ public:
+  // `fields`: of every reply of the gateway.
+  WebCall(std::shared_ptr<ReplyStream> reply, HttpFields fields)
+      : reply_(std::move(reply)), fields_(std::move(fields)) {}
+
+  // Once. Makes the call, or tells the client why not. `pool` outlives it.
+  void Begin(const HttpHead& head, absl::string_view body, ServerPool* pool,
+             GatewayCounters* counters);
+
+  void OnSent() override;
+  void OnGone() override;
+  void OnDrain() override;
+  void OnAnswer(const grpc::ByteBuffer& message) override;
+  void OnWritten() override;
+  void OnEnd(CallEnd end) override;
+
+ private:
+  absl::Status TryBegin(const HttpHead& head, absl::string_view body, ServerPool* pool,
+                        GatewayCounters* counters);
+  void SendEnd(const CallEnd& end);
+  void BeginReply(const HttpFields& end_fields);
+  // Lets go of both sides.
+  void Done();
+
+  std::shared_ptr<ReplyStream> reply_;
+  const HttpFields fields_;
+  std::shared_ptr<UpstreamCall> upstream_;
+  bool begun_ = false;
+  bool sending_ = false;
+  std::optional<CallEnd> end_;  // to be sent after what is being sent
+};
+
+// As a call's end: code and message.
+CallEnd EndOf(const absl::Status& status);
+
+}  // namespace tissueform
