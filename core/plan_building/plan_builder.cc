@@ -4,6 +4,7 @@
 #include "core/plan_building/plan_builder.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_format.h"
@@ -68,6 +69,8 @@ struct Anatomy {
   HeadSegmentation head;
   BoneParts parts;
   Landmarks landmarks;
+  std::optional<FrankfortLandmarks> frankfort;
+  HeadFrame frame;
 };
 
 struct DividedBone {
@@ -113,7 +116,17 @@ absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unsc
   const absl::Status found = landmarks.ok() ? CheckLandmarks(*landmarks) : landmarks.status();
   if (!found.ok()) return ExplainMissingAnatomy(head, plane_given, found);
   TF_RETURN_IF_ERROR(CheckOneHead(ct.hu, head, *parts));
-  return Anatomy{.head = std::move(head), .parts = *std::move(parts), .landmarks = *landmarks};
+  const std::optional<FrankfortLandmarks> frankfort =
+      FindFrankfort(head.hu, head.options.bone_above_hu, *landmarks);
+  TF_ASSIGN_OR_RETURN(HeadFrame frame, ChooseHeadFrame({.landmarks = *landmarks,
+                                                        .frankfort = frankfort,
+                                                        .given_midsagittal = recipe.midsagittal,
+                                                        .given_horizontal = recipe.horizontal}));
+  return Anatomy{.head = std::move(head),
+                 .parts = *std::move(parts),
+                 .landmarks = *landmarks,
+                 .frankfort = frankfort,
+                 .frame = std::move(frame)};
 }
 
 absl::StatusOr<TriangleMesh> SegmentSurface(const LabelGrid& bone, uint8_t label) {
@@ -303,6 +316,8 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                    .still_torn = description.released.still_torn,
                    .skin_distance = std::move(description.skin_distance),
                    .coverage = std::move(coverage),
+                   .frankfort = anatomy.frankfort,
+                   .head_frame = std::move(anatomy.frame),
                    .viewer_surfaces = std::move(viewer_surfaces)};
 }
 

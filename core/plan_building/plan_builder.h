@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,10 @@
 #include "core/anatomy/soft_tissue.h"
 #include "core/anatomy/tet_stiffness.h"
 #include "core/case_file/case_file.h"
+#include "core/constraints/head_frame.h"
 #include "core/ct/ct_volume.h"
 #include "core/metal/metal_reduction.h"
+#include "core/plan_building/frankfort.h"
 #include "core/plan_building/planning_regions.h"
 #include "core/plan_building/recipe.h"
 #include "core/plan_building/skin_coverage.h"
@@ -64,6 +67,8 @@ struct PlanBuild {
   int64_t still_torn = 0;      // tets that it could not keep from turning inside out
   SkinDistance skin_distance;
   SkinCoverage coverage;
+  std::optional<FrankfortLandmarks> frankfort;  // where they were found
+  HeadFrame head_frame;
   std::vector<CaseSurface> viewer_surfaces;
 };
 

@@ -14,6 +14,7 @@
 #include "core/mesh_io/tet_mesh_io.h"
 #include "core/mesh_io/triangle_mesh_io.h"
 #include "core/plan_building/plan_builder.h"
+#include "core/plan_building/viewer_landmarks.h"
 #include "core/planning/json_values.h"
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
@@ -99,9 +100,15 @@ absl::Status WriteSegments(const PlanBuild& build, const std::filesystem::path& 
 // It says which mesh file it belongs to, by what has been written of that.
 absl::Status WriteViewer(const PlanBuild& build, const std::filesystem::path& folder) {
   TF_ASSIGN_OR_RETURN(const std::string mesh_sha256, MeshFileSha256((folder / kMeshFile).string()));
-  TF_ASSIGN_OR_RETURN(
-      const std::string bytes,
-      SerializeViewer({.mesh_file_sha256 = mesh_sha256, .surfaces = build.viewer_surfaces}));
+  std::vector<std::string> segments;
+  for (const BuiltSegment& segment : build.segments) segments.push_back(segment.cut.name);
+  TF_ASSIGN_OR_RETURN(const std::string bytes,
+                      SerializeViewer({.mesh_file_sha256 = mesh_sha256,
+                                       .surfaces = build.viewer_surfaces,
+                                       .landmarks = MakeViewerLandmarks(
+                                           build.landmarks, build.frankfort, build.bone, segments,
+                                           build.viewer_surfaces.front()),
+                                       .head_frame = build.head_frame}));
   return WriteFileAtomically((folder / kViewerFile).string(), bytes);
 }
 

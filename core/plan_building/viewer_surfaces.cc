@@ -9,6 +9,8 @@
 #include <optional>
 #include <utility>
 
+#include "absl/status/status.h"
+
 #include "core/anatomy/bone_parts.h"
 #include "core/anatomy/grid_operations.h"
 #include "core/anatomy/itk_filters.h"
@@ -105,15 +107,14 @@ absl::StatusOr<TriangleMesh> SkinSurface(const ViewerSources& sources) {
                          .min_cavity_volume_mm3 = std::numeric_limits<double>::infinity()});
 }
 
-// Bone ends a voxel before the skin where the CT does, so that the two ends are not one.
+// Bone ends two voxels before the skin where the CT does, so that it does not show through.
 void ClearBorder(LabelGrid* mask) {
   const auto& size = mask->geometry.size;
   size_t index = 0;
   for (int z = 0; z < size[2]; ++z) {
     for (int y = 0; y < size[1]; ++y) {
       for (int x = 0; x < size[0]; ++x, ++index) {
-        if (x == 0 || y == 0 || z == 0 || x == size[0] - 1 || y == size[1] - 1 ||
-            z == size[2] - 1) {
+        if (x < 2 || y < 2 || z < 2 || x >= size[0] - 2 || y >= size[1] - 2 || z >= size[2] - 2) {
           mask->values[index] = 0;
         }
       }
@@ -211,7 +212,8 @@ absl::Status AddSkin(const ViewerSources& sources, std::vector<CaseSurface>* sur
   const auto split = Split(skin, 2, [&](const Vector3d& middle) -> size_t {
     return IsAtEnd(middle, sources.head.hu.geometry) ? 1 : 0;
   });
-  if (split[0]) surfaces->push_back(ToCaseSurface("skin", SurfaceKind::kSkin, "", *split[0]));
+  if (!split[0]) return absl::InvalidArgumentError("the CT shows no skin of the head");
+  surfaces->push_back(ToCaseSurface("skin", SurfaceKind::kSkin, "", *split[0]));
   if (split[1]) {
     surfaces->push_back(ToCaseSurface("end of the CT", SurfaceKind::kSkin, "", *split[1]));
   }

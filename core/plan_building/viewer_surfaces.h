@@ -34,7 +34,8 @@ struct ViewerSources {
 // the segments as they are cut, and the teeth of each apart, so that they may be coloured. Where
 // the CT ends and the head does not is apart from its skin, too. Surfaces have no follows.
 //
-// Errors: those of ExtractSurface and DecimateSurface.
+// The first is the skin. Errors: those of ExtractSurface and DecimateSurface; InvalidArgument when
+// there is no skin.
 absl::StatusOr<std::vector<CaseSurface>> MakeViewerSurfaces(const ViewerSources& sources);
 
 }  // namespace tissueform
