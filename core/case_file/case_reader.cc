@@ -4,7 +4,7 @@
 #include "core/case_file/case_reader.h"
 
 #include <algorithm>
-#include <cstring>
+#include <cmath>
 #include <set>
 #include <utility>
 
@@ -13,6 +13,7 @@
 #include "nlohmann/json.hpp"
 
 #include "core/base/status_macros.h"
+#include "core/case_file/extension_parser.h"
 #include "core/case_file/glb_container.h"
 #include "core/case_file/surface_parser.h"
 #include "core/json/json_file.h"
@@ -23,8 +24,6 @@
 namespace tissueform {
 namespace {
 
-using Eigen::Index;
-using Eigen::Vector3d;
 using Json = nlohmann::json;
 
 const JsonSchema& CaseSchema() {
@@ -34,36 +33,11 @@ const JsonSchema& CaseSchema() {
 
 // From here on `ours` has passed the schema: keys that it requires are there and have their types.
 
-Vector3d VectorOf(const Json& json) {
-  return {json[0].get<double>(), json[1].get<double>(), json[2].get<double>()};
-}
-
-std::string TextOf(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  return found == json.end() ? "" : found->get<std::string>();
-}
-
-// Titles and labels go to terminals and pages: no line breaks, no escape sequences.
-absl::Status CheckIsOneLine(const Json& json, const std::string& where) {
-  if (json.is_string()) {
-    const std::string& text = json.get_ref<const std::string&>();
-    const bool has_control = std::any_of(text.begin(), text.end(), [](char c) {
-      return static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
-    });
-    if (has_control) return BrokenCase(where, "holds a control character");
-  }
-  if (!json.is_structured()) return absl::OkStatus();
-  for (const auto& [key, value] : json.items()) {
-    TF_RETURN_IF_ERROR(CheckIsOneLine(value, absl::StrCat(where, "/", key)));
-  }
-  return absl::OkStatus();
-}
-
 constexpr char kMeshNamePrefix[] = "meshes/";
 
 absl::StatusOr<CaseMesh> ParseMesh(const Glb& glb, const Json& json) {
   CaseMesh mesh;
-  mesh.name = TextOf(json, "name");
+  mesh.name = TextIn(json, "name");
   mesh.vertex_count = json["vertex_count"].get<int64_t>();
   mesh.tet_count = json["tet_count"].get<int64_t>();
   mesh.cell_arrays = json["cell_arrays"].get<std::vector<std::string>>();
@@ -83,52 +57,35 @@ absl::StatusOr<CaseMesh> ParseMesh(const Glb& glb, const Json& json) {
 
 CaseHandle ParseHandle(const Json& json) {
   CaseHandle handle;
-  handle.name = TextOf(json, "name");
-  handle.label = TextOf(json, "label");
-  handle.pivot_mm = VectorOf(json["pivot_mm"]);
+  handle.name = TextIn(json, "name");
+  handle.label = TextIn(json, "label");
+  handle.pivot_mm = VectorIn(json["pivot_mm"]);
   const Json& pose = json["pose"];
-  handle.pose = {.rotation_vector = VectorOf(pose["rotation_vector_deg"]) * (M_PI / 180),
-                 .pivot_mm = VectorOf(pose["pivot_mm"]),
-                 .translation_mm = VectorOf(pose["translation_mm"]),
+  handle.pose = {.rotation_vector = VectorIn(pose["rotation_vector_deg"]) * (M_PI / 180),
+                 .pivot_mm = VectorIn(pose["pivot_mm"]),
+                 .translation_mm = VectorIn(pose["translation_mm"]),
                  .scale = pose["scale"].get<double>()};
   handle.most_translation_mm = json["limits"]["translation_mm"].get<double>();
   handle.most_rotation_deg = json["limits"]["rotation_deg"].get<double>();
   return handle;
 }
 
-CaseLandmark ParseLandmark(const Json& json) {
-  CaseLandmark landmark;
-  landmark.name = TextOf(json, "name");
-  landmark.label = TextOf(json, "label");
-  landmark.position_mm = VectorOf(json["position_mm"]);
-  landmark.handle = TextOf(json, "handle");
-  if (json.contains("skin_vertex")) landmark.skin_vertex = json["skin_vertex"].get<int32_t>();
-  return landmark;
-}
-
 // What needs no bytes of the file.
 void ParsePlainKeys(const Json& ours, CaseFile* contents) {
-  contents->title = TextOf(ours, "title");
+  contents->title = TextIn(ours, "title");
   const Json& provenance = ours["provenance"];
-  contents->software = TextOf(provenance, "software");
-  contents->commit = TextOf(provenance, "commit");
-  contents->created = TextOf(provenance, "created");
-  contents->plan_sha256 = TextOf(provenance, "plan_sha256");
-  contents->model = TextOf(ours, "model");
+  contents->software = TextIn(provenance, "software");
+  contents->commit = TextIn(provenance, "commit");
+  contents->created = TextIn(provenance, "created");
+  contents->plan_sha256 = TextIn(provenance, "plan_sha256");
+  contents->model = TextIn(ours, "model");
   for (const Json& region : ours["skin_regions"]) {
     contents->skin_regions.push_back(
-        {region["number"].get<int>(), TextOf(region, "name"), TextOf(region, "label")});
+        {region["number"].get<int>(), TextIn(region, "name"), TextIn(region, "label")});
   }
   for (const Json& handle : ours["handles"]) contents->handles.push_back(ParseHandle(handle));
-  for (const Json& landmark : ours["landmarks"]) {
-    contents->landmarks.push_back(ParseLandmark(landmark));
-  }
-  const Json& frame = ours["head_frame"];
-  contents->head_frame = {.origin_mm = VectorOf(frame["origin_mm"]),
-                          .left = VectorOf(frame["left"]),
-                          .posterior = VectorOf(frame["posterior"]),
-                          .superior = VectorOf(frame["superior"]),
-                          .source = TextOf(frame, "source")};
+  contents->landmarks = ParseLandmarks(ours["landmarks"]);
+  contents->head_frame = ParseHeadFrame(ours["head_frame"]);
 }
 
 absl::Status ParseBytes(const Glb& glb, const Json& ours, CaseFile* contents) {
@@ -139,27 +96,19 @@ absl::Status ParseBytes(const Glb& glb, const Json& ours, CaseFile* contents) {
     TF_ASSIGN_OR_RETURN(const absl::string_view ranges, ViewOf(glb, ours, "material_ranges", ""));
     contents->material_ranges = std::string(ranges);
   }
-  // Several surfaces may name one buffer view: together they are held to what one file may hold.
-  size_t bytes = 0;
-  for (size_t s = 0; s < ours["surfaces"].size(); ++s) {
-    const std::string where = absl::StrCat("/surfaces/", s);
-    TF_ASSIGN_OR_RETURN(CaseSurface surface,
-                        ParseSurface(glb, ours["surfaces"][s], contents->mesh.vertex_count, where));
-    bytes += static_cast<size_t>(surface.positions.size() + surface.triangles.size()) * 4;
-    if (bytes > kMostCaseBytes) {
-      return absl::ResourceExhaustedError(
-          absl::StrCat("the surfaces have more than ", kMostCaseBytes, " bytes together"));
-    }
-    contents->surfaces.push_back(std::move(surface));
-  }
+  TF_ASSIGN_OR_RETURN(contents->surfaces,
+                      ParseSurfaces(glb, ours["surfaces"], contents->mesh.vertex_count));
   return absl::OkStatus();
 }
 
 // Each name once, and what refers to one refers to one that there is.
 absl::Status CheckNames(const CaseFile& contents) {
-  std::set<std::string> handles = {""};
+  std::vector<std::string> handles;
   for (const CaseHandle& handle : contents.handles) {
-    if (!handles.insert(handle.name).second) return BrokenCase("/handles", "has a name twice");
+    if (std::find(handles.begin(), handles.end(), handle.name) != handles.end()) {
+      return BrokenCase("/handles", "has a name twice");
+    }
+    handles.push_back(handle.name);
   }
   std::set<int> regions = {0};
   for (const CaseSkinRegion& region : contents.skin_regions) {
@@ -170,53 +119,11 @@ absl::Status CheckNames(const CaseFile& contents) {
   for (size_t s = 0; s < contents.surfaces.size(); ++s) {
     const CaseSurface& surface = contents.surfaces[s];
     const std::string where = absl::StrCat("/surfaces/", s);
-    if (handles.count(surface.handle) == 0) {
-      return BrokenCase(where + "/handle", "names a handle that there is not");
-    }
-    if (surface.kind == SurfaceKind::kSegment && surface.handle.empty()) {
-      return BrokenCase(where, "is a segment and has no handle");
-    }
     const bool has_stray = std::any_of(surface.regions.begin(), surface.regions.end(),
                                        [&](uint8_t r) { return regions.count(r) == 0; });
     if (has_stray) return BrokenCase(where + "/regions", "has a number of no skin region");
   }
-  return absl::OkStatus();
-}
-
-absl::Status CheckLandmarks(const CaseFile& contents) {
-  const auto skin = std::find_if(contents.surfaces.begin(), contents.surfaces.end(),
-                                 [](const CaseSurface& s) { return s.kind == SurfaceKind::kSkin; });
-  const Index skin_vertices = skin == contents.surfaces.end() ? 0 : skin->positions.rows();
-  for (size_t l = 0; l < contents.landmarks.size(); ++l) {
-    const CaseLandmark& landmark = contents.landmarks[l];
-    const std::string where = absl::StrCat("/landmarks/", l);
-    const bool has_handle =
-        landmark.handle.empty() ||
-        std::any_of(contents.handles.begin(), contents.handles.end(),
-                    [&](const CaseHandle& h) { return h.name == landmark.handle; });
-    if (!has_handle) return BrokenCase(where + "/handle", "names a handle that there is not");
-    if (landmark.skin_vertex && *landmark.skin_vertex >= skin_vertices) {
-      return BrokenCase(where + "/skin_vertex",
-                        absl::StrCat("is none of the skin's ", skin_vertices, " vertices"));
-    }
-  }
-  return absl::OkStatus();
-}
-
-absl::StatusOr<Json> OurExtension(const Glb& glb) {
-  const auto extensions = glb.root.find("extensions");
-  if (extensions == glb.root.end() || !extensions->is_object() ||
-      !extensions->contains(kCaseExtension)) {
-    return absl::InvalidArgumentError(absl::StrCat("not a case: a glTF file without ",
-                                                   kCaseExtension,
-                                                   "; make one by `tissueform case pack`"));
-  }
-  Json ours = (*extensions)[kCaseExtension];
-  if (const absl::Status status = CaseSchema().Check(ours); !status.ok()) {
-    return absl::Status(status.code(), absl::StrCat("not a usable case: ", status.message()));
-  }
-  TF_RETURN_IF_ERROR(CheckIsOneLine(ours, ""));
-  return ours;
+  return CheckReferences(contents.surfaces, contents.landmarks, handles);
 }
 
 }  // namespace
@@ -227,13 +134,12 @@ absl::StatusOr<CaseFile> ParseCase(absl::string_view bytes) {
         absl::StrCat("it has ", bytes.size(), " bytes; at most ", kMostCaseBytes, " are read"));
   }
   TF_ASSIGN_OR_RETURN(const Glb glb, ParseGlb(bytes, kMostCaseJsonBytes));
-  TF_ASSIGN_OR_RETURN(const Json ours, OurExtension(glb));
+  TF_ASSIGN_OR_RETURN(const Json ours, ParseExtension(glb, kCaseExtension, CaseSchema()));
   CaseFile contents;
   ParsePlainKeys(ours, &contents);
   TF_RETURN_IF_ERROR(CheckHeadFrame(contents.head_frame));
   TF_RETURN_IF_ERROR(ParseBytes(glb, ours, &contents));
   TF_RETURN_IF_ERROR(CheckNames(contents));
-  TF_RETURN_IF_ERROR(CheckLandmarks(contents));
   return contents;
 }
 

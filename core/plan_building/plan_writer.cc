@@ -12,9 +12,11 @@
 
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
+#include "core/case_file/viewer_file.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "core/mesh_io/triangle_mesh_io.h"
 #include "core/plan_building/plan_builder.h"
+#include "core/plan_building/viewer_landmarks.h"
 #include "core/planning/json_values.h"
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
@@ -122,12 +124,28 @@ absl::Status WriteSegments(const PlanBuild& build, const std::filesystem::path& 
   return absl::OkStatus();
 }
 
+// It says which mesh file it belongs to, by what has been written of that.
+absl::Status WriteViewer(const PlanBuild& build, const std::filesystem::path& folder) {
+  TF_ASSIGN_OR_RETURN(const std::string mesh_sha256, MeshFileSha256((folder / kMeshFile).string()));
+  std::vector<std::string> segments;
+  for (const BuiltSegment& segment : build.segments) segments.push_back(segment.cut.name);
+  TF_ASSIGN_OR_RETURN(const std::string bytes,
+                      SerializeViewer({.mesh_file_sha256 = mesh_sha256,
+                                       .surfaces = build.viewer_surfaces,
+                                       .landmarks = MakeViewerLandmarks(
+                                           build.landmarks, build.frankfort, build.bone, segments,
+                                           build.viewer_surfaces.front()),
+                                       .head_frame = build.head_frame}));
+  return WriteFileAtomically((folder / kViewerFile).string(), bytes);
+}
+
 }  // namespace
 
 absl::Status WritePlan(const PlanBuild& build, const std::string& folder) {
   const std::filesystem::path root = folder;
   TF_RETURN_IF_ERROR(WriteTetMesh((root / kMeshFile).string(), MeshFile(build)));
   TF_RETURN_IF_ERROR(WriteSegments(build, root / "segments"));
+  TF_RETURN_IF_ERROR(WriteViewer(build, root));
   return WriteFileAtomically((root / "plan.json").string(), PlanJson(build));
 }
 

@@ -6,47 +6,15 @@
 #include <algorithm>
 #include <limits>
 
-#include <Eigen/Geometry>
 #include <Eigen/LU>
+
+#include "core/mesh/nearest_point.h"
 
 namespace tissueform {
 namespace {
 
 using Eigen::Index;
 using Eigen::Vector3d;
-
-// Shares of a, b, c in the point of their triangle that is nearest to p: by the region of the
-// triangle's corners and edges that p lies over (Ericson 2005, 5.1.5).
-Vector3d NearestShares(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-  const Vector3d ab = b - a;
-  const Vector3d ac = c - a;
-  const double d1 = ab.dot(p - a);
-  const double d2 = ac.dot(p - a);
-  if (d1 <= 0 && d2 <= 0) return {1, 0, 0};
-  const double d3 = ab.dot(p - b);
-  const double d4 = ac.dot(p - b);
-  if (d3 >= 0 && d4 <= d3) return {0, 1, 0};
-  const double over_ab = d1 * d4 - d3 * d2;
-  if (over_ab <= 0 && d1 >= 0 && d3 <= 0) {
-    const double t = d1 / (d1 - d3);
-    return {1 - t, t, 0};
-  }
-  const double d5 = ab.dot(p - c);
-  const double d6 = ac.dot(p - c);
-  if (d6 >= 0 && d5 <= d6) return {0, 0, 1};
-  const double over_ac = d5 * d2 - d1 * d6;
-  if (over_ac <= 0 && d2 >= 0 && d6 <= 0) {
-    const double t = d2 / (d2 - d6);
-    return {1 - t, 0, t};
-  }
-  const double over_bc = d3 * d6 - d5 * d4;
-  if (over_bc <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    const double t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {0, 1 - t, t};
-  }
-  const double whole = over_ab + over_ac + over_bc;
-  return {over_bc / whole, over_ac / whole, over_ab / whole};
-}
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,6 +22,7 @@
 #include "core/base/software_version.h"
 #include "core/base/status_macros.h"
 #include "core/case_file/case_writer.h"
+#include "core/case_file/viewer_file.h"
 #include "core/json/json_file.h"
 #include "core/mesh_payload/sha256.h"
 #include "core/planning/plan_io.h"
@@ -56,18 +58,32 @@ std::string TitleOf(const CaseFile& contents) {
   return absl::StrJoin(contents.handles, ", ", add_label).substr(0, 256);
 }
 
+// What lies beside the mesh and belongs to it. Nothing where there is none.
+absl::StatusOr<std::optional<ViewerFile>> FindViewer(const std::string& mesh_path) {
+  const fs::path path = fs::path(mesh_path).parent_path() / kViewerFile;
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) return std::nullopt;
+  TF_ASSIGN_OR_RETURN(ViewerFile viewer, ReadViewer(path.string()));
+  TF_ASSIGN_OR_RETURN(const std::string mesh_sha256, MeshFileSha256(mesh_path));
+  if (viewer.mesh_file_sha256 == mesh_sha256) return viewer;
+  return absl::FailedPreconditionError(
+      absl::StrCat(path.string(), " belongs to another mesh than ", mesh_path,
+                   "; build the plan again, or take the file away to show the mesh alone"));
+}
+
 absl::Status PackCase(const CasePackOptions& options) {
   TF_RETURN_IF_ERROR(CheckCaseOut(options));
   TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(options.plan, "plan", kMaxPlanBytes));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan, options.reading));
   TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
+  TF_ASSIGN_OR_RETURN(std::optional<ViewerFile> viewer, FindViewer(plan.mesh_path));
   CaseFile about;
   about.title = options.title;
   about.software = absl::StrCat("tissueform ", SoftwareVersion());
   about.commit = SoftwareCommit();
   about.created = absl::FormatTime("%Y-%m-%dT%H:%M:%SZ", absl::Now(), absl::UTCTimeZone());
   about.plan_sha256 = Sha256Hex({text});
-  TF_ASSIGN_OR_RETURN(CaseFile contents, CaseOfPlan(problem, std::move(about)));
+  TF_ASSIGN_OR_RETURN(CaseFile contents, CaseOfPlan(problem, std::move(about), std::move(viewer)));
   if (contents.title.empty()) contents.title = TitleOf(contents);
   TF_ASSIGN_OR_RETURN(const std::string bytes, SerializeCase(contents));
   TF_RETURN_IF_ERROR(WriteFileAtomically(options.out, bytes));
@@ -75,6 +91,10 @@ absl::Status PackCase(const CasePackOptions& options) {
   for (const CaseSurface& surface : contents.surfaces) {
     absl::PrintF("%-10s %-16s %7d triangles\n", SurfaceKindName(surface.kind), surface.name,
                  surface.triangles.rows());
+  }
+  if (contents.landmarks.empty()) {
+    absl::PrintF("no %s lies beside the mesh: its own surfaces are shown, without landmarks\n",
+                 kViewerFile);
   }
   absl::PrintF("%d handles, %d landmarks, head frame by %s, %.1f MB: %s\n", contents.handles.size(),
                contents.landmarks.size(), contents.head_frame.source,
