@@ -27,16 +27,19 @@ function softenSkin(shader: { fragmentShader: string }): void {
   shader.fragmentShader = shader.fragmentShader
     .replace(
       "#include <lights_physical_pars_fragment>",
-      three.ShaderChunk.lights_physical_pars_fragment.replace(
-        "vec3 irradiance = dotNL * directLight.color;",
-        `const vec3 wrap = vec3( 0.34, 0.2, 0.16 );
-         vec3 irradiance = saturate( ( dot( geometryNormal, directLight.direction ) + wrap ) / ( 1.0 + wrap ) ) * directLight.color;`,
-      ),
+      // Of the diffuse light only: the gloss divides by the cosine that it is given.
+      three.ShaderChunk.lights_physical_pars_fragment
+        .replace(
+          "vec3 irradiance = dotNL * directLight.color;",
+          `vec3 irradiance = dotNL * directLight.color;
+           const vec3 wrap = vec3( 0.34, 0.2, 0.16 );
+           vec3 wrapped = saturate( ( dot( geometryNormal, directLight.direction ) + wrap ) / ( 1.0 + wrap ) ) * directLight.color;`,
+        )
+        .replace("directDiffuse += irradiance * diffuseBRDF", "directDiffuse += wrapped * diffuseBRDF"),
     )
     .replace(
       "#include <opaque_fragment>",
       `float rim = 1.0 - abs( dot( normalize( vViewPosition ), normal ) );
-       outgoingLight -= totalSpecular * smoothstep( 0.7, 1.0, rim );
        if ( ! gl_FrontFacing ) outgoingLight *= vec3( 0.6, 0.4, 0.36 );
        diffuseColor.a = opacity >= 1.0 ? 1.0 : min( 1.0, opacity + ( 1.0 - opacity ) * 0.55 * rim * rim );
        #include <opaque_fragment>`,
