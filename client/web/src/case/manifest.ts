@@ -68,6 +68,7 @@ export function readManifest(root: Field, views: number, meshes: number): Manife
   const view = (field: Field) => field.integer(0, views - 1);
   const optionalView = (field: Field) => (field.isPresent ? view(field) : null);
   const handles = root.get("handles").list(MAX_HANDLES).map(readHandle);
+  if (new Set(handles.map((handle) => handle.name)).size !== handles.length) root.get("handles").fail("a list of handles with a name of its own each");
   const names = ["", ...handles.map((handle) => handle.name)];
   return {
     title: root.get("title").textOr(""),

@@ -80,6 +80,11 @@ export class LiveSession {
     return this.choice.model;
   }
 
+  /** Whether the server has said that it keeps the newest poses. */
+  get isKept(): boolean {
+    return !this.hasUnkeptPoses && this.drag?.isCommitted === true;
+  }
+
   /** The planner is done with the case: the session ends on the server, too. */
   async end(): Promise<void> {
     this.attempt += 1;

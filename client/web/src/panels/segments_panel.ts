@@ -113,7 +113,12 @@ function pivotField(bench: Workbench): HTMLElement {
   const choices = () => {
     const handle = bench.plan.handles[bench.selected.value];
     const landmarks = bench.file.manifest.landmarks.filter((landmark) => landmark.handle === handle.name);
-    return [{ value: handle.pivotMm, label: "Centre of the segment" }, ...landmarks.map((l) => ({ value: l.positionMm, label: l.label }))];
+    const middle = bench.view.head.segmentMiddle(handle.name);
+    return [
+      { value: handle.pivotMm, label: "The case’s pivot" },
+      ...(middle === null ? [] : [{ value: middle, label: "Middle of the segment" }]),
+      ...landmarks.map((l) => ({ value: l.positionMm, label: l.label })),
+    ];
   };
   const field = select("Turns about", choices(), (point) => bench.plan.setPivot(bench.selected.value, point));
   const show = () => {

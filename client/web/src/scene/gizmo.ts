@@ -24,7 +24,8 @@ export class Gizmo {
     onPose: (pose: Pose, isFinal: boolean) => void,
   ) {
     this.controls = new TransformControls(stage.camera, stage.canvas);
-    this.controls.setSize(0.75);
+    this.controls.setSize(0.8);
+    this.controls.setColors(0xe0705f, 0x62b97c, 0x5b9be0, 0xffd34d);
     this.controls.attach(this.proxy);
     stage.scene.add(this.proxy, this.controls.getHelper());
     this.controls.addEventListener("change", () => stage.invalidate());

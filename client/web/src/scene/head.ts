@@ -38,12 +38,13 @@ export class Head {
   private readonly depth = depthMaterial();
   private readonly skin = skinMaterial();
   private readonly ghosts = new three.Group();
+  private readonly middles = new Map<string, Vector>();
   private readonly cutPlane = new three.Plane();
 
   constructor(private readonly file: CaseFile) {
     const axes = headAxes(file.manifest.headFrame);
     this.worldAxes = [...axes.slice(0, 3), ...axes.slice(6, 9), -axes[3], -axes[4], -axes[5]];
-    const bounds = boundsOf(file);
+    const bounds = boundsOf(file.surfaces);
     this.middle = bounds.getCenter(new three.Vector3()).toArray();
     this.radius = 0.5 * bounds.getSize(new three.Vector3()).length() * 0.8;
     this.surfaces = file.surfaces.map((surface) => this.add(surface));
@@ -120,6 +121,17 @@ export class Head {
     return new three.Vector3(...apply(this.worldAxes, subtract(point, this.middle)));
   }
 
+  /** The middle of a segment's surfaces at rest, LPS; null where it has none. */
+  segmentMiddle(handle: string): Vector | null {
+    const known = this.middles.get(handle);
+    if (known !== undefined) return known;
+    const bounds = boundsOf(this.file.surfaces.filter(({ entry }) => entry.kind === "segment" && entry.handle === handle));
+    if (bounds.isEmpty()) return null;
+    const middle: Vector = bounds.getCenter(new three.Vector3()).toArray();
+    this.middles.set(handle, middle);
+    return middle;
+  }
+
   /** Frees what the graphics card holds. */
   dispose(): void {
     this.group.traverse((object) => {
@@ -192,10 +204,10 @@ function dynamic(attribute: three.BufferAttribute): three.BufferAttribute {
   return attribute.setUsage(three.DynamicDrawUsage);
 }
 
-function boundsOf(file: CaseFile): three.Box3 {
+function boundsOf(surfaces: readonly CaseSurface[]): three.Box3 {
   const bounds = new three.Box3();
   const point = new three.Vector3();
-  for (const { positions } of file.surfaces) {
+  for (const { positions } of surfaces) {
     for (let i = 0; i < positions.length; i += 3) bounds.expandByPoint(point.fromArray(positions, i));
   }
   return bounds;

@@ -4,7 +4,7 @@
 import * as three from "three";
 
 /** Skin as a map is laid upon it, or as it looks. */
-export const SKIN_COLOR = new three.Color(0xd9a48c);
+export const SKIN_COLOR = new three.Color(0xe2b7a3);
 const BONE_COLOR = 0xe3dac6;
 const TEETH_COLOR = 0xf4f0e4;
 const GHOST_COLOR = 0x8fb7d9;
@@ -27,16 +27,20 @@ function softenSkin(shader: { fragmentShader: string }): void {
   shader.fragmentShader = shader.fragmentShader
     .replace(
       "#include <lights_physical_pars_fragment>",
-      three.ShaderChunk.lights_physical_pars_fragment.replace(
-        "vec3 irradiance = dotNL * directLight.color;",
-        `const vec3 wrap = vec3( 0.38, 0.17, 0.11 );
-         vec3 irradiance = saturate( ( dot( geometryNormal, directLight.direction ) + wrap ) / ( 1.0 + wrap ) ) * directLight.color;`,
-      ),
+      // Of the diffuse light only: the gloss divides by the cosine that it is given.
+      three.ShaderChunk.lights_physical_pars_fragment
+        .replace(
+          "vec3 irradiance = dotNL * directLight.color;",
+          `vec3 irradiance = dotNL * directLight.color;
+           const vec3 wrap = vec3( 0.34, 0.2, 0.16 );
+           vec3 wrapped = saturate( ( dot( geometryNormal, directLight.direction ) + wrap ) / ( 1.0 + wrap ) ) * directLight.color;`,
+        )
+        .replace("directDiffuse += irradiance * diffuseBRDF", "directDiffuse += wrapped * diffuseBRDF"),
     )
     .replace(
       "#include <opaque_fragment>",
       `float rim = 1.0 - abs( dot( normalize( vViewPosition ), normal ) );
-       if ( ! gl_FrontFacing ) outgoingLight *= vec3( 0.72, 0.5, 0.46 );
+       if ( ! gl_FrontFacing ) outgoingLight *= vec3( 0.6, 0.4, 0.36 );
        diffuseColor.a = opacity >= 1.0 ? 1.0 : min( 1.0, opacity + ( 1.0 - opacity ) * 0.55 * rim * rim );
        #include <opaque_fragment>`,
     );

@@ -33,7 +33,7 @@ export class Stage {
   private isWaiting = false;
   private isDrawing = true;
   private afterDrawing: (() => void)[] = [];
-  private readonly keyLight = new three.DirectionalLight(0xfff4ea, 2.1);
+  private readonly keyLight = new three.DirectionalLight(0xfff6ee, 2.0);
 
   constructor(
     private readonly container: HTMLElement,
@@ -140,11 +140,11 @@ export class Stage {
   }
 
   private addLights(): void {
-    const fill = new three.DirectionalLight(0xdfe9ff, 0.75);
+    const fill = new three.DirectionalLight(0xe6edff, 0.8);
     fill.position.set(1, 0.1, 0.6);
-    const rim = new three.DirectionalLight(0xffffff, 0.9);
+    const rim = new three.DirectionalLight(0xffffff, 0.5);
     rim.position.set(-0.4, 0.5, -1);
-    this.scene.add(new three.HemisphereLight(0xf7f8fb, 0x6b5a52, 0.95), this.keyLight, fill, rim);
+    this.scene.add(new three.HemisphereLight(0xf9fafc, 0x8a766c, 1.25), this.keyLight, fill, rim);
   }
 
   private resize(): void {
