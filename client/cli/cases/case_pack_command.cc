@@ -5,25 +5,16 @@
 
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "absl/strings/str_join.h"
-#include "absl/time/clock.h"
-#include "absl/time/time.h"
 
-#include "client/cli/cases/plan_case.h"
+#include "client/cli/cases/packed_case.h"
 #include "client/cli/shared/option_checks.h"
 #include "core/base/atomic_file.h"
-#include "core/base/software_version.h"
 #include "core/base/status_macros.h"
-#include "core/case_file/case_writer.h"
 #include "core/case_file/viewer_file.h"
-#include "core/json/json_file.h"
 #include "core/mesh_payload/sha256.h"
 #include "core/planning/plan_io.h"
 
@@ -52,40 +43,11 @@ absl::Status CheckCaseOut(const CasePackOptions& options) {
   return absl::OkStatus();
 }
 
-// Of the segments, for a folder may be named after a patient.
-std::string TitleOf(const CaseFile& contents) {
-  const auto add_label = [](std::string* text, const CaseHandle& h) { *text += h.label; };
-  return absl::StrJoin(contents.handles, ", ", add_label).substr(0, 256);
-}
-
-// What lies beside the mesh and belongs to it. Nothing where there is none.
-absl::StatusOr<std::optional<ViewerFile>> FindViewer(const std::string& mesh_path) {
-  const fs::path path = fs::path(mesh_path).parent_path() / kViewerFile;
-  std::error_code ignored;
-  if (!fs::exists(path, ignored)) return std::nullopt;
-  TF_ASSIGN_OR_RETURN(ViewerFile viewer, ReadViewer(path.string()));
-  TF_ASSIGN_OR_RETURN(const std::string mesh_sha256, MeshFileSha256(mesh_path));
-  if (viewer.mesh_file_sha256 == mesh_sha256) return viewer;
-  return absl::FailedPreconditionError(
-      absl::StrCat(path.string(), " belongs to another mesh than ", mesh_path,
-                   "; build the plan again, or take the file away to show the mesh alone"));
-}
-
 absl::Status PackCase(const CasePackOptions& options) {
   TF_RETURN_IF_ERROR(CheckCaseOut(options));
-  TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(options.plan, "plan", kMaxPlanBytes));
-  TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan, options.reading));
-  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
-  TF_ASSIGN_OR_RETURN(std::optional<ViewerFile> viewer, FindViewer(plan.mesh_path));
-  CaseFile about;
-  about.title = options.title;
-  about.software = absl::StrCat("tissueform ", SoftwareVersion());
-  about.commit = SoftwareCommit();
-  about.created = absl::FormatTime("%Y-%m-%dT%H:%M:%SZ", absl::Now(), absl::UTCTimeZone());
-  about.plan_sha256 = Sha256Hex({text});
-  TF_ASSIGN_OR_RETURN(CaseFile contents, CaseOfPlan(problem, std::move(about), std::move(viewer)));
-  if (contents.title.empty()) contents.title = TitleOf(contents);
-  TF_ASSIGN_OR_RETURN(const std::string bytes, SerializeCase(contents));
+  TF_ASSIGN_OR_RETURN(const PackedCase packed,
+                      PackPlan(options.plan, options.reading, options.title));
+  const auto& [contents, bytes] = packed;
   TF_RETURN_IF_ERROR(WriteFileAtomically(options.out, bytes));
   absl::PrintF("cases/%s\n", Sha256Hex({bytes}));
   for (const CaseSurface& surface : contents.surfaces) {

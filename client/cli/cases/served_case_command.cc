@@ -13,11 +13,10 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "client/cli/cases/packed_case.h"
 #include "client/cli/online/resource_text.h"
-#include "client/cli/online/upload_lines.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/status_macros.h"
-#include "core/base/stopwatch.h"
 #include "core/case_file/case_reader.h"
 
 namespace tissueform {
@@ -50,11 +49,6 @@ absl::StatusOr<std::string> ReadCaseBytes(const std::string& path) {
   return bytes;
 }
 
-MeshPayloadView PayloadOf(const CaseMesh& mesh) {
-  return {.shape = {mesh.vertex_count, mesh.tet_count, mesh.cell_arrays},
-          .segments = {mesh.payload}};
-}
-
 void PrintCaseHead() { absl::PrintF("%-70s %10s %-20s %s\n", "case", "MB", "sent", "title"); }
 
 void PrintCase(const v1::Case& found) {
@@ -72,16 +66,8 @@ absl::Status Publish(const ServedCaseOptions& options) {
                                      "; `tissueform case pack` makes cases"));
   }
   TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
-  const Stopwatch stopwatch;
-  const auto print = [](const std::string& line) { absl::FPrintF(stderr, "%s\n", line); };
-  const auto seconds = [&stopwatch] { return stopwatch.Seconds(); };
-  UploadLines mesh_lines(print, seconds);
-  // First, so that whoever sees the case can open it.
-  TF_RETURN_IF_ERROR(client->UploadMesh(PayloadOf(contents->mesh), mesh_lines.Options()).status());
-  UploadLines case_lines(print, seconds);
   const std::string& title = options.title.empty() ? contents->title : options.title;
-  TF_ASSIGN_OR_RETURN(const v1::Case published,
-                      client->cases().Upload(bytes, title, case_lines.Options()));
+  TF_ASSIGN_OR_RETURN(const v1::Case published, PublishCase(client.get(), *contents, bytes, title));
   PrintCaseHead();
   PrintCase(published);
   return absl::OkStatus();
