@@ -35,7 +35,7 @@ TEST(DecimateSurfaceTest, ABallStaysAClosedBallOfTheWantedSize) {
   EXPECT_EQ(report.euler_characteristic, 2);
   EXPECT_NEAR(report.enclosed_volume_mm3, ValidateTriangleMesh(ball).enclosed_volume_mm3,
               0.002 * report.enclosed_volume_mm3);
-  EXPECT_LT(DistancesToSurface(ball.positions(), coarse).maxCoeff(), 0.6);
+  EXPECT_LT(DistancesToSurface(coarse.positions(), ball).maxCoeff(), 0.6);
 }
 
 TEST(DecimateSurfaceTest, EdgesOfACubeStaySharp) {
