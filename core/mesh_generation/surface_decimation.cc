@@ -11,6 +11,7 @@
 #include "absl/status/status.h"
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
+#include <CGAL/Polygon_mesh_processing/repair.h>
 #include <CGAL/Simple_cartesian.h>
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Bounded_normal_change_filter.h>
@@ -44,6 +45,7 @@ absl::StatusOr<Halfedges> ToHalfedges(const TriangleMesh& surface) {
   }
   Halfedges mesh;
   pmp::polygon_soup_to_polygon_mesh(points, triangles, mesh);
+  pmp::remove_isolated_vertices(mesh);
   return mesh;
 }
 

@@ -152,8 +152,9 @@ enum BonePart : size_t { kPlainBone = 0, kUpperTeeth = 1, kLowerTeeth = 2 };
 // Which triangles are of crowns, by where they lie: the teeth's planes go through the tips.
 class CrownFinder {
  public:
-  CrownFinder(const Landmarks& landmarks, const LabelGrid& parts)
-      : landmarks_(landmarks), parts_(parts) {}
+  // Of the surface of bone with that label.
+  CrownFinder(const ViewerSources& sources, uint8_t label)
+      : landmarks_(sources.landmarks), parts_(sources.parts), bone_(sources.bone), label_(label) {}
 
   BonePart operator()(const Vector3d& place) const {
     const Landmarks& l = landmarks_;
@@ -177,7 +178,7 @@ class CrownFinder {
            PartAt(place) == (tips_up > 0 ? kMandible : kCranium);
   }
 
-  // Of the voxels about the place, which lies on the bone's border.
+  // Of the label's voxels about the place, which lies on their border.
   uint8_t PartAt(const Vector3d& place) const {
     const VoxelCell cell(parts_.geometry.ToVoxels(place), parts_.geometry.size);
     uint8_t best = 0;
@@ -185,7 +186,7 @@ class CrownFinder {
     for (unsigned corner = 0; corner < 8; ++corner) {
       const auto [x, y, z] = cell.Corner(corner);
       const uint8_t part = parts_.At(x, y, z);
-      if (part == 0 || cell.Weight(corner) <= most) continue;
+      if (bone_.At(x, y, z) != label_ || cell.Weight(corner) <= most) continue;
       best = part;
       most = cell.Weight(corner);
     }
@@ -194,6 +195,8 @@ class CrownFinder {
 
   const Landmarks& landmarks_;
   const LabelGrid& parts_;
+  const LabelGrid& bone_;
+  const uint8_t label_;
 };
 
 // Whether the CT ends there: the surface runs up to half a voxel outside its last centres.
@@ -255,10 +258,10 @@ absl::StatusOr<std::vector<CaseSurface>> MakeViewerSurfaces(const ViewerSources&
   }
   const double kept =
       std::min(1.0, static_cast<double>(kBoneTriangles) / static_cast<double>(triangles));
-  const CrownFinder crowns(sources.landmarks, sources.parts);
   for (size_t b = 0; b < bones.size(); ++b) {
     const auto wanted = static_cast<int64_t>(kept * static_cast<double>(bones[b].num_triangles()));
     TF_ASSIGN_OR_RETURN(const TriangleMesh bone, DecimateSurface(bones[b], wanted));
+    const CrownFinder crowns(sources, static_cast<uint8_t>(kFixedBone + b));
     AddBone(bone, b == 0 ? "" : sources.segments[b - 1], crowns, &surfaces);
   }
   return surfaces;
