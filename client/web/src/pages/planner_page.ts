@@ -3,7 +3,7 @@
 
 import type { Gateway } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
-import { button, el } from "../panels/dom";
+import { button, el, onceAPicture } from "../panels/dom";
 import { exportPanel } from "../panels/export_panel";
 import { bindKeys, helpDialog } from "../panels/keyboard";
 import { legendBox, mapPanel, modelPanel } from "../panels/maps_panel";
@@ -27,13 +27,13 @@ export function pictureBox(file: CaseFile, onNotice: (text: string) => void): { 
   view.stage.canvas.setAttribute("aria-label", "Head in three dimensions. Press the question mark for keys.");
   view.stage.canvas.setAttribute("role", "application");
   const marks = pictureMarks(view);
-  update = marks.update;
+  update = onceAPicture(marks.update);
   element.append(marks.element);
   if (!view.stage.hasRenderer) {
     const text = "This browser shows no 3D pictures (WebGL is off or missing). Numbers, predictions and export work all the same.";
     element.append(el("p", { class: "no-picture", text, attributes: { role: "alert" } }));
   }
-  update();
+  marks.update();
   return { element, view };
 }
 
@@ -53,9 +53,10 @@ export function plannerPage(
   const status = statusBar(file.manifest.title === "" ? "Case" : file.manifest.title, () => followLink(bench.live.session), leave);
   bench.connection.watch(status.connection);
   bench.followers.watch(status.followers);
-  bench.picture.watch((facts) => {
-    if (facts !== null) status.answered(facts.roundTripMs);
-  });
+  const showAge = () => {
+    if (bench.picture.value !== null) status.answered(bench.picture.value.roundTripMs);
+  };
+  bench.picture.watch(onceAPicture(showAge));
   bench.notice.watch(notice.show);
 
   const help = helpDialog();

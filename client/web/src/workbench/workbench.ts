@@ -239,7 +239,8 @@ export class Workbench {
 
   private lay(displacements: Float32Array, used?: () => void): void {
     this.view.head.setDisplacements(displacements);
-    this.legend.value = this.color(displacements);
+    const legend = this.color(displacements);
+    if (legend !== null || this.legend.value !== null) this.legend.value = legend;
     this.view.stage.invalidate(used);
     this.shown.value += 1;
   }
