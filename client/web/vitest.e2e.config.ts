@@ -6,7 +6,8 @@ import { defineConfig } from "vitest/config";
 
 const path = (relative: string) => fileURLToPath(new URL(relative, import.meta.url));
 
-// The suite that drives a browser: tests/e2e, with the packages of this folder. With --mode measure: figures of the planner.
+// The suite that drives a browser: tests/e2e, with the packages of this folder. With --mode measure or pictures: figures and
+// pictures of docs/planner.md.
 export default defineConfig(({ mode }) => ({
   root: path("../../tests/e2e"),
   cacheDir: path("node_modules/.vite-e2e"),
@@ -14,7 +15,7 @@ export default defineConfig(({ mode }) => ({
   server: { fs: { strict: false } },
   test: {
     globals: true,
-    include: mode === "measure" ? ["measure.ts"] : ["**/*.test.ts"],
+    include: mode === "test" ? ["**/*.test.ts"] : [`${mode}.ts`],
     testTimeout: 90_000,
     hookTimeout: 90_000,
     // Browsers without a graphics card take all processors that they get.

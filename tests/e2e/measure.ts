@@ -5,14 +5,14 @@ import { type Hook, Planner, openCase } from "./planner";
 
 // Figures of docs/planner.md: by hand, on a machine that does nothing else.
 //
-//   TISSUEFORM_MEASURE_SECONDS=60 TISSUEFORM_MEASURE_CASE=CASE.tfcase npm --prefix client/web run measure
+//   TISSUEFORM_MEASURE_SECONDS=60 TISSUEFORM_CASE=CASE.tfcase npm --prefix client/web run measure
 
 const SECONDS = Number(process.env.TISSUEFORM_MEASURE_SECONDS ?? 60);
 /** 20 Mbit/s, as the network panel of a browser has it. */
 const SLOW = { offline: false, latency: 10, downloadThroughput: 20e6 / 8, uploadThroughput: 20e6 / 8 };
 
 let planner: Planner;
-beforeAll(async () => (planner = await Planner.start(process.env.TISSUEFORM_MEASURE_CASE)));
+beforeAll(async () => (planner = await Planner.start(process.env.TISSUEFORM_CASE)));
 afterAll(() => planner.stop());
 
 test("pose sent to positions and normals in the geometry buffers, memory and pauses of a drag", async () => {

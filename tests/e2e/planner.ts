@@ -186,7 +186,8 @@ export function state(page: Page) {
 export async function moved(page: Page, least: number, most: number): Promise<void> {
   await page.waitForFunction(
     ([low, high]) => {
-      const { shape } = (globalThis as unknown as Hook).tissueform.view.head.skins[0];
+      const shape = (globalThis as unknown as Hook).tissueform.view?.head.skins[0].shape;
+      if (shape === undefined) return false;
       let largest = 0;
       for (let i = 0; i < shape.positions.length; i += 3) {
         largest = Math.max(largest, Math.hypot(...[0, 1, 2].map((k) => shape.positions[i + k] - shape.rest[i + k])));

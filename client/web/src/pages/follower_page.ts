@@ -54,7 +54,7 @@ export class Follower {
     private readonly gateway: Gateway,
     private readonly file: CaseFile,
     private readonly session: string,
-    private readonly view: HeadView,
+    readonly view: HeadView,
     private readonly listener: FollowerListener,
   ) {
     this.rest = followedRest(file);

@@ -37,6 +37,9 @@ export function pictureBox(file: CaseFile, onNotice: (text: string) => void): { 
   return { element, view };
 }
 
+/** An answer that takes longer than this is waited for in words. */
+const LATE_MS = 500;
+
 /** The planner of one case. `followLink`: for who follows this session. */
 export function plannerPage(
   gateway: Gateway,
@@ -54,9 +57,11 @@ export function plannerPage(
   bench.connection.watch(status.connection);
   bench.followers.watch(status.followers);
   const showAge = () => {
-    if (bench.picture.value !== null) status.answered(bench.picture.value.roundTripMs);
+    if (bench.waitingMs > LATE_MS) status.waiting(bench.waitingMs);
+    else if (bench.picture.value !== null) status.answered(bench.picture.value.roundTripMs);
   };
   bench.picture.watch(onceAPicture(showAge));
+  setInterval(showAge, LATE_MS);
   bench.notice.watch(notice.show);
 
   const help = helpDialog();

@@ -5,6 +5,11 @@ import { cell, describeMovement, landmarkMovement } from "../planning/landmarks"
 import type { Workbench } from "../workbench/workbench";
 import { el, onceAPicture, section } from "./dom";
 
+function captionOf(source: string): string {
+  const frame = source === "scanner" ? " Directions are the scanner’s: no head frame was found." : "";
+  return `In mm of the head frame; a dot is less than 0.05.${frame}`;
+}
+
 /** Where landmarks go, in mm of the head frame. */
 export function movementsPanel(bench: Workbench): HTMLElement {
   const { landmarks, headFrame } = bench.file.manifest;
@@ -26,6 +31,6 @@ export function movementsPanel(bench: Workbench): HTMLElement {
   };
   bench.shown.watch(onceAPicture(show));
   const heads = ["Landmark", "Forward", "Left", "Up", "In all"].map((text) => el("th", { text, attributes: { scope: "col" } }));
-  const table = el("table", {}, [el("caption", { text: "in mm; a dot is less than 0.05" }), el("thead", {}, [el("tr", {}, heads)]), el("tbody", {}, rows.map(({ row }) => row))]);
+  const table = el("table", {}, [el("caption", { text: captionOf(headFrame.source) }), el("thead", {}, [el("tr", {}, heads)]), el("tbody", {}, rows.map(({ row }) => row))]);
   return section("Movements", [landmarks.length === 0 ? el("p", { class: "quiet", text: "The case has no landmarks." }) : table]);
 }

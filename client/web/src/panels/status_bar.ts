@@ -14,6 +14,7 @@ export interface StatusBar {
   element: HTMLElement;
   connection(connection: Connection): void;
   answered(roundTripMs: number): void;
+  waiting(sinceMs: number): void;
   followers(count: number): void;
 }
 
@@ -52,6 +53,9 @@ export function statusBar(title: string, link: (() => string) | null, onLeave: (
     },
     answered(roundTripMs) {
       age.textContent = roundTripMs < FRESH_MS ? `answered in ${Math.max(1, Math.round(roundTripMs))} ms` : `answered in ${(roundTripMs / 1000).toFixed(1)} s`;
+    },
+    waiting(sinceMs) {
+      age.textContent = `waiting for ${(sinceMs / 1000).toFixed(1)} s`;
     },
     followers(count) {
       follow.textContent = followersText(count);
