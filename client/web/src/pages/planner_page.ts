@@ -53,7 +53,7 @@ export function plannerPage(
   const { element: picture, view } = pictureBox(file, notice.show);
   const bench = new Workbench(gateway, file, caseName, view, models);
   const leave = () => void bench.live.end().then(onLeave);
-  const status = statusBar(file.manifest.title === "" ? "Case" : file.manifest.title, () => followLink(bench.live.session), leave);
+  const status = statusBar(file.manifest.title === "" ? "Case" : file.manifest.title, () => followLink(bench.live.session), leave, () => void bench.live.retry());
   bench.connection.watch(status.connection);
   bench.followers.watch(status.followers);
   const showAge = () => {

@@ -128,6 +128,7 @@ export class Workbench {
 
   async chooseModel(model: DeformationModel): Promise<void> {
     this.model.value = model;
+    if (this.map.value.kind === "band" && !this.hasBand) this.map.value = { kind: "none" };
     await this.live.choose(this.dragChoice());
   }
 
