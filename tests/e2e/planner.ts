@@ -61,16 +61,18 @@ class Program {
 /** Server and gateway with a case of the bundled head, and a browser. */
 export class Planner {
   readonly folder = mkdtempSync(join(tmpdir(), "tissueform-e2e-"));
-  readonly casePath = join(this.folder, "head.tfcase");
+  casePath = join(this.folder, "head.tfcase");
   private server: Program | null = null;
   private gateway: Program | null = null;
   private readonly browsers: Browser[] = [];
 
-  static async start(): Promise<Planner> {
+  /** `casePath`: of a case; left out: one of the bundled head with three segments. */
+  static async start(casePath?: string): Promise<Planner> {
     const planner = new Planner();
     chmodSync(planner.folder, 0o700);
     const plan = join(SOURCE, "tests/data/plans/three_segments/plan.json");
-    execFileSync(join(BIN, "tissueform"), ["case", "pack", plan, "--out", planner.casePath]);
+    if (casePath !== undefined) planner.casePath = casePath;
+    else execFileSync(join(BIN, "tissueform"), ["case", "pack", plan, "--out", planner.casePath]);
     await planner.startServer();
     planner.gateway = await Program.start("tissueform-gateway", [
       "--server", planner.serverAddress, "--listen", "127.0.0.1:0", "--web", WEB, "--drain-seconds", "1",
@@ -184,7 +186,8 @@ export function state(page: Page) {
 export async function moved(page: Page, least: number, most: number): Promise<void> {
   await page.waitForFunction(
     ([low, high]) => {
-      const { shape } = (globalThis as unknown as Hook).tissueform.view.head.skins[0];
+      const shape = (globalThis as unknown as Hook).tissueform.view?.head.skins[0].shape;
+      if (shape === undefined) return false;
       let largest = 0;
       for (let i = 0; i < shape.positions.length; i += 3) {
         largest = Math.max(largest, Math.hypot(...[0, 1, 2].map((k) => shape.positions[i + k] - shape.rest[i + k])));

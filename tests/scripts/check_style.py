@@ -15,7 +15,7 @@ import re
 import sys
 
 FOLDERS = (".ci", "cmake", "client", "core", "deploy", "proto", "server", "tests")
-SUFFIXES = {".h", ".cc", ".py", ".sh", ".cmake", ".proto", ".toml", ".ts"}
+SUFFIXES = {".h", ".cc", ".py", ".sh", ".cmake", ".proto", ".toml", ".ts", ".mjs"}
 # What npm and protoc put there.
 FOREIGN = ("node_modules", "generated")
 MAX_LINES = 600

@@ -63,6 +63,7 @@ async function openPlanner(file: CaseFile, name: string, models: readonly ModelI
 function openFollower(file: CaseFile, session: string): void {
   const { element, follower } = followerPage(gateway, file, session);
   hook.follower = follower;
+  hook.view = follower.view;
   show(element);
 }
 

@@ -27,7 +27,7 @@ export class CallError extends Error {
   /** Whether the same call may succeed in a moment: nobody answered, or not for now. */
   get isPassing(): boolean {
     // A server that is killed shows as UNAVAILABLE directly, as UNKNOWN or INTERNAL behind proxies.
-    return this.code === Code.Unavailable || this.code === Code.DeadlineExceeded || this.isOfTransport;
+    return this.code === Code.Unavailable || this.code === Code.DeadlineExceeded || this.reason === "UPLOAD_UNDER_WAY" || this.isOfTransport;
   }
 
   private get isOfTransport(): boolean {

@@ -76,6 +76,11 @@ export class LiveSession {
     if (this.session !== "") await this.connect(true);
   }
 
+  /** Once more, after what had failed. */
+  async retry(): Promise<void> {
+    await this.connect(true);
+  }
+
   get model(): DeformationModel | undefined {
     return this.choice.model;
   }

@@ -9,6 +9,8 @@ import { randomId } from "./session_opening";
 const STORAGE_KEY = "tissueform-sessions";
 const TAB_KEY = "tissueform-session";
 const MOST_REMEMBERED = 64;
+/** How long a page that is being reloaded may hold on to its session. */
+const RELOAD_MS = 1000;
 
 interface Remembered {
   session: string;
@@ -28,7 +30,7 @@ export async function claimSession(caseName: string): Promise<Claim> {
   const known = read().filter((entry) => entry.case === caseName);
   // The tab's own first, then the newest.
   for (const { session } of known.reverse().sort((a, b) => Number(b.session === own) - Number(a.session === own))) {
-    if (await lock(session)) {
+    if (await lock(session, session === own ? RELOAD_MS : 0)) {
       sessionStorage.setItem(TAB_KEY, session);
       return { session, isOld: true };
     }
@@ -39,7 +41,7 @@ export async function claimSession(caseName: string): Promise<Claim> {
 /** A new name that is remembered as this tab's. */
 export async function newSession(caseName: string): Promise<string> {
   const session = `sessions/${randomId()}`;
-  await lock(session);
+  await lock(session, 0);
   sessionStorage.setItem(TAB_KEY, session);
   write([...read(), { session, case: caseName }].slice(-MOST_REMEMBERED));
   return session;
@@ -60,14 +62,16 @@ export function forgetSession(session: string): void {
   if (sessionStorage.getItem(TAB_KEY) === session) sessionStorage.removeItem(TAB_KEY);
 }
 
-/** False where another tab holds it. Without locks (a page that is not secure) a tab knows its own session only. */
-function lock(session: string): Promise<boolean> {
+/** False where another tab holds it for longer than `patienceMs`. Without locks (a page that is not secure) a tab knows its own session only. */
+function lock(session: string, patienceMs: number): Promise<boolean> {
   if (navigator.locks === undefined) return Promise.resolve(sessionStorage.getItem(TAB_KEY) === session);
   return new Promise((resolve) => {
-    void navigator.locks.request(session, { ifAvailable: true }, (held) => {
+    const options = patienceMs > 0 ? { signal: AbortSignal.timeout(patienceMs) } : { ifAvailable: true };
+    const hold = (held: Lock | null) => {
       resolve(held !== null);
       return held === null ? undefined : new Promise<void>(() => {});
-    });
+    };
+    navigator.locks.request(session, options, hold).catch(() => resolve(false));
   });
 }
 

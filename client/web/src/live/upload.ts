@@ -27,7 +27,7 @@ export async function uploadCase(gateway: Gateway, source: CaseSource, sha256: s
       onMessage: (message) => (answer = message),
       onEnd: (error) => (error === null ? resolve() : reject(error)),
     });
-    const header = { $typeName: "tissueform.v1.CaseHeader" as const, sha256, totalBytes: BigInt(source.totalBytes), title };
+    const header = { $typeName: "tissueform.v1.CaseHeader" as const, sha256, totalBytes: BigInt(source.totalBytes), title: clipTitle(title) };
     call.send(create(UploadCaseRequestSchema, { message: { case: "header", value: header } }));
     const sendChunk = (offset: number, data: Uint8Array, finishWrite: boolean) => {
       const value = { $typeName: "tissueform.v1.CaseChunk" as const, writeOffset: BigInt(offset), data, finishWrite };
@@ -97,6 +97,15 @@ async function sendChunks(
     onProgress(range.length === 0 ? 1 : (at + length) / range.length);
   }
   call.halfClose();
+}
+
+const MOST_TITLE_BYTES = 256;
+
+/** As much of a title as servers keep: whole characters of at most 256 bytes. */
+export function clipTitle(title: string): string {
+  const bytes = new TextEncoder().encode(title);
+  if (bytes.length <= MOST_TITLE_BYTES) return title;
+  return new TextDecoder().decode(bytes.subarray(0, MOST_TITLE_BYTES)).replace(/\uFFFD+$/, "");
 }
 
 /** Whether a call failed because the server does not have what it names. */

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { sentenceOf, toCallError } from "../calls/call_error";
+import { Code, sentenceOf, toCallError } from "../calls/call_error";
 import type { Gateway } from "../calls/gateway";
 import { openCase } from "../case/case_file";
 import { fileSource, listCases, sha256Of } from "../case/case_sources";
@@ -98,8 +98,8 @@ async function bringIn(gateway: Gateway, file: File, tell: (text: string, share:
   try {
     return await gateway.cases.getCase({ name });
   } catch (thrown) {
-    // What the server does not have is sent; without a server sending says why.
-    toCallError(thrown);
+    const error = toCallError(thrown);
+    if (error.code !== Code.NotFound) throw error;
   }
   const sha256 = name.replace("cases/", "");
   return uploadCase(gateway, source, sha256, opened.manifest.title, (share) => tell("Sending the case", share));

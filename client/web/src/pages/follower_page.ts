@@ -21,7 +21,7 @@ import { pictureBox } from "./planner_page";
 export function followerPage(gateway: Gateway, file: CaseFile, session: string): { element: HTMLElement; follower: Follower } {
   const notice = noticeBox();
   const { element: picture, view } = pictureBox(file, notice.show);
-  const status = statusBar(`${file.manifest.title === "" ? "Case" : file.manifest.title}, followed`, null, () => {});
+  const status = statusBar(`${file.manifest.title === "" ? "Case" : file.manifest.title}, followed`, null, () => {}, null);
   status.connection({ kind: "preparing", text: "Joining", share: null });
   const follower = new Follower(gateway, file, session, view, {
     onLive: (isLive, text) => status.connection(isLive ? { kind: "live" } : { kind: "broken", text }),
@@ -54,7 +54,7 @@ export class Follower {
     private readonly gateway: Gateway,
     private readonly file: CaseFile,
     private readonly session: string,
-    private readonly view: HeadView,
+    readonly view: HeadView,
     private readonly listener: FollowerListener,
   ) {
     this.rest = followedRest(file);

@@ -3,7 +3,7 @@
 
 import type { Gateway } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
-import { button, el } from "../panels/dom";
+import { button, el, onceAPicture } from "../panels/dom";
 import { exportPanel } from "../panels/export_panel";
 import { bindKeys, helpDialog } from "../panels/keyboard";
 import { legendBox, mapPanel, modelPanel } from "../panels/maps_panel";
@@ -27,15 +27,18 @@ export function pictureBox(file: CaseFile, onNotice: (text: string) => void): { 
   view.stage.canvas.setAttribute("aria-label", "Head in three dimensions. Press the question mark for keys.");
   view.stage.canvas.setAttribute("role", "application");
   const marks = pictureMarks(view);
-  update = marks.update;
+  update = onceAPicture(marks.update);
   element.append(marks.element);
   if (!view.stage.hasRenderer) {
     const text = "This browser shows no 3D pictures (WebGL is off or missing). Numbers, predictions and export work all the same.";
     element.append(el("p", { class: "no-picture", text, attributes: { role: "alert" } }));
   }
-  update();
+  marks.update();
   return { element, view };
 }
+
+/** An answer that takes longer than this is waited for in words. */
+const LATE_MS = 500;
 
 /** The planner of one case. `followLink`: for who follows this session. */
 export function plannerPage(
@@ -50,12 +53,15 @@ export function plannerPage(
   const { element: picture, view } = pictureBox(file, notice.show);
   const bench = new Workbench(gateway, file, caseName, view, models);
   const leave = () => void bench.live.end().then(onLeave);
-  const status = statusBar(file.manifest.title === "" ? "Case" : file.manifest.title, () => followLink(bench.live.session), leave);
+  const status = statusBar(file.manifest.title === "" ? "Case" : file.manifest.title, () => followLink(bench.live.session), leave, () => void bench.live.retry());
   bench.connection.watch(status.connection);
   bench.followers.watch(status.followers);
-  bench.picture.watch((facts) => {
-    if (facts !== null) status.answered(facts.roundTripMs);
-  });
+  const showAge = () => {
+    if (bench.waitingMs > LATE_MS) status.waiting(bench.waitingMs);
+    else if (bench.picture.value !== null) status.answered(bench.picture.value.roundTripMs);
+  };
+  bench.picture.watch(onceAPicture(showAge));
+  setInterval(showAge, LATE_MS);
   bench.notice.watch(notice.show);
 
   const help = helpDialog();

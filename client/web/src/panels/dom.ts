@@ -34,6 +34,22 @@ export function section(title: string, children: Child[], properties: Properties
   return el("section", { ...properties, attributes: { "aria-label": title, ...properties.attributes } }, [heading, ...children]);
 }
 
+/**
+ * Calls `update` once before the browser's next picture, however often the result is called before: what is written at every step
+ * of a drag would cost more than the step.
+ */
+export function onceAPicture(update: () => void): () => void {
+  let isWaiting = false;
+  return () => {
+    if (isWaiting) return;
+    isWaiting = true;
+    requestAnimationFrame(() => {
+      isWaiting = false;
+      update();
+    });
+  };
+}
+
 let count = 0;
 
 /** For labels that name what they belong to. */

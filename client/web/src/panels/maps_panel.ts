@@ -7,7 +7,7 @@ import { VIRIDIS, colorTable } from "../geometry/color_map";
 import { formatNumber } from "../planning/numbers";
 import type { MapLegend } from "../workbench/face_colors";
 import type { MapChoice, Workbench } from "../workbench/workbench";
-import { type Choice, el, newId, section, select } from "./dom";
+import { type Choice, el, newId, onceAPicture, section, select } from "./dom";
 
 interface ModelText {
   label: string;
@@ -35,7 +35,11 @@ export function modelPanel(bench: Workbench): HTMLElement {
     return el("label", { class: "model" }, [input, el("span", {}, [el("strong", { text: label }), el("small", { text })])]);
   });
   const answer = el("p", { class: "quiet" });
-  bench.picture.watch((picture) => (answer.textContent = picture === null ? "" : describeAnswer(picture)));
+  const show = () => {
+    const text = bench.picture.value === null ? "" : describeAnswer(bench.picture.value);
+    if (answer.textContent !== text) answer.textContent = text;
+  };
+  bench.picture.watch(onceAPicture(show));
   return section("Model", [el("div", { attributes: { role: "radiogroup", "aria-label": "Model" } }, items), answer]);
 }
 

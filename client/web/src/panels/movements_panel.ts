@@ -3,7 +3,12 @@
 
 import { cell, describeMovement, landmarkMovement } from "../planning/landmarks";
 import type { Workbench } from "../workbench/workbench";
-import { el, section } from "./dom";
+import { el, onceAPicture, section } from "./dom";
+
+function captionOf(source: string): string {
+  const frame = source === "scanner" ? " Directions are the scanner’s: no head frame was found." : "";
+  return `In mm of the head frame; a dot is less than 0.05.${frame}`;
+}
 
 /** Where landmarks go, in mm of the head frame. */
 export function movementsPanel(bench: Workbench): HTMLElement {
@@ -13,9 +18,7 @@ export function movementsPanel(bench: Workbench): HTMLElement {
     const row = el("tr", {}, [el("th", { text: landmark.label, attributes: { scope: "row" } }), ...cells]);
     return { landmark, row, cells };
   });
-  let isWaiting = false;
   const show = () => {
-    isWaiting = false;
     for (const { landmark, row, cells } of rows) {
       const movement = landmarkMovement(landmark, bench.shownPoses, bench.skinPoint, headFrame);
       const values = [movement.forwardMm, movement.leftMm, movement.upMm, movement.totalMm];
@@ -26,13 +29,8 @@ export function movementsPanel(bench: Workbench): HTMLElement {
       row.title = describeMovement(movement);
     }
   };
-  // A table that is written at every picture would cost more than the picture.
-  bench.shown.watch(() => {
-    if (isWaiting) return;
-    isWaiting = true;
-    requestAnimationFrame(show);
-  });
+  bench.shown.watch(onceAPicture(show));
   const heads = ["Landmark", "Forward", "Left", "Up", "In all"].map((text) => el("th", { text, attributes: { scope: "col" } }));
-  const table = el("table", {}, [el("caption", { text: "in mm; a dot is less than 0.05" }), el("thead", {}, [el("tr", {}, heads)]), el("tbody", {}, rows.map(({ row }) => row))]);
+  const table = el("table", {}, [el("caption", { text: captionOf(headFrame.source) }), el("thead", {}, [el("tr", {}, heads)]), el("tbody", {}, rows.map(({ row }) => row))]);
   return section("Movements", [landmarks.length === 0 ? el("p", { class: "quiet", text: "The case has no landmarks." }) : table]);
 }

@@ -14,19 +14,21 @@ export interface StatusBar {
   element: HTMLElement;
   connection(connection: Connection): void;
   answered(roundTripMs: number): void;
+  waiting(sinceMs: number): void;
   followers(count: number): void;
 }
 
 const FRESH_MS = 1000;
 
 /** How page and server stand to each other, in words; `link`: what a follower opens, null on a follower's page. */
-export function statusBar(title: string, link: (() => string) | null, onLeave: () => void): StatusBar {
+export function statusBar(title: string, link: (() => string) | null, onLeave: () => void, onRetry: (() => void) | null): StatusBar {
   const dot = el("span", { class: "dot", attributes: { "aria-hidden": "true" } });
   const state = el("span", { attributes: { role: "status" } });
   const age = el("span", { class: "quiet age" });
   const follow = el("span", { class: "quiet" });
   const progress = el("progress", { attributes: { max: "1", "aria-label": "Progress" } });
   progress.hidden = true;
+  const retry = onRetry === null ? null : button("Try again", onRetry);
   const copied = el("span", { class: "quiet", attributes: { role: "status" } });
   const copy = link === null ? null : button("Copy follow link", () => void copyLink(link(), copied));
   const back = button("Cases", onLeave, { attributes: { title: "Back to the list of cases; the session ends" } });
@@ -34,6 +36,7 @@ export function statusBar(title: string, link: (() => string) | null, onLeave: (
     link === null ? null : back,
     el("h1", { text: title }),
     el("span", { class: "state" }, [dot, state, progress, age]),
+    retry,
     follow,
     copy,
     copied,
@@ -48,10 +51,14 @@ export function statusBar(title: string, link: (() => string) | null, onLeave: (
       progress.hidden = connection.kind !== "preparing";
       if (share === null) progress.removeAttribute("value");
       else progress.value = share;
+      if (retry !== null) retry.hidden = connection.kind !== "failed";
       age.hidden = connection.kind !== "live";
     },
     answered(roundTripMs) {
       age.textContent = roundTripMs < FRESH_MS ? `answered in ${Math.max(1, Math.round(roundTripMs))} ms` : `answered in ${(roundTripMs / 1000).toFixed(1)} s`;
+    },
+    waiting(sinceMs) {
+      age.textContent = `waiting for ${(sinceMs / 1000).toFixed(1)} s`;
     },
     followers(count) {
       follow.textContent = followersText(count);

@@ -69,9 +69,9 @@ export function segmentMaterial(index: number): three.MeshStandardMaterial {
   return new three.MeshStandardMaterial({ color: segmentColor(index), roughness: 0.66, side: three.DoubleSide });
 }
 
-/** A veil whose edges are seen: the shape at rest about or below the one that moved. */
+/** A veil whose edges are seen, also through what lies before it: the profile at rest beside the one that moved. */
 export function ghostMaterial(): three.MeshBasicMaterial {
-  const material = new three.MeshBasicMaterial({ color: GHOST_COLOR, transparent: true, opacity: 0.9, depthWrite: false });
+  const material = new three.MeshBasicMaterial({ color: GHOST_COLOR, transparent: true, opacity: 0.95, depthWrite: false, depthTest: false });
   material.onBeforeCompile = (shader) => {
     shader.vertexShader = shader.vertexShader
       .replace("#include <common>", "#include <common>\nvarying vec3 ghostNormal;\nvarying vec3 ghostView;")
@@ -81,7 +81,7 @@ export function ghostMaterial(): three.MeshBasicMaterial {
       .replace(
         "#include <opaque_fragment>",
         `float facing = abs( dot( normalize( ghostNormal ), normalize( ghostView ) ) );
-         diffuseColor.a = opacity * ( 0.1 + 0.75 * pow( 1.0 - facing, 2.5 ) );
+         diffuseColor.a = opacity * ( 0.05 + 0.85 * pow( 1.0 - facing, 3.0 ) );
          #include <opaque_fragment>`,
       );
   };

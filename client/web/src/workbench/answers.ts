@@ -10,6 +10,7 @@ import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
 import type { Pose } from "../geometry/pose";
 import { toMessages } from "../live/pose_messages";
 import { randomId } from "../live/session_opening";
+import { clipTitle } from "../live/upload";
 import { pick, subtractInto } from "./face_colors";
 
 const PAGE_SIZE = 200;
@@ -40,7 +41,7 @@ export class Answers {
 
   /** Solves in full and keeps the answer under this title. */
   store(session: string, model: DeformationModel | undefined, poses: Pose[], title: string): Promise<Prediction> {
-    const request = { session, model, poses: toMessages(this.names, poses), title, case: this.caseName, requestId: randomId() };
+    const request = { session, model, poses: toMessages(this.names, poses), title: clipTitle(title), case: this.caseName, requestId: randomId() };
     const options = { headers: sessionMetadata(session), timeoutMs: ANSWER_DEADLINE_MS };
     return this.call(() => this.gateway.predictions.createPrediction(request, options));
   }

@@ -81,6 +81,7 @@ export class Workbench {
   private readonly penetrationTest: PenetrationTest;
   private uncertainty: Float32Array | null = null;
   private other: Float32Array | null = null;
+  private waitingFrom: number | null = null;
   private settling: ReturnType<typeof setTimeout> | undefined;
 
   /** `models`: of the server. */
@@ -116,12 +117,18 @@ export class Workbench {
     await Promise.all([this.live.start(this.plan.poses()), this.loadPredictions()]);
   }
 
+  /** For how long a pose has been waiting for its picture, in ms; 0: none is. */
+  get waitingMs(): number {
+    return this.waitingFrom === null ? 0 : performance.now() - this.waitingFrom;
+  }
+
   modelInfo(model: DeformationModel): ModelInfo | undefined {
     return this.models.find((info) => info.model === model);
   }
 
   async chooseModel(model: DeformationModel): Promise<void> {
     this.model.value = model;
+    if (this.map.value.kind === "band" && !this.hasBand) this.map.value = { kind: "none" };
     await this.live.choose(this.dragChoice());
   }
 
@@ -205,6 +212,7 @@ export class Workbench {
   private planChanged(isFinal: boolean): void {
     const poses = this.plan.poses();
     this.live.sendPoses(poses, isFinal);
+    this.waitingFrom ??= performance.now();
     if (this.comparison.value === null) this.setPoses(poses);
     if (!this.gizmo.isDragging) this.placeGizmo();
     clearTimeout(this.settling);
@@ -231,6 +239,7 @@ export class Workbench {
   private show(picture: Picture, used: () => void): void {
     if (picture.positions.length !== this.rest.length) throw new Error("a picture came that has other vertices than the case");
     subtractInto(picture.positions, this.rest, this.displacements);
+    this.waitingFrom = null;
     if (picture.frame.refinement === 0) this.uncertainty = picture.uncertainty;
     this.picture.value = { roundTripMs: picture.roundTripMs, summary: picture.frame.summary ?? null, isRefining: picture.frame.refining };
     if (this.comparison.value !== null) used();
@@ -239,7 +248,8 @@ export class Workbench {
 
   private lay(displacements: Float32Array, used?: () => void): void {
     this.view.head.setDisplacements(displacements);
-    this.legend.value = this.color(displacements);
+    const legend = this.color(displacements);
+    if (legend !== null || this.legend.value !== null) this.legend.value = legend;
     this.view.stage.invalidate(used);
     this.shown.value += 1;
   }
