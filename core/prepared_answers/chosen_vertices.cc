@@ -105,6 +105,29 @@ double ChosenVertices::RoundingBoundMm(absl::Span<const HandlePose> poses) const
   return kHalfUnit * largest;
 }
 
+void ChosenVertices::Describe(PortableAnswers* answers) const {
+  answers->numbers.num_vertices = static_cast<double>(size_);
+  answers->numbers.num_handles = static_cast<double>(handles_.size());
+  answers->regions.assign(static_cast<size_t>(size_), PortableAnswers::kFree);
+  answers->fixed_rest.assign(fixed_rest_.data(), fixed_rest_.data() + fixed_rest_.size());
+  for (const int32_t place : fixed_places_) {
+    answers->regions[static_cast<size_t>(place)] = PortableAnswers::kFixed;
+  }
+  // Here handle by handle, there in the order of the answer.
+  std::vector<Eigen::RowVector3d> rest(static_cast<size_t>(size_));
+  for (size_t h = 0; h < handles_.size(); ++h) {
+    for (size_t i = 0; i < handles_[h].places.size(); ++i) {
+      const auto place = static_cast<size_t>(handles_[h].places[i]);
+      answers->regions[place] = static_cast<int32_t>(h);
+      rest[place] = handles_[h].rest.row(static_cast<Eigen::Index>(i));
+    }
+  }
+  for (size_t place = 0; place < rest.size(); ++place) {
+    if (answers->regions[place] < 0) continue;
+    answers->handle_rest.insert(answers->handle_rest.end(), rest[place].begin(), rest[place].end());
+  }
+}
+
 int64_t ChosenVertices::bytes_held() const {
   size_t bytes = free_.size() * sizeof(Run) + fixed_places_.size() * sizeof(int32_t) +
                  static_cast<size_t>(fixed_rest_.size()) * sizeof(float);

@@ -8,6 +8,7 @@
 
 #include "absl/types/span.h"
 
+#include "core/answer_evaluator/portable_answers.h"
 #include "core/base/types.h"
 #include "core/constraints/constraint_set.h"
 #include "core/constraints/handle_pose.h"
@@ -36,6 +37,9 @@ class ChosenVertices {
   // How far, in mm, a vertex that is not free can lie from where it should be: half a unit in the
   // last place of the largest coordinate.
   double RoundingBoundMm(absl::Span<const HandlePose> poses) const;
+
+  // Writes how many vertices and handles there are, regions, and the rest of all but free ones.
+  void Describe(PortableAnswers* answers) const;
 
   Eigen::Index size() const { return size_; }
   Eigen::Index num_free() const { return num_free_; }

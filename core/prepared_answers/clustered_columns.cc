@@ -192,6 +192,19 @@ void ClusteredColumns::Evaluate(const Eigen::VectorXd& factors, FloatPositions* 
   }
 }
 
+void ClusteredColumns::Describe(PortableAnswers* answers) const {
+  answers->free_rest.assign(rest_.data(), rest_.data() + rest_.size());
+  answers->cluster_vertices = vertices_;
+  map_.Describe(&answers->cluster_map);
+  for (const Cluster& cluster : clusters_) {
+    for (const Eigen::Index count :
+         {cluster.columns.rows() / 3, cluster.columns.cols(), cluster.columns.full_cols()}) {
+      answers->clusters.push_back(static_cast<int32_t>(count));
+    }
+    cluster.columns.Describe(&answers->columns);
+  }
+}
+
 Eigen::Index ClusteredColumns::num_columns() const {
   Eigen::Index entries = 0;
   for (const Cluster& cluster : clusters_)

@@ -139,6 +139,15 @@ double ColumnCompression::CutBoundMm(const Eigen::MatrixXd& factors) const {
   return kBoundRounding * (double{of_cut} + double{of_tail});
 }
 
+void ColumnCompression::Describe(PortableAnswers* answers) const {
+  const RowMajorMatrix<double> map = map_;
+  const RowMajorMatrix<float> cut_map = cut_map_;
+  answers->map.assign(map.data(), map.data() + map.size());
+  answers->gains.assign(gains_.begin(), gains_.end());
+  answers->cut_map.assign(cut_map.data(), cut_map.data() + cut_map.size());
+  answers->tail.assign(tail_.begin(), tail_.end());
+}
+
 int64_t ColumnCompression::bytes_held() const {
   return (kept_.size() + gains_.size() + map_.size()) * static_cast<int64_t>(sizeof(double)) +
          (cut_map_.size() + tail_.size()) * static_cast<int64_t>(sizeof(float));

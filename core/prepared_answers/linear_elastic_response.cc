@@ -61,6 +61,7 @@ class LinearElasticResponse : public VertexResponse {
       : preparation_(std::move(preparation)),
         elastic_(elastic),
         tolerance_mm_(options.tolerance_mm),
+        max_rotation_rad_(options.max_rotation_rad),
         chosen_(std::move(chosen)),
         panel_(preparation_->mesh().positions()(free, Eigen::all),
                PanelResponse::Rows::kCoordinates, RowsOfVertices(elastic_.response_columns(), free),
@@ -87,6 +88,17 @@ class LinearElasticResponse : public VertexResponse {
     return bound_mm;
   }
 
+  PortableAnswers Describe() const override {
+    PortableAnswers answers;
+    chosen_.Describe(&answers);
+    panel_.Describe(&answers);
+    answers.numbers.model = static_cast<double>(AnswerModel::kLinearElastic);
+    answers.numbers.tolerance_mm = tolerance_mm_;
+    answers.numbers.max_rotation_rad = max_rotation_rad_;
+    answers.origins.assign(elastic_.origin().begin(), elastic_.origin().end());
+    return answers;
+  }
+
   Eigen::Index num_vertices() const override { return chosen_.size(); }
   int num_terms() const override { return static_cast<int>(panel_.num_columns()); }
   int num_terms_before() const override { return static_cast<int>(panel_.num_columns_before()); }
@@ -110,6 +122,7 @@ class LinearElasticResponse : public VertexResponse {
   const std::shared_ptr<MeshPreparation> preparation_;  // owns elastic_
   const ElasticSystem& elastic_;
   const double tolerance_mm_;
+  const double max_rotation_rad_;
   const ChosenVertices chosen_;
   const PanelResponse panel_;  // of the free ones
 };

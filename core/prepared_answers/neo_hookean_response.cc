@@ -111,6 +111,25 @@ class NeoHookeanResponse : public VertexResponse {
     return use.error_mm;
   }
 
+  PortableAnswers Describe() const override {
+    PortableAnswers answers;
+    chosen_.Describe(&answers);
+    columns_->Describe(&answers);
+    estimate_->Describe(&answers);
+    AnswerNumbers& numbers = answers.numbers;
+    numbers.model = static_cast<double>(AnswerModel::kNeoHookean);
+    numbers.tolerance_mm = options_.tolerance_mm;
+    numbers.max_rotation_rad = options_.max_rotation_rad;
+    numbers.max_estimate_mm = options_.max_estimate_mm;
+    numbers.cut_per_mm = cut_per_mm_;
+    numbers.rounding_mm = rounding_mm_;
+    answers.origins.assign(elastic_.origin().begin(), elastic_.origin().end());
+    for (const Eigen::Vector3d& centroid : centroids_) {
+      answers.centroids.insert(answers.centroids.end(), centroid.begin(), centroid.end());
+    }
+    return answers;
+  }
+
   Eigen::Index num_vertices() const override { return chosen_.size(); }
   int num_terms() const override { return static_cast<int>(columns_->num_columns()); }
   int num_terms_before() const override { return static_cast<int>(columns_->num_columns_before()); }

@@ -139,6 +139,13 @@ double PanelResponse::RoundingBoundMm(const Eigen::VectorXd& sizes) const {
   return kHalfUnit * (3 * sum + partial_sums + largest_rest_ + largest_rest_ + sum);
 }
 
+void PanelResponse::Describe(PortableAnswers* answers) const {
+  answers->free_rest.assign(rest_.data(), rest_.data() + rest_.size());
+  answers->numbers.largest_rest_mm = largest_rest_;
+  compression_.Describe(answers);
+  panels_.Describe(&answers->columns);
+}
+
 int64_t PanelResponse::bytes_held() const {
   return panels_.bytes_held() + compression_.bytes_held() +
          rest_.size() * static_cast<int64_t>(sizeof(float));

@@ -121,6 +121,25 @@ class ResponseBasis : public VertexResponse {
     return plan.bound_mm;
   }
 
+  PortableAnswers Describe() const override {
+    PortableAnswers answers;
+    chosen_.Describe(&answers);
+    panel_->Describe(&answers);
+    expansion_.Describe(&answers);
+    AnswerNumbers& numbers = answers.numbers;
+    numbers.model = static_cast<double>(AnswerModel::kGradientField);
+    numbers.tolerance_mm = options_.tolerance_mm;
+    numbers.max_rotation_rad = options_.max_rotation_rad;
+    numbers.max_scale_change = options_.max_scale_change;
+    numbers.num_polynomials = static_cast<double>(num_polynomials_);
+    numbers.largest_gain_mm = largest_gain_;
+    answers.guard_gains.assign(guard_gains_.begin(), guard_gains_.end());
+    for (const Eigen::Vector3d& origin : origins_) {
+      answers.origins.insert(answers.origins.end(), origin.begin(), origin.end());
+    }
+    return answers;
+  }
+
   Eigen::Index num_vertices() const override { return chosen_.size(); }
   int num_terms() const override { return static_cast<int>(panel_->num_columns()); }
   int num_terms_before() const override { return static_cast<int>(panel_->num_columns_before()); }

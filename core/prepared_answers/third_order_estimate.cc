@@ -71,6 +71,15 @@ double ThirdOrderEstimate::UnscaledMm(const Eigen::VectorXd& products) const {
   return std::pow(together * single, 0.75) / std::sqrt(size_mm_);
 }
 
+void ThirdOrderEstimate::Describe(PortableAnswers* answers) const {
+  answers->numbers.size_mm = size_mm_;
+  answers->numbers.estimate_scale = scale_;
+  answers->first_gains.assign(first_gains_.begin(), first_gains_.end());
+  answers->second_gains.assign(second_gains_.begin(), second_gains_.end());
+  const Eigen::MatrixXf rows = probes_.transpose();  // column by column: row-major
+  answers->probes.assign(rows.data(), rows.data() + rows.size());
+}
+
 int64_t ThirdOrderEstimate::bytes_held() const {
   return probes_.size() * static_cast<int64_t>(sizeof(float)) +
          (first_gains_.size() + second_gains_.size()) * static_cast<int64_t>(sizeof(double));

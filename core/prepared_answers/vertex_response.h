@@ -8,6 +8,7 @@
 
 #include "absl/types/span.h"
 
+#include "core/answer_evaluator/portable_answers.h"
 #include "core/base/types.h"
 #include "core/constraints/handle_pose.h"
 
@@ -45,6 +46,10 @@ class VertexResponse {
   // when the poses are not covered.
   virtual std::optional<double> Answer(absl::Span<const HandlePose> poses,
                                        FloatPositions* positions) const = 0;
+
+  // All that AnswerEvaluator, or a program that is not ours, needs to give the same answers; see
+  // docs/prepared-answers.md. Copies: as large as what is held.
+  virtual PortableAnswers Describe() const = 0;
 
   virtual Eigen::Index num_vertices() const = 0;
   virtual int num_terms() const = 0;         // columns of the product, all handles together

@@ -49,6 +49,9 @@ void FuzzDeformStream(const uint8_t* data, size_t size);
 // name says.
 void FuzzCaseUpload(const uint8_t* data, size_t size);
 
+// Prepared answers as bytes (ReadAnswers), and poses for those that are accepted (AnswerEvaluator).
+void FuzzAnswers(const uint8_t* data, size_t size);
+
 // Rows of a store's database and announcements of uploads, the first byte says of what
 // (ParseRecord, ParsePoses, ParseMesh, ParseAnnouncement, ParsePrediction, Unseal,
 // ParseCaseRecord): what is accepted comes back from its own bytes.
