@@ -56,8 +56,9 @@ describe("a planner", () => {
     const { page } = opened;
     await takeSegment(page, "Chin");
     await page.getByRole("button", { name: "Front", exact: true }).click();
-    const grip = await page.evaluate(() => {
+    const grip = await page.evaluate(async () => {
       const { view, bench } = (globalThis as unknown as Hook).tissueform;
+      await new Promise<void>((done) => view.stage.invalidate(done));
       const pose = bench.plan.poses()[2];
       const at = view.head.toWorld([0, 1, 2].map((k: number) => pose.pivotMm[k] + pose.translationMm[k]));
       const scale = view.stage.millimetresPerPixel;
