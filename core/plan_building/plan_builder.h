@@ -67,9 +67,9 @@ struct PlanBuild {
   int64_t still_torn = 0;      // tets that it could not keep from turning inside out
   SkinDistance skin_distance;
   SkinCoverage coverage;
-  std::optional<FrankfortLandmarks> frankfort;  // where they were found
-  HeadFrame head_frame;
-  std::vector<CaseSurface> viewer_surfaces;
+  std::optional<FrankfortLandmarks> frankfort = {};  // where they were found
+  HeadFrame head_frame = {};
+  std::vector<CaseSurface> viewer_surfaces = {};
 };
 
 struct PlanBuildOptions {
