@@ -73,7 +73,8 @@ class MessageStream : public grpc::ServerWriteReactor<Response> {
     if (post_ == nullptr) {
       MakeAndWrite();
     } else {
-      post_([this] { MakeAndWrite(); });
+      const Post post = post_;  // the job may end this object before it is posted here
+      post([this] { MakeAndWrite(); });
     }
   }
 
