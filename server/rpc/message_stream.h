@@ -52,7 +52,10 @@ class MessageStream : public grpc::ServerWriteReactor<Response> {
     post_ = std::move(post);
     WriteNext();
   }
-  void End(const absl::Status& outcome) { this->Finish(scope_.End(outcome)); }
+  void End(const absl::Status& outcome) {
+    next_ = nullptr;  // what it holds is free when the client hears of the end
+    this->Finish(scope_.End(outcome));
+  }
 
   void OnWriteDone(bool ok) override {
     timer_->Cancel(deadline_);
