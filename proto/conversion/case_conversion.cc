@@ -4,6 +4,7 @@
 #include "proto/conversion/case_conversion.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
@@ -15,6 +16,15 @@ namespace tissueform {
 namespace {
 
 constexpr absl::string_view kCasePrefix = "cases/";
+
+// Those of ASCII, and of Latin-1 as UTF-8 writes them: to a terminal both are commands.
+bool HasControlCharacter(absl::string_view text) {
+  unsigned char before = 0;
+  return std::any_of(text.begin(), text.end(), [&before](unsigned char c) {
+    const bool is_latin1 = std::exchange(before, c) == 0xC2 && c < 0xA0;
+    return is_latin1 || absl::ascii_iscntrl(c);
+  });
+}
 
 }  // namespace
 
@@ -34,8 +44,7 @@ absl::Status CheckTitle(absl::string_view title, int max_bytes) {
     return absl::InvalidArgumentError(
         absl::StrCat("title has ", title.size(), " bytes; it may have ", max_bytes));
   }
-  if (std::any_of(title.begin(), title.end(),
-                  [](unsigned char c) { return absl::ascii_iscntrl(c); })) {
+  if (HasControlCharacter(title)) {
     return absl::InvalidArgumentError(
         "title has a control character, such as a line feed; leave it out");
   }

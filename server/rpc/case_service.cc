@@ -83,10 +83,10 @@ grpc::ServerWriteReactor<v1::ReadCaseResponse>* CaseService::ReadCase(
       call->End(part.status());
       return;
     }
-    const auto next = [part = *std::move(part), most](v1::ReadCaseResponse* message) mutable {
+    auto next = [part = *std::move(part), most](v1::ReadCaseResponse* message) mutable {
       return NextOfCase(most, &part, message);
     };
-    call->Send(next, post);
+    call->Send(std::move(next), post);
   });
   return call;
 }

@@ -92,12 +92,12 @@ grpc::ServerWriteReactor<v1::GetSurfaceResponse>* MeshService::GetSurface(
     return call;
   }
   pool_->Post(Lane::kStore, [call, request, catalog = catalog_] {
-    const absl::StatusOr<std::shared_ptr<SurfaceToSend>> made = MakeSurface(*request, catalog);
+    absl::StatusOr<std::shared_ptr<SurfaceToSend>> made = MakeSurface(*request, catalog);
     if (!made.ok()) {
       call->End(made.status());
       return;
     }
-    call->Send([to_send = *made](v1::GetSurfaceResponse* message) {
+    call->Send([to_send = *std::move(made)](v1::GetSurfaceResponse* message) {
       return NextOfSurface(to_send.get(), message);
     });
   });

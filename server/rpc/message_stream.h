@@ -52,7 +52,10 @@ class MessageStream : public grpc::ServerWriteReactor<Response> {
     post_ = std::move(post);
     WriteNext();
   }
-  void End(const absl::Status& outcome) { this->Finish(scope_.End(outcome)); }
+  void End(const absl::Status& outcome) {
+    next_ = nullptr;  // what it holds is free when the client hears of the end
+    this->Finish(scope_.End(outcome));
+  }
 
   void OnWriteDone(bool ok) override {
     timer_->Cancel(deadline_);
@@ -73,7 +76,8 @@ class MessageStream : public grpc::ServerWriteReactor<Response> {
     if (post_ == nullptr) {
       MakeAndWrite();
     } else {
-      post_([this] { MakeAndWrite(); });
+      const Post post = post_;  // the job may end this object before it is posted here
+      post([this] { MakeAndWrite(); });
     }
   }
 

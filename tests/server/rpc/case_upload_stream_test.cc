@@ -185,6 +185,12 @@ TEST_F(CaseUploadStreamTest, WhatIsNoUploadIsRefused) {
           Code::INVALID_ARGUMENT, "256");
   refused(changed([](v1::CaseHeader& to) { to.set_title("two\nlines"); }), Code::INVALID_ARGUMENT,
           "control");
+  refused(changed([](v1::CaseHeader& to) {
+            to.set_title(
+                "a\xc2\x9b"
+                "2J");
+          }),
+          Code::INVALID_ARGUMENT, "control");
 }
 
 TEST_F(CaseUploadStreamTest, AMessageNeverHoldsTheTitle) {
