@@ -39,6 +39,7 @@ constexpr int kEarBehindJointTo = 12;
 constexpr int kEarOverJoint = 8;
 constexpr int kEarUnderJoint = 14;
 constexpr double kCanalHu = -350;  // narrow, so that its air is blurred
+constexpr int kLeastCanalMm = 2;
 
 constexpr double kLeastDepthMm = 55;
 constexpr double kMostDepthMm = 100;
@@ -157,15 +158,23 @@ class FrankfortFinder {
     return kHighestBrow - static_cast<double>(below) + 0.5;
   }
 
+  // Of the longest upright run of air, which is the canal: cells of the bone over it are smaller.
   std::optional<Vector3d> TopOfCanal(double lateral, double joint_front,
                                      double joint_height) const {
-    for (int over = kEarOverJoint; over >= -kEarUnderJoint; --over) {
-      for (int behind = kEarBehindJointFrom; behind <= kEarBehindJointTo; ++behind) {
-        const Vector3d place = Place(lateral, joint_front - behind, joint_height + over);
-        if (IsInView(place) && Interpolate(hu_, place) < kCanalHu) return place;
+    std::optional<Vector3d> top;
+    int longest_mm = kLeastCanalMm - 1;
+    for (int behind = kEarBehindJointFrom; behind <= kEarBehindJointTo; ++behind) {
+      int run_mm = 0;
+      for (int under = kEarUnderJoint; under >= -kEarOverJoint; --under) {  // upward
+        const Vector3d place = Place(lateral, joint_front - behind, joint_height - under);
+        const bool is_air = IsInView(place) && Interpolate(hu_, place) < kCanalHu;
+        run_mm = is_air ? run_mm + 1 : 0;
+        if (run_mm <= longest_mm) continue;
+        longest_mm = run_mm;
+        top = place;
       }
     }
-    return std::nullopt;
+    return top;
   }
 
   const HuGrid& hu_;

@@ -62,7 +62,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Target{"medit", FuzzMeditLines}, Target{"displacements", FuzzDisplacements},
                       Target{"store_record", FuzzStoreRecord},
                       Target{"deform_stream", FuzzDeformStream},
-                      Target{"case_upload", FuzzCaseUpload}, Target{"answers", FuzzAnswers}),
+                      Target{"case_file", FuzzCaseFile}, Target{"case_upload", FuzzCaseUpload}, Target{"answers", FuzzAnswers}),
     [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

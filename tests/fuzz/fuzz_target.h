@@ -36,6 +36,10 @@ void FuzzRecipe(const uint8_t* data, size_t size);
 // A step and packed displacements as a client takes them from the network (DecodeDisplacements).
 void FuzzDisplacements(const uint8_t* data, size_t size);
 
+// A case, or a plan's surfaces for viewers (ParseCase, ParseViewer): what is accepted can be
+// written again, and no number in it leads outside.
+void FuzzCaseFile(const uint8_t* data, size_t size);
+
 // A MEDIT text, before Gmsh sees it (CheckMeditLines).
 void FuzzMeditLines(const uint8_t* data, size_t size);
 

@@ -3,6 +3,7 @@
 
 #include "core/plan_building/recipe.h"
 
+#include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
@@ -137,6 +138,28 @@ TEST(RecipeTest, KeysOfVersion2ArriveAndAreWrittenAgain) {
                                                   HasSubstr("a number from 2500 to 32000"))));
   // With this one the bone of a head was 63 pieces of metal, 11 cm3 together, and the plan ready.
   EXPECT_THAT(parse(R"("metal": 1500)"), StatusIs(kInvalid, HasSubstr("/metal")));
+}
+
+TEST(RecipeTest, KeysOfVersion3ArriveAndAreWrittenAgain) {
+  const auto parse = [](int version, const std::string& frame) {
+    return ParseRecipe(absl::StrCat(R"({"format": "tissueform-recipe", "version": )", version,
+                                    R"(, "segments": [{"name": "chin", "osteotomy": "genioplasty"}],
+                                    "head_frame": )",
+                                    frame, "}"),
+                       "r");
+  };
+  const std::string horizontal =
+      R"({"horizontal": {"point_mm": [1, 2, 3], "normal": [0, -0.3, 2]}})";
+  ASSERT_OK_AND_ASSIGN(const Recipe given, parse(3, horizontal));
+  ASSERT_TRUE(given.horizontal.has_value());
+  EXPECT_FALSE(given.midsagittal.has_value());
+  EXPECT_NEAR(given.horizontal->normal.norm(), 1, 1e-12);
+  EXPECT_THAT(RecipeToJson(given),
+              ::testing::AllOf(HasSubstr("\"horizontal\""), HasSubstr("\"version\": 3")));
+  EXPECT_THAT(parse(2, horizontal), StatusIs(kInvalid, HasSubstr("version")));
+  EXPECT_THAT(parse(3, "{}"), StatusIs(kInvalid, HasSubstr("/head_frame")));
+  EXPECT_THAT(parse(3, R"({"midsagittal": {"point_mm": [0, 0, 0], "normal": [0, 0, 0]}})"),
+              StatusIs(kInvalid, HasSubstr("/head_frame/midsagittal")));
 }
 
 TEST(RecipeTest, Version1HasTheDefaultsOfLaterKeysAndRefusesThem) {
