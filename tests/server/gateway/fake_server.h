@@ -14,12 +14,14 @@ namespace tissueform::testing {
 
 // A gRPC server in this process that does by a method's name what a test wants:
 //
-//   DeformService/Deform, MeshService/GetMesh   sends every message back, ends with OK at the half-close; trailers
+//   DeformService/Deform, MeshService/GetMesh   sends every message back, ends with OK at the
+//   half-close; trailers
 //                                               x-tissueform-node: fake and secret: no
 //   MeshService/ListMeshes, DeformService/Stuck never answers; the second never reads, either
-//   CaseService/ReadCase, DeformService/Watch   sends messages of kEndlessBytes until it is cancelled
-//   SessionService/GetSession                   the names of the client's metadata that it saw, with their values
-//   others                                      NOT_FOUND, "not here: 5 %", with details
+//   CaseService/ReadCase, DeformService/Watch   sends messages of kEndlessBytes until it is
+//   cancelled SessionService/GetSession                   the names of the client's metadata that
+//   it saw, with their values others                                      NOT_FOUND, "not here: 5
+//   %", with details
 class FakeServer : public grpc::CallbackGenericService {
  public:
   static constexpr size_t kEndlessBytes = size_t{64} << 10;
@@ -38,7 +40,8 @@ class FakeServer : public grpc::CallbackGenericService {
   std::atomic<int> written = 0;
 
  private:
-  grpc::ServerGenericBidiReactor* CreateReactor(grpc::GenericCallbackServerContext* context) override;
+  grpc::ServerGenericBidiReactor* CreateReactor(
+      grpc::GenericCallbackServerContext* context) override;
 
   int port_ = 0;
   std::unique_ptr<grpc::Server> server_;

@@ -34,7 +34,8 @@ TEST_F(GatewayHttpTest, ReadinessIsThatOfTheServer) {
 TEST_F(GatewayHttpTest, EveryAnswerForbidsInlineScriptGuessingAndFrames) {
   for (const char* path : {"/healthz", "/nothing"}) {
     const std::string reply = Ask(port(), absl::StrCat("GET ", path, " HTTP/1.1"));
-    EXPECT_THAT(reply, HasSubstr("content-security-policy: default-src 'none'; script-src 'self'; "));
+    EXPECT_THAT(reply,
+                HasSubstr("content-security-policy: default-src 'none'; script-src 'self'; "));
     EXPECT_THAT(reply, Not(HasSubstr("unsafe")));
     EXPECT_THAT(reply, HasSubstr("x-content-type-options: nosniff"));
     EXPECT_THAT(reply, HasSubstr("frame-ancestors 'none'"));
@@ -114,13 +115,15 @@ INSTANTIATE_TEST_SUITE_P(
         BadHttp{"NoWebSocket", Request("GET /call"), 426, GatewayEvent::kWrongSubprotocol},
         BadHttp{"OtherService", Request("POST /other.Service/Method", WebFields()), 404,
                 GatewayEvent::kNoSuchPath},
-        BadHttp{"Json", Request(absl::StrCat("POST ", kWebEcho),
-                                "content-type: application/json\r\ncontent-length: 2\r\n") + "{}",
-                415, GatewayEvent::kWrongContentType},
-        BadHttp{"LongBody",
+        BadHttp{"Json",
                 Request(absl::StrCat("POST ", kWebEcho),
-                        WebFields() + "content-length: 4194310\r\n"),
-                413, GatewayEvent::kBodyTooLarge},
+                        "content-type: application/json\r\ncontent-length: 2\r\n") +
+                    "{}",
+                415, GatewayEvent::kWrongContentType},
+        BadHttp{
+            "LongBody",
+            Request(absl::StrCat("POST ", kWebEcho), WebFields() + "content-length: 4194310\r\n"),
+            413, GatewayEvent::kBodyTooLarge},
         BadHttp{"LongChunk",
                 Request(absl::StrCat("POST ", kWebEcho),
                         WebFields() + "transfer-encoding: chunked\r\n") +
@@ -188,7 +191,8 @@ TEST_F(GatewayHttpTest, AnOldClientGetsItUntilTheEndOfTheConnection) {
 }
 
 TEST_F(GatewayHttpTest, AnErrorWithoutAnAnswerIsInTheHeader) {
-  const std::string reply = AskWeb(port(), "/tissueform.v1.SessionService/UpdateSession", WebBody(""));
+  const std::string reply =
+      AskWeb(port(), "/tissueform.v1.SessionService/UpdateSession", WebBody(""));
   EXPECT_EQ(StatusOf(reply), 200);
   EXPECT_THAT(reply, HasSubstr("grpc-status: 5\r\n"));
   EXPECT_THAT(reply, HasSubstr("grpc-message: not here: 5 %25\r\n"));
@@ -219,8 +223,9 @@ TEST_F(GatewayHttpTest, FramesThatAreNoneAreRefused) {
 }
 
 TEST_F(GatewayHttpTest, WhatLivesLongIsToldOfTheWebSocket) {
-  for (const char* method : {"DeformService/Watch", "DeformService/Deform", "MeshService/UploadMesh",
-                             "SessionService/PrepareSession", "NewService/NewMethod"}) {
+  for (const char* method :
+       {"DeformService/Watch", "DeformService/Deform", "MeshService/UploadMesh",
+        "SessionService/PrepareSession", "NewService/NewMethod"}) {
     const std::string reply = AskWeb(port(), absl::StrCat("/tissueform.v1.", method), WebBody(""));
     EXPECT_THAT(reply, HasSubstr("grpc-status: 12\r\n")) << method;
     EXPECT_THAT(reply, HasSubstr("WebSocket")) << method;

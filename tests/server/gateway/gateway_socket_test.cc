@@ -147,7 +147,8 @@ std::string StartOfCall(const std::string& method) {
   return OurFrame(SocketFrameKind::kStart, start.SerializeAsString());
 }
 
-class BadSocketTest : public GatewaySocketTest, public ::testing::WithParamInterface<BadSequence> {};
+class BadSocketTest : public GatewaySocketTest,
+                      public ::testing::WithParamInterface<BadSequence> {};
 
 TEST_P(BadSocketTest, EndsTheCallWithAWord) {
   RawSocket socket(port());
@@ -158,21 +159,29 @@ TEST_P(BadSocketTest, EndsTheCallWithAWord) {
 
 INSTANTIATE_TEST_SUITE_P(
     Sequences, BadSocketTest,
-    ::testing::Values(
-        BadSequence{"Rubbish", {"rubbish"}, 3, GatewayEvent::kMalformedFrame},
-        BadSequence{"EmptyMessage", {""}, 3, GatewayEvent::kMalformedFrame},
-        BadSequence{"MessageFirst", {OurFrame(SocketFrameKind::kMessage, "")}, 3,
-                    GatewayEvent::kMalformedFrame},
-        BadSequence{"TwoStarts", {StartOfCall(kSilent), StartOfCall(kSilent)}, 3,
-                    GatewayEvent::kMalformedFrame},
-        BadSequence{"MessageAfterHalfClose",
-                    {StartOfCall(kSilent), OurFrame(SocketFrameKind::kHalfClose, ""),
-                     OurFrame(SocketFrameKind::kMessage, "")},
-                    3, GatewayEvent::kMalformedFrame},
-        BadSequence{"StartThatIsNone", {OurFrame(SocketFrameKind::kStart, "\xff")}, 3,
-                    GatewayEvent::kMetadataRefused},
-        BadSequence{"OtherService", {StartOfCall("/grpc.reflection.v1alpha.ServerReflection/X")}, 12,
-                    GatewayEvent::kMethodRefused}),
+    ::testing::Values(BadSequence{"Rubbish", {"rubbish"}, 3, GatewayEvent::kMalformedFrame},
+                      BadSequence{"EmptyMessage", {""}, 3, GatewayEvent::kMalformedFrame},
+                      BadSequence{"MessageFirst",
+                                  {OurFrame(SocketFrameKind::kMessage, "")},
+                                  3,
+                                  GatewayEvent::kMalformedFrame},
+                      BadSequence{"TwoStarts",
+                                  {StartOfCall(kSilent), StartOfCall(kSilent)},
+                                  3,
+                                  GatewayEvent::kMalformedFrame},
+                      BadSequence{"MessageAfterHalfClose",
+                                  {StartOfCall(kSilent), OurFrame(SocketFrameKind::kHalfClose, ""),
+                                   OurFrame(SocketFrameKind::kMessage, "")},
+                                  3,
+                                  GatewayEvent::kMalformedFrame},
+                      BadSequence{"StartThatIsNone",
+                                  {OurFrame(SocketFrameKind::kStart, "\xff")},
+                                  3,
+                                  GatewayEvent::kMetadataRefused},
+                      BadSequence{"OtherService",
+                                  {StartOfCall("/grpc.reflection.v1alpha.ServerReflection/X")},
+                                  12,
+                                  GatewayEvent::kMethodRefused}),
     [](const auto& test) { return std::string(test.param.name); });
 
 struct BadBytes {
@@ -196,7 +205,9 @@ TEST_P(BadWebSocketFrameTest, ClosesTheSocketAndCancelsTheCall) {
 
 INSTANTIATE_TEST_SUITE_P(
     Bytes, BadWebSocketFrameTest,
-    ::testing::Values(BadBytes{"Unmasked", std::string("\x82\x01" "a", 3)},
+    ::testing::Values(BadBytes{"Unmasked", std::string("\x82\x01"
+                                                       "a",
+                                                       3)},
                       BadBytes{"ReservedBit", std::string("\xc2\x81\0\0\0\0a", 7)},
                       BadBytes{"UnknownOpcode", std::string("\x83\x81\0\0\0\0a", 7)},
                       BadBytes{"ContinuationOfNothing", std::string("\x80\x81\0\0\0\0a", 7)},

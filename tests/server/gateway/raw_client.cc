@@ -82,7 +82,8 @@ std::string RawClient::ReadUntil(absl::string_view end) {
 std::string Ask(int port, const std::string& line, const std::string& fields,
                 const std::string& body) {
   RawClient client(port);
-  client.Send(absl::StrCat(line, "\r\nhost: localhost\r\nconnection: close\r\n", fields, "\r\n", body));
+  client.Send(
+      absl::StrCat(line, "\r\nhost: localhost\r\nconnection: close\r\n", fields, "\r\n", body));
   return client.ReadAll();
 }
 
@@ -169,7 +170,8 @@ int RawSocket::ReceiveClose() {
   while (true) {
     const Message message = Receive();
     if (message.opcode == 0) return 0;
-    if (message.opcode == kCloseCode) return static_cast<int>(BigEndian(message.payload.substr(0, 2)));
+    if (message.opcode == kCloseCode)
+      return static_cast<int>(BigEndian(message.payload.substr(0, 2)));
   }
 }
 

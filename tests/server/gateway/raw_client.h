@@ -39,8 +39,8 @@ class RawClient {
   std::string read_;
 };
 
-// The reply to one request on a connection of its own: "GET / HTTP/1.1". Adds Host and `connection: close`; `fields` end
-// with line ends.
+// The reply to one request on a connection of its own: "GET / HTTP/1.1". Adds Host and `connection:
+// close`; `fields` end with line ends.
 std::string Ask(int port, const std::string& line, const std::string& fields = "",
                 const std::string& body = "");
 
@@ -64,7 +64,8 @@ class RawSocket {
   };
 
   // Opens it, with these fields beside.
-  explicit RawSocket(int port, const std::string& fields = "sec-websocket-protocol: tissueform.v1\r\n");
+  explicit RawSocket(int port,
+                     const std::string& fields = "sec-websocket-protocol: tissueform.v1\r\n");
 
   RawClient& raw() { return raw_; }
   // Of the answer to the request.
