@@ -74,7 +74,7 @@ void FuzzWebRequest(const uint8_t* data, size_t size) {
   }
   for (const auto& field : WebEndFields(
            {.status = grpc::Status(grpc::StatusCode::UNKNOWN, std::string(body), std::string(body)),
-            .trailers = {}})) {
+          .trailers = {}})) {
     for (const char c : field.second) Require(c >= ' ' && c <= '~');
   }
 }

@@ -68,8 +68,7 @@ TEST_F(GatewayClientsTest, PythonDragsOverWebSockets) {
 }
 
 TEST_F(GatewayClientsTest, PythonDragsThroughHaproxyWithTls) {
-  const int exit_code =
-      RunScript("behind_haproxy.py", SourcePath("deploy/haproxy/planner.cfg"));
+  const int exit_code = RunScript("behind_haproxy.py", SourcePath("deploy/haproxy/planner.cfg"));
   if (exit_code == kMissing) GTEST_SKIP() << "haproxy is missing: deploy/packages.txt";
   EXPECT_EQ(exit_code, 0);
   EXPECT_THAT(Read("out.txt"), AllOf(HasSubstr("tls: True True\n"), HasSubstr(kCalls)));
@@ -88,7 +87,8 @@ TEST_F(GatewayClientsTest, BufCallsOverGrpcWeb) {
   EXPECT_NE(RunCommand(absl::StrCat(curl, "-d '{\"name\": \"predictions/none\"}' ", service,
                                     "PredictionService/ReadPositions")),
             0);
-  EXPECT_THAT(Read("out.txt"), AllOf(HasSubstr("\"not_found\""), HasSubstr("google.rpc.ErrorInfo")));
+  EXPECT_THAT(Read("out.txt"),
+              AllOf(HasSubstr("\"not_found\""), HasSubstr("google.rpc.ErrorInfo")));
   EXPECT_NE(RunCommand(absl::StrCat(curl, "-d '{\"session\": \"sessions/none\"}' ", service,
                                     "DeformService/Watch")),
             0);
