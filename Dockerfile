@@ -6,14 +6,19 @@
 #
 # The volume holds what the server has acknowledged; --in-memory does without.
 #
-# There is no login and no encryption yet: publish the port on loopback only, as above.
+# The gateway for browsers (docs/gateway.md) is in the same image, for a container of its own:
+#   docker run --rm -p 127.0.0.1:8080:8080 --entrypoint tissueform-gateway tissueform --server SERVER:50051 --listen 0.0.0.0:8080
+#
+# There is no login and no encryption yet: publish the ports on loopback only, as above.
 
 FROM debian:12 AS builder
 COPY deploy /src/deploy
 WORKDIR /src
 RUN deploy/install_packages.sh build && rm -rf /var/lib/apt/lists/*
 COPY . .
-RUN deploy/build.sh release tissueform-server && cmake --install build/release --component server --prefix /opt/tissueform
+RUN deploy/build.sh release tissueform-server tissueform-gateway \
+    && cmake --install build/release --component server --prefix /opt/tissueform \
+    && cmake --install build/release --component gateway --prefix /opt/tissueform
 
 FROM debian:12-slim
 COPY deploy/install_packages.sh deploy/packages.txt /tmp/tissueform/deploy/
@@ -25,7 +30,7 @@ COPY --from=builder /opt/tissueform/ /usr/local/
 USER tissueform
 ENV XDG_STATE_HOME=/var/lib
 VOLUME /var/lib/tissueform
-EXPOSE 50051
+EXPOSE 50051 8080
 STOPSIGNAL SIGTERM
 # Whether the port answers; orchestrators ask the standard gRPC health service instead.
 HEALTHCHECK --interval=30s --timeout=3s CMD ["bash", "-c", "</dev/tcp/127.0.0.1/50051"]

@@ -18,7 +18,7 @@ commands=(
   "tissueform mesh check" "tissueform mesh generate"
   "tissueform plan build" "tissueform plan check" "tissueform plan fit" "tissueform case pack"
   "tissueform deform" "tissueform run" "tissueform demo" "tissueform load" "tissueform server-info" "tissueform compare" "tissueform experiments" "tissueform bench"
-  "tissueform-server"
+  "tissueform-server" "tissueform-gateway"
 )
 
 mkdir -p "$out"

@@ -179,6 +179,8 @@ class BeastConnection final : public ReplyStream,
                                 [self = shared_from_this(), stream_count](Error error) {
                                   if (!self->streams_ || stream_count != self->stream_count_)
                                     return;
+                                  if (error == boost::asio::error::operation_aborted)
+                                    return;  // a piece was not taken
                                   char byte = 0;
                                   const ssize_t size = recv(self->stream_.socket().native_handle(),
                                                             &byte, 1, MSG_PEEK | MSG_DONTWAIT);

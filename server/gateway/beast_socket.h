@@ -52,6 +52,12 @@ class BeastSocket final : public Socket,
     ws_.binary(true);
     ws_.auto_fragment(false);
     ws_.read_message_max(0);  // ReadSome counts: an end shall be sent before the socket closes
+    // The call ends with the client's close, whenever it ends the connection then.
+    ws_.control_callback([this](websocket::frame_type kind, boost::beast::string_view) {
+      if (kind == websocket::frame_type::close && !closing_since_.has_value()) {
+        Post([self = shared_from_this()] { self->Leave(); });
+      }
+    });
     ws_.async_accept(request_, [self = shared_from_this()](Error error) {
       if (error || self->user_ == nullptr) return self->Gone();
       self->opened_ = true;
@@ -121,6 +127,8 @@ class BeastSocket final : public Socket,
       // Beast has sent 1002 then.
       if (error == boost::beast::websocket::condition::protocol_violation) {
         context_->counters->Add(GatewayEvent::kMalformedFrame);
+      } else if (error == boost::beast::error::timeout && !closing_since_.has_value()) {
+        context_->counters->Add(GatewayEvent::kStalled);  // it answered no ping
       }
       return Gone();
     }
@@ -138,6 +146,7 @@ class BeastSocket final : public Socket,
     waiting_since_ = Clock::now();
     std::string message = boost::beast::buffers_to_string(in_.data());
     in_.consume(in_.size());
+    if (in_.capacity() > kPieceBytes) in_.shrink_to_fit();
     user_->OnMessage(std::move(message));
   }
 
@@ -189,6 +198,10 @@ class BeastSocket final : public Socket,
     gone_ = true;
     watchdog_.cancel();
     boost::beast::get_lowest_layer(ws_).close();
+    Leave();
+  }
+
+  void Leave() {
     if (const auto user = std::move(user_); user != nullptr) user->OnGone();
   }
 

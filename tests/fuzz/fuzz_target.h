@@ -56,6 +56,16 @@ void FuzzCaseUpload(const uint8_t* data, size_t size);
 // Prepared answers as bytes (ReadAnswers), and poses for those that are accepted (AnswerEvaluator).
 void FuzzAnswers(const uint8_t* data, size_t size);
 
+// One message of a WebSocket as the gateway takes it from a browser, as a start's payload, and as a
+// message of a server whose longest bytes are looked for (ParseClientFrame, ParseStart,
+// MessageFrame): what is accepted may be given to gRPC.
+void FuzzSocketFrame(const uint8_t* data, size_t size);
+
+// Path, metadata, timeout and body of a request of gRPC-Web, each of the first five after a byte
+// that says its length (ParseWebRequest, MetadataOf, ParseGrpcTimeout), and the end of a call with
+// the body as its message.
+void FuzzWebRequest(const uint8_t* data, size_t size);
+
 // Rows of a store's database and announcements of uploads, the first byte says of what
 // (ParseRecord, ParsePoses, ParseMesh, ParseAnnouncement, ParsePrediction, Unseal,
 // ParseCaseRecord): what is accepted comes back from its own bytes.

@@ -2,7 +2,7 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
-# Fails when a program is linked with a library that reads files of meshes or images. Run on the server: what clients
+# Fails when a program is linked with a library that reads files of meshes or images, or with one that speaks HTTP. Run on the server: what clients
 # send is parsed by our own few lines and protobuf only, and its image stays small. And on a program of client/cpp alone:
 # those who build on it need none of these libraries.
 #
@@ -19,5 +19,10 @@ fi
 symbols=$(nm --demangle "$program" 2>/dev/null || true)
 if grep -m 3 -E 'CGAL::|tetgenmesh::' <<<"$symbols"; then
   echo "check_file_library_links.sh: $program holds code of a file library (see above)" >&2
+  exit 1
+fi
+# What browsers send is the gateway's.
+if grep -m 3 -E 'boost::(beast|asio)::' <<<"$symbols"; then
+  echo "check_file_library_links.sh: $program holds code of Boost.Beast (see above)" >&2
   exit 1
 fi

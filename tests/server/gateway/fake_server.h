@@ -1,0 +1,50 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+
+#include "grpcpp/generic/async_generic_service.h"
+#include "grpcpp/server.h"
+
+namespace tissueform::testing {
+
+// A gRPC server in this process that does by a method's name what a test wants:
+//
+//   DeformService/Deform, MeshService/GetMesh   sends every message back, ends with OK at the
+//   half-close; trailers
+//                                               x-tissueform-node: fake and secret: no
+//   MeshService/ListMeshes, DeformService/Stuck never answers; the second never reads, either
+//   CaseService/ReadCase, DeformService/Watch   sends messages of kEndlessBytes until it is
+//   cancelled SessionService/GetSession                   the names of the client's metadata that
+//   it saw, with their values others                                      NOT_FOUND, "not here: 5
+//   %", with details
+class FakeServer : public grpc::CallbackGenericService {
+ public:
+  static constexpr size_t kEndlessBytes = size_t{64} << 10;
+
+  FakeServer();
+  // Cancels what is open.
+  ~FakeServer() override;
+
+  std::string address() const;
+  // By the health service.
+  void SetServing(bool serving);
+
+  std::atomic<int> open = 0;
+  std::atomic<int> cancelled = 0;
+  // Messages of the endless calls that gRPC has taken.
+  std::atomic<int> written = 0;
+
+ private:
+  grpc::ServerGenericBidiReactor* CreateReactor(
+      grpc::GenericCallbackServerContext* context) override;
+
+  int port_ = 0;
+  std::unique_ptr<grpc::Server> server_;
+};
+
+}  // namespace tissueform::testing
