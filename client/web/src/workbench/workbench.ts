@@ -263,7 +263,7 @@ export class Workbench {
   private color(displacements: Float32Array): MapLegend | null {
     const map = this.map.value;
     if (map.kind === "movement") return this.colors.showLengths("Movement of the skin", displacements);
-    if (map.kind === "band" && this.uncertainty !== null) return this.colors.showNumbers("Band of uncertainty (95 of 100, material only)", this.uncertainty);
+    if (map.kind === "band" && this.uncertainty !== null) return this.colors.showNumbers("Band of 95 in 100 (stiffness only; excludes model and surgical error)", this.uncertainty);
     if ((map.kind === "model" || map.kind === "prediction") && this.other !== null) {
       const title = map.kind === "model" ? `Difference to ${map.label}` : `Difference to “${map.prediction.title}”`;
       return this.colors.showLengths(title, subtractInto(displacements, this.other, new Float32Array(displacements.length)));
