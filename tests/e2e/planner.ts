@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { type ChildProcess, execFileSync, spawn } from "node:child_process";
-import { chmodSync, mkdtempSync, rmSync } from "node:fs";
+import { chmodSync, cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -70,14 +70,23 @@ export class Planner {
   static async start(casePath?: string): Promise<Planner> {
     const planner = new Planner();
     chmodSync(planner.folder, 0o700);
-    const plan = join(SOURCE, "tests/data/plans/three_segments/plan.json");
     if (casePath !== undefined) planner.casePath = casePath;
-    else execFileSync(join(BIN, "tissueform"), ["case", "pack", plan, "--out", planner.casePath]);
+    else execFileSync(join(BIN, "tissueform"), ["case", "pack", planner.writePlan(), "--out", planner.casePath]);
     await planner.startServer();
     planner.gateway = await Program.start("tissueform-gateway", [
       "--server", planner.serverAddress, "--listen", "127.0.0.1:0", "--web", WEB, "--drain-seconds", "1",
     ]);
     return planner;
+  }
+
+  /** The bundled head with three segments, whose stiffness is known within a range. */
+  private writePlan(): string {
+    const folder = join(this.folder, "plan");
+    cpSync(join(SOURCE, "tests/data/plans/three_segments"), folder, { recursive: true });
+    const path = join(folder, "plan.json");
+    const uncertainty = { youngs_modulus_factor_95: 2, poisson_ratio_95: [0.4, 0.48] };
+    writeFileSync(path, JSON.stringify({ ...JSON.parse(readFileSync(path, "utf8")), version: 2, uncertainty }));
+    return path;
   }
 
   serverAddress = "127.0.0.1:0";

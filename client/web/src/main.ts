@@ -1,7 +1,10 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+import "./styles/base.css";
+import "./styles/start.css";
 import "./styles/planner.css";
+import "./styles/panel.css";
 import { sentenceOf, toCallError } from "./calls/call_error";
 import { Gateway } from "./calls/gateway";
 import { type CaseFile, openCase } from "./case/case_file";

@@ -3,7 +3,7 @@
 
 import type { HeadFrame } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
-import { type Field } from "./field";
+import { CaseError, type Field } from "./field";
 
 // What the extension TISSUEFORM_case says (docs/case-format.md), checked; names as there.
 
@@ -57,12 +57,14 @@ export interface Manifest {
 }
 
 const DEFAULT_LIMITS = { translationMm: 20, rotationDeg: 30 };
+const VERSION = 1;
 const MAX_COUNT = 2 ** 31 - 1;
 
 /** Throws a CaseError that names the key. `views` and `meshes`: how many the file has. */
 export function readManifest(root: Field, views: number, meshes: number): Manifest {
   root.get("format").oneOf(["tissueform-case"]);
-  root.get("version").integer(1, 1);
+  const version = root.get("version").integer(1, MAX_COUNT);
+  if (version > VERSION) throw new CaseError(`the case is of version ${version}, and this planner knows ${VERSION}: open it with a newer one`);
   root.get("unit").oneOf(["mm"]);
   root.get("coordinate_system").oneOf(["LPS"]);
   const view = (field: Field) => field.integer(0, views - 1);

@@ -30,6 +30,9 @@ export interface LiveListener {
   onNotice(text: string): void;
 }
 
+/** How often one attempt may be mended (made anew, opened instead, without prepared answers) before it is said to fail. */
+const MOST_MENDED = 4;
+
 /**
  * The session of this tab for one case: opened again where it was left, made anew where the server has lost it, with one drag on
  * it whose model may change. Errors are told as the connection's state; nothing is thrown.
@@ -104,7 +107,7 @@ export class LiveSession {
     const isOver = () => attempt !== this.attempt;
     const backoff = new Backoff();
     let isThere = exists;
-    for (;;) {
+    for (let mended = 0; ; ) {
       try {
         const session = await this.prepare(isThere, isOver);
         if (isOver()) return null;
@@ -113,17 +116,20 @@ export class LiveSession {
       } catch (thrown) {
         if (isOver()) return null;
         const error = toCallError(thrown);
-        if (isThere && error.code === Code.NotFound) isThere = false;
+        if (error.isPassing) await this.wait(error, backoff.next());
+        else if (++mended > MOST_MENDED) return this.fail(error);
+        else if (isThere && error.code === Code.NotFound) isThere = false;
         else if (error.reason === "NO_PREPARED_ANSWERS" && this.choice.isPrepared) this.choice = { ...this.choice, isPrepared: false, ranges: null };
         else if (error.reason === "SESSION_ID_TAKEN") isThere = true;
-        else if (error.isPassing) await this.wait(error, backoff.next());
-        else {
-          this.listener.onConnection({ kind: "failed", text: sentenceOf(error) });
-          return null;
-        }
+        else return this.fail(error);
         if (isOver()) return null;
       }
     }
+  }
+
+  private fail(error: CallError): null {
+    this.listener.onConnection({ kind: "failed", text: sentenceOf(error) });
+    return null;
   }
 
   private prepare(exists: boolean, isOver: () => boolean): Promise<Session> {

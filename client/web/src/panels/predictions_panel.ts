@@ -3,7 +3,8 @@
 
 import { sentenceOf } from "../calls/call_error";
 import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
-import type { Comparison, Workbench } from "../workbench/workbench";
+import type { Comparison } from "../workbench/comparison";
+import type { Workbench } from "../workbench/workbench";
 import { type Choice, button, el, newId, section, select, slider, whileBusy } from "./dom";
 import { modelText } from "./maps_panel";
 

@@ -13,12 +13,12 @@ import { type Pose, toMove } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
 import type { Picture } from "../live/drag_session";
 import { type Connection, LiveSession } from "../live/live_session";
-import { fromMessages } from "../live/pose_messages";
 import { Plan } from "../planning/plan";
 import { Gizmo } from "../scene/gizmo";
 import type { HeadView } from "../scene/head_view";
 import { Answers } from "./answers";
-import { FaceColors, type MapLegend, followedRest, mix, subtractInto } from "./face_colors";
+import { Comparer, type Comparison } from "./comparison";
+import { FaceColors, type MapLegend, followedRest, subtractInto } from "./face_colors";
 import { Signal } from "./signal";
 
 /** What the colours of the skin show. */
@@ -29,24 +29,11 @@ export type MapChoice =
   | { kind: "model"; model: DeformationModel; label: string }
   | { kind: "prediction"; prediction: Prediction };
 
-/** The face between two: the plan (or the rest shape) and a prediction. */
-export interface Comparison {
-  from: Prediction | "plan" | "rest";
-  to: Prediction;
-  /** 0: `from`, 1: `to`. */
-  share: number;
-}
-
 /** What a picture was answered with. */
 export interface PictureFacts {
   roundTripMs: number;
   summary: SolveSummary | null;
   isRefining: boolean;
-}
-
-interface Shape {
-  displacements: Float32Array;
-  poses: Pose[];
 }
 
 const SETTLE_MS = 150;
@@ -75,6 +62,7 @@ export class Workbench {
   /** The face or the bone on the stage changed. */
   readonly shown = new Signal(0);
 
+  private readonly comparer: Comparer;
   private readonly colors: FaceColors;
   private readonly rest: Float32Array;
   private readonly displacements: Float32Array;
@@ -97,6 +85,7 @@ export class Workbench {
     this.displacements = new Float32Array(this.rest.length);
     this.colors = new FaceColors(view.head);
     this.answers = new Answers(gateway, file, caseName, this.rest);
+    this.comparer = new Comparer(this.plan, this.answers);
     const solids = file.surfaces.filter(({ entry }) => entry.kind === "bone" || entry.kind === "segment");
     this.penetrationTest = new PenetrationTest(solids.map((s) => new BoneSolid(s.entry.name, s.entry.handle, s.positions, s.triangles)));
     this.gizmo = new Gizmo(view.stage, view.head, (pose, isFinal) => this.pull(pose, isFinal));
@@ -263,7 +252,7 @@ export class Workbench {
   private color(displacements: Float32Array): MapLegend | null {
     const map = this.map.value;
     if (map.kind === "movement") return this.colors.showLengths("Movement of the skin", displacements);
-    if (map.kind === "band" && this.uncertainty !== null) return this.colors.showNumbers("Band of uncertainty (95 of 100, material only)", this.uncertainty);
+    if (map.kind === "band" && this.uncertainty !== null) return this.colors.showNumbers("Band of 95 in 100 (stiffness only; excludes model and surgical error)", this.uncertainty);
     if ((map.kind === "model" || map.kind === "prediction") && this.other !== null) {
       const title = map.kind === "model" ? `Difference to ${map.label}` : `Difference to “${map.prediction.title}”`;
       return this.colors.showLengths(title, subtractInto(displacements, this.other, new Float32Array(displacements.length)));
@@ -283,26 +272,11 @@ export class Workbench {
 
   private async redraw(): Promise<void> {
     const comparison = this.comparison.value;
-    if (comparison === null) {
-      this.lay(this.displacements);
-      this.setPoses(this.plan.poses());
-      return;
-    }
-    const from = await this.shapeOf(comparison.from);
-    const to = await this.shapeOf(comparison.to);
+    const planned = { displacements: this.displacements, poses: this.plan.poses() };
+    const shape = comparison === null ? planned : await this.comparer.between(comparison, planned);
+    // Another comparison may have been chosen meanwhile.
     if (comparison !== this.comparison.value) return;
-    this.lay(mix(from.displacements, to.displacements, comparison.share));
-    this.setPoses(from.poses.map((pose, index) => this.plan.poseBetween(index, pose, to.poses[index], comparison.share)));
-  }
-
-  private async shapeOf(what: Comparison["from"]): Promise<Shape> {
-    if (what === "plan") return { displacements: this.displacements, poses: this.plan.poses() };
-    const rest = this.plan.restPoses();
-    if (what === "rest") return { displacements: new Float32Array(this.rest.length), poses: rest };
-    const poses = fromMessages(what.poses);
-    return {
-      displacements: await this.answers.ofPrediction(what),
-      poses: this.plan.handles.map((handle, index) => poses.get(handle.name) ?? rest[index]),
-    };
+    this.lay(shape.displacements);
+    this.setPoses(shape.poses);
   }
 }
