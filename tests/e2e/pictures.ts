@@ -74,3 +74,17 @@ test("six pictures", async () => {
   await picture(follower, "follower");
   await live(page);
 });
+
+// README's animation, by ImageMagick: convert -delay 12 FOLDER/jaw-*.jpg -resize 800x -layers Optimize -colors 96 jaw.gif
+test("the lower jaw goes forward, in frames", async () => {
+  const { page } = await openCase(await planner.browse(), planner);
+  await page.emulateMedia({ colorScheme: "dark" });
+  await takeSegment(page, "Lower jaw");
+  await page.getByLabel("Opacity of the skin").fill("0.75");
+  const forth = [0, 1, 2, 3, 4, 5, 6, 7, 8, 8, 8];
+  for (const [frame, mm] of [...forth, ...forth.slice(1, 8).reverse()].entries()) {
+    await typeMove(page, "Forward", String(mm));
+    await moved(page, 0.8 * mm, mm + 0.1);
+    await picture(page, `jaw-${String(frame).padStart(2, "0")}`);
+  }
+});
