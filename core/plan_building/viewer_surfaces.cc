@@ -17,6 +17,7 @@
 #include "core/anatomy/osteotomy.h"
 #include "core/anatomy/surface_extraction.h"
 #include "core/base/status_macros.h"
+#include "core/mesh/surface_cut.h"
 #include "core/mesh_generation/surface_decimation.h"
 
 namespace tissueform {
@@ -38,8 +39,8 @@ constexpr double kBoneEdgeHu = 400;
 // highest tips.
 constexpr double kCrownMm = 8.5;
 constexpr double kOverCrownMm = 5;
-constexpr double kArchHalfWidthMm = 36;
-constexpr double kBehindLastToothMm = 4;
+constexpr double kArchHalfWidthMm = 33;
+constexpr double kBehindLastToothMm = 2;
 constexpr double kBeforeIncisorMm = 12;
 
 TriangleMesh Pick(const TriangleMesh& surface, const std::vector<Index>& triangles) {
@@ -157,25 +158,47 @@ class CrownFinder {
       : landmarks_(sources.landmarks), parts_(sources.parts), bone_(sources.bone), label_(label) {}
 
   BonePart operator()(const Vector3d& place) const {
-    const Landmarks& l = landmarks_;
-    if (IsCrown(place, l.upper_teeth, l.upper_incisor, -1)) return kUpperTeeth;
-    if (IsCrown(place, l.lower_teeth, l.lower_incisor, 1)) return kLowerTeeth;
+    const uint8_t part = PartAt(place);
+    if (part == kCranium && UpperHeight(place) > 0) return kUpperTeeth;
+    if (part == kMandible && LowerHeight(place) > 0) return kLowerTeeth;
     return kPlainBone;
   }
 
+  // The surface with edges where crowns begin.
+  TriangleMesh Cut(const TriangleMesh& bone) const {
+    const TriangleMesh once =
+        CutWhereZero(bone, Heights(bone, [this](const Vector3d& p) { return UpperHeight(p); }));
+    return CutWhereZero(once, Heights(once, [this](const Vector3d& p) { return LowerHeight(p); }));
+  }
+
  private:
-  // `tips_up` is 1 for lower teeth.
-  bool IsCrown(const Vector3d& place, const Plane& teeth, const Vector3d& incisor,
-               double tips_up) const {
+  template <typename Height>
+  static Eigen::VectorXd Heights(const TriangleMesh& bone, const Height& height) {
+    Eigen::VectorXd heights(bone.num_vertices());
+    for (Index v = 0; v < heights.size(); ++v) {
+      heights[v] = height(bone.positions().row(v).transpose());
+    }
+    return heights;
+  }
+
+  double UpperHeight(const Vector3d& place) const {
+    return CrownHeight(place, landmarks_.upper_teeth, landmarks_.upper_incisor, -1);
+  }
+  double LowerHeight(const Vector3d& place) const {
+    return CrownHeight(place, landmarks_.lower_teeth, landmarks_.lower_incisor, 1);
+  }
+
+  // How far inside the room of the crowns, in mm; negative outside. `tips_up` is 1 for lower teeth.
+  double CrownHeight(const Vector3d& place, const Plane& teeth, const Vector3d& incisor,
+                     double tips_up) const {
     const Landmarks& l = landmarks_;
     const double over = tips_up * teeth.HeightMm(place);
     const double behind = -l.ForwardOf(teeth).dot(place - incisor);
     const double last = -std::min(l.ForwardOf(teeth).dot(l.last_upper_tooth.left - incisor),
                                   l.ForwardOf(teeth).dot(l.last_upper_tooth.right - incisor));
-    return over > -kCrownMm && over < kOverCrownMm && behind > -kBeforeIncisorMm &&
-           behind < last + kBehindLastToothMm &&
-           std::abs(l.midsagittal.HeightMm(place)) < kArchHalfWidthMm &&
-           PartAt(place) == (tips_up > 0 ? kMandible : kCranium);
+    return std::min({over + kCrownMm, kOverCrownMm - over, behind + kBeforeIncisorMm,
+                     last + kBehindLastToothMm - behind,
+                     kArchHalfWidthMm - std::abs(l.midsagittal.HeightMm(place))});
   }
 
   // Of the label's voxels about the place, which lies on their border.
@@ -225,7 +248,7 @@ absl::Status AddSkin(const ViewerSources& sources, std::vector<CaseSurface>* sur
 
 void AddBone(const TriangleMesh& bone, const std::string& segment, const CrownFinder& crowns,
              std::vector<CaseSurface>* surfaces) {
-  const auto split = Split(bone, 3, crowns);
+  const auto split = Split(crowns.Cut(bone), 3, crowns);
   const std::string of = segment.empty() ? "" : " of " + segment;
   if (split[kPlainBone]) {
     surfaces->push_back(

@@ -4,6 +4,8 @@
 #include "core/plan_building/frankfort.h"
 
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -31,31 +33,31 @@ struct FoundHead {
   std::optional<FrankfortLandmarks> frankfort;
 };
 
+FoundHead FindAll() {
+  CtReadOptions options;
+  options.hu_offset = -1024;
+  options.axes = "RPI";
+  const CtVolume volume =
+      *ReadCtVolume(testing::TestDataPath("ct/headsq/headsq_quarter.nhdr"), options);
+  HeadSegmentation head = *SegmentHead(*ResampleIsotropic(volume, 1.5));
+  const BoneParts parts = *SeparateBoneParts(head, std::nullopt);
+  const Landmarks landmarks = *FindLandmarks(head, parts);
+  const auto frankfort = FindFrankfort(head.hu, head.options.bone_above_hu, landmarks);
+  return {std::move(head), landmarks, frankfort};
+}
+
 class BundledHeadTest : public ::testing::Test {
  protected:
-  static void SetUpTestSuite() {
-    CtReadOptions options;
-    options.hu_offset = -1024;
-    options.axes = "RPI";
-    const CtVolume volume =
-        *ReadCtVolume(testing::TestDataPath("ct/headsq/headsq_quarter.nhdr"), options);
-    HeadSegmentation head = *SegmentHead(*ResampleIsotropic(volume, 1.5));
-    const BoneParts parts = *SeparateBoneParts(head, std::nullopt);
-    Landmarks landmarks = *FindLandmarks(head, parts);
-    auto frankfort = FindFrankfort(head.hu, head.options.bone_above_hu, landmarks);
-    found_ = new FoundHead{std::move(head), landmarks, frankfort};
+  static const FoundHead& Found() {
+    static const FoundHead* const found = new FoundHead(FindAll());
+    return *found;
   }
-  static void TearDownTestSuite() { delete found_; }
-
-  static FoundHead* found_;
 };
-
-FoundHead* BundledHeadTest::found_ = nullptr;
 
 // As read off the CT by eye, on its slices.
 TEST_F(BundledHeadTest, EarsAndEyesAreFoundWhereTheyAre) {
-  ASSERT_TRUE(found_->frankfort.has_value());
-  const FrankfortLandmarks& f = *found_->frankfort;
+  ASSERT_TRUE(Found().frankfort.has_value());
+  const FrankfortLandmarks& f = *Found().frankfort;
   EXPECT_LT((f.porion.left - Vector3d(-44, 113, -32)).norm(), 5);
   EXPECT_LT((f.porion.right - Vector3d(-150, 113, -34)).norm(), 5);
   EXPECT_LT((f.orbitale.left - Vector3d(-67, 38, -45)).norm(), 6);
@@ -64,37 +66,37 @@ TEST_F(BundledHeadTest, EarsAndEyesAreFoundWhereTheyAre) {
 
 TEST_F(BundledHeadTest, TheFrameIsThePatients) {
   ASSERT_OK_AND_ASSIGN(const HeadFrame frame,
-                       ChooseHeadFrame({found_->landmarks, found_->frankfort, {}, {}}));
+                       ChooseHeadFrame({Found().landmarks, Found().frankfort, {}, {}}));
   EXPECT_THAT(CheckHeadFrame(frame), IsOk());
   EXPECT_EQ(frame.source, "landmarks");
   const auto height = [&](const Vector3d& p) { return frame.superior.dot(p - frame.origin_mm); };
-  const FrankfortLandmarks& f = *found_->frankfort;
+  const FrankfortLandmarks& f = *Found().frankfort;
   EXPECT_NEAR((height(f.porion.left) + height(f.porion.right)) / 2, 0, 1e-9);
   EXPECT_NEAR((height(f.orbitale.left) + height(f.orbitale.right)) / 2, 0, 1e-9);
   // This head lies with its chin 9 degrees up in the scanner.
   EXPECT_NEAR(std::asin(frame.posterior.z()) * (180 / M_PI), 9, 2);
-  EXPECT_NEAR(found_->landmarks.midsagittal.HeightMm(frame.origin_mm), 0, 1e-9);
+  EXPECT_NEAR(Found().landmarks.midsagittal.HeightMm(frame.origin_mm), 0, 1e-9);
 }
 
 TEST_F(BundledHeadTest, WhatIsNotInViewIsNotFound) {
   // Without what lies over the nose, as in a CT of the jaws.
-  HuGrid low = found_->head.hu;
+  HuGrid low = Found().head.hu;
   for (int z = 0; z < low.geometry.size[2]; ++z) {
     if (low.geometry.Centre(0, 0, z).z() < -60) continue;
     for (int y = 0; y < low.geometry.size[1]; ++y) {
       for (int x = 0; x < low.geometry.size[0]; ++x) low.At(x, y, z) = -1000;
     }
   }
-  EXPECT_FALSE(FindFrankfort(low, 250, found_->landmarks).has_value());
+  EXPECT_FALSE(FindFrankfort(low, 250, Found().landmarks).has_value());
 }
 
 TEST_F(BundledHeadTest, LandmarksOfNoHeadGiveNothing) {
-  Landmarks wrong = found_->landmarks;
+  Landmarks wrong = Found().landmarks;
   wrong.condyle.left.z() += 20;  // one ear is looked for far too high
-  EXPECT_FALSE(FindFrankfort(found_->head.hu, 250, wrong).has_value());
-  Landmarks turned = found_->landmarks;
+  EXPECT_FALSE(FindFrankfort(Found().head.hu, 250, wrong).has_value());
+  Landmarks turned = Found().landmarks;
   turned.upper_teeth.normal = Vector3d(0, 0.5, 0.5).normalized();
-  EXPECT_FALSE(FindFrankfort(found_->head.hu, 250, turned).has_value());
+  EXPECT_FALSE(FindFrankfort(Found().head.hu, 250, turned).has_value());
 }
 
 class ChooseHeadFrameTest : public ::testing::Test {

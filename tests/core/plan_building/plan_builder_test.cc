@@ -72,7 +72,7 @@ void ExpectSurfacesOfAHead(const ViewerFile& viewer) {
   }
   EXPECT_EQ(teeth, 2);  // the upper ones of the skull, the lower ones of the jaw
   EXPECT_EQ(segments, 1);
-  EXPECT_LE(triangles, kSkinTriangles + kBoneTriangles + 1000);
+  EXPECT_LE(triangles, kSkinTriangles + kBoneTriangles + 5000);
   const auto find = [&](const std::string& name) {
     return std::find_if(viewer.landmarks.begin(), viewer.landmarks.end(),
                         [&](const CaseLandmark& landmark) { return landmark.name == name; });
