@@ -40,7 +40,4 @@ absl::StatusOr<std::chrono::nanoseconds> ParseGrpcTimeout(absl::string_view text
 // KiB of them.
 std::map<std::string, std::string> AllowedTrailers(const grpc::ClientContext& context);
 
-// As `grpc-message` travels.
-std::string PercentEncode(absl::string_view text);
-
 }  // namespace tissueform

@@ -8,8 +8,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
-
-#include "server/gateway/call_metadata.h"
+#include "absl/strings/str_format.h"
 
 namespace tissueform {
 namespace {
@@ -33,6 +32,19 @@ uint32_t SizeIn(absl::string_view head) {
   uint32_t size = 0;
   for (size_t i = 1; i < kHeadBytes; ++i) size = size << 8 | static_cast<uint8_t>(head[i]);
   return size;
+}
+
+// As `grpc-message` travels.
+std::string PercentEncode(absl::string_view text) {
+  std::string encoded;
+  for (const char c : text) {
+    if (c >= ' ' && c <= '~' && c != '%') {
+      encoded += c;
+    } else {
+      absl::StrAppendFormat(&encoded, "%%%02X", static_cast<unsigned char>(c));
+    }
+  }
+  return encoded;
 }
 
 }  // namespace

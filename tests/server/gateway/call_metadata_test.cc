@@ -74,9 +74,5 @@ TEST(CallMetadata, WhatIsNoTimeoutIsRefused) {
   }
 }
 
-TEST(CallMetadata, MessagesAreAsciiWithoutPercent) {
-  EXPECT_EQ(PercentEncode("no room: 5 %\n\xc3\xa9"), "no room: 5 %25%0A%C3%A9");
-}
-
 }  // namespace
 }  // namespace tissueform

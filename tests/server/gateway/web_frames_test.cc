@@ -85,6 +85,11 @@ TEST(WebFrames, AnEndIsTrailersInText) {
   EXPECT_EQ(WebEndFrame(end), Bytes({128, 0, 0, 0, static_cast<int>(text.size())}, text));
 }
 
+TEST(WebFrames, MessagesAreAsciiWithoutPercent) {
+  EXPECT_THAT(WebEndFields({.status = grpc::Status(grpc::StatusCode::ABORTED, "5 %\n\xc3\xa9")}),
+              ElementsAre(Pair("grpc-status", "10"), Pair("grpc-message", "5 %25%0A%C3%A9")));
+}
+
 TEST(WebFrames, AGoodEndSaysNoMore) {
   EXPECT_THAT(WebEndFields({.status = grpc::Status::OK}), ElementsAre(Pair("grpc-status", "0")));
 }
