@@ -121,7 +121,9 @@ export class Planner {
     const args = ["--no-sandbox", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", ...flags];
     const browser = await chromium.launch({ executablePath: CHROMIUM, args });
     this.browsers.push(browser);
-    return browser.newContext({ viewport: { width: 1280, height: 720 }, acceptDownloads: true });
+    const context = await browser.newContext({ viewport: { width: 1280, height: 720 }, acceptDownloads: true });
+    context.setDefaultTimeout(60_000);
+    return context;
   }
 
   async stop(): Promise<void> {
