@@ -16,7 +16,7 @@ export default defineConfig(({ mode }) => ({
   test: {
     globals: true,
     include: mode === "test" ? ["**/*.test.ts"] : [`${mode}.ts`],
-    testTimeout: 90_000,
+    testTimeout: 120_000,
     hookTimeout: 90_000,
     // Browsers without a graphics card take all processors that they get.
     fileParallelism: false,

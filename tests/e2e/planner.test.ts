@@ -31,7 +31,7 @@ describe("a planner", () => {
     await moved(page, 6, 10);
     const { moves, matrix } = await state(page);
     expect(moves[1].forwardMm).toBe(8);
-    expect(matrix[13]).toBeCloseTo(-8, 6);
+    expect(Math.hypot(...matrix.slice(12, 15))).toBeCloseTo(8, 6);
   });
 
   test("takes back and brings back by keys", async () => {
@@ -136,7 +136,7 @@ describe("a planner", () => {
       const bytes = readFileSync(path);
       if (file.endsWith(".png")) expect(bytes.subarray(1, 4).toString()).toBe("PNG");
       else expect(bytes.toString("latin1")).toContain("not a medical device");
-      if (file.endsWith(".json")) expect(JSON.parse(bytes.toString()).segments[1].pose.translation_mm[1]).toBeCloseTo(-8, 6);
+      if (file.endsWith(".json")) expect(JSON.parse(bytes.toString()).segments[1].move.forwardMm).toBe(8);
     },
   );
 
@@ -169,6 +169,27 @@ describe("a planner", () => {
   });
 });
 
+describe("a whole head", () => {
+  test("has bone that stays, teeth that go along, and landmarks that tell how far", async () => {
+    const { page, faults } = await openCase(await planner.browse(), planner, planner.packWholeHead());
+    await takeSegment(page, "Lower jaw");
+    await typeMove(page, "Forward", "8");
+    await moved(page, 6, 10);
+    const matrices = await page.evaluate(() => {
+      const { surfaces } = (globalThis as unknown as Hook).tissueform.view.head;
+      return surfaces.map((s: any) => [s.source.entry.kind, s.source.entry.handle, Math.hypot(...s.mesh.matrix.elements.slice(12, 15))]);
+    });
+    expect(matrices).toContainEqual(["bone", "", 0]);
+    const teeth = matrices.find(([kind, handle]: string[]) => kind === "teeth" && handle === "mandible");
+    expect(teeth[2]).toBeCloseTo(8, 6);
+    const row = (name: string) => page.getByRole("row", { name }).first().locator("td");
+    await expect.poll(() => row("Lower incisor").allInnerTexts()).toEqual(["8.0", "·", "·", "8.0"]);
+    expect(await row("Upper incisor").allInnerTexts()).toEqual(["·", "·", "·", "·"]);
+    await expect.poll(async () => Number((await row("Soft pogonion").allInnerTexts())[0])).toBeGreaterThan(5);
+    expect(faults).toEqual([]);
+  });
+});
+
 describe("who follows", () => {
   test("sees the same bytes as the planner, and the bone where it is", async () => {
     const context = await planner.browse();
@@ -187,7 +208,7 @@ describe("who follows", () => {
       const { view } = (globalThis as unknown as Hook).tissueform;
       return view.head.surfaces.find((s: any) => s.source.entry.handle === "mandible").mesh.matrix.elements as number[];
     });
-    expect(matrix[13]).toBeCloseTo(-7, 3);
+    expect(Math.hypot(...matrix.slice(12, 15))).toBeCloseTo(7, 3);
     expect(await follower.locator("aside").count()).toBe(0);
     await follower.close();
     await page.getByText("nobody follows").waitFor();

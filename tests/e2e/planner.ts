@@ -66,12 +66,12 @@ export class Planner {
   private gateway: Program | null = null;
   private readonly browsers: Browser[] = [];
 
-  /** `casePath`: of a case; left out: one of the bundled head with three segments. */
+  /** `casePath`: of a case; left out: one of the bundled head with three segments, without the surfaces that surround it. */
   static async start(casePath?: string): Promise<Planner> {
     const planner = new Planner();
     chmodSync(planner.folder, 0o700);
     if (casePath !== undefined) planner.casePath = casePath;
-    else execFileSync(join(BIN, "tissueform"), ["case", "pack", planner.writePlan(), "--out", planner.casePath]);
+    else execFileSync(join(BIN, "tissueform"), ["case", "pack", planner.writePlan(false), "--out", planner.casePath]);
     await planner.startServer();
     planner.gateway = await Program.start("tissueform-gateway", [
       "--server", planner.serverAddress, "--listen", "127.0.0.1:0", "--web", WEB, "--drain-seconds", "1",
@@ -79,10 +79,18 @@ export class Planner {
     return planner;
   }
 
-  /** The bundled head with three segments, whose stiffness is known within a range. */
-  private writePlan(): string {
-    const folder = join(this.folder, "plan");
-    cpSync(join(SOURCE, "tests/data/plans/three_segments"), folder, { recursive: true });
+  /** A case of the whole head: skin, skull, teeth and landmarks beside the segments. A browser without a graphics card is slow with it. */
+  packWholeHead(): string {
+    const path = join(this.folder, "whole.tfcase");
+    execFileSync(join(BIN, "tissueform"), ["case", "pack", this.writePlan(true), "--out", path]);
+    return path;
+  }
+
+  /** The bundled head with three segments, whose stiffness is known within a range; `isWhole`: and what surrounds it. */
+  private writePlan(isWhole: boolean): string {
+    const folder = join(this.folder, isWhole ? "whole" : "plan");
+    const filter = (path: string) => isWhole || !path.endsWith("viewer.glb");
+    cpSync(join(SOURCE, "tests/data/plans/three_segments"), folder, { recursive: true, filter });
     const path = join(folder, "plan.json");
     const uncertainty = { youngs_modulus_factor_95: 2, poisson_ratio_95: [0.4, 0.48] };
     writeFileSync(path, JSON.stringify({ ...JSON.parse(readFileSync(path, "utf8")), version: 2, uncertainty }));
@@ -121,7 +129,9 @@ export class Planner {
     const args = ["--no-sandbox", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", ...flags];
     const browser = await chromium.launch({ executablePath: CHROMIUM, args });
     this.browsers.push(browser);
-    return browser.newContext({ viewport: { width: 1280, height: 720 }, acceptDownloads: true });
+    const context = await browser.newContext({ viewport: { width: 1280, height: 720 }, acceptDownloads: true });
+    context.setDefaultTimeout(60_000);
+    return context;
   }
 
   async stop(): Promise<void> {
@@ -162,9 +172,9 @@ export async function live(page: Page): Promise<void> {
 }
 
 /** The planner of the case, opened by its file. */
-export async function openCase(context: BrowserContext, planner: Planner): Promise<{ page: Page; faults: string[] }> {
+export async function openCase(context: BrowserContext, planner: Planner, path = planner.casePath): Promise<{ page: Page; faults: string[] }> {
   const opened = await openPage(context, planner.url);
-  await opened.page.setInputFiles("input[type=file]", planner.casePath);
+  await opened.page.setInputFiles("input[type=file]", path);
   await live(opened.page);
   return opened;
 }
