@@ -4,6 +4,7 @@
 #include "server/rpc/mesh_surface.h"
 
 #include <cstring>
+#include <future>
 #include <map>
 #include <optional>
 #include <string>
@@ -34,13 +35,24 @@ std::vector<Number> NumbersOf(const std::string& bytes, int64_t offset, int64_t 
 
 class GetSurfaceTest : public ReactorsTest {
  protected:
+  // Workers wait until the call is bound, as in BindCreateSession.
+  void Bind(FakeWriterCall<v1::GetSurfaceResponse>* call, const v1::GetSurfaceRequest* request) {
+    std::promise<void> bound;
+    const std::shared_future<void> is_bound = bound.get_future().share();
+    for (int worker = 0; worker < kWorkers; ++worker) {
+      workers_->Post(Lane::kStore, [is_bound] { is_bound.wait(); });
+    }
+    call->Bind(mesh_service_.GetSurface(nullptr, request));
+    bound.set_value();
+  }
+
   // What comes of the sample; its end in `status_`.
   void Get(const std::vector<std::string>& arrays, const std::string& name = "") {
     v1::GetSurfaceRequest request;
     request.set_name(name.empty() ? absl::StrCat("meshes/", stored_->sha256) : name);
     for (const std::string& array : arrays) request.add_cell_arrays(array);
     FakeWriterCall<v1::GetSurfaceResponse> call(reactions_.get());
-    call.Bind(mesh_service_.GetSurface(nullptr, &request));
+    Bind(&call, &request);
     bytes_.clear();
     header_.reset();
     while (const std::optional<v1::GetSurfaceResponse> message = call.Receive()) {
@@ -163,7 +175,7 @@ TEST_F(GetSurfaceTest, ADrainingServerAndAClientThatLeavesEndIt) {
   {
     FakeWriterCall<v1::GetSurfaceResponse> call(reactions_.get());
     call.StopReading();
-    call.Bind(mesh_service_.GetSurface(nullptr, &request));
+    Bind(&call, &request);
     call.Cancel();
     EXPECT_FALSE(call.WaitUntilDone()->ok());
   }
