@@ -66,6 +66,7 @@ std::vector<uint8_t> RegionsOfFollowers(const FollowedVertices& follows,
                                         const std::vector<uint8_t>& region_of_vertex) {
   std::vector<uint8_t> regions;
   if (region_of_vertex.empty()) return regions;
+  regions.reserve(static_cast<size_t>(follows.weights.rows()));
   for (Index v = 0; v < follows.weights.rows(); ++v) {
     Index most = 0;
     const bool follows_any = follows.weights.row(v).maxCoeff(&most) > 0;

@@ -20,8 +20,8 @@ namespace {
 using Eigen::Index;
 using Json = nlohmann::json;
 
-constexpr int kFloat = 5126;
-constexpr int kUnsignedInt = 5125;
+constexpr int kFloatComponents = 5126;
+constexpr int kIndexComponents = 5125;
 constexpr int kTriangles = 4;
 // Rounding of three float32 that sum to one.
 constexpr float kWeightTolerance = 1e-5F;
@@ -87,10 +87,11 @@ absl::Status ParseTriangles(const Glb& glb, size_t mesh, const std::string& wher
                             CaseSurface* surface) {
   TF_ASSIGN_OR_RETURN(const Json primitive, OnlyPrimitive(glb, mesh, where));
   const std::string at = absl::StrCat("/meshes/", mesh, "/primitives/0");
-  TF_ASSIGN_OR_RETURN(const Numbers positions,
-                      ParseAccessor(glb, primitive["attributes"], "POSITION", kFloat, "VEC3", at));
+  TF_ASSIGN_OR_RETURN(
+      const Numbers positions,
+      ParseAccessor(glb, primitive["attributes"], "POSITION", kFloatComponents, "VEC3", at));
   TF_ASSIGN_OR_RETURN(const Numbers indices,
-                      ParseAccessor(glb, primitive, "indices", kUnsignedInt, "SCALAR", at));
+                      ParseAccessor(glb, primitive, "indices", kIndexComponents, "SCALAR", at));
   if (indices.count > 3 * kMostSurfaceTriangles) {
     return absl::ResourceExhaustedError(absl::StrCat(where, " has ", indices.count / 3,
                                                      " triangles; at most ", kMostSurfaceTriangles,

@@ -32,6 +32,7 @@ const JsonSchema& ViewerSchema() {
 // Of all surfaces and landmarks: here every name is taken for one of a handle that there is.
 std::vector<std::string> HandlesNamed(const ViewerFile& contents) {
   std::vector<std::string> handles;
+  handles.reserve(contents.surfaces.size() + contents.landmarks.size());
   for (const CaseSurface& surface : contents.surfaces) handles.push_back(surface.handle);
   for (const CaseLandmark& landmark : contents.landmarks) handles.push_back(landmark.handle);
   return handles;

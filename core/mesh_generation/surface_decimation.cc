@@ -33,6 +33,7 @@ absl::StatusOr<Halfedges> ToHalfedges(const TriangleMesh& surface) {
   std::vector<DecimationKernel::Point_3> points;
   for (const auto& p : surface.positions().rowwise()) points.emplace_back(p[0], p[1], p[2]);
   std::vector<std::array<std::size_t, 3>> triangles;
+  triangles.reserve(static_cast<std::size_t>(surface.num_triangles()));
   for (const auto& t : surface.triangles().rowwise()) {
     triangles.push_back({static_cast<std::size_t>(t[0]), static_cast<std::size_t>(t[1]),
                          static_cast<std::size_t>(t[2])});

@@ -226,6 +226,7 @@ double BandMm(const Recipe& recipe, const std::vector<BuiltSegment>& segments) {
 
 std::vector<std::string> NamesOf(const std::vector<BuiltSegment>& segments) {
   std::vector<std::string> names;
+  names.reserve(segments.size());
   for (const BuiltSegment& segment : segments) names.push_back(segment.cut.name);
   return names;
 }
@@ -240,6 +241,7 @@ absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTiss
   TF_ASSIGN_OR_RETURN(TetStiffness stiffness, ComputeTetStiffness(built.mesh, head.hu, head.bone,
                                                                   {.table = recipe.tissues}));
   std::vector<HandlePose> poses;
+  poses.reserve(segments.size());
   for (const BuiltSegment& segment : segments) poses.push_back(segment.pose);
   const double contact_band_mm = BandMm(recipe, segments);
   const double tissue_above_hu = recipe.segmentation.tissue_above_hu;

@@ -128,6 +128,7 @@ absl::Status WriteSegments(const PlanBuild& build, const std::filesystem::path& 
 absl::Status WriteViewer(const PlanBuild& build, const std::filesystem::path& folder) {
   TF_ASSIGN_OR_RETURN(const std::string mesh_sha256, MeshFileSha256((folder / kMeshFile).string()));
   std::vector<std::string> segments;
+  segments.reserve(build.segments.size());
   for (const BuiltSegment& segment : build.segments) segments.push_back(segment.cut.name);
   TF_ASSIGN_OR_RETURN(const std::string bytes,
                       SerializeViewer({.mesh_file_sha256 = mesh_sha256,

@@ -11,14 +11,13 @@
 
 #include "absl/status/status.h"
 
-#include "core/anatomy/bone_parts.h"
 #include "core/anatomy/grid_operations.h"
 #include "core/anatomy/itk_filters.h"
 #include "core/anatomy/osteotomy.h"
 #include "core/anatomy/surface_extraction.h"
 #include "core/base/status_macros.h"
-#include "core/mesh/surface_cut.h"
 #include "core/mesh_generation/surface_decimation.h"
+#include "core/plan_building/crown_finder.h"
 
 namespace tissueform {
 namespace {
@@ -34,14 +33,6 @@ constexpr double kMostSmoothMm = 2;
 // So many HU above the threshold count as one voxel inside: what a scanner's blur makes of the edge
 // of a bone.
 constexpr double kBoneEdgeHu = 400;
-
-// A crown stands so far out of the gum, from its tip; and the teeth's planes lie so deep below the
-// highest tips.
-constexpr double kCrownMm = 8.5;
-constexpr double kOverCrownMm = 5;
-constexpr double kArchHalfWidthMm = 33;
-constexpr double kBehindLastToothMm = 2;
-constexpr double kBeforeIncisorMm = 12;
 
 TriangleMesh Pick(const TriangleMesh& surface, const std::vector<Index>& triangles) {
   std::vector<int32_t> number(static_cast<size_t>(surface.num_vertices()), -1);
@@ -148,80 +139,6 @@ absl::StatusOr<TriangleMesh> BoneSurface(const HeadSegmentation& head, const Lab
                                  .min_cavity_volume_mm3 = std::numeric_limits<double>::infinity()});
 }
 
-enum BonePart : size_t { kPlainBone = 0, kUpperTeeth = 1, kLowerTeeth = 2 };
-
-// Which triangles are of crowns, by where they lie: the teeth's planes go through the tips.
-class CrownFinder {
- public:
-  // Of the surface of bone with that label.
-  CrownFinder(const ViewerSources& sources, uint8_t label)
-      : landmarks_(sources.landmarks), parts_(sources.parts), bone_(sources.bone), label_(label) {}
-
-  BonePart operator()(const Vector3d& place) const {
-    const uint8_t part = PartAt(place);
-    if (part == kCranium && UpperHeight(place) > 0) return kUpperTeeth;
-    if (part == kMandible && LowerHeight(place) > 0) return kLowerTeeth;
-    return kPlainBone;
-  }
-
-  // The surface with edges where crowns begin.
-  TriangleMesh Cut(const TriangleMesh& bone) const {
-    const TriangleMesh once =
-        CutWhereZero(bone, Heights(bone, [this](const Vector3d& p) { return UpperHeight(p); }));
-    return CutWhereZero(once, Heights(once, [this](const Vector3d& p) { return LowerHeight(p); }));
-  }
-
- private:
-  template <typename Height>
-  static Eigen::VectorXd Heights(const TriangleMesh& bone, const Height& height) {
-    Eigen::VectorXd heights(bone.num_vertices());
-    for (Index v = 0; v < heights.size(); ++v) {
-      heights[v] = height(bone.positions().row(v).transpose());
-    }
-    return heights;
-  }
-
-  double UpperHeight(const Vector3d& place) const {
-    return CrownHeight(place, landmarks_.upper_teeth, landmarks_.upper_incisor, -1);
-  }
-  double LowerHeight(const Vector3d& place) const {
-    return CrownHeight(place, landmarks_.lower_teeth, landmarks_.lower_incisor, 1);
-  }
-
-  // How far inside the room of the crowns, in mm; negative outside. `tips_up` is 1 for lower teeth.
-  double CrownHeight(const Vector3d& place, const Plane& teeth, const Vector3d& incisor,
-                     double tips_up) const {
-    const Landmarks& l = landmarks_;
-    const double over = tips_up * teeth.HeightMm(place);
-    const double behind = -l.ForwardOf(teeth).dot(place - incisor);
-    const double last = -std::min(l.ForwardOf(teeth).dot(l.last_upper_tooth.left - incisor),
-                                  l.ForwardOf(teeth).dot(l.last_upper_tooth.right - incisor));
-    return std::min({over + kCrownMm, kOverCrownMm - over, behind + kBeforeIncisorMm,
-                     last + kBehindLastToothMm - behind,
-                     kArchHalfWidthMm - std::abs(l.midsagittal.HeightMm(place))});
-  }
-
-  // Of the label's voxels about the place, which lies on their border.
-  uint8_t PartAt(const Vector3d& place) const {
-    const VoxelCell cell(parts_.geometry.ToVoxels(place), parts_.geometry.size);
-    uint8_t best = 0;
-    double most = 0;
-    for (unsigned corner = 0; corner < 8; ++corner) {
-      const auto [x, y, z] = cell.Corner(corner);
-      const uint8_t part = parts_.At(x, y, z);
-      if (bone_.At(x, y, z) != label_ || cell.Weight(corner) <= most) continue;
-      best = part;
-      most = cell.Weight(corner);
-    }
-    return best;
-  }
-
-  const Landmarks& landmarks_;
-  const LabelGrid& parts_;
-  const LabelGrid& bone_;
-  const uint8_t label_;
-};
-
 // Whether the CT ends there: the surface runs up to half a voxel outside its last centres.
 bool IsAtEnd(const Vector3d& place, const GridGeometry& geometry) {
   const Vector3d voxel = geometry.ToVoxels(place);
@@ -284,7 +201,8 @@ absl::StatusOr<std::vector<CaseSurface>> MakeViewerSurfaces(const ViewerSources&
   for (size_t b = 0; b < bones.size(); ++b) {
     const auto wanted = static_cast<int64_t>(kept * static_cast<double>(bones[b].num_triangles()));
     TF_ASSIGN_OR_RETURN(const TriangleMesh bone, DecimateSurface(bones[b], wanted));
-    const CrownFinder crowns(sources, static_cast<uint8_t>(kFixedBone + b));
+    const CrownFinder crowns(sources.landmarks, sources.parts, sources.bone,
+                             static_cast<uint8_t>(kFixedBone + b));
     AddBone(bone, b == 0 ? "" : sources.segments[b - 1], crowns, &surfaces);
   }
   return surfaces;

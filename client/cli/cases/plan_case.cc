@@ -33,6 +33,7 @@ absl::StatusOr<std::vector<uint8_t>> SkinRegionOfVertex(const PlanProblem& probl
   if (FindAttribute(problem.point_data, "skin_region") == nullptr) return regions;
   TF_ASSIGN_OR_RETURN(const std::vector<double> values,
                       FindScalars(problem.point_data, "skin_region", "point"));
+  regions.reserve(values.size());
   for (const double value : values) {
     uint8_t number = 0;
     for (const SkinRegion region : kNamedSkinRegions) {
@@ -71,6 +72,7 @@ Vector3d PivotOf(const PlanProblem& problem, size_t handle,
 std::vector<CaseHandle> HandlesOf(const PlanProblem& problem,
                                   const std::vector<CaseLandmark>& landmarks) {
   std::vector<CaseHandle> handles;
+  handles.reserve(problem.poses.size());
   for (size_t h = 0; h < problem.poses.size(); ++h) {
     const std::string& name = problem.constraints.handles()[h].name;
     handles.push_back({.name = name,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <random>
 #include <string>
 
 #include "gmock/gmock.h"
@@ -139,6 +140,28 @@ TEST(BadCaseTest, WhatFollowsTheEndIsRefused) {
   std::string longer = GoodCase() + "more";
   SetWord(&longer, 8, static_cast<uint32_t>(longer.size()));
   EXPECT_THAT(ParseCase(longer), StatusIs(kInvalid, HasSubstr("follows")));
+}
+
+// Of any bytes: a case that can be written again, or a refusal in one line.
+TEST(BadCaseTest, RandomDamageIsRefusedOrHarmless) {
+  std::mt19937 random(11);
+  int refused = 0;
+  for (int trial = 0; trial < 3000; ++trial) {
+    std::string damaged = GoodCase();
+    // Half of it in the JSON, which says where everything is.
+    const size_t within = trial % 2 == 0 ? 20 + WordAt(damaged, 12) : damaged.size();
+    for (int change = 0; change <= trial % 4; ++change) {
+      damaged[random() % within] = static_cast<char>(random());
+    }
+    const absl::StatusOr<CaseFile> read = ParseCase(damaged);
+    if (read.ok()) {
+      EXPECT_THAT(SerializeCase(*read), IsOk());
+    } else {
+      ++refused;
+      EXPECT_THAT(std::string(read.status().message()), Not(HasSubstr("\n")));
+    }
+  }
+  EXPECT_GT(refused, 1000);
 }
 
 TEST(BadCaseTest, OtherFilesAreNoCases) {
