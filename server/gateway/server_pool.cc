@@ -45,6 +45,7 @@ std::vector<std::shared_ptr<grpc::Channel>> ConnectForHealth(
   grpc::ChannelArguments arguments = Arguments(limits);
   arguments.SetServiceConfigJSON(ServerHealth::HealthServiceConfig());
   std::vector<std::shared_ptr<grpc::Channel>> channels;
+  channels.reserve(addresses.size());
   for (const std::string& address : addresses) channels.push_back(Connect(address, arguments));
   return channels;
 }
