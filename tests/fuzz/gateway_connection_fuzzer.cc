@@ -59,7 +59,7 @@ std::string AnswerTo(absl::string_view bytes) {
   std::array<char, 4096> buffer{};
   while (true) {
     const ssize_t count = recv(fd, buffer.data(), buffer.size(), 0);
-    if (count < 0 && errno == EINTR) continue;  // libFuzzer's clock
+    if (count < 0 && errno == EINTR) continue;       // libFuzzer's clock
     if (count < 0 && errno == EAGAIN) std::abort();  // it hangs
     if (count <= 0) break;
     answer.append(buffer.data(), static_cast<size_t>(count));
