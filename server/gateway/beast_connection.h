@@ -148,10 +148,10 @@ class BeastConnection final : public ReplyStream,
   void OnHead() {
     request_head_ = ToHead(parser_->get());
     context_->counters->Add(GatewayEvent::kRequest);
-    HttpDecision decision = context_->handler->Decide(request_head_);
+    const HttpDecision decision = context_->handler->Decide(request_head_);
     switch (decision.kind) {
       case HttpDecision::kReply:
-        return Write(std::move(decision.reply), parser_->is_done());
+        return Write(decision.reply, parser_->is_done());
       case HttpDecision::kStream:
         return ReadBody();
       case HttpDecision::kSocket:
@@ -209,7 +209,7 @@ class BeastConnection final : public ReplyStream,
   }
 
   // The whole reply.
-  void Write(HttpReply reply, bool stays_open) {
+  void Write(const HttpReply& reply, bool stays_open) {
     stays_open = stays_open && StaysOpen();
     const auto body = reply.body != nullptr ? reply.body : std::make_shared<const std::string>();
     auto response = std::make_shared<Response<FileBody>>(ToResponse(reply).base());

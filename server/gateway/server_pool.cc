@@ -28,7 +28,6 @@ grpc::ChannelArguments Arguments(const GatewayLimits& limits) {
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMilliseconds);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMilliseconds);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstBackoffMilliseconds);
-  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kFirstBackoffMilliseconds);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kLastBackoffMilliseconds);
   arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
   arguments.SetMaxReceiveMessageSize(static_cast<int>(limits.answer_bytes));
@@ -45,6 +44,7 @@ std::vector<std::shared_ptr<grpc::Channel>> ConnectForHealth(
   grpc::ChannelArguments arguments = Arguments(limits);
   arguments.SetServiceConfigJSON(ServerHealth::HealthServiceConfig());
   std::vector<std::shared_ptr<grpc::Channel>> channels;
+  channels.reserve(addresses.size());
   for (const std::string& address : addresses) channels.push_back(Connect(address, arguments));
   return channels;
 }

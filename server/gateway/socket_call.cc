@@ -66,7 +66,7 @@ void SocketCall::Forward(std::string payload) {
     return;
   }
   writing_ = true;
-  upstream_->Write(std::move(payload));
+  upstream_->Write(payload);
   socket_->Receive();
 }
 

@@ -26,6 +26,7 @@ std::shared_ptr<UpstreamCall> UpstreamCall::Begin(CallSlot slot, const CallStart
   call->slot_.stub().PrepareBidiStreamingCall(&call->context_, start.method, {}, call.get());
   // Reads and writes are begun outside of gRPC's callbacks: without it OnDone might come before.
   call->AddHold();
+  call->begun_ = true;
   call->StartCall();
   return call;
 }
@@ -38,7 +39,7 @@ void UpstreamCall::Read() {
   if (!released_) StartRead(&read_);
 }
 
-void UpstreamCall::Write(std::string message) {
+void UpstreamCall::Write(const std::string& message) {
   if (released_) return;
   const grpc::Slice slice(message);
   written_ = grpc::ByteBuffer(&slice, 1);
@@ -63,19 +64,22 @@ void UpstreamCall::Release() {
 }
 
 void UpstreamCall::OnReadDone(bool ok) {
-  strand_->Post([self = self_, ok] {
+  if (!begun_) return;
+  strand_->Post([self = shared_from_this(), ok] {
     if (!ok) return self->Release();
     if (const auto user = self->user_; user != nullptr) user->OnAnswer(self->read_);
   });
 }
 
 void UpstreamCall::OnWriteDone(bool /*ok*/) {
-  strand_->Post([self = self_] {
+  if (!begun_) return;
+  strand_->Post([self = shared_from_this()] {
     if (const auto user = self->user_; user != nullptr) user->OnWritten();
   });
 }
 
 void UpstreamCall::OnDone(const grpc::Status& status) {
+  if (!begun_) return;
   CallEnd end = {.status = status, .trailers = AllowedTrailers(context_)};
   // `this` may be gone before Post returns.
   const std::shared_ptr<Strand> strand = strand_;

@@ -55,16 +55,15 @@ TEST_P(CorpusTest, EveryBeginningOfEveryInputIsSurvived) {
 
 INSTANTIATE_TEST_SUITE_P(
     Targets, CorpusTest,
-    ::testing::Values(Target{"plan", FuzzPlan}, Target{"mesh_validation", FuzzMeshValidation},
-                      Target{"mesh_payload", FuzzMeshPayload},
-                      Target{"dicom_series", FuzzDicomSeries},
-                      Target{"volume_header", FuzzVolumeHeader}, Target{"recipe", FuzzRecipe},
-                      Target{"medit", FuzzMeditLines}, Target{"displacements", FuzzDisplacements},
-                      Target{"store_record", FuzzStoreRecord},
-                      Target{"deform_stream", FuzzDeformStream}, Target{"case_file", FuzzCaseFile},
-                      Target{"case_upload", FuzzCaseUpload}, Target{"answers", FuzzAnswers},
-                      Target{"socket_frame", FuzzSocketFrame},
-                      Target{"web_request", FuzzWebRequest}),
+    ::testing::Values(
+        Target{"plan", FuzzPlan}, Target{"mesh_validation", FuzzMeshValidation},
+        Target{"mesh_payload", FuzzMeshPayload}, Target{"dicom_series", FuzzDicomSeries},
+        Target{"volume_header", FuzzVolumeHeader}, Target{"recipe", FuzzRecipe},
+        Target{"medit", FuzzMeditLines}, Target{"displacements", FuzzDisplacements},
+        Target{"store_record", FuzzStoreRecord}, Target{"deform_stream", FuzzDeformStream},
+        Target{"case_file", FuzzCaseFile}, Target{"case_upload", FuzzCaseUpload},
+        Target{"answers", FuzzAnswers}, Target{"socket_frame", FuzzSocketFrame},
+        Target{"web_request", FuzzWebRequest}, Target{"gateway_connection", FuzzGatewayConnection}),
     [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

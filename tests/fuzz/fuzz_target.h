@@ -56,6 +56,11 @@ void FuzzCaseUpload(const uint8_t* data, size_t size);
 // Prepared answers as bytes (ReadAnswers), and poses for those that are accepted (AnswerEvaluator).
 void FuzzAnswers(const uint8_t* data, size_t size);
 
+// What a browser sends on a connection to a gateway in this process: requests, or, where the first
+// byte is odd, frames of a WebSocket that was opened. The gateway ends the connection after the
+// client has, and serves the next one.
+void FuzzGatewayConnection(const uint8_t* data, size_t size);
+
 // One message of a WebSocket as the gateway takes it from a browser, as a start's payload, and as a
 // message of a server whose longest bytes are looked for (ParseClientFrame, ParseStart,
 // MessageFrame): what is accepted may be given to gRPC.

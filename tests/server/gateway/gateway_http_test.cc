@@ -72,6 +72,8 @@ std::string Request(const std::string& line, const std::string& fields = "") {
   return absl::StrCat(line, " HTTP/1.1\r\nhost: localhost\r\n", fields, "\r\n");
 }
 
+std::string Letters(size_t count) { return std::string(count, 'x'); }
+
 const std::string& WebFields() {
   static const std::string fields = "content-type: application/grpc-web+proto\r\n";
   return fields;
@@ -88,10 +90,9 @@ INSTANTIATE_TEST_SUITE_P(
         BadHttp{"LengthAndChunks",
                 Request("POST /", "content-length: 1\r\ntransfer-encoding: chunked\r\n"), 400,
                 GatewayEvent::kMalformedRequest},
-        BadHttp{"HeaderOf10Megabytes",
-                Request("GET /", "x: " + std::string(10'000'000, 'x') + "\r\n"), 431,
+        BadHttp{"HeaderOf10Megabytes", Request("GET /", "x: " + Letters(10'000'000) + "\r\n"), 431,
                 GatewayEvent::kHeaderTooLarge},
-        BadHttp{"LineOf10Megabytes", Request("GET /" + std::string(10'000'000, 'x')), 431,
+        BadHttp{"LineOf10Megabytes", Request("GET /" + Letters(10'000'000)), 431,
                 GatewayEvent::kHeaderTooLarge},
         BadHttp{"ManyFields",
                 [] {
