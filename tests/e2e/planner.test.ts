@@ -186,6 +186,11 @@ describe("a whole head", () => {
     await expect.poll(() => row("Lower incisor").allInnerTexts()).toEqual(["8.0", "·", "·", "8.0"]);
     expect(await row("Upper incisor").allInnerTexts()).toEqual(["·", "·", "·", "·"]);
     await expect.poll(async () => Number((await row("Soft pogonion").allInnerTexts())[0])).toBeGreaterThan(5);
+    await typeMove(page, "Forward", "0");
+    await typeMove(page, "Up", "-3");
+    await page.getByText(/Lower jaw lies up to [1-5]\.\d mm in Chin\./).waitFor();
+    await typeMove(page, "Up", "0");
+    await page.locator(".warning").waitFor({ state: "hidden" });
     expect(faults).toEqual([]);
   });
 });
