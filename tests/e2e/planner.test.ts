@@ -222,6 +222,21 @@ describe("who follows", () => {
 });
 
 describe("bad input", () => {
+  test("a case that is dropped opens, what is dropped beside it does not", async () => {
+    const { page, faults } = await openPage(await planner.browse(), planner.url);
+    const drop = (bytes: number[]) =>
+      page.locator(".drop").evaluate((zone, content) => {
+        const dataTransfer = new DataTransfer();
+        dataTransfer.items.add(new File([Uint8Array.from(content)], "head.tfcase"));
+        zone.dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true }));
+      }, bytes);
+    await drop([1, 2, 3]);
+    await page.getByRole("alert").getByText("This is no case file").waitFor();
+    await drop(Array.from(readFileSync(planner.casePath)));
+    await live(page);
+    expect(faults).toEqual([]);
+  });
+
   test.each<[string, (bytes: Buffer) => Buffer, string]>([
     ["a file that is no case", () => Buffer.from("hello"), "This is no case file"],
     ["a case that is cut off", (bytes) => bytes.subarray(0, bytes.length / 2), "copy it again"],
