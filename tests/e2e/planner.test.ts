@@ -224,15 +224,15 @@ describe("who follows", () => {
 describe("bad input", () => {
   test("a case that is dropped opens, what is dropped beside it does not", async () => {
     const { page, faults } = await openPage(await planner.browse(), planner.url);
-    const drop = (bytes: number[]) =>
+    const drop = (bytes: Buffer) =>
       page.locator(".drop").evaluate((zone, content) => {
         const dataTransfer = new DataTransfer();
-        dataTransfer.items.add(new File([Uint8Array.from(content)], "head.tfcase"));
+        dataTransfer.items.add(new File([Uint8Array.from(atob(content), (char) => char.charCodeAt(0))], "head.tfcase"));
         zone.dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true }));
-      }, bytes);
-    await drop([1, 2, 3]);
+      }, bytes.toString("base64"));
+    await drop(Buffer.from([1, 2, 3]));
     await page.getByRole("alert").getByText("This is no case file").waitFor();
-    await drop(Array.from(readFileSync(planner.casePath)));
+    await drop(readFileSync(planner.casePath));
     await live(page);
     expect(faults).toEqual([]);
   });
