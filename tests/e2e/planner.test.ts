@@ -196,25 +196,30 @@ describe("a whole head", () => {
 });
 
 describe("who follows", () => {
-  test("sees the same bytes as the planner, and the bone where it is", async () => {
+  test("sees the same bytes as the planner, two of them, and the bone where it is", async () => {
     const context = await planner.browse();
     const { page, faults } = await openCase(context, planner);
     const { session } = await state(page);
     const link = page.url().replace("#case=", `#follow=${session.replace("sessions/", "")}&case=`);
     const { page: follower, faults: theirs } = await openPage(await planner.browse(), link);
     await page.getByText("one follows").waitFor();
+    const { page: second } = await openPage(follower.context(), link);
+    await page.getByText("2 follow").waitFor();
     await takeSegment(page, "Lower jaw");
     await typeMove(page, "Forward", "7");
     await moved(page, 5, 9);
     await moved(follower, 5, 9);
+    await moved(second, 5, 9);
     const positions = (p: typeof page) => p.evaluate(() => Array.from((globalThis as unknown as Hook).tissueform.view.head.skins[0].shape.positions as Float32Array));
     expect(await positions(follower)).toEqual(await positions(page));
+    expect(await positions(second)).toEqual(await positions(page));
     const matrix = await follower.evaluate(() => {
       const { view } = (globalThis as unknown as Hook).tissueform;
       return view.head.surfaces.find((s: any) => s.source.entry.handle === "mandible").mesh.matrix.elements as number[];
     });
     expect(Math.hypot(...matrix.slice(12, 15))).toBeCloseTo(7, 3);
     expect(await follower.locator("aside").count()).toBe(0);
+    await second.close();
     await follower.close();
     await page.getByText("nobody follows").waitFor();
     expect([...faults, ...theirs]).toEqual([]);
