@@ -88,3 +88,21 @@ test("the lower jaw goes forward, in frames", async () => {
     await picture(page, `jaw-${String(frame).padStart(2, "0")}`);
   }
 });
+
+// docs/images/planner/jaw.gif is put together of them by hand: none of our packages makes animations.
+test("frames of an animation: the lower jaw 8 mm forward and back", async () => {
+  const { page } = await openCase(await planner.browse(), planner);
+  await page.emulateMedia({ colorScheme: "dark" });
+  await takeSegment(page, "Lower jaw");
+  await page.getByLabel("Opacity of the skin").fill("0.55");
+  await page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.gizmo.setVisible(false));
+  const steps = 14;
+  for (let step = 0; step <= steps; ++step) {
+    const forward = 4 * (1 - Math.cos((Math.PI * step) / steps));
+    await typeMove(page, "Forward", forward.toFixed(2));
+    await moved(page, 0.6 * forward - 0.05, 1.5 * forward + 0.05);
+    await page.evaluate(() => new Promise<void>((done) => (globalThis as unknown as Hook).tissueform.view.stage.invalidate(done)));
+    await page.waitForTimeout(150);
+    await page.screenshot({ path: join(FOLDER, `drag-${String(step).padStart(2, "0")}.png`), clip: { x: 150, y: 90, width: 1130, height: 510 } });
+  }
+});

@@ -186,30 +186,40 @@ describe("a whole head", () => {
     await expect.poll(() => row("Lower incisor").allInnerTexts()).toEqual(["8.0", "·", "·", "8.0"]);
     expect(await row("Upper incisor").allInnerTexts()).toEqual(["·", "·", "·", "·"]);
     await expect.poll(async () => Number((await row("Soft pogonion").allInnerTexts())[0])).toBeGreaterThan(5);
+    await typeMove(page, "Forward", "0");
+    await typeMove(page, "Up", "-3");
+    await page.getByText(/Lower jaw lies up to [1-5]\.\d mm in Chin\./).waitFor();
+    await typeMove(page, "Up", "0");
+    await page.locator(".warning").waitFor({ state: "hidden" });
     expect(faults).toEqual([]);
   });
 });
 
 describe("who follows", () => {
-  test("sees the same bytes as the planner, and the bone where it is", async () => {
+  test("sees the same bytes as the planner, two of them, and the bone where it is", async () => {
     const context = await planner.browse();
     const { page, faults } = await openCase(context, planner);
     const { session } = await state(page);
     const link = page.url().replace("#case=", `#follow=${session.replace("sessions/", "")}&case=`);
     const { page: follower, faults: theirs } = await openPage(await planner.browse(), link);
     await page.getByText("one follows").waitFor();
+    const { page: second } = await openPage(follower.context(), link);
+    await page.getByText("2 follow").waitFor();
     await takeSegment(page, "Lower jaw");
     await typeMove(page, "Forward", "7");
     await moved(page, 5, 9);
     await moved(follower, 5, 9);
+    await moved(second, 5, 9);
     const positions = (p: typeof page) => p.evaluate(() => Array.from((globalThis as unknown as Hook).tissueform.view.head.skins[0].shape.positions as Float32Array));
     expect(await positions(follower)).toEqual(await positions(page));
+    expect(await positions(second)).toEqual(await positions(page));
     const matrix = await follower.evaluate(() => {
       const { view } = (globalThis as unknown as Hook).tissueform;
       return view.head.surfaces.find((s: any) => s.source.entry.handle === "mandible").mesh.matrix.elements as number[];
     });
     expect(Math.hypot(...matrix.slice(12, 15))).toBeCloseTo(7, 3);
     expect(await follower.locator("aside").count()).toBe(0);
+    await second.close();
     await follower.close();
     await page.getByText("nobody follows").waitFor();
     expect([...faults, ...theirs]).toEqual([]);
@@ -217,6 +227,21 @@ describe("who follows", () => {
 });
 
 describe("bad input", () => {
+  test("a case that is dropped opens, what is dropped beside it does not", async () => {
+    const { page, faults } = await openPage(await planner.browse(), planner.url);
+    const drop = (bytes: Buffer) =>
+      page.locator(".drop").evaluate((zone, content) => {
+        const dataTransfer = new DataTransfer();
+        dataTransfer.items.add(new File([Uint8Array.from(atob(content), (char) => char.charCodeAt(0))], "head.tfcase"));
+        zone.dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true }));
+      }, bytes.toString("base64"));
+    await drop(Buffer.from([1, 2, 3]));
+    await page.getByRole("alert").getByText("This is no case file").waitFor();
+    await drop(readFileSync(planner.casePath));
+    await live(page);
+    expect(faults).toEqual([]);
+  });
+
   test.each<[string, (bytes: Buffer) => Buffer, string]>([
     ["a file that is no case", () => Buffer.from("hello"), "This is no case file"],
     ["a case that is cut off", (bytes) => bytes.subarray(0, bytes.length / 2), "copy it again"],

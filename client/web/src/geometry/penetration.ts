@@ -13,7 +13,7 @@ const REACH_MM = 6;
 const MOST_SAMPLES = 3000;
 const LEAST_DEPTH_MM = 0.5;
 
-/** Where one piece of bone lies in another, at most `depthMm`. */
+/** Where one piece of bone lies in another, at most `depthMm` deeper than at rest. */
 export interface Penetration {
   segment: string;
   other: string;
@@ -149,7 +149,7 @@ function deeper(moved: Vector[], other: BoneSolid, pose: Pose, rest: Float32Arra
     const depth = other.depth([x + pose.pivotMm[0], y + pose.pivotMm[1], z + pose.pivotMm[2]]);
     if (depth < LEAST_DEPTH_MM || depth < rest[index] + LEAST_DEPTH_MM) return;
     points.push(point);
-    depthMm = Math.max(depthMm, depth);
+    depthMm = Math.max(depthMm, depth - rest[index]);
   });
   return { depthMm, points };
 }

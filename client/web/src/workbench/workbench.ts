@@ -87,7 +87,10 @@ export class Workbench {
     this.answers = new Answers(gateway, file, caseName, this.rest);
     this.comparer = new Comparer(this.plan, this.answers);
     const solids = file.surfaces.filter(({ entry }) => entry.kind === "bone" || entry.kind === "segment");
-    this.penetrationTest = new PenetrationTest(solids.map((s) => new BoneSolid(s.entry.name, s.entry.handle, s.positions, s.triangles)));
+    const label = (handle: string) => file.manifest.handles.find(({ name }) => name === handle)?.label;
+    this.penetrationTest = new PenetrationTest(
+      solids.map(({ entry, positions, triangles }) => new BoneSolid(label(entry.handle) ?? "the fixed bone", entry.handle, positions, triangles)),
+    );
     this.gizmo = new Gizmo(view.stage, view.head, (pose, isFinal) => this.pull(pose, isFinal));
     this.model.value = models.find((model) => model.name === file.manifest.model)?.model ?? file.sessionRequest.model;
     this.live = new LiveSession(gateway, file, caseName, {
