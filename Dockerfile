@@ -7,7 +7,7 @@
 # The volume holds what the server has acknowledged; --in-memory does without.
 #
 # The gateway for browsers (docs/gateway.md) is in the same image, for a container of its own:
-#   docker run --rm -p 127.0.0.1:8080:8080 --entrypoint tissueform-gateway tissueform --server SERVER:50051 --listen 0.0.0.0:8080
+#   docker run --rm -p 127.0.0.1:8080:8080 --entrypoint tissueform-gateway tissueform --server SERVER:50051 --listen 0.0.0.0:8080 --web /usr/local/share/tissueform/web
 #
 # There is no login and no encryption yet: publish the ports on loopback only, as above.
 
@@ -16,7 +16,8 @@ COPY deploy /src/deploy
 WORKDIR /src
 RUN deploy/install_packages.sh build && rm -rf /var/lib/apt/lists/*
 COPY . .
-RUN deploy/build.sh release tissueform-server tissueform-gateway \
+RUN deploy/build_web.sh \
+    && deploy/build.sh release tissueform-server tissueform-gateway \
     && cmake --install build/release --component server --prefix /opt/tissueform \
     && cmake --install build/release --component gateway --prefix /opt/tissueform
 

@@ -7,7 +7,7 @@
 #   libexec/tissueform/           what those start, and the modules that they load
 #   lib/, include/tissueform/     the client library with all that it links; includes are written as in the repository
 #   lib/cmake/tissueform/         find_package(tissueform): tissueform::client_cpp
-#   share/tissueform/             bundled plans, .proto files, schemas
+#   share/tissueform/             bundled plans, .proto files, schemas, the planner for browsers
 #   share/doc/tissueform/         an example, the licence
 #   share/man/man1/               manual pages, made from --help
 #
@@ -136,6 +136,8 @@ function(tissueform_install_data)
   file(MAKE_DIRECTORY "${PROJECT_BINARY_DIR}/share/tissueform")
   file(CREATE_LINK "${PROJECT_SOURCE_DIR}/tests/data/plans" "${PROJECT_BINARY_DIR}/share/tissueform/plans" SYMBOLIC)
   file(CREATE_LINK "${PROJECT_SOURCE_DIR}/build/web" "${PROJECT_BINARY_DIR}/share/tissueform/web" SYMBOLIC)
+  # Where deploy/build_web.sh has built it.
+  install(DIRECTORY "${PROJECT_SOURCE_DIR}/build/web" DESTINATION "${TISSUEFORM_INSTALL_DATA}" COMPONENT gateway OPTIONAL)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/tests/data/plans" DESTINATION "${TISSUEFORM_INSTALL_DATA}")
   install(FILES "${PROJECT_SOURCE_DIR}/docs/plan.schema.json" "${PROJECT_SOURCE_DIR}/docs/recipe.schema.json"
                 "${PROJECT_SOURCE_DIR}/docs/targets.schema.json" "${PROJECT_SOURCE_DIR}/docs/case.schema.json" "${PROJECT_SOURCE_DIR}/docs/viewer.schema.json"
