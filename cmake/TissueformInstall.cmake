@@ -135,9 +135,10 @@ endfunction()
 function(tissueform_install_data)
   file(MAKE_DIRECTORY "${PROJECT_BINARY_DIR}/share/tissueform")
   file(CREATE_LINK "${PROJECT_SOURCE_DIR}/tests/data/plans" "${PROJECT_BINARY_DIR}/share/tissueform/plans" SYMBOLIC)
+  file(CREATE_LINK "${PROJECT_SOURCE_DIR}/build/web" "${PROJECT_BINARY_DIR}/share/tissueform/web" SYMBOLIC)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/tests/data/plans" DESTINATION "${TISSUEFORM_INSTALL_DATA}")
   install(FILES "${PROJECT_SOURCE_DIR}/docs/plan.schema.json" "${PROJECT_SOURCE_DIR}/docs/recipe.schema.json"
-                "${PROJECT_SOURCE_DIR}/docs/targets.schema.json"
+                "${PROJECT_SOURCE_DIR}/docs/targets.schema.json" "${PROJECT_SOURCE_DIR}/docs/case.schema.json" "${PROJECT_SOURCE_DIR}/docs/viewer.schema.json"
           DESTINATION "${TISSUEFORM_INSTALL_DATA}")
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/proto/tissueform" DESTINATION "${TISSUEFORM_INSTALL_DATA}/proto"
           FILES_MATCHING PATTERN "*.proto" PATTERN "store" EXCLUDE)  # what a server keeps for itself is no interface

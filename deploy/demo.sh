@@ -7,7 +7,8 @@
 #
 #   deploy/demo.sh [options of `tissueform demo`]
 #
-# With --serve the server keeps running afterwards, with what it has predicted, until Ctrl-C.
+# With --serve the server keeps running afterwards, with what it has predicted, until Ctrl-C, and the planner for browsers
+# in front of it: open the address that is printed.
 #
 # TISSUEFORM_BUILD_DIR and JOBS: see deploy/build.sh.
 set -euo pipefail
@@ -16,5 +17,12 @@ cd "$(dirname "$0")/.."
 export TISSUEFORM_BUILD_DIR=${TISSUEFORM_BUILD_DIR:-$PWD/build/release}
 
 deploy/install_packages.sh build
-deploy/build.sh release tissueform tissueform-server
+targets=(tissueform tissueform-server)
+for option in "$@"; do
+  if [[ $option == --serve ]]; then
+    targets+=(tissueform-gateway)
+    deploy/build_web.sh
+  fi
+done
+deploy/build.sh release "${targets[@]}"
 exec "$TISSUEFORM_BUILD_DIR/bin/tissueform" demo "$@"

@@ -16,7 +16,7 @@ version=${3:?}
 commands=(
   "tissueform"
   "tissueform mesh check" "tissueform mesh generate"
-  "tissueform plan build" "tissueform plan check" "tissueform plan fit"
+  "tissueform plan build" "tissueform plan check" "tissueform plan fit" "tissueform case pack"
   "tissueform deform" "tissueform run" "tissueform demo" "tissueform load" "tissueform server-info" "tissueform compare" "tissueform experiments" "tissueform bench"
   "tissueform-server" "tissueform-gateway"
 )

@@ -15,4 +15,5 @@ jobs=${JOBS:-$(nproc)}
 
 deploy/install_packages.sh build
 deploy/build.sh release
+deploy/build_web.sh
 exec ctest --test-dir "$TISSUEFORM_BUILD_DIR" --output-on-failure --no-tests=error --parallel "$jobs" "$@"

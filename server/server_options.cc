@@ -57,6 +57,10 @@ void AddLimits(CLI::App& app, ServerOptions* options) {
             "sessions in memory at the same time", Into(&limits.max_sessions));
   AddNumber(app, "--max-stored-sessions", limits.max_stored_sessions, 1, kMaxCount,
             "sessions kept, in memory or not", Into(&limits.max_stored_sessions));
+  AddNumber(app, "--max-case-mib", limits.max_case_bytes / kMebibyte, 1, kMaxMebibytes,
+            "size of one case as it is sent", MebibytesInto(&limits.max_case_bytes));
+  AddNumber(app, "--max-cases", limits.max_cases, 1, kMaxCount, "cases kept",
+            Into(&limits.max_cases));
   AddNumber(app, "--max-streams", limits.max_streams, 1, kMaxCount,
             "drags (Deform streams) open at the same time", Into(&limits.max_streams));
   AddNumber(app, "--max-watches", limits.max_watches, 1, kMaxCount,
@@ -66,11 +70,11 @@ void AddLimits(CLI::App& app, ServerOptions* options) {
   AddNumber(app, "--session-idle-ttl", limits.session_idle_ttl.count(), 0, kMaxSeconds,
             "seconds after which an unused session or mesh may be removed when room is needed",
             SecondsInto(&limits.session_idle_ttl));
-  AddNumber(
-      app, "--retention-days", limits.retention_days, 0, kMaxDays,
-      "days after which sessions, predictions and meshes that nobody used are deleted; 0 keeps "
-      "them for ever",
-      Into(&limits.retention_days));
+  AddNumber(app, "--retention-days", limits.retention_days, 0, kMaxDays,
+            "days after which sessions, predictions, meshes and cases that nobody used are "
+            "deleted; 0 keeps "
+            "them for ever",
+            Into(&limits.retention_days));
   AddNumber(app, "--max-calls-per-connection", options->max_calls_per_connection, 1, kMaxCount,
             "calls open at the same time on one connection; more wait at the client",
             Into(&options->max_calls_per_connection));

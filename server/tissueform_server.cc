@@ -140,6 +140,8 @@ TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr
       deform_service_(&gate_, options.limits, &registry_, &streams_, &watches_, &timer_),
       prediction_service_(&gate_, options.limits, &catalog_, &registry_, &stores_->predictions(),
                           &timer_),
+      plan_service_(&gate_, &registry_),
+      case_service_(&gate_, options.limits, &stores_->cases(), pool_.get(), &timer_),
       server_info_service_(&gate_, LimitsOf(options)) {
   SetBlasThreads(1);  // the pool's workers share the cores already
   registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
@@ -173,6 +175,8 @@ absl::Status TissueformServer::Listen() {
   builder.RegisterService(&session_service_);
   builder.RegisterService(&deform_service_);
   builder.RegisterService(&prediction_service_);
+  builder.RegisterService(&plan_service_);
+  builder.RegisterService(&case_service_);
   builder.RegisterService(&server_info_service_);
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) return absl::InternalError("gRPC does not start");

@@ -11,9 +11,11 @@
 #include "grpcpp/server_builder.h"
 
 #include "server/rpc/call_scope.h"
+#include "server/rpc/case_service.h"
 #include "server/rpc/deform_service.h"
 #include "server/rpc/deform_streams.h"
 #include "server/rpc/mesh_service.h"
+#include "server/rpc/plan_service.h"
 #include "server/rpc/prediction_service.h"
 #include "server/rpc/server_info_service.h"
 #include "server/rpc/session_service.h"
@@ -84,6 +86,8 @@ class TissueformServer {
   SessionService session_service_;
   DeformService deform_service_;
   PredictionService prediction_service_;
+  PlanService plan_service_;
+  CaseService case_service_;
   ServerInfoService server_info_service_;
   // gRPC gets its connections from the listener, through the acceptor. The server comes last: what
   // it is given goes to the acceptor of a server that lives.

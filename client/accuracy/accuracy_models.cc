@@ -3,13 +3,18 @@
 
 #include "client/accuracy/accuracy_models.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <memory>
+#include <numeric>
 #include <utility>
+#include <vector>
 
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/deformation/deformation_quality.h"
 #include "core/deformation/mesh_preparation.h"
+#include "core/prepared_answers/create_response.h"
 
 namespace tissueform {
 namespace {
@@ -37,6 +42,31 @@ absl::StatusOr<std::shared_ptr<MeshPreparation>> Prepare(const AccuracyCase& pro
                                  std::move(options));
 }
 
+// At all vertices, with the settings of a drag but for how far handles may turn: as far as these.
+absl::StatusOr<Deformation> AnswerFromPrepared(const std::shared_ptr<MeshPreparation>& preparation,
+                                               DeformationModel model,
+                                               const AccuracyCase& problem) {
+  ResponseOptions options{.model = model};
+  for (const HandlePose& pose : problem.poses) {
+    options.max_rotation_rad = std::max(options.max_rotation_rad, pose.rotation_vector.norm());
+  }
+  std::vector<int32_t> all(static_cast<size_t>(problem.mesh.num_vertices()));
+  std::iota(all.begin(), all.end(), 0);
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<VertexResponse> response,
+                      CreateResponse(preparation, all, options));
+  FloatPositions positions;
+  response->Evaluate(problem.poses, &positions);
+  return Deformation{.positions = positions.cast<double>(), .summary = {}};
+}
+
+absl::StatusOr<Deformation> Answer(const std::shared_ptr<MeshPreparation>& preparation,
+                                   const ModelVariant& variant, const AccuracyCase& problem) {
+  if (variant.is_prepared) return AnswerFromPrepared(preparation, variant.model, problem);
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<Deformer> deformer,
+                      CreateDeformer(preparation, OptionsOf(variant)));
+  return deformer->Deform(problem.poses);
+}
+
 }  // namespace
 
 const std::vector<ModelVariant>& AllModelVariants() {
@@ -49,6 +79,8 @@ const std::vector<ModelVariant>& AllModelVariants() {
        RotationMode::kEstimated, false},
       {"arap", "ARAP", kArap, RotationMode::kPropagated, false},
       {"linear_elastic", "linear elastic", kLinearElastic, RotationMode::kPropagated, true},
+      {"neo_hookean_prepared", "neo-Hookean, prepared", kNeoHookean, RotationMode::kPropagated,
+       true, true},
       {"neo_hookean", "neo-Hookean", kNeoHookean, RotationMode::kPropagated, true},
   };
   return *kVariants;
@@ -58,9 +90,7 @@ absl::StatusOr<ModelAnswer> AnswerByModel(const ModelVariant& variant, const Acc
                                           double poisson_ratio) {
   const Stopwatch stopwatch;
   TF_ASSIGN_OR_RETURN(const auto preparation, Prepare(problem, poisson_ratio));
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<Deformer> deformer,
-                      CreateDeformer(preparation, OptionsOf(variant)));
-  TF_ASSIGN_OR_RETURN(Deformation deformation, deformer->Deform(problem.poses));
+  TF_ASSIGN_OR_RETURN(Deformation deformation, Answer(preparation, variant, problem));
   const double seconds = stopwatch.Seconds();
   const Eigen::Index inverted =
       MeasureDeformation(problem.mesh, deformation.positions).inverted_tets;

@@ -21,9 +21,11 @@ struct ModelVariant {
   DeformationModel model = DeformationModel::kGradientField;
   RotationMode rotation = RotationMode::kPropagated;  // of the gradient field
   bool uses_poisson_ratio = false;
+  bool is_prepared = false;  // by its prepared answers, as a drag shows them
 };
 
-// Plain Poisson, both modes of the gradient field, ARAP, linear elasticity, neo-Hookean.
+// Plain Poisson, both modes of the gradient field, ARAP, linear elasticity, neo-Hookean by its
+// prepared answers and by itself.
 const std::vector<ModelVariant>& AllModelVariants();
 
 // What one model, or CalculiX, made of a case.

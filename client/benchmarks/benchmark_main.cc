@@ -34,8 +34,8 @@ using FrameBenchmarkList = std::vector<std::unique_ptr<FrameBenchmark>>;
 absl::StatusOr<FrameBenchmarkList> FrameBenchmarks(const TestBar& bar, int threads) {
   std::vector<FrameBenchmark::Kind> kinds = {FrameBenchmark::Kind::kBasis};
   if (bar.number != kLargeBar) {
-    kinds.insert(kinds.end(),
-                 {FrameBenchmark::Kind::kBasisThreeHandles, FrameBenchmark::Kind::kElastic});
+    kinds.insert(kinds.end(), {FrameBenchmark::Kind::kBasisThreeHandles,
+                               FrameBenchmark::Kind::kElastic, FrameBenchmark::Kind::kNeoHookean});
   }
   FrameBenchmarkList benchmarks;
   for (const FrameBenchmark::Kind kind : kinds) {

@@ -3,6 +3,8 @@
 //
 // The companion of `tissueform` that speaks with servers.
 
+#include "client/cli/cases/case_command.h"
+#include "client/cli/cases/planner_process.h"
 #include "client/cli/load/load_command.h"
 #include "client/cli/online/demo_command.h"
 #include "client/cli/online/drag_command.h"
@@ -23,7 +25,8 @@ int main(int argc, char** argv) {
     tissueform::AddServerMeshCommand(app, work);
     tissueform::AddWatchCommand(app, work);
     tissueform::AddPredictionCommand(app, work);
+    tissueform::AddCaseCommand(app, work);
     tissueform::AddServerInfoCommand(app, work);
-    tissueform::AddDemoCommand(app, work);
+    tissueform::AddDemoCommand(app, tissueform::OpenPlannerOfPlan, work);
   });
 }

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/mesh_payload.h"
 #include "proto/conversion/material_conversion.h"
 #include "proto/conversion/mesh_conversion.h"
 
@@ -20,13 +19,17 @@ constexpr char kStiffnessArray[] = "youngs_modulus_pa";
 }  // namespace
 
 absl::StatusOr<v1::Mesh> UploadMeshOf(TissueformClient* client, const PlanProblem& problem) {
-  return client->UploadMesh(*problem.mesh, {{kStiffnessArray, problem.stiffness}});
+  return client->UploadMesh(*problem.mesh, CellArraysOf(problem));
+}
+
+std::vector<CellArray> CellArraysOf(const PlanProblem& problem) {
+  return {{kStiffnessArray, problem.stiffness}};
 }
 
 std::string MeshNameOf(const PlanProblem& problem) {
-  return MeshName(ViewMeshPayload(problem.mesh->positions(), problem.mesh->tets(),
-                                  {{kStiffnessArray, problem.stiffness}})
-                      .Sha256());
+  return MeshName(
+      ViewMeshPayload(problem.mesh->positions(), problem.mesh->tets(), CellArraysOf(problem))
+          .Sha256());
 }
 
 SessionRequest SessionRequestOf(const PlanProblem& problem, const std::string& mesh) {

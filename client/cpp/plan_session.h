@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 
 #include "client/cpp/tissueform_client.h"
+#include "core/mesh_payload/mesh_payload.h"
 #include "core/problem/plan_problem.h"
 
 namespace tissueform {
@@ -47,6 +48,8 @@ class PlanSession {
 
 // What PlanSession::Create does, step by step: for those who want more than one session of a plan.
 absl::StatusOr<v1::Mesh> UploadMeshOf(TissueformClient* client, const PlanProblem& problem);
+// With which UploadMeshOf sends the mesh: the stiffness of its tets.
+std::vector<CellArray> CellArraysOf(const PlanProblem& problem);
 // The name of the mesh that UploadMeshOf uploads, without a server.
 std::string MeshNameOf(const PlanProblem& problem);
 SessionRequest SessionRequestOf(const PlanProblem& problem, const std::string& mesh);

@@ -51,7 +51,8 @@ void PredictionCalls::SetDeadline(grpc::ClientContext* context) const {
 absl::StatusOr<v1::Prediction> PredictionCalls::Create(const std::string& session,
                                                        absl::Span<const NamedPose> poses,
                                                        v1::DeformationModel model,
-                                                       const std::string& request_id) {
+                                                       const std::string& request_id,
+                                                       const PredictionLabel& label) {
   grpc::ClientContext context;
   SetDeadline(&context);
   AddSessionHeader(session, &context);
@@ -62,6 +63,8 @@ absl::StatusOr<v1::Prediction> PredictionCalls::Create(const std::string& sessio
   }
   request.set_model(model);
   request.set_request_id(request_id);
+  request.set_case_(label.case_name);
+  request.set_title(label.title);
   v1::Prediction prediction;
   TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->CreatePrediction(&context, request, &prediction)));
   return prediction;
@@ -77,10 +80,12 @@ absl::StatusOr<v1::Prediction> PredictionCalls::Get(const std::string& name) {
   return prediction;
 }
 
-absl::StatusOr<std::vector<v1::Prediction>> PredictionCalls::List(const std::string& session) {
+absl::StatusOr<std::vector<v1::Prediction>> PredictionCalls::List(const std::string& session,
+                                                                  const std::string& case_name) {
   std::vector<v1::Prediction> predictions;
   v1::ListPredictionsRequest request;
   request.set_session(session);
+  request.set_case_(case_name);
   do {
     grpc::ClientContext context;
     SetDeadline(&context);

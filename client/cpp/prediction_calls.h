@@ -28,6 +28,12 @@ struct ComparedPredictions {
   Positions differences;
 };
 
+// What a planner says of a prediction.
+struct PredictionLabel {
+  std::string case_name = {};  // "cases/{sha256}" that it was planned in
+  std::string title = {};
+};
+
 // What a server keeps of answers: the rpcs of PredictionService. Got from TissueformClient, whose
 // contract it shares: calls block, each with a deadline, and errors carry the server's code,
 // message and reason.
@@ -43,11 +49,12 @@ class PredictionCalls {
   absl::StatusOr<v1::Prediction> Create(
       const std::string& session, absl::Span<const NamedPose> poses,
       v1::DeformationModel model = v1::DEFORMATION_MODEL_UNSPECIFIED,
-      const std::string& request_id = "");
+      const std::string& request_id = "", const PredictionLabel& label = {});
 
   absl::StatusOr<v1::Prediction> Get(const std::string& name);
-  // All of them, page after page; of one session where it is named.
-  absl::StatusOr<std::vector<v1::Prediction>> List(const std::string& session = "");
+  // All of them, page after page; of one session or of one case where they are named.
+  absl::StatusOr<std::vector<v1::Prediction>> List(const std::string& session = "",
+                                                   const std::string& case_name = "");
   absl::Status Delete(const std::string& name);
 
   // Of all vertices, #V by 3. Errors: DataLoss also when chunks are missing.

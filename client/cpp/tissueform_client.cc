@@ -62,7 +62,8 @@ TissueformClient::TissueformClient(const std::shared_ptr<grpc::Channel>& channel
       sessions_(v1::SessionService::NewStub(channel)),
       deform_(v1::DeformService::NewStub(channel)),
       server_info_(v1::ServerInfoService::NewStub(channel)),
-      predictions_(channel, options.call_deadline) {}
+      predictions_(channel, options.call_deadline),
+      cases_(channel, options.call_deadline) {}
 
 void TissueformClient::SetDeadline(grpc::ClientContext* context) const {
   context->set_deadline(std::chrono::system_clock::now() + options_.call_deadline);
@@ -86,7 +87,11 @@ absl::StatusOr<v1::Mesh> TissueformClient::UploadMesh(const TetMesh& mesh,
                                                      mesh.num_tets(), " tets"));
     }
   }
-  const MeshPayloadView payload = ViewMeshPayload(mesh.positions(), mesh.tets(), cell_arrays);
+  return UploadMesh(ViewMeshPayload(mesh.positions(), mesh.tets(), cell_arrays), options);
+}
+
+absl::StatusOr<v1::Mesh> TissueformClient::UploadMesh(const MeshPayloadView& payload,
+                                                      const UploadOptions& options) {
   const std::string sha256 = payload.Sha256();
   // The name is the content: asking costs one round trip, and the same head again costs no more.
   const absl::StatusOr<v1::Mesh> known = GetMesh(MeshName(sha256));

@@ -13,6 +13,7 @@
 #include "absl/types/span.h"
 #include "grpcpp/channel.h"
 
+#include "client/cpp/case_calls.h"
 #include "client/cpp/deform_stream.h"
 #include "client/cpp/mesh_upload.h"
 #include "client/cpp/prediction_calls.h"
@@ -61,6 +62,9 @@ class TissueformClient {
   absl::StatusOr<v1::Mesh> UploadMesh(const TetMesh& mesh,
                                       const std::vector<CellArray>& cell_arrays,
                                       const UploadOptions& options = {});
+  // The same of a payload as it is.
+  absl::StatusOr<v1::Mesh> UploadMesh(const MeshPayloadView& payload,
+                                      const UploadOptions& options = {});
   // How much of a mesh that is not complete has come to the server.
   absl::StatusOr<v1::QueryUploadResponse> QueryUpload(const std::string& name);
   absl::StatusOr<v1::Mesh> GetMesh(const std::string& name);
@@ -98,6 +102,9 @@ class TissueformClient {
   // Answers that the server keeps.
   PredictionCalls& predictions() { return predictions_; }
 
+  // What planners open.
+  CaseCalls& cases() { return cases_; }
+
  private:
   TissueformClient(const std::shared_ptr<grpc::Channel>& channel, const Options& options);
 
@@ -109,6 +116,7 @@ class TissueformClient {
   const std::unique_ptr<v1::DeformService::Stub> deform_;
   const std::unique_ptr<v1::ServerInfoService::Stub> server_info_;
   PredictionCalls predictions_;
+  CaseCalls cases_;
 };
 
 }  // namespace tissueform

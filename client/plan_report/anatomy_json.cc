@@ -111,6 +111,21 @@ Json LandmarksJson(const PlanBuild& build) {
                                     std::pair("occlusal_plane", landmarks.occlusal)}) {
     json[name] = PlaneJson(plane);
   }
+  for (const char* name : {"porion_left", "porion_right", "orbitale_left", "orbitale_right"}) {
+    json[name] = nullptr;
+  }
+  if (build.frankfort) {
+    json["porion_left"] = ToJson(build.frankfort->porion.left);
+    json["porion_right"] = ToJson(build.frankfort->porion.right);
+    json["orbitale_left"] = ToJson(build.frankfort->orbitale.left);
+    json["orbitale_right"] = ToJson(build.frankfort->orbitale.right);
+  }
+  const HeadFrame& frame = build.head_frame;
+  json["head_frame"] = {{"origin_mm", ToJson(frame.origin_mm)},
+                        {"left", ToJson(frame.left)},
+                        {"posterior", ToJson(frame.posterior)},
+                        {"superior", ToJson(frame.superior)},
+                        {"source", frame.source}};
   return json;
 }
 

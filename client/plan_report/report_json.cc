@@ -96,6 +96,7 @@ Json StiffnessJson(const PlanBuild& build, const PlanMeasures& measures) {
   for (size_t t = 0; t < build.recipe.tissues.size(); ++t) {
     const TissueClass& tissue = build.recipe.tissues[t];
     Json row = {{"name", tissue.name}, {"youngs_modulus_pa", tissue.youngs_modulus_pa}};
+    if (tissue.factor_95 != 0) row["youngs_modulus_factor_95"] = tissue.factor_95;
     if (t + 1 < build.recipe.tissues.size()) row["hu_below"] = tissue.hu_below;
     row["tets"] = measures.tets_of_tissue[t];
     row["source"] = tissue.source;

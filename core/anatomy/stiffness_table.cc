@@ -24,13 +24,18 @@ std::string Source(const char* place) {
 }  // namespace
 
 StiffnessTable DefaultStiffnessTable() {
-  return {{"fat", -30, 16e3, Source("cheek 16 +- 5 kPa")},
-          {"muscle", 150, 27e3, Source("below the cheekbone 27 +- 11 kPa")},
-          {"dense", kNoLimit, 53e3, Source("chin 53 +- 21 kPa")}};
+  return {{"fat", -30, 16e3, Source("cheek 16 +- 5 kPa"), 1.8},
+          {"muscle", 150, 27e3, Source("below the cheekbone 27 +- 11 kPa"), 2.2},
+          {"dense", kNoLimit, 53e3, Source("chin 53 +- 21 kPa"), 2.1}};
 }
 
 absl::Status CheckStiffnessTable(const StiffnessTable& table) {
   if (table.empty()) return absl::InvalidArgumentError("the stiffness table is empty");
+  if (table.front().factor_95 != 0 && table.size() > kMostTissuesWithFactors) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "stiffness table: ", table.size(), " tissues have \"youngs_modulus_factor_95\"; at most ",
+        kMostTissuesWithFactors, " may, so leave it out of all or take fewer tissues"));
+  }
   double last = -kNoLimit;
   for (const TissueClass& tissue : table) {
     if (!(tissue.hu_below > last)) {
@@ -42,6 +47,12 @@ absl::Status CheckStiffnessTable(const StiffnessTable& table) {
       return absl::InvalidArgumentError(
           absl::StrCat("stiffness table: \"youngs_modulus_pa\" of tissue \"", tissue.name,
                        "\" must be positive, not ", tissue.youngs_modulus_pa));
+    }
+    if ((tissue.factor_95 == 0) != (table.front().factor_95 == 0)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("stiffness table: give \"youngs_modulus_factor_95\" to every tissue or to "
+                       "none; \"",
+                       tissue.name, "\" differs from \"", table.front().name, "\""));
     }
     last = tissue.hu_below;
   }

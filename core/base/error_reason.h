@@ -44,6 +44,9 @@ enum class ErrorReason {
   kUploadNotFound,
   kUploadUnderWay,
   kDiskFull,
+  kCaseNotFound,
+  kTooManyCases,
+  kCaseDamagedOnItsWay,
   // Of a code, where nothing more was said.
   kInvalidRequest,
   kNotFound,

@@ -116,7 +116,8 @@ class NeoHookeanDeformer : public Deformer {
         energy_(preparation_->elements(), preparation_->vertex_cells(), preparation_->stiffness(),
                 preparation_->options().poisson_ratio, preparation_->options().threads),
         search_(&energy_, &elastic.system(), rounded, ForceUnit(*preparation_), options.history),
-        newton_(preparation_.get(), &elastic, &search_, options.newton_after) {
+        newton_(preparation_.get(), &elastic, &search_, options.newton_after,
+                options.newton_blas_threads) {
     const FactorizationSummary& factorization = elastic_.system().factorization();
     summary_.assemble_seconds = elastic_.assemble_seconds();
     summary_.analyse_seconds = factorization.analyse_seconds;

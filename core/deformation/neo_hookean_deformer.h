@@ -26,6 +26,7 @@ struct NeoHookeanOptions {
   // those that L-BFGS alone brings to the tolerance in some 350 iterations never wait for 60;
   // searches that take longer without Newton steps, or never end, are shortened by them.
   int newton_after = 60;
+  int newton_blas_threads = 1;  // for their factors, see BlasThreadsScope; 1 in a server
 };
 
 // The equilibrium of a compressible neo-Hookean body (see NeoHookeanEnergy) with the constrained

@@ -3,10 +3,12 @@
 
 #include "core/deformation/newton_fallback.h"
 
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "core/base/status_macros.h"
+#include "core/linear_solvers/blas_threads.h"
 
 namespace tissueform {
 namespace {
@@ -79,6 +81,8 @@ absl::Status NewtonFallback::Factorise(TangentForm form) {
       NeoHookeanTangent(preparation_.elements(), preparation_.vertex_cells(),
                         preparation_.stiffness(), preparation_.options().poisson_ratio,
                         search_.displacements(), form, preparation_.options().threads);
+  std::optional<BlasThreadsScope> factorising;  // not at all in a server: see there
+  if (blas_threads_ > 1) factorising.emplace(blas_threads_);
   if (system_ != nullptr) {
     return system_->Refactorize(tangent);
   }

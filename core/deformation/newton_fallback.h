@@ -53,10 +53,14 @@ class NewtonFallback {
   static constexpr int kMostPatiences = 8;
 
   // All must outlive it. `elastic` is of `preparation`. `patience`: iterations in which the
-  // residual has not halved before the first Newton step.
+  // residual has not halved before the first Newton step. `blas_threads` factorise.
   NewtonFallback(const MeshPreparation* preparation, const ElasticSystem* elastic,
-                 EquilibriumSearch* search, int patience)
-      : preparation_(*preparation), elastic_(*elastic), search_(*search), patience_(patience) {}
+                 EquilibriumSearch* search, int patience, int blas_threads)
+      : preparation_(*preparation),
+        elastic_(*elastic),
+        search_(*search),
+        patience_(patience),
+        blas_threads_(blas_threads) {}
 
   // Before an answer. `admission`, which may be empty, is asked for bytes_needed() before the
   // factor is made.
@@ -87,6 +91,7 @@ class NewtonFallback {
   const ElasticSystem& elastic_;
   EquilibriumSearch& search_;
   const int patience_;
+  const int blas_threads_;
 
   // Of one answer.
   FactorAdmission admission_;

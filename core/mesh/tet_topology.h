@@ -37,7 +37,12 @@ ConnectedComponents FindConnectedComponents(const Eigen::Ref<const CellIndices>&
 // them.
 TriangleIndices BoundaryFacets(const TetMesh& mesh);
 
+// Of each of a mesh's BoundaryFacets the tet that has it. REQUIRES: `facets` are those.
+std::vector<int32_t> TetsBehind(const TriangleIndices& facets, const TetMesh& mesh);
+
 // The distinct vertices of BoundaryFacets, rising: the "skin" of a mesh.
 std::vector<int32_t> BoundaryVertices(const TetMesh& mesh);
+// The same where the facets are there already.
+std::vector<int32_t> VerticesOf(const TriangleIndices& facets);
 
 }  // namespace tissueform

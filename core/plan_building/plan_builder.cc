@@ -4,6 +4,7 @@
 #include "core/plan_building/plan_builder.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_format.h"
@@ -14,6 +15,7 @@
 #include "core/base/status_macros.h"
 #include "core/ct/unscanned.h"
 #include "core/plan_building/contact_trial.h"
+#include "core/plan_building/viewer_surfaces.h"
 
 namespace tissueform {
 namespace {
@@ -67,6 +69,8 @@ struct Anatomy {
   HeadSegmentation head;
   BoneParts parts;
   Landmarks landmarks;
+  std::optional<FrankfortLandmarks> frankfort;
+  HeadFrame frame;
 };
 
 struct DividedBone {
@@ -112,7 +116,17 @@ absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unsc
   const absl::Status found = landmarks.ok() ? CheckLandmarks(*landmarks) : landmarks.status();
   if (!found.ok()) return ExplainMissingAnatomy(head, plane_given, found);
   TF_RETURN_IF_ERROR(CheckOneHead(ct.hu, head, *parts));
-  return Anatomy{.head = std::move(head), .parts = *std::move(parts), .landmarks = *landmarks};
+  const std::optional<FrankfortLandmarks> frankfort =
+      FindFrankfort(head.hu, head.options.bone_above_hu, *landmarks);
+  TF_ASSIGN_OR_RETURN(HeadFrame frame, ChooseHeadFrame({.landmarks = *landmarks,
+                                                        .frankfort = frankfort,
+                                                        .given_midsagittal = recipe.midsagittal,
+                                                        .given_horizontal = recipe.horizontal}));
+  return Anatomy{.head = std::move(head),
+                 .parts = *std::move(parts),
+                 .landmarks = *landmarks,
+                 .frankfort = frankfort,
+                 .frame = std::move(frame)};
 }
 
 absl::StatusOr<TriangleMesh> SegmentSurface(const LabelGrid& bone, uint8_t label) {
@@ -210,27 +224,31 @@ double BandMm(const Recipe& recipe, const std::vector<BuiltSegment>& segments) {
   return std::max(kBandVoxels * recipe.spacing_mm, kBandOfMove * largest_move_mm);
 }
 
+std::vector<std::string> NamesOf(const std::vector<BuiltSegment>& segments) {
+  std::vector<std::string> names;
+  names.reserve(segments.size());
+  for (const BuiltSegment& segment : segments) names.push_back(segment.cut.name);
+  return names;
+}
+
 // What the tets are made of and what holds the vertices.
 absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTissue& soft_tissue,
                                      const Anatomy& anatomy,
                                      const std::vector<BuiltSegment>& segments,
                                      const Recipe& recipe, int threads, Progress* progress) {
-  progress->Begin("stiffness and regions", 0.9, 0.98);
+  progress->Begin("stiffness and regions", 0.9, 0.96);
   const HeadSegmentation& head = anatomy.head;
   TF_ASSIGN_OR_RETURN(TetStiffness stiffness, ComputeTetStiffness(built.mesh, head.hu, head.bone,
                                                                   {.table = recipe.tissues}));
-  std::vector<std::string> names;
   std::vector<HandlePose> poses;
-  for (const BuiltSegment& segment : segments) {
-    names.push_back(segment.cut.name);
-    poses.push_back(segment.pose);
-  }
+  poses.reserve(segments.size());
+  for (const BuiltSegment& segment : segments) poses.push_back(segment.pose);
   const double contact_band_mm = BandMm(recipe, segments);
   const double tissue_above_hu = recipe.segmentation.tissue_above_hu;
   TF_ASSIGN_OR_RETURN(
       PlanningRegions regions,
-      AssignRegions(built.mesh, built.surface.num_vertices(), soft_tissue, names, contact_band_mm,
-                    anatomy.landmarks, {head.hu, tissue_above_hu, &head.cut}));
+      AssignRegions(built.mesh, built.surface.num_vertices(), soft_tissue, NamesOf(segments),
+                    contact_band_mm, anatomy.landmarks, {head.hu, tissue_above_hu, &head.cut}));
   TF_ASSIGN_OR_RETURN(ReleasedContacts released,
                       ReleaseTornContacts({.mesh = built.mesh,
                                            .youngs_modulus_pa = stiffness.youngs_modulus_pa,
@@ -263,12 +281,21 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                       Mesh(soft_tissue, anatomy.landmarks, recipe, options.threads, &progress));
   TF_ASSIGN_OR_RETURN(Description description, Describe(mesh, soft_tissue, anatomy, bone.segments,
                                                         recipe, options.threads, &progress));
-  progress.Begin("comparing with the CT's skin", 0.98, 1);
+  progress.Begin("comparing with the CT's skin", 0.96, 0.98);
   TF_ASSIGN_OR_RETURN(SkinCoverage coverage,
                       MeasureSkinCoverage(anatomy.head, anatomy.landmarks,
                                           {mesh.surface, description.released.regions,
                                            soft_tissue.region, &soft_tissue.outside_air},
                                           ct.spacing_mm.maxCoeff(), options.threads));
+  progress.Begin("surfaces for a viewer", 0.98, 1);
+  TF_ASSIGN_OR_RETURN(std::vector<CaseSurface> viewer_surfaces,
+                      MakeViewerSurfaces({.head = anatomy.head,
+                                          .outside_air = soft_tissue.outside_air,
+                                          .parts = anatomy.parts.labels,
+                                          .bone = bone.labels,
+                                          .landmarks = anatomy.landmarks,
+                                          .segments = NamesOf(bone.segments),
+                                          .ct_voxel_mm = ct.spacing_mm.maxCoeff()}));
   soft_tissue.outside_air = {};  // as large as the CT's grid, and not asked for any more
   TellStage(options.tell, "done", 1);
   return PlanBuild{.recipe = recipe,
@@ -290,7 +317,10 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                    .freed_by_trial = description.released.freed,
                    .still_torn = description.released.still_torn,
                    .skin_distance = std::move(description.skin_distance),
-                   .coverage = std::move(coverage)};
+                   .coverage = std::move(coverage),
+                   .frankfort = anatomy.frankfort,
+                   .head_frame = std::move(anatomy.frame),
+                   .viewer_surfaces = std::move(viewer_surfaces)};
 }
 
 }  // namespace tissueform

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,8 +18,11 @@
 #include "core/anatomy/osteotomy.h"
 #include "core/anatomy/soft_tissue.h"
 #include "core/anatomy/tet_stiffness.h"
+#include "core/case_file/case_file.h"
+#include "core/constraints/head_frame.h"
 #include "core/ct/ct_volume.h"
 #include "core/metal/metal_reduction.h"
+#include "core/plan_building/frankfort.h"
 #include "core/plan_building/planning_regions.h"
 #include "core/plan_building/recipe.h"
 #include "core/plan_building/skin_coverage.h"
@@ -63,6 +67,9 @@ struct PlanBuild {
   int64_t still_torn = 0;      // tets that it could not keep from turning inside out
   SkinDistance skin_distance;
   SkinCoverage coverage;
+  std::optional<FrankfortLandmarks> frankfort = {};  // where they were found
+  HeadFrame head_frame = {};
+  std::vector<CaseSurface> viewer_surfaces = {};
 };
 
 struct PlanBuildOptions {
@@ -83,6 +90,7 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
 //   head.vtu            the mesh; point arrays anatomy, skin_region; cell arrays mean_hu, voxels,
 //                       tissue, youngs_modulus_pa
 //   segments/NAME.stl   the pieces of bone
+//   viewer.glb          what a viewer needs besides (core/case_file/viewer_file.h)
 // The same build gives the same bytes. Errors: those of writing files.
 absl::Status WritePlan(const PlanBuild& build, const std::string& folder);
 

@@ -141,7 +141,8 @@ absl::StatusOr<StiffnessTable> ToTissues(const Json& json) {
     table.push_back({.name = tissue.at("name"),
                      .hu_below = tissue.value("hu_below", std::numeric_limits<double>::infinity()),
                      .youngs_modulus_pa = tissue.at("youngs_modulus_pa"),
-                     .source = tissue.value("source", "")});
+                     .source = tissue.value("source", ""),
+                     .factor_95 = tissue.value("youngs_modulus_factor_95", 0.0)});
   }
   TF_RETURN_IF_ERROR(CheckStiffnessTable(table));
   return table;
@@ -151,6 +152,11 @@ absl::Status ReadRegionOfInterest(const Json& json, Recipe* recipe) {
   TF_RETURN_IF_ERROR(ReadPlane(json, "back", "/region_of_interest", &recipe->back));
   TF_RETURN_IF_ERROR(ReadPlane(json, "above", "/region_of_interest", &recipe->above));
   return ReadPlane(json, "below", "/region_of_interest", &recipe->below);
+}
+
+absl::Status ReadHeadFrame(const Json& json, Recipe* recipe) {
+  TF_RETURN_IF_ERROR(ReadPlane(json, "midsagittal", "/head_frame", &recipe->midsagittal));
+  return ReadPlane(json, "horizontal", "/head_frame", &recipe->horizontal);
 }
 
 absl::StatusOr<Recipe> ToRecipe(const Json& json) {
@@ -163,6 +169,7 @@ absl::StatusOr<Recipe> ToRecipe(const Json& json) {
   TF_RETURN_IF_ERROR(ReadPlane(json, "occlusal_plane", "", &recipe.occlusal_plane));
   TF_RETURN_IF_ERROR(ReadSegments(json.at("segments"), &recipe));
   TF_RETURN_IF_ERROR(ReadRegionOfInterest(json.value("region_of_interest", nothing), &recipe));
+  TF_RETURN_IF_ERROR(ReadHeadFrame(json.value("head_frame", nothing), &recipe));
   recipe.soft_tissue = ToSoftTissue(json.value("soft_tissue", nothing));
   TF_ASSIGN_OR_RETURN(recipe.mesh, ToMesh(json.value("mesh", nothing)));
   if (json.contains("contact_band_mm")) {
@@ -214,6 +221,7 @@ Json TissueToJson(const TissueClass& tissue) {
                {"youngs_modulus_pa", tissue.youngs_modulus_pa},
                {"source", tissue.source}};
   if (std::isfinite(tissue.hu_below)) json["hu_below"] = tissue.hu_below;
+  if (tissue.factor_95 != 0) json["youngs_modulus_factor_95"] = tissue.factor_95;
   return json;
 }
 
@@ -281,6 +289,9 @@ std::string RecipeToJson(const Recipe& recipe) {
   add_plane(json["region_of_interest"], "back", recipe.back);
   add_plane(json["region_of_interest"], "above", recipe.above);
   add_plane(json["region_of_interest"], "below", recipe.below);
+  add_plane(json["head_frame"], "midsagittal", recipe.midsagittal);
+  add_plane(json["head_frame"], "horizontal", recipe.horizontal);
+  if (json["head_frame"].is_null()) json.erase("head_frame");
   if (recipe.contact_band_mm) json["contact_band_mm"] = *recipe.contact_band_mm;
   // Only where it is not the default, so that a recipe of version 1 stays one.
   if (!recipe.metal.correct) json["metal"] = "off";

@@ -50,6 +50,8 @@ struct Recipe {
   std::optional<Plane> back;            // of the region of interest
   std::optional<Plane> above;
   std::optional<Plane> below;
+  std::optional<Plane> midsagittal;  // of the head frame
+  std::optional<Plane> horizontal;
   SoftTissueOptions soft_tissue;
   RecipeMesh mesh;
   std::optional<double> contact_band_mm;

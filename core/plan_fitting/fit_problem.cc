@@ -4,6 +4,7 @@
 #include "core/plan_fitting/fit_problem.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -11,6 +12,7 @@
 #include "absl/strings/str_join.h"
 
 #include "core/base/status_macros.h"
+#include "core/mesh/tet_topology.h"
 
 namespace tissueform {
 namespace {
@@ -29,9 +31,11 @@ absl::Status Refuse(const std::string& what, const std::string& why) {
 
 class Resolver {
  public:
-  Resolver(const FitRequest& request, const TetMesh& mesh, const ConstraintSet& constraints)
+  Resolver(const FitRequest& request, const TetMesh& mesh, const TriangleIndices& boundary,
+           const ConstraintSet& constraints)
       : request_(request),
         mesh_(mesh),
+        boundary_(boundary),
         constraints_(constraints),
         signs_(SignsToLps(request.axes)) {}
 
@@ -107,12 +111,11 @@ class Resolver {
   }
 
   absl::Status AddTargets() {
-    const SkinFacets skin(mesh_, constraints_);
     for (const FitTargetRequest& request : request_.targets) {
       FitTarget target;
       target.name = request.name;
       target.weight = request.weight;
-      TF_RETURN_IF_ERROR(FindPoint(request, skin, &target));
+      TF_RETURN_IF_ERROR(FindPoint(request, &target));
       target.rest_mm = PositionOf(target.point, mesh_.positions());
       SetWish(request, &target);
       problem_.targets.push_back(std::move(target));
@@ -120,8 +123,7 @@ class Resolver {
     return absl::OkStatus();
   }
 
-  absl::Status FindPoint(const FitTargetRequest& request, const SkinFacets& skin,
-                         FitTarget* target) const {
+  absl::Status FindPoint(const FitTargetRequest& request, FitTarget* target) {
     const std::string what = absl::StrCat("target \"", request.name, "\"");
     if (!request.point_mm.has_value()) {
       for (const int32_t v : request.vertices) {
@@ -133,6 +135,8 @@ class Resolver {
       target->point = MeanOfVertices(request.vertices);
       return absl::OkStatus();
     }
+    if (!skin_.has_value()) skin_.emplace(mesh_, boundary_, constraints_);
+    const SkinFacets& skin = *skin_;
     if (skin.empty()) return Refuse(what, "the mesh has no skin: all of its boundary is held");
     const NearestSkin nearest = skin.Nearest(signs_.cwiseProduct(*request.point_mm));
     if (nearest.distance_mm > kMostOffSkinMm) {
@@ -141,7 +145,9 @@ class Resolver {
           absl::StrFormat("point_mm %s lies %.2f mm off the skin (%s; at most %g mm are taken); "
                           "the nearest point of the skin is %s",
                           PointText(*request.point_mm), nearest.distance_mm,
-                          nearest.in_tissue ? "in the tissue" : "in the air or in bone",
+                          skin.IsInTissue(signs_.cwiseProduct(*request.point_mm))
+                              ? "in the tissue"
+                              : "in the air or in bone",
                           kMostOffSkinMm, PointText(signs_.cwiseProduct(nearest.position))));
     }
     target->point = nearest.point;
@@ -166,8 +172,10 @@ class Resolver {
 
   const FitRequest& request_;
   const TetMesh& mesh_;
+  const TriangleIndices& boundary_;
   const ConstraintSet& constraints_;
   const Vector3d signs_;
+  std::optional<SkinFacets> skin_;  // of the first target that asks for it
   FitProblem problem_;
 };
 
@@ -186,9 +194,16 @@ std::string UnknownName(const FitProblem& problem, const FitUnknown& unknown) {
 }
 
 absl::StatusOr<FitProblem> ResolveFit(const FitRequest& request, const TetMesh& mesh,
+                                      const TriangleIndices& boundary,
                                       const ConstraintSet& constraints,
                                       absl::Span<const HandlePose> poses) {
-  return Resolver(request, mesh, constraints).Resolve(poses);
+  return Resolver(request, mesh, boundary, constraints).Resolve(poses);
+}
+
+absl::StatusOr<FitProblem> ResolveFit(const FitRequest& request, const TetMesh& mesh,
+                                      const ConstraintSet& constraints,
+                                      absl::Span<const HandlePose> poses) {
+  return ResolveFit(request, mesh, BoundaryFacets(mesh), constraints, poses);
 }
 
 }  // namespace tissueform

@@ -60,6 +60,8 @@ struct FitProblem {
 // "mandible rotation_x_deg", in the axes of the request.
 std::string UnknownName(const FitProblem& problem, const FitUnknown& unknown);
 
+// `boundary`: BoundaryFacets(mesh), for who asks often.
+//
 // A moving handle turns about the request's pivot, or about the middle of its vertices: then its
 // translation is how that middle moves. Its pose in the plan is written for that pivot, and is the
 // same movement.
@@ -68,6 +70,10 @@ std::string UnknownName(const FitProblem& problem, const FitUnknown& unknown);
 // handle: a point off the skin (by how much, in the tissue or outside it, and where the nearest
 // skin is); a vertex or a handle that does not exist; nothing that may move, or more than
 // kMostFitUnknowns.
+absl::StatusOr<FitProblem> ResolveFit(const FitRequest& request, const TetMesh& mesh,
+                                      const TriangleIndices& boundary,
+                                      const ConstraintSet& constraints,
+                                      absl::Span<const HandlePose> poses);
 absl::StatusOr<FitProblem> ResolveFit(const FitRequest& request, const TetMesh& mesh,
                                       const ConstraintSet& constraints,
                                       absl::Span<const HandlePose> poses);

@@ -119,7 +119,14 @@ absl::Status CheckFitRequest(const FitRequest& request) {
   }
   TF_RETURN_IF_ERROR(CheckSettings(request));
   std::set<std::string> names;
+  size_t num_vertices = 0;
   for (const FitTargetRequest& target : request.targets) {
+    num_vertices += target.vertices.size();
+    if (num_vertices > kMostFitVertices) {
+      return Refuse(absl::StrCat("target \"", target.name, "\""),
+                    absl::StrCat("the targets name more than ", kMostFitVertices,
+                                 " vertices together; name fewer, or points"));
+    }
     TF_RETURN_IF_ERROR(CheckTarget(target));
     if (!names.insert(target.name).second) {
       return Refuse(absl::StrCat("target \"", target.name, "\""),

@@ -29,18 +29,21 @@ struct NearestSkin {
   MeshPoint point;  // on a facet: three vertices
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   double distance_mm = 0;
-  bool in_tissue = false;  // the place lies in a tet: under the skin, not in the air or in bone
 };
 
 // The facets of a mesh that are skin: its boundary without those whose vertices are all fixed or
 // all of handles, which are bone and where the tissue was cut.
 class SkinFacets {
  public:
-  SkinFacets(const TetMesh& mesh, const ConstraintSet& constraints);
+  // `boundary`: BoundaryFacets(mesh)
+  SkinFacets(const TetMesh& mesh, const TriangleIndices& boundary,
+             const ConstraintSet& constraints);
 
   bool empty() const { return facets_.rows() == 0; }
   // REQUIRES: not empty.
   NearestSkin Nearest(const Eigen::Vector3d& place) const;
+  // The place lies in a tet: under the skin, not in the air or in bone.
+  bool IsInTissue(const Eigen::Vector3d& place) const;
 
  private:
   const TetMesh mesh_;

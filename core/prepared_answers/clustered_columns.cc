@@ -89,7 +89,9 @@ ClusteredColumns::ClusteredColumns(const Positions& rest, const Eigen::MatrixXd&
     : rest_(rest.cast<float>()), vertices_(static_cast<size_t>(rest.rows())), map_(0, 0, 0) {
   std::iota(vertices_.begin(), vertices_.end(), 0);
   std::vector<Eigen::Index> ends;
-  Divide(rest, vertices_.begin(), vertices_.end(), vertices_.begin(), &ends);
+  if (!vertices_.empty()) {
+    Divide(rest, vertices_.begin(), vertices_.end(), vertices_.begin(), &ends);
+  }
   const Turned turned = Turn(ends, columns, uses);
   for (const Digits& digits : {Digits{}, Digits{.all_of_map = true}, Digits{true, true}}) {
     Store(turned, ends, digits);
@@ -172,7 +174,7 @@ bool ClusteredColumns::HasDigitsEnough(const Turned& turned, const Uses& uses) c
 }
 
 void ClusteredColumns::Evaluate(const Eigen::VectorXd& factors, FloatPositions* positions) const {
-  positions->resize(rest_.rows(), 3);
+  if (positions->rows() < rest_.rows()) positions->resize(rest_.rows(), 3);
   Eigen::VectorXf coefficients(map_.rows());
   const auto all_of = [](const PanelMatrix& panels) {
     return PanelMatrix::Reading{.first = 0, .first_full = panels.cols() - panels.full_cols()};
@@ -187,6 +189,19 @@ void ClusteredColumns::Evaluate(const Eigen::VectorXd& factors, FloatPositions* 
     for (Eigen::Index i = 0; i < cluster.columns.rows() / 3; ++i) {
       positions->row(vertices[i]) = rest_.row(vertices[i]) + moves.row(i);
     }
+  }
+}
+
+void ClusteredColumns::Describe(PortableAnswers* answers) const {
+  answers->free_rest.assign(rest_.data(), rest_.data() + rest_.size());
+  answers->cluster_vertices = vertices_;
+  map_.Describe(&answers->cluster_map);
+  for (const Cluster& cluster : clusters_) {
+    for (const Eigen::Index count :
+         {cluster.columns.rows() / 3, cluster.columns.cols(), cluster.columns.full_cols()}) {
+      answers->clusters.push_back(static_cast<int32_t>(count));
+    }
+    cluster.columns.Describe(&answers->columns);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/answer_evaluator/portable_answers.h"
 #include "core/base/types.h"
 #include "core/prepared_answers/panel_matrix.h"
 
@@ -34,8 +35,12 @@ class ClusteredColumns {
   // room of any use that is tried. Entries have 16 bits where that is enough for it, else 32.
   ClusteredColumns(const Positions& rest, const Eigen::MatrixXd& columns, const Uses& uses);
 
-  // rest + columns * factors, to what was cut and to digits; resized.
+  // rest + columns * factors, to what was cut and to digits, in the first num_vertices() rows;
+  // resized where there are fewer.
   void Evaluate(const Eigen::VectorXd& factors, FloatPositions* positions) const;
+
+  // Writes the vertices' rest as that of the free ones, clusters, columns and their map.
+  void Describe(PortableAnswers* answers) const;
 
   Eigen::Index num_vertices() const { return rest_.rows(); }
   Eigen::Index num_columns_before() const { return map_.cols(); }

@@ -87,7 +87,7 @@ ColumnCompression::ColumnCompression(const Eigen::MatrixXd& columns, int rows_pe
   const Eigen::Index count = columns.cols();
   const Eigen::MatrixXd root = UsesRoot(uses);
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(count, count);
-  gram.selfadjointView<Eigen::Lower>().rankUpdate(columns.transpose());
+  if (columns.rows() > 0) gram.selfadjointView<Eigen::Lower>().rankUpdate(columns.transpose());
   gram = root.transpose() * gram.selfadjointView<Eigen::Lower>() * root;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(gram);
 
@@ -137,6 +137,15 @@ double ColumnCompression::CutBoundMm(const Eigen::MatrixXd& factors) const {
   const float of_cut = MultiplySmall(cut_map_, singles).rowwise().norm().sum();
   const float of_tail = tail_.dot(singles.rowwise().norm());
   return kBoundRounding * (double{of_cut} + double{of_tail});
+}
+
+void ColumnCompression::Describe(PortableAnswers* answers) const {
+  const RowMajorMatrix<double> map = map_;
+  const RowMajorMatrix<float> cut_map = cut_map_;
+  answers->map.assign(map.data(), map.data() + map.size());
+  answers->gains.assign(gains_.begin(), gains_.end());
+  answers->cut_map.assign(cut_map.data(), cut_map.data() + cut_map.size());
+  answers->tail.assign(tail_.begin(), tail_.end());
 }
 
 int64_t ColumnCompression::bytes_held() const {

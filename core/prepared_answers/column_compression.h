@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "core/answer_evaluator/portable_answers.h"
 #include "core/prepared_answers/small_product.h"
 
 namespace tissueform {
@@ -47,6 +48,9 @@ class ColumnCompression {
 
   // How far a vertex can be put off by what is cut.
   double CutBoundMm(const Eigen::MatrixXd& factors) const;
+
+  // Writes what becomes of factors: map, gains, cut_map and tail.
+  void Describe(PortableAnswers* answers) const;
 
   Eigen::Index num_columns() const { return map_.cols(); }
   Eigen::Index num_kept() const { return map_.rows(); }

@@ -3,6 +3,7 @@
 
 #include "core/prepared_answers/linear_elastic_response.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -10,6 +11,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/deformation/deformation_checks.h"
+#include "core/prepared_answers/chosen_vertices.h"
 #include "core/prepared_answers/panel_response.h"
 #include "core/prepared_answers/pose_samples.h"
 
@@ -54,18 +56,19 @@ ColumnUses UsesOf(const MeshPreparation& preparation, const ElasticSystem& elast
 class LinearElasticResponse : public VertexResponse {
  public:
   LinearElasticResponse(std::shared_ptr<MeshPreparation> preparation, const ElasticSystem& elastic,
-                        const std::vector<int32_t>& vertices,
+                        ChosenVertices chosen, const std::vector<int32_t>& free,
                         const LinearElasticResponseOptions& options)
       : preparation_(std::move(preparation)),
         elastic_(elastic),
         tolerance_mm_(options.tolerance_mm),
-        panel_(preparation_->mesh().positions()(vertices, Eigen::all),
-               PanelResponse::Rows::kCoordinates,
-               RowsOfVertices(elastic_.response_columns(), vertices),
+        max_rotation_rad_(options.max_rotation_rad),
+        chosen_(std::move(chosen)),
+        panel_(preparation_->mesh().positions()(free, Eigen::all),
+               PanelResponse::Rows::kCoordinates, RowsOfVertices(elastic_.response_columns(), free),
                UsesOf(*preparation_, elastic_, options.max_rotation_rad), options.tolerance_mm) {}
 
   double ErrorBoundMm(absl::Span<const HandlePose> poses) const override {
-    return Choose(poses).bound_mm;
+    return BoundMm(poses, Choose(poses));
   }
 
   bool Covers(absl::Span<const HandlePose> poses) const override {
@@ -73,32 +76,55 @@ class LinearElasticResponse : public VertexResponse {
   }
 
   void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) const override {
-    panel_.Evaluate(Choose(poses), positions);
+    Write(poses, Choose(poses), positions);
   }
 
   std::optional<double> Answer(absl::Span<const HandlePose> poses,
                                FloatPositions* positions) const override {
     const PanelResponse::Reading reading = Choose(poses);
-    if (!(reading.bound_mm <= tolerance_mm_)) return std::nullopt;
-    panel_.Evaluate(reading, positions);
-    return reading.bound_mm;
+    const double bound_mm = BoundMm(poses, reading);
+    if (!(bound_mm <= tolerance_mm_)) return std::nullopt;
+    Write(poses, reading, positions);
+    return bound_mm;
   }
 
-  Eigen::Index num_vertices() const override { return panel_.num_vertices(); }
+  PortableAnswers Describe() const override {
+    PortableAnswers answers;
+    chosen_.Describe(&answers);
+    panel_.Describe(&answers);
+    answers.numbers.model = static_cast<double>(AnswerModel::kLinearElastic);
+    answers.numbers.tolerance_mm = tolerance_mm_;
+    answers.numbers.max_rotation_rad = max_rotation_rad_;
+    answers.origins.assign(elastic_.origin().begin(), elastic_.origin().end());
+    return answers;
+  }
+
+  Eigen::Index num_vertices() const override { return chosen_.size(); }
   int num_terms() const override { return static_cast<int>(panel_.num_columns()); }
   int num_terms_before() const override { return static_cast<int>(panel_.num_columns_before()); }
-  int64_t bytes_held() const override { return panel_.bytes_held(); }
+  int64_t bytes_held() const override { return panel_.bytes_held() + chosen_.bytes_held(); }
 
  private:
   // Nothing is truncated: 12 columns make every affine motion of a handle.
   PanelResponse::Reading Choose(absl::Span<const HandlePose> poses) const {
     return panel_.Choose(elastic_.Coefficients(poses), tolerance_mm_);
   }
+  double BoundMm(absl::Span<const HandlePose> poses, const PanelResponse::Reading& reading) const {
+    return std::max(reading.bound_mm, chosen_.RoundingBoundMm(poses));
+  }
+  void Write(absl::Span<const HandlePose> poses, const PanelResponse::Reading& reading,
+             FloatPositions* positions) const {
+    positions->resize(chosen_.size(), 3);
+    panel_.Evaluate(reading, positions);
+    chosen_.Complete(poses, positions);
+  }
 
   const std::shared_ptr<MeshPreparation> preparation_;  // owns elastic_
   const ElasticSystem& elastic_;
   const double tolerance_mm_;
-  PanelResponse panel_;
+  const double max_rotation_rad_;
+  const ChosenVertices chosen_;
+  const PanelResponse panel_;  // of the free ones
 };
 
 }  // namespace
@@ -125,7 +151,10 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateLinearElasticResponse(
   TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic(cancellation));
   // Turned, not solved for: too short to be counted.
   TellProgress(options.observer, PreparationStage::kAnswers);
-  return std::make_unique<LinearElasticResponse>(preparation, *elastic, vertices, options);
+  ChosenVertices chosen(preparation->mesh().positions(), preparation->constraints(), vertices);
+  const std::vector<int32_t> free = chosen.FreeAmong(vertices);
+  return std::make_unique<LinearElasticResponse>(preparation, *elastic, std::move(chosen), free,
+                                                 options);
 }
 
 }  // namespace tissueform

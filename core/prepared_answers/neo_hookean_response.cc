@@ -15,6 +15,7 @@
 #include "core/deformation/deformation_checks.h"
 #include "core/deformation/neo_hookean_deformer.h"
 #include "core/elasticity/neo_hookean_expansion.h"
+#include "core/prepared_answers/chosen_vertices.h"
 #include "core/prepared_answers/clustered_columns.h"
 #include "core/prepared_answers/panel_response.h"
 #include "core/prepared_answers/pose_numbers.h"
@@ -70,21 +71,21 @@ double LargestMove(const Eigen::Ref<const Eigen::VectorXd>& column) {
 class NeoHookeanResponse : public VertexResponse {
  public:
   NeoHookeanResponse(std::shared_ptr<MeshPreparation> preparation, const ElasticSystem& elastic,
-                     NeoHookeanResponseOptions options)
+                     ChosenVertices chosen, NeoHookeanResponseOptions options)
       : preparation_(std::move(preparation)),
         elastic_(elastic),
         options_(std::move(options)),
+        chosen_(std::move(chosen)),
         centroids_(HandleCentroids(*preparation_)) {}
 
-  absl::Status Prepare(const std::vector<int32_t>& vertices, const Cancellation& cancellation) {
-    Eigen::MatrixXd columns(3 * static_cast<Eigen::Index>(vertices.size()),
-                            NumColumns(*preparation_));
-    columns.leftCols(NumFirst(*preparation_)) =
-        RowsOfVertices(elastic_.response_columns(), vertices);
-    TF_RETURN_IF_ERROR(PrepareSecondOrder(vertices, cancellation, &columns));
-    TF_RETURN_IF_ERROR(Calibrate(vertices, columns, cancellation));
+  // `free`: those of the chosen vertices.
+  absl::Status Prepare(const std::vector<int32_t>& free, const Cancellation& cancellation) {
+    Eigen::MatrixXd columns(3 * static_cast<Eigen::Index>(free.size()), NumColumns(*preparation_));
+    columns.leftCols(NumFirst(*preparation_)) = RowsOfVertices(elastic_.response_columns(), free);
+    TF_RETURN_IF_ERROR(PrepareSecondOrder(free, cancellation, &columns));
+    TF_RETURN_IF_ERROR(Calibrate(free, columns, cancellation));
     TF_RETURN_IF_ERROR(cancellation.Check());
-    Compress(preparation_->mesh().positions()(vertices, Eigen::all), columns);
+    Compress(preparation_->mesh().positions()(free, Eigen::all), columns);
     return absl::OkStatus();
   }
 
@@ -98,7 +99,7 @@ class NeoHookeanResponse : public VertexResponse {
   }
 
   void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) const override {
-    columns_->Evaluate(UseOf(poses).factors, positions);
+    Write(poses, UseOf(poses), positions);
   }
 
   std::optional<double> Answer(absl::Span<const HandlePose> poses,
@@ -106,14 +107,35 @@ class NeoHookeanResponse : public VertexResponse {
     if (!InRange(poses)) return std::nullopt;
     const Use use = UseOf(poses);
     if (!(use.error_mm <= options_.max_estimate_mm)) return std::nullopt;
-    columns_->Evaluate(use.factors, positions);
+    Write(poses, use, positions);
     return use.error_mm;
   }
 
-  Eigen::Index num_vertices() const override { return columns_->num_vertices(); }
+  PortableAnswers Describe() const override {
+    PortableAnswers answers;
+    chosen_.Describe(&answers);
+    columns_->Describe(&answers);
+    estimate_->Describe(&answers);
+    AnswerNumbers& numbers = answers.numbers;
+    numbers.model = static_cast<double>(AnswerModel::kNeoHookean);
+    numbers.tolerance_mm = options_.tolerance_mm;
+    numbers.max_rotation_rad = options_.max_rotation_rad;
+    numbers.max_estimate_mm = options_.max_estimate_mm;
+    numbers.cut_per_mm = cut_per_mm_;
+    numbers.rounding_mm = rounding_mm_;
+    answers.origins.assign(elastic_.origin().begin(), elastic_.origin().end());
+    for (const Eigen::Vector3d& centroid : centroids_) {
+      answers.centroids.insert(answers.centroids.end(), centroid.begin(), centroid.end());
+    }
+    return answers;
+  }
+
+  Eigen::Index num_vertices() const override { return chosen_.size(); }
   int num_terms() const override { return static_cast<int>(columns_->num_columns()); }
   int num_terms_before() const override { return static_cast<int>(columns_->num_columns_before()); }
-  int64_t bytes_held() const override { return columns_->bytes_held() + estimate_->bytes_held(); }
+  int64_t bytes_held() const override {
+    return columns_->bytes_held() + chosen_.bytes_held() + estimate_->bytes_held();
+  }
 
  private:
   // What the columns are multiplied with, and what that leaves out.
@@ -130,8 +152,16 @@ class NeoHookeanResponse : public VertexResponse {
     use.factors.resize(NumColumns(*preparation_));
     use.factors << elastic_.Coefficients(poses), products;
     use.series_mm = estimate_->Mm(products);
-    use.error_mm = use.series_mm + rounding_mm_ + cut_per_mm_ * estimate_->FirstOrderMm(numbers);
+    use.error_mm =
+        std::max(use.series_mm + rounding_mm_ + cut_per_mm_ * estimate_->FirstOrderMm(numbers),
+                 chosen_.RoundingBoundMm(poses));
     return use;
+  }
+
+  void Write(absl::Span<const HandlePose> poses, const Use& use, FloatPositions* positions) const {
+    positions->resize(chosen_.size(), 3);
+    columns_->Evaluate(use.factors, positions);
+    chosen_.Complete(poses, positions);
   }
 
   // Displacements, a unit of each number: of all vertices, 3 #V by #numbers.
@@ -155,7 +185,7 @@ class NeoHookeanResponse : public VertexResponse {
     return elastic_.response_columns() * coefficients;
   }
 
-  absl::Status PrepareSecondOrder(const std::vector<int32_t>& vertices,
+  absl::Status PrepareSecondOrder(const std::vector<int32_t>& free,
                                   const Cancellation& cancellation, Eigen::MatrixXd* columns) {
     const Eigen::MatrixXd fields = LinearFields();
     const Eigen::MatrixXd forces =
@@ -172,11 +202,10 @@ class NeoHookeanResponse : public VertexResponse {
       TF_ASSIGN_OR_RETURN(
           const Eigen::MatrixXd second,
           elastic_.Solve(-forces.middleCols(first, count), at_rest.leftCols(count)));
-      columns->middleCols(NumFirst(*preparation_) + first, count) =
-          RowsOfVertices(second, vertices);
+      columns->middleCols(NumFirst(*preparation_) + first, count) = RowsOfVertices(second, free);
     }
     TellProgress(options_.observer, PreparationStage::kAnswers, pairs, pairs);
-    estimate_.emplace(RowsOfVertices(fields, vertices), columns->rightCols(pairs),
+    estimate_.emplace(RowsOfVertices(fields, free), columns->rightCols(pairs),
                       preparation_->mesh().BoundingBoxDiagonal());
     return absl::OkStatus();
   }
@@ -214,6 +243,7 @@ class NeoHookeanResponse : public VertexResponse {
                   const std::vector<std::vector<HandlePose>>& tried) {
     // Of the rest positions and of the sum: single precision's half unit of each.
     constexpr double kRoundings = 2 * 5.97e-8;
+    if (rest.rows() == 0) return;
     rounding_mm_ = kRoundings * rest.rowwise().norm().maxCoeff();
     double worst = 0;
     FloatPositions answer;
@@ -255,9 +285,10 @@ class NeoHookeanResponse : public VertexResponse {
     });
   }
 
-  // Against what the model converges to. `columns`: of the chosen vertices.
-  absl::Status Calibrate(const std::vector<int32_t>& vertices, const Eigen::MatrixXd& columns,
+  // Against what the model converges to. `columns`: of the free vertices.
+  absl::Status Calibrate(const std::vector<int32_t>& free, const Eigen::MatrixXd& columns,
                          const Cancellation& cancellation) {
+    if (free.empty()) return absl::OkStatus();  // handles are where their poses put them
     NeoHookeanOptions options;
     options.max_iterations = kMostCalibrationIterations;
     TF_ASSIGN_OR_RETURN(const std::unique_ptr<Deformer> deformer,
@@ -273,7 +304,7 @@ class NeoHookeanResponse : public VertexResponse {
       if (!converged.summary.converged) continue;  // nothing is learnt from it
       const Use use = UseOf(poses);
       const Positions displacements =
-          (converged.positions - preparation_->mesh().positions())(vertices, Eigen::all);
+          (converged.positions - preparation_->mesh().positions())(free, Eigen::all);
       const double error =
           LargestMove(columns * use.factors - displacements.reshaped<Eigen::RowMajor>());
       if (use.series_mm > 0) ratios.push_back(error / use.series_mm);
@@ -306,6 +337,7 @@ class NeoHookeanResponse : public VertexResponse {
   const std::shared_ptr<MeshPreparation> preparation_;  // owns elastic_
   const ElasticSystem& elastic_;
   const NeoHookeanResponseOptions options_;
+  const ChosenVertices chosen_;
   const std::vector<Eigen::Vector3d> centroids_;
   std::optional<ThirdOrderEstimate> estimate_;
   std::optional<ClusteredColumns> columns_;
@@ -335,8 +367,11 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateNeoHookeanResponse(
         NeoHookeanResponseBytes(*preparation, static_cast<Eigen::Index>(vertices.size()))));
   }
   TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic(cancellation));
-  auto response = std::make_unique<NeoHookeanResponse>(preparation, *elastic, options);
-  TF_RETURN_IF_ERROR(response->Prepare(vertices, cancellation));
+  ChosenVertices chosen(preparation->mesh().positions(), preparation->constraints(), vertices);
+  const std::vector<int32_t> free = chosen.FreeAmong(vertices);
+  auto response =
+      std::make_unique<NeoHookeanResponse>(preparation, *elastic, std::move(chosen), options);
+  TF_RETURN_IF_ERROR(response->Prepare(free, cancellation));
   return response;
 }
 

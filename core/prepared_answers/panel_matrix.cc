@@ -210,6 +210,22 @@ void PanelMatrix::Multiply(const Eigen::MatrixXd& factors, const Reading& readin
   (factors.cols() == 1 ? kMultiply1 : kMultiply3)(of, product);
 }
 
+void PanelMatrix::Describe(PackedColumns* packed) const {
+  packed->steps.insert(packed->steps.end(), steps_.begin(), steps_.end());
+  const auto append = [this](const std::vector<Panel>& panels, Eigen::Index cols,
+                             std::vector<int16_t>* halves) {
+    for (Eigen::Index c = 0; c < cols; ++c) {
+      for (Eigen::Index row = 0; row < rows_; ++row) {
+        const int32_t pair = panels[row / kPanelRows * cols + c].pairs[row % kLanes];
+        halves->push_back(
+            static_cast<int16_t>(row % kPanelRows < kLanes ? pair & 0xffff : pair >> 16));
+      }
+    }
+  };
+  append(upper_, cols_, &packed->upper);
+  append(lower_, full_cols_, &packed->lower);
+}
+
 int64_t PanelMatrix::BytesNeeded(Eigen::Index rows, Eigen::Index cols, Eigen::Index full_cols) {
   return NumPanels(rows) * (cols + full_cols) * static_cast<int64_t>(sizeof(Panel));
 }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/answer_evaluator/portable_answers.h"
 #include "core/base/types.h"
 
 namespace tissueform {
@@ -45,6 +46,9 @@ class PanelMatrix {
   double upper_step(Eigen::Index column) const { return steps_[column] * kUpper; }
   // The same for a column with that largest entry.
   static double UpperStepOf(double largest);
+
+  // Appends all columns as they are kept.
+  void Describe(PackedColumns* packed) const;
 
   Eigen::Index rows() const { return rows_; }
   Eigen::Index cols() const { return cols_; }

@@ -120,9 +120,9 @@ PanelResponse::Reading PanelResponse::Choose(const Eigen::MatrixXd& factors,
 }
 
 void PanelResponse::Evaluate(const Reading& reading, FloatPositions* positions) const {
-  positions->resize(rest_.rows(), 3);
+  if (positions->rows() < rest_.rows()) positions->resize(rest_.rows(), 3);
   panels_.Multiply(reading.factors, reading.columns, positions->data());
-  *positions += rest_;
+  positions->topRows(rest_.rows()) += rest_;
 }
 
 double PanelResponse::RoundingBoundMm(const Eigen::VectorXd& sizes) const {
@@ -137,6 +137,13 @@ double PanelResponse::RoundingBoundMm(const Eigen::VectorXd& sizes) const {
   }
   // Entry, factor and product of every column, every partial sum; the rest, the result.
   return kHalfUnit * (3 * sum + partial_sums + largest_rest_ + largest_rest_ + sum);
+}
+
+void PanelResponse::Describe(PortableAnswers* answers) const {
+  answers->free_rest.assign(rest_.data(), rest_.data() + rest_.size());
+  answers->numbers.largest_rest_mm = largest_rest_;
+  compression_.Describe(answers);
+  panels_.Describe(&answers->columns);
 }
 
 int64_t PanelResponse::bytes_held() const {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/answer_evaluator/portable_answers.h"
 #include "core/base/types.h"
 #include "core/prepared_answers/column_compression.h"
 #include "core/prepared_answers/panel_matrix.h"
@@ -46,8 +47,11 @@ class PanelResponse {
   // for kCoordinates.
   Reading Choose(const Eigen::MatrixXd& factors, double tolerance_mm) const;
 
-  // rest + columns * factors.
+  // rest + columns * factors, in the first num_vertices() rows; resized where there are fewer.
   void Evaluate(const Reading& reading, FloatPositions* positions) const;
+
+  // Writes the vertices' rest as that of the free ones, columns and their compression.
+  void Describe(PortableAnswers* answers) const;
 
   Eigen::Index num_vertices() const { return rest_.rows(); }
   Eigen::Index num_columns() const { return panels_.cols(); }

@@ -96,6 +96,16 @@ double RotationExpansion::RemainderBound(absl::Span<const HandlePose> poses, int
          0.5 * (largest_scale - smallest_scale) * Remainder(radius, degree - 1);
 }
 
+void RotationExpansion::Describe(PortableAnswers* answers) const {
+  answers->numbers.degree = polynomials_.degree();
+  answers->numbers.simplex_width = domain_.width;
+  answers->simplex_low.assign(domain_.low.begin(), domain_.low.end());
+  const RowMajorMatrix<double> nodes = nodes_;
+  const RowMajorMatrix<double> interpolation = interpolation_;
+  answers->nodes.assign(nodes.data(), nodes.data() + nodes.size());
+  answers->interpolation.assign(interpolation.data(), interpolation.data() + interpolation.size());
+}
+
 int64_t RotationExpansion::bytes_held() const {
   return polynomials_.bytes_held() +
          (nodes_.size() + interpolation_.size()) * static_cast<int64_t>(sizeof(double));

@@ -8,6 +8,7 @@
 #include "absl/types/span.h"
 #include <Eigen/Core>
 
+#include "core/answer_evaluator/portable_answers.h"
 #include "core/constraints/handle_pose.h"
 #include "core/prepared_answers/simplex_polynomials.h"
 
@@ -37,6 +38,9 @@ class RotationExpansion {
   // Chebyshev's expansion gains on it, and 2^4 an allowance for interpolating instead of
   // approximating best.
   double RemainderBound(absl::Span<const HandlePose> poses, int degree) const;
+
+  // Writes degree, nodes, interpolation and the simplex.
+  void Describe(PortableAnswers* answers) const;
 
   int64_t bytes_held() const;
   static int64_t BytesNeeded(int dimension, int degree);

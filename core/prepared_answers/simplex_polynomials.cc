@@ -78,6 +78,7 @@ SimplexPolynomials::SimplexPolynomials(int dimension, int degree)
     }
     factors_.insert(factors_.end(), factors.begin(), factors.end());
     scales.push_back(std::sqrt(squared_scale));
+    degrees_.push_back(rest);
   };
   for (int d = 0; d <= degree; ++d) {
     ForEachComposition(dimension, d, add);
@@ -95,7 +96,7 @@ Eigen::Index SimplexPolynomials::NumTerms(int dimension, int degree) {
 
 int64_t SimplexPolynomials::bytes_held() const {
   return static_cast<int64_t>(begins_.size() * sizeof(size_t) + steps_.size() * sizeof(Step) +
-                              factors_.size() * sizeof(int32_t)) +
+                              (factors_.size() + degrees_.size()) * sizeof(int32_t)) +
          num_terms() * static_cast<int64_t>(sizeof(double));
 }
 
@@ -103,16 +104,18 @@ void SimplexPolynomials::Evaluate(const Eigen::VectorXd& y, Eigen::Index first,
                                   absl::Span<double> values, std::vector<double>* workspace) const {
   workspace->resize(steps_.size());
   double* table = workspace->data();
+  // As far as these need it: many ask for a few of low degree.
+  const int degree = values.empty() ? 0 : degrees_[static_cast<size_t>(first) + values.size() - 1];
   double s = 1;
   for (int i = 0; i < dimension_; ++i) {
     // The homogeneous form s^n P_n(2 y / s - 1) has no division, so the corner s = 0 needs no case.
     const double z = 2 * y[i] - s;
-    const int largest_rest = i + 1 < dimension_ ? degree_ : 0;
+    const int largest_rest = i + 1 < dimension_ ? degree : 0;
     for (int rest = 0; rest <= largest_rest; ++rest) {
       double* J = table + Begin(i, rest);
       const Step* step = steps_.data() + Begin(i, rest);
       J[0] = 1;
-      for (int n = 1; n <= degree_ - rest; ++n) {
+      for (int n = 1; n <= degree - rest; ++n) {
         J[n] = (step[n].z_factor * z + step[n].s_factor * s) * J[n - 1];
         if (n > 1) {
           J[n] -= step[n].s2_factor * s * s * J[n - 2];

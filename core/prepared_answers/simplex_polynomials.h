@@ -73,6 +73,7 @@ class SimplexPolynomials {
   std::vector<size_t> begins_;
   std::vector<Step> steps_;       // one for each entry of the table
   std::vector<int32_t> factors_;  // of every term: `dimension` entries of the table
+  std::vector<int32_t> degrees_;  // of every term: its total degree
   Eigen::VectorXd scales_;        // of every term: the product of the roots
 };
 

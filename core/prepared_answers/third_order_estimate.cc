@@ -33,6 +33,7 @@ Eigen::VectorXd Gains(const Eigen::MatrixXd& columns) {
 
 // Those that single columns move most, by how much of any.
 std::vector<Eigen::Index> MostMoved(const Eigen::MatrixXd& columns) {
+  if (columns.rows() == 0) return {};
   std::map<Eigen::Index, double> moved;
   for (Eigen::Index c = 0; c < columns.cols(); ++c) {
     const auto [vertex, move] = LargestMove(columns.col(c));
@@ -63,10 +64,20 @@ ThirdOrderEstimate::ThirdOrderEstimate(const Eigen::MatrixXd& first, const Eigen
 }
 
 double ThirdOrderEstimate::UnscaledMm(const Eigen::VectorXd& products) const {
+  if (probes_.rows() == 0) return 0;
   const Eigen::VectorXf moves = probes_ * products.cast<float>();
   const double together = LargestMove(moves.cast<double>()).second;
   const double single = second_gains_.cwiseProduct(products).norm();
   return std::pow(together * single, 0.75) / std::sqrt(size_mm_);
+}
+
+void ThirdOrderEstimate::Describe(PortableAnswers* answers) const {
+  answers->numbers.size_mm = size_mm_;
+  answers->numbers.estimate_scale = scale_;
+  answers->first_gains.assign(first_gains_.begin(), first_gains_.end());
+  answers->second_gains.assign(second_gains_.begin(), second_gains_.end());
+  const Eigen::MatrixXf rows = probes_.transpose();  // column by column: row-major
+  answers->probes.assign(rows.data(), rows.data() + rows.size());
 }
 
 int64_t ThirdOrderEstimate::bytes_held() const {

@@ -7,6 +7,8 @@
 
 #include <Eigen/Core>
 
+#include "core/answer_evaluator/portable_answers.h"
+
 namespace tissueform {
 
 // What a series of first and second order leaves out, told by its second order:
@@ -31,6 +33,9 @@ class ThirdOrderEstimate {
 
   void set_scale(double scale) { scale_ = scale; }
   double Mm(const Eigen::VectorXd& products) const { return scale_ * UnscaledMm(products); }
+
+  // Writes size_mm, estimate_scale, first_gains, second_gains and probes.
+  void Describe(PortableAnswers* answers) const;
 
   int64_t bytes_held() const;
 

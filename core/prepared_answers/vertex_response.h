@@ -8,6 +8,7 @@
 
 #include "absl/types/span.h"
 
+#include "core/answer_evaluator/portable_answers.h"
 #include "core/base/types.h"
 #include "core/constraints/handle_pose.h"
 
@@ -16,6 +17,8 @@ namespace tissueform {
 // Answers of a linear-in-its-columns model at chosen vertices without a back-substitution: a small
 // dense product of prepared columns with coefficients that depend on the poses only (the response
 // basis of the gradient field, the 12 columns a handle of linear elasticity). Single precision.
+// Only free vertices have columns; fixed ones rest, and those of handles are where the poses put
+// them (ChosenVertices).
 //
 // Constant: any number of threads may ask at once.
 class VertexResponse {
@@ -43,6 +46,10 @@ class VertexResponse {
   // when the poses are not covered.
   virtual std::optional<double> Answer(absl::Span<const HandlePose> poses,
                                        FloatPositions* positions) const = 0;
+
+  // All that AnswerEvaluator, or a program that is not ours, needs to give the same answers; see
+  // docs/prepared-answers.md. Copies: as large as what is held.
+  virtual PortableAnswers Describe() const = 0;
 
   virtual Eigen::Index num_vertices() const = 0;
   virtual int num_terms() const = 0;         // columns of the product, all handles together

@@ -105,7 +105,34 @@ void DeformStreamReactor::OnDone() {
     rest = rest_;
   }
   timer_->Cancel(rest);
+  DeadlineTimer::Id word;
+  {
+    MutexLock lock(followers_mutex_);  // the publisher is gone: no other word will come
+    word = followers_word_;
+  }
+  timer_->Cancel(word);
   delete this;
+}
+
+// The channel is told of its watches under locks that come after this stream's own.
+void DeformStreamReactor::FollowersChanged(int count) {
+  MutexLock lock(followers_mutex_);
+  followers_ = count;
+  if (std::exchange(followers_due_, true)) return;
+  followers_word_ = timer_->Start(std::chrono::steady_clock::now(), [this] { TellFollowers(); });
+}
+
+void DeformStreamReactor::TellFollowers() {
+  int count = 0;
+  {
+    MutexLock lock(followers_mutex_);
+    followers_due_ = false;
+    count = followers_;
+  }
+  MutexLock lock(mutex_);
+  if (std::exchange(told_followers_, count) == count) return;
+  notices_.emplace_back().mutable_followers()->set_count(count);
+  Advance();
 }
 
 void DeformStreamReactor::NotifyDraining(std::chrono::system_clock::time_point end) {
@@ -186,7 +213,7 @@ void DeformStreamReactor::Begin(StreamBegin begin) {
   flow_->FinishPreparation();
   claim_ = std::move(begin.claim);
   if (!started_.has_value() && !has_started_) {
-    publisher_.emplace(watches_->ChannelOf(stream_request_.session_id),
+    publisher_.emplace(static_cast<Dragger*>(this), watches_->ChannelOf(stream_request_.session_id),
                        FormOf(*configuration_, begin.started.started()));
     started_ = std::move(begin.started);
   }

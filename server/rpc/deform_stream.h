@@ -36,7 +36,8 @@ namespace tissueform {
 // or commit is under way: whatever runs may use this object. Jobs hold the configuration
 // themselves; nothing that the mutex guards leaves it by pointer. The registry is never called
 // under the mutex, since it may answer before it returns: jobs in the lane of frames call it.
-class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse> {
+class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>,
+                            private Dragger {
  public:
   // All pointers must outlive the stream.
   DeformStreamReactor(CallScope scope, const ServiceLimits& limits, SessionRegistry* registry,
@@ -52,6 +53,10 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
 
  private:
   using Configuration = std::shared_ptr<const StreamConfiguration>;
+
+  // By the channel, with its lock: leaves word for the timer's thread, which tells the client.
+  void FollowersChanged(int count) override ABSL_LOCKS_EXCLUDED(followers_mutex_);
+  void TellFollowers() ABSL_LOCKS_EXCLUDED(mutex_, followers_mutex_);
 
   // The client has had its time for the configuration.
   void EndUnlessConfigured() ABSL_LOCKS_EXCLUDED(mutex_);
@@ -117,7 +122,13 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   v1::DeformRequest request_;
   std::shared_ptr<const v1::DeformResponse> writing_;  // those who watch hold it as well
 
+  Mutex followers_mutex_;  // innermost
+  int followers_ ABSL_GUARDED_BY(followers_mutex_) = 0;
+  bool followers_due_ ABSL_GUARDED_BY(followers_mutex_) = false;        // are to be told
+  DeadlineTimer::Id followers_word_ ABSL_GUARDED_BY(followers_mutex_);  // that they are
+
   Mutex mutex_;
+  int told_followers_ ABSL_GUARDED_BY(mutex_) = 0;
   StreamRequest stream_request_ ABSL_GUARDED_BY(mutex_);
   std::optional<FrameFlow> flow_ ABSL_GUARDED_BY(mutex_);         // empty before the first message
   Configuration configuration_ ABSL_GUARDED_BY(mutex_);           // null before there is a session

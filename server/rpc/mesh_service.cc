@@ -3,21 +3,61 @@
 
 #include "server/rpc/mesh_service.h"
 
+#include <cstddef>
 #include <memory>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "core/base/status_macros.h"
 #include "proto/conversion/mesh_conversion.h"
+#include "server/rpc/mesh_surface.h"
 #include "server/rpc/mesh_upload_stream.h"
+#include "server/rpc/message_stream.h"
 #include "server/rpc/resource_conversion.h"
 
 namespace tissueform {
+namespace {
+
+// What one GetSurface call sends, as far as it has come.
+struct SurfaceToSend {
+  MeshSurface surface;
+  MemoryReservation reservation;
+  bool told = false;  // the header
+  size_t offset = 0;
+};
+
+// Blocks on the disk, and computes.
+absl::StatusOr<std::shared_ptr<SurfaceToSend>> MakeSurface(const v1::GetSurfaceRequest& request,
+                                                           MeshCatalog* catalog) {
+  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request.name()));
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<const StoredMesh> mesh, catalog->Load(sha256));
+  TF_ASSIGN_OR_RETURN(const std::vector<const CellArray*> arrays,
+                      FindSurfaceArrays(*mesh, request.cell_arrays()));
+  auto to_send = std::make_shared<SurfaceToSend>();
+  TF_ASSIGN_OR_RETURN(to_send->reservation,
+                      catalog->budget()->Reserve(SurfaceBytes(*mesh, arrays.size()), "surface"));
+  to_send->surface = EncodeSurface(*mesh, arrays);
+  return to_send;
+}
+
+bool NextOfSurface(SurfaceToSend* to_send, v1::GetSurfaceResponse* message) {
+  if (!std::exchange(to_send->told, true)) {
+    *message->mutable_header() = to_send->surface.header;
+    return true;
+  }
+  return NextSurfaceChunk(to_send->surface.bytes, &to_send->offset, message->mutable_chunk());
+}
+
+}  // namespace
 
 grpc::ServerReadReactor<v1::UploadMeshRequest>* MeshService::UploadMesh(
     grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) {
-  return new MeshUploadStream(
-      CallScope(context, "MeshService.UploadMesh", CallKind::kNewWork, gate_), limits_, catalog_,
-      uploads_, pool_, timer_, response);
+  auto* call =
+      new MeshUploadStream(CallScope(context, "MeshService.UploadMesh", CallKind::kNewWork, gate_),
+                           limits_, catalog_, uploads_, pool_, timer_, response);
+  call->Start();
+  return call;
 }
 
 grpc::ServerUnaryReactor* MeshService::Run(grpc::CallbackServerContext* context,
@@ -40,6 +80,28 @@ grpc::ServerUnaryReactor* MeshService::GetMesh(grpc::CallbackServerContext* cont
                                                const v1::GetMeshRequest* request,
                                                v1::Mesh* response) {
   return Run(context, "MeshService.GetMesh", [=, this] { return FindMesh(*request, response); });
+}
+
+grpc::ServerWriteReactor<v1::GetSurfaceResponse>* MeshService::GetSurface(
+    grpc::CallbackServerContext* context, const v1::GetSurfaceRequest* request) {
+  auto* call = new MessageStream<v1::GetSurfaceResponse>(
+      CallScope(context, "MeshService.GetSurface", CallKind::kNewWork, gate_), CancelOf(context),
+      timer_, limits_.upload_silence);
+  if (!call->scope().admission().ok()) {
+    call->End(call->scope().admission());
+    return call;
+  }
+  pool_->Post(Lane::kStore, [call, request, catalog = catalog_] {
+    absl::StatusOr<std::shared_ptr<SurfaceToSend>> made = MakeSurface(*request, catalog);
+    if (!made.ok()) {
+      call->End(made.status());
+      return;
+    }
+    call->Send([to_send = *std::move(made)](v1::GetSurfaceResponse* message) {
+      return NextOfSurface(to_send.get(), message);
+    });
+  });
+  return call;
 }
 
 grpc::ServerUnaryReactor* MeshService::ListMeshes(grpc::CallbackServerContext* context,

@@ -38,6 +38,8 @@ class MeshService final : public v1::MeshService::CallbackService {
                                         v1::QueryUploadResponse* response) override;
   grpc::ServerUnaryReactor* GetMesh(grpc::CallbackServerContext* context,
                                     const v1::GetMeshRequest* request, v1::Mesh* response) override;
+  grpc::ServerWriteReactor<v1::GetSurfaceResponse>* GetSurface(
+      grpc::CallbackServerContext* context, const v1::GetSurfaceRequest* request) override;
   grpc::ServerUnaryReactor* ListMeshes(grpc::CallbackServerContext* context,
                                        const v1::ListMeshesRequest* request,
                                        v1::ListMeshesResponse* response) override;

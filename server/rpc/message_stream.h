@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "grpcpp/server_context.h"
 #include "grpcpp/support/server_callback.h"
 
@@ -32,8 +33,10 @@ inline CancelCall CancelOf(grpc::CallbackServerContext* context) {
 template <typename Response>
 class MessageStream : public grpc::ServerWriteReactor<Response> {
  public:
-  // Makes the next message; false when there is none. Called from threads of gRPC: not long.
-  using Next = std::function<bool(Response* message)>;
+  // Makes the next message; false when there is none. An error ends the call.
+  using Next = std::function<absl::StatusOr<bool>(Response* message)>;
+  // Runs a job elsewhere.
+  using Post = std::function<void(std::function<void()> job)>;
 
   // A message that is not taken within `patience` is the last one. `timer` must outlive the call.
   MessageStream(CallScope scope, CancelCall cancel, DeadlineTimer* timer,
@@ -42,12 +45,17 @@ class MessageStream : public grpc::ServerWriteReactor<Response> {
 
   const CallScope& scope() const { return scope_; }
 
-  // One of the two, once, from any thread.
-  void Send(Next next) {
+  // One of the two, once, from any thread. `next` is called from threads of gRPC, so not long; or
+  // by `post`, where it may block.
+  void Send(Next next, Post post = nullptr) {
     next_ = std::move(next);
+    post_ = std::move(post);
     WriteNext();
   }
-  void End(const absl::Status& outcome) { this->Finish(scope_.End(outcome)); }
+  void End(const absl::Status& outcome) {
+    next_ = nullptr;  // what it holds is free when the client hears of the end
+    this->Finish(scope_.End(outcome));
+  }
 
   void OnWriteDone(bool ok) override {
     timer_->Cancel(deadline_);
@@ -65,9 +73,19 @@ class MessageStream : public grpc::ServerWriteReactor<Response> {
 
  private:
   void WriteNext() {
+    if (post_ == nullptr) {
+      MakeAndWrite();
+    } else {
+      const Post post = post_;  // the job may end this object before it is posted here
+      post([this] { MakeAndWrite(); });
+    }
+  }
+
+  void MakeAndWrite() {
     message_.Clear();
-    if (!next_(&message_)) {
-      End(absl::OkStatus());
+    const absl::StatusOr<bool> made = next_(&message_);
+    if (!made.ok() || !*made) {
+      End(made.status());
       return;
     }
     // Before the write, which may be done at once.
@@ -80,6 +98,7 @@ class MessageStream : public grpc::ServerWriteReactor<Response> {
   DeadlineTimer* const timer_;
   const std::chrono::milliseconds patience_;
   Next next_;
+  Post post_;         // null: where it is asked
   Response message_;  // gRPC's while a write is under way
   DeadlineTimer::Id deadline_;
 };

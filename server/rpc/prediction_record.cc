@@ -8,9 +8,11 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/software_version.h"
+#include "core/base/status_macros.h"
 #include "core/deformation/deformation_quality.h"
 #include "core/mesh_payload/sha256.h"
 #include "proto/conversion/answer_conversion.h"
+#include "proto/conversion/case_conversion.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "proto/conversion/model_conversion.h"
@@ -62,16 +64,28 @@ PredictionRequestKey KeyOf(const Principal& owner, const std::string& request_id
   return {.id = Sha256Hex({prefix, request_id}).substr(0, kIdDigits), .fingerprint = fingerprint};
 }
 
+absl::StatusOr<PredictionNotes> NotesOf(const v1::CreatePredictionRequest& request,
+                                        int max_title_bytes) {
+  TF_RETURN_IF_ERROR(CheckTitle(request.title(), max_title_bytes));
+  PredictionNotes notes{.case_sha256 = "", .title = request.title()};
+  if (!request.case_().empty()) {
+    TF_ASSIGN_OR_RETURN(notes.case_sha256, ParseCaseName(request.case_()));
+  }
+  return notes;
+}
+
 PredictionToKeep ToKeep(const PredictionRequestKey& key, const Principal& owner, int64_t now_s,
-                        const SingleAnswer& answer) {
+                        const PredictionNotes& notes, const SingleAnswer& answer) {
   const StoredMesh& mesh = answer.session->mesh();
   store::v1::PredictionMetadata metadata;
   *metadata.mutable_prediction() = Describe(answer);
+  metadata.mutable_prediction()->set_title(notes.title);
   metadata.set_request_fingerprint(key.fingerprint);
   return {.record = {.id = key.id,
                      .owner = owner.name,
                      .session = answer.session->id(),
                      .mesh_sha256 = mesh.sha256,
+                     .case_sha256 = notes.case_sha256,
                      .created_s = now_s,
                      .metadata = metadata.SerializeAsString(),
                      .vertex_count = mesh.mesh.num_vertices()},
@@ -91,6 +105,7 @@ absl::StatusOr<KeptPrediction> FromRecord(const PredictionRecord& record) {
   kept.prediction.set_name(PredictionName(record.id));
   kept.prediction.set_session(SessionName(record.session));
   kept.prediction.set_mesh(MeshName(record.mesh_sha256));
+  if (!record.case_sha256.empty()) kept.prediction.set_case_(CaseName(record.case_sha256));
   kept.prediction.set_vertex_count(record.vertex_count);
   kept.prediction.mutable_create_time()->set_seconds(record.created_s);
   kept.fingerprint = metadata.request_fingerprint();

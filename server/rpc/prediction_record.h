@@ -13,6 +13,7 @@
 #include "server/session/session.h"
 #include "server/store/prediction_store.h"
 #include "tissueform/v1/prediction.pb.h"
+#include "tissueform/v1/prediction_service.pb.h"
 
 namespace tissueform {
 
@@ -28,13 +29,22 @@ struct PredictionRequestKey {
 PredictionRequestKey KeyOf(const Principal& owner, const std::string& request_id,
                            const std::string& fingerprint);
 
+// What a planner says of a prediction beside what it asks.
+struct PredictionNotes {
+  std::string case_sha256;  // empty: of no case
+  std::string title;
+};
+// Errors: InvalidArgument.
+absl::StatusOr<PredictionNotes> NotesOf(const v1::CreatePredictionRequest& request,
+                                        int max_title_bytes);
+
 // The answer as it goes to the store.
 struct PredictionToKeep {
   PredictionRecord record;
   std::string positions;  // float32, all vertices
 };
 PredictionToKeep ToKeep(const PredictionRequestKey& key, const Principal& owner, int64_t now_s,
-                        const SingleAnswer& answer);
+                        const PredictionNotes& notes, const SingleAnswer& answer);
 
 struct KeptPrediction {
   v1::Prediction prediction;

@@ -12,6 +12,7 @@
 
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
+#include "proto/conversion/case_conversion.h"
 #include "proto/conversion/prediction_conversion.h"
 #include "proto/conversion/session_conversion.h"
 #include "server/rpc/compare_predictions.h"
@@ -65,12 +66,13 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
   void OnDone() override { delete this; }
 
  private:
-  absl::Status Check(const ServiceLimits& limits) const {
+  absl::Status Check(const ServiceLimits& limits) {
     const size_t bytes = request_.request_id().size();
     if (bytes > static_cast<size_t>(limits.max_request_id_bytes)) {
       return absl::InvalidArgumentError(absl::StrCat(
           "request_id has ", bytes, " bytes; it may have ", limits.max_request_id_bytes));
     }
+    TF_ASSIGN_OR_RETURN(notes_, NotesOf(request_, limits.max_title_bytes));
     return ParseSessionName(request_.session()).status();
   }
 
@@ -96,7 +98,8 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
                          End(answer.status());
                          return;
                        }
-                       keep_ = ToKeep(key_, scope_.principal(), SystemUnixSeconds(), *answer);
+                       keep_ =
+                           ToKeep(key_, scope_.principal(), SystemUnixSeconds(), notes_, *answer);
                        PostToStore([this] { End(Keep()); });
                      });
   }
@@ -120,6 +123,7 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
   v1::Prediction& response_;
   const PredictionRequestKey key_;
   const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
+  PredictionNotes notes_;
   PredictionToKeep keep_;
 };
 
@@ -225,6 +229,9 @@ absl::Status PredictionService::List(const v1::ListPredictionsRequest& request,
       .owner = caller.name, .after = page.after, .limit = page.size};
   if (!request.session().empty()) {
     TF_ASSIGN_OR_RETURN(wanted.session, ParseSessionName(request.session()));
+  }
+  if (!request.case_().empty()) {
+    TF_ASSIGN_OR_RETURN(wanted.case_sha256, ParseCaseName(request.case_()));
   }
   TF_ASSIGN_OR_RETURN(const PredictionStore::Page records, store_->List(wanted));
   response->set_next_page_token(records.next);

@@ -47,14 +47,17 @@ void AddEncodings(v1::ServerInfo* info) {
 // a name, too.
 NamedLimits ToNamedLimits(const ServiceLimits& limits) {
   const auto& [max_vertices, max_tets, max_mesh_bytes, max_sessions, max_stored_sessions,
-               max_streams, max_watches, max_watches_per_session, session_idle_ttl, retention_days,
-               configuration_deadline, upload_silence, max_handles, max_cell_arrays, max_name_bytes,
-               max_request_id_bytes, max_chunk_bytes, max_unacked, max_iterations] = limits;
+               max_case_bytes, max_cases, max_streams, max_watches, max_watches_per_session,
+               session_idle_ttl, retention_days, configuration_deadline, upload_silence,
+               max_handles, max_cell_arrays, max_name_bytes, max_request_id_bytes, max_title_bytes,
+               max_case_uploads, max_chunk_bytes, max_unacked, max_iterations] = limits;
   return {{"max_vertices", max_vertices},
           {"max_tets", max_tets},
           {"max_mesh_bytes", max_mesh_bytes},
           {"max_sessions", max_sessions},
           {"max_stored_sessions", max_stored_sessions},
+          {"max_case_bytes", max_case_bytes},
+          {"max_cases", max_cases},
           {"max_streams", max_streams},
           {"max_watches", max_watches},
           {"max_watches_per_session", max_watches_per_session},
@@ -66,6 +69,8 @@ NamedLimits ToNamedLimits(const ServiceLimits& limits) {
           {"max_cell_arrays", max_cell_arrays},
           {"max_name_bytes", max_name_bytes},
           {"max_request_id_bytes", max_request_id_bytes},
+          {"max_title_bytes", max_title_bytes},
+          {"max_case_uploads", max_case_uploads},
           {"max_chunk_bytes", max_chunk_bytes},
           {"max_unacked", max_unacked},
           {"max_iterations", max_iterations}};

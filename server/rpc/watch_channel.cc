@@ -83,21 +83,28 @@ void WatchChannel::EncodeAll() {
   }
 }
 
-void WatchChannel::AddDrag() {
+void WatchChannel::AddDrag(Dragger* dragger) {
   MutexLock lock(watchers_mutex_);
-  ++num_drags_;
+  drags_.insert(dragger);
+  if (!watchers_.empty()) dragger->FollowersChanged(static_cast<int>(watchers_.size()));
 }
 
-void WatchChannel::RemoveDrag() {
+void WatchChannel::RemoveDrag(Dragger* dragger) {
   MutexLock lock(watchers_mutex_);
-  if (--num_drags_ > 0 || !end_with_drags_.has_value()) return;
+  drags_.erase(dragger);
+  if (!drags_.empty() || !end_with_drags_.has_value()) return;
   for (Watcher* watcher : watchers_) watcher->EndWatch(*end_with_drags_);
+}
+
+void WatchChannel::TellDrags() {
+  for (Dragger* dragger : drags_) dragger->FollowersChanged(static_cast<int>(watchers_.size()));
 }
 
 bool WatchChannel::Add(Watcher* watcher) {
   MutexLock lock(watchers_mutex_);
   watchers_.insert(watcher);
-  if (end_with_drags_.has_value() && num_drags_ == 0) watcher->EndWatch(*end_with_drags_);
+  TellDrags();
+  if (end_with_drags_.has_value() && drags_.empty()) watcher->EndWatch(*end_with_drags_);
   if (shown_ != nullptr) watcher->Show(shown_);
   MutexLock newest_lock(newest_mutex_);
   watched_ = true;
@@ -108,6 +115,7 @@ bool WatchChannel::Add(Watcher* watcher) {
 void WatchChannel::Remove(Watcher* watcher) {
   MutexLock lock(watchers_mutex_);
   watchers_.erase(watcher);
+  TellDrags();
   if (!watchers_.empty()) return;
   // Kept as it came until somebody watches again.
   shown_.reset();
@@ -134,7 +142,7 @@ void WatchChannel::EndWatches(const absl::Status& outcome) {
 void WatchChannel::EndWithDrags(const absl::Status& outcome) {
   MutexLock lock(watchers_mutex_);
   end_with_drags_ = outcome;
-  if (num_drags_ > 0) return;
+  if (!drags_.empty()) return;
   for (Watcher* watcher : watchers_) watcher->EndWatch(outcome);
 }
 

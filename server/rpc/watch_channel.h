@@ -40,6 +40,17 @@ class Watcher {
   ~Watcher() = default;
 };
 
+// Somebody who drags. Called with the channel's lock held, by which AddDrag and RemoveDrag are
+// taken, too: must not call the channel, nor take a lock that is held while it is called, nor
+// block.
+class Dragger {
+ public:
+  virtual void FollowersChanged(int count) = 0;
+
+ protected:
+  ~Dragger() = default;
+};
+
 // From the drags of one session to those who watch it: the newest frame, encoded once on a worker
 // when somebody watches. Frames that come faster than they are encoded replace each other.
 //
@@ -56,8 +67,9 @@ class WatchChannel : public std::enable_shared_from_this<WatchChannel> {
   void PublishBase(v1::WatchOrigin origin, v1::DeformFrame frame,
                    std::shared_ptr<const v1::WatchForm> form) ABSL_LOCKS_EXCLUDED(newest_mutex_);
 
-  void AddDrag();
-  void RemoveDrag();
+  // It is told when somebody watches already, and whenever the number changes.
+  void AddDrag(Dragger* dragger);
+  void RemoveDrag(Dragger* dragger);
 
   // The watcher is shown the newest frame; false when there is none: somebody must PublishBase.
   bool Add(Watcher* watcher);
@@ -78,6 +90,7 @@ class WatchChannel : public std::enable_shared_from_this<WatchChannel> {
     std::shared_ptr<const v1::WatchForm> form;
   };
 
+  void TellDrags() ABSL_EXCLUSIVE_LOCKS_REQUIRED(watchers_mutex_);
   void Put(Newest newest) ABSL_EXCLUSIVE_LOCKS_REQUIRED(newest_mutex_);
   void StartEncoding() ABSL_EXCLUSIVE_LOCKS_REQUIRED(newest_mutex_);
   // On a worker, one at a time.
@@ -90,7 +103,7 @@ class WatchChannel : public std::enable_shared_from_this<WatchChannel> {
   mutable Mutex watchers_mutex_;  // before the other, and before the locks of the watchers
   std::set<Watcher*> watchers_ ABSL_GUARDED_BY(watchers_mutex_);
   std::shared_ptr<const WatchedFrame> shown_ ABSL_GUARDED_BY(watchers_mutex_);  // null: none
-  int num_drags_ ABSL_GUARDED_BY(watchers_mutex_) = 0;
+  std::set<Dragger*> drags_ ABSL_GUARDED_BY(watchers_mutex_);
   std::optional<absl::Status> end_with_drags_ ABSL_GUARDED_BY(watchers_mutex_);
 
   Mutex newest_mutex_;
@@ -103,13 +116,14 @@ class WatchChannel : public std::enable_shared_from_this<WatchChannel> {
 // A drag's side of a channel. One thread at a time.
 class DragPublisher {
  public:
-  DragPublisher(std::shared_ptr<WatchChannel> channel, v1::WatchForm form)
-      : channel_(std::move(channel)),
+  DragPublisher(Dragger* dragger, std::shared_ptr<WatchChannel> channel, v1::WatchForm form)
+      : dragger_(dragger),
+        channel_(std::move(channel)),
         form_(std::make_shared<const v1::WatchForm>(std::move(form))) {
-    channel_->AddDrag();
+    channel_->AddDrag(dragger_);
   }
   // REQUIRES: no lock is held that a watcher may wait for.
-  ~DragPublisher() { channel_->RemoveDrag(); }
+  ~DragPublisher() { channel_->RemoveDrag(dragger_); }
   DragPublisher(const DragPublisher&) = delete;
   DragPublisher& operator=(const DragPublisher&) = delete;
 
@@ -118,6 +132,7 @@ class DragPublisher {
   }
 
  private:
+  Dragger* const dragger_;
   const std::shared_ptr<WatchChannel> channel_;
   const std::shared_ptr<const v1::WatchForm> form_;
 };

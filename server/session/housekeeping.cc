@@ -88,14 +88,17 @@ Housekeeping::Removed Housekeeping::RunOnce() {
   if (options_.retention_days > 0) {
     const int64_t before_s = now_s - options_.retention_days * kDaySeconds;
     removed.sessions = RemoveSessions(before_s);
-    std::set<std::string> of_predictions;
-    if (RemovePredictions(before_s, &of_predictions, &removed.predictions)) {
-      removed.meshes = RemoveMeshes(before_s, of_predictions);
+    Claimed claimed;
+    if (RemovePredictions(before_s, &claimed, &removed.predictions)) {
+      removed.meshes = RemoveMeshes(before_s, claimed.meshes);
+      removed.cases = RemoveCases(before_s, claimed.cases);
     }
   }
-  if (removed.sessions + removed.predictions + removed.meshes + removed.uploads > 0) {
-    spdlog::info("deleted for their age: {} sessions, {} predictions, {} meshes, {} uploads",
-                 removed.sessions, removed.predictions, removed.meshes, removed.uploads);
+  if (removed.sessions + removed.predictions + removed.meshes + removed.uploads + removed.cases >
+      0) {
+    spdlog::info(
+        "deleted for their age: {} sessions, {} predictions, {} meshes, {} uploads, {} cases",
+        removed.sessions, removed.predictions, removed.meshes, removed.uploads, removed.cases);
   }
   return removed;
 }
@@ -142,8 +145,7 @@ int Housekeeping::RemoveSessions(int64_t before_s) {
   return registry_->RemoveUnused(ids, written_until_);
 }
 
-bool Housekeeping::RemovePredictions(int64_t before_s, std::set<std::string>* meshes,
-                                     int* removed) {
+bool Housekeeping::RemovePredictions(int64_t before_s, Claimed* claimed, int* removed) {
   PredictionStore& store = stores_->predictions();
   PredictionStore::ListRequest request{
       .owner = std::nullopt, .session = std::nullopt, .after = "", .limit = kPageSize};
@@ -156,7 +158,8 @@ bool Housekeeping::RemovePredictions(int64_t before_s, std::set<std::string>* me
       if (old && *removed < kMostOfARound && store.Delete(record.id).ok()) {
         ++*removed;
       } else {
-        meshes->insert(record.mesh_sha256);
+        claimed->meshes.insert(record.mesh_sha256);
+        claimed->cases.insert(record.case_sha256);
       }
     }
     request.after = std::move(page->next);
@@ -190,6 +193,13 @@ int Housekeeping::RemoveMeshes(int64_t before_s, const std::set<std::string>& of
   WarnUnlessOk(stores_->meshes().Touch(of_unknown_age, options_.unix_clock()),
                "times of use are not written");
   return removed;
+}
+
+int Housekeeping::RemoveCases(int64_t before_s, const std::set<std::string>& of_predictions) {
+  const absl::StatusOr<int> removed =
+      stores_->cases().RemoveUnused(before_s, of_predictions, kMostOfARound);
+  WarnUnlessOk(removed.status(), "cases that nobody used stay");
+  return removed.value_or(0);
 }
 
 }  // namespace tissueform

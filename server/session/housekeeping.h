@@ -21,7 +21,8 @@ namespace tissueform {
 // deletes what nobody has used for too long, and uploads that were broken off.
 //
 // Unused means: a session that nobody opened and no stream holds; a mesh of no session and no
-// prediction; a prediction that was made so long ago and whose session is gone. What was used while
+// prediction; a prediction that was made so long ago and whose session is gone; a case that nobody
+// has sent or read, of no prediction. What was used while
 // the server ran is known by a clock that never goes back. The machine's clock only decides about
 // the rest, and only as far as it went on with that one: set back or forward while the server runs,
 // it deletes nothing early.
@@ -41,6 +42,7 @@ class Housekeeping {
     int predictions = 0;
     int meshes = 0;
     int uploads = 0;
+    int cases = 0;
   };
 
   // All must outlive it.
@@ -67,9 +69,15 @@ class Housekeeping {
   void Work();
   int RemoveUploads(int64_t before_s);
   int RemoveSessions(int64_t before_s);
-  // Puts the meshes of those that stay into `meshes`; false when they are not all known.
-  bool RemovePredictions(int64_t before_s, std::set<std::string>* meshes, int* removed);
+  // What predictions are made from, by name.
+  struct Claimed {
+    std::set<std::string> meshes;
+    std::set<std::string> cases;
+  };
+  // Puts those of the predictions that stay into `claimed`; false when they are not all known.
+  bool RemovePredictions(int64_t before_s, Claimed* claimed, int* removed);
   int RemoveMeshes(int64_t before_s, const std::set<std::string>& of_predictions);
+  int RemoveCases(int64_t before_s, const std::set<std::string>& of_predictions);
 
   // Constant.
   const Options options_;

@@ -16,6 +16,8 @@ struct ServiceLimits {
   int64_t max_mesh_bytes = int64_t{1} << 30;
   int max_sessions = 64;
   int max_stored_sessions = 10'000;  // in memory or not
+  int64_t max_case_bytes = int64_t{512} << 20;
+  int max_cases = 1'000;
   int max_streams = 64;
   int max_watches = 256;
   int max_watches_per_session = 16;
@@ -29,6 +31,8 @@ struct ServiceLimits {
   int max_cell_arrays = 16;
   int max_name_bytes = 128;  // of handles and cell arrays
   int max_request_id_bytes = 64;
+  int max_title_bytes = 256;  // of cases and predictions
+  int max_case_uploads = 16;  // being sent at the same time
   int64_t max_chunk_bytes = 1 << 20;
   int max_unacked = 64;       // frames of a stream
   int max_iterations = 1000;  // linear solves of one answer

@@ -18,14 +18,18 @@ namespace {
 absl::StatusOr<std::shared_ptr<const StoredMesh>> MakeStored(MemoryReservation reservation,
                                                              const std::string& sha256,
                                                              TetMesh mesh, MeshPayload* payload) {
-  std::vector<int32_t> skin = BoundaryVertices(mesh);
+  TriangleIndices facets = BoundaryFacets(mesh);
+  std::vector<int32_t> skin = VerticesOf(facets);
   std::vector<CellArray> cell_arrays = std::move(payload->cell_arrays());
   const int64_t payload_bytes =
       ViewMeshPayload(mesh.positions(), mesh.tets(), cell_arrays).shape.TotalBytes();
   TF_RETURN_IF_ERROR(reservation.Resize(
-      payload_bytes + static_cast<int64_t>(skin.size() * sizeof(int32_t)), "mesh"));
-  return std::make_shared<const StoredMesh>(StoredMesh{
-      std::move(reservation), sha256, std::move(mesh), std::move(cell_arrays), std::move(skin)});
+      payload_bytes + static_cast<int64_t>((static_cast<size_t>(facets.size()) + skin.size()) *
+                                           sizeof(int32_t)),
+      "mesh"));
+  return std::make_shared<const StoredMesh>(StoredMesh{std::move(reservation), sha256,
+                                                       std::move(mesh), std::move(cell_arrays),
+                                                       std::move(facets), std::move(skin)});
 }
 
 absl::Status NoSuchMesh() {

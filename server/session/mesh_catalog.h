@@ -32,7 +32,8 @@ struct StoredMesh {
   std::string sha256;
   TetMesh mesh;
   std::vector<CellArray> cell_arrays;
-  std::vector<int32_t> skin;  // BoundaryVertices
+  TriangleIndices skin_facets;  // BoundaryFacets
+  std::vector<int32_t> skin;    // their vertices, rising
 
   // Null when the mesh has no array of that name.
   const CellArray* FindCellArray(absl::string_view name) const;
@@ -60,6 +61,9 @@ class MeshCatalog {
   // `clock` the catalog.
   MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget, MeshStore* store = nullptr,
               const Clock* clock = Clock::System(), UnixClock unix_clock = SystemUnixSeconds);
+
+  // Where meshes take their memory from, and what is made of them should, too.
+  MemoryBudget* budget() const { return budget_; }
 
   // What is not in memory can be had again.
   bool keeps_meshes() const { return store_ != nullptr; }

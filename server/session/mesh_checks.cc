@@ -21,8 +21,8 @@ namespace tissueform {
 namespace {
 
 // Upper bounds of what validation and the search for the skin hold at their peak, beside the mesh.
-// The most a tet takes are the four facets of the skin's search at 20 bytes, twice where all are
-// boundary, or four keys of 24 bytes in the search for facets with a third tet.
+// The most a tet takes are the four facets of the skin's search at 20 bytes, twice while they are
+// sorted, or four keys of 24 bytes in the search for facets with a third tet.
 constexpr int64_t kValidationBytesPerTet = 256;
 constexpr int64_t kValidationBytesPerVertex = 64;
 

@@ -4,10 +4,13 @@
 #include "server/store/blob_store.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstdio>
+#include <fcntl.h>
 #include <filesystem>
 #include <numeric>
+#include <unistd.h>
 
 #include "absl/strings/str_cat.h"
 #include <sys/stat.h>
@@ -39,25 +42,62 @@ absl::StatusOr<std::unique_ptr<BlobStore>> BlobStore::Open(std::string folder,
   return std::unique_ptr<BlobStore>(new BlobStore(std::move(folder), std::move(damaged_folder)));
 }
 
+BlobStore::Pin BlobStore::PinTo(const std::string& sha256) {
+  MutexLock lock(mutex_);
+  ++pins_[sha256];
+  return {this, sha256};
+}
+
+absl::StatusOr<bool> BlobStore::Has(const std::string& sha256, int64_t bytes) const {
+  const absl::StatusOr<int64_t> size = Size(sha256);
+  if (!size.ok() || *size != bytes) return false;
+  // Whoever has written it may have died before the folder was synced.
+  TF_RETURN_IF_ERROR(SyncFolder(folder_));
+  return true;
+}
+
 absl::StatusOr<BlobStore::Pin> BlobStore::Put(const std::string& sha256,
                                               const std::vector<absl::string_view>& parts) {
   TF_RETURN_IF_ERROR(CheckMeshName(sha256));
-  {
-    MutexLock lock(mutex_);
-    ++pins_[sha256];
-  }
-  Pin pin(this, sha256);
+  Pin pin = PinTo(sha256);
   const size_t bytes =
       std::accumulate(parts.begin(), parts.end(), size_t{0},
                       [](size_t sum, absl::string_view part) { return sum + part.size(); });
-  const absl::StatusOr<int64_t> size = Size(sha256);
-  if (size.ok() && static_cast<size_t>(*size) == bytes) {
-    // Whoever has written it may have died before the folder was synced.
-    TF_RETURN_IF_ERROR(SyncFolder(folder_));
-  } else {
-    TF_RETURN_IF_ERROR(WriteDurably(Path(sha256), parts));
+  TF_ASSIGN_OR_RETURN(const bool there, Has(sha256, static_cast<int64_t>(bytes)));
+  if (!there) TF_RETURN_IF_ERROR(WriteDurably(Path(sha256), parts));
+  return pin;
+}
+
+absl::StatusOr<std::unique_ptr<BlobStore::Incoming>> BlobStore::Receive() {
+  static std::atomic<unsigned> counter = 0;
+  std::string path = absl::StrCat(folder_, "/incoming.", counter++, ".new");
+  TF_ASSIGN_OR_RETURN(OpenFile file, OpenFile::Open(path, O_WRONLY | O_CREAT | O_TRUNC));
+  return std::unique_ptr<Incoming>(new Incoming(this, std::move(path), std::move(file)));
+}
+
+BlobStore::Incoming::~Incoming() { unlink(path_.c_str()); }
+
+absl::Status BlobStore::Incoming::Append(absl::string_view bytes) {
+  TF_RETURN_IF_ERROR(file_.WriteAt(bytes_, bytes));
+  bytes_ += static_cast<int64_t>(bytes.size());
+  return absl::OkStatus();
+}
+
+absl::StatusOr<BlobStore::Pin> BlobStore::Incoming::Keep(const std::string& sha256) {
+  TF_RETURN_IF_ERROR(CheckMeshName(sha256));
+  Pin pin = store_->PinTo(sha256);
+  TF_ASSIGN_OR_RETURN(const bool there, store_->Has(sha256, bytes_));
+  if (!there) {
+    TF_FAULT_POINT("file.written");
+    TF_RETURN_IF_ERROR(file_.Sync());
+    TF_RETURN_IF_ERROR(RenameDurably(path_, store_->Path(sha256)));
   }
   return pin;
+}
+
+absl::StatusOr<OpenFile> BlobStore::OpenBlob(const std::string& sha256) const {
+  TF_RETURN_IF_ERROR(CheckMeshName(sha256));
+  return OpenFile::Open(Path(sha256), O_RDONLY);
 }
 
 absl::Status BlobStore::Read(const std::string& sha256,

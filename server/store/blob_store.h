@@ -16,6 +16,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/base/mutex.h"
+#include "server/store/durable_file.h"
 
 namespace tissueform {
 
@@ -42,6 +43,30 @@ class BlobStore {
     std::string sha256_;
   };
 
+  // A blob that comes piece by piece, as a file that is removed with it, or at the next start,
+  // unless it was kept. One thread at a time; must not outlive its store.
+  class Incoming {
+   public:
+    ~Incoming();
+    Incoming(const Incoming&) = delete;
+    Incoming& operator=(const Incoming&) = delete;
+
+    absl::Status Append(absl::string_view bytes);
+    // The blob is on the disk when it returns; one of this name and size that is there stays. Once.
+    // REQUIRES: sha256 is that of all bytes.
+    absl::StatusOr<Pin> Keep(const std::string& sha256);
+
+   private:
+    friend class BlobStore;
+    Incoming(BlobStore* store, std::string path, OpenFile file)
+        : store_(store), path_(std::move(path)), file_(std::move(file)) {}
+
+    BlobStore* const store_;
+    const std::string path_;
+    OpenFile file_;
+    int64_t bytes_ = 0;
+  };
+
   // Makes the folder where there is none, and removes what a crash has left half-written.
   static absl::StatusOr<std::unique_ptr<BlobStore>> Open(std::string folder,
                                                          std::string damaged_folder);
@@ -50,10 +75,14 @@ class BlobStore {
   // REQUIRES: sha256 is that of the parts one after the other.
   absl::StatusOr<Pin> Put(const std::string& sha256, const std::vector<absl::string_view>& parts);
 
+  absl::StatusOr<std::unique_ptr<Incoming>> Receive();
+
   // Calls `sink` for all bytes in order; then checks the digest: DataLoss, when it is another,
   // after all was given. NotFound.
   absl::Status Read(const std::string& sha256,
                     const std::function<absl::Status(absl::string_view)>& sink);
+  // For reading, also when it is removed meanwhile. The digest is not checked. Errors: NotFound.
+  absl::StatusOr<OpenFile> OpenBlob(const std::string& sha256) const;
   // Errors: NotFound.
   absl::StatusOr<int64_t> Size(const std::string& sha256) const;
 
@@ -71,6 +100,9 @@ class BlobStore {
   BlobStore(std::string folder, std::string damaged_folder)
       : folder_(std::move(folder)), damaged_folder_(std::move(damaged_folder)) {}
 
+  Pin PinTo(const std::string& sha256);
+  // True when a blob of this name and size is on the disk.
+  absl::StatusOr<bool> Has(const std::string& sha256, int64_t bytes) const;
   std::string Path(const std::string& sha256) const { return folder_ + "/" + sha256; }
 
   const std::string folder_;

@@ -11,7 +11,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/mesh_payload/sha256.h"
-#include "server/store/fault_points.h"
+#include "server/store/claimed_blobs.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_rows.h"
 
@@ -19,60 +19,6 @@ namespace tissueform {
 namespace {
 
 constexpr int64_t kVertexBytes = 12;
-
-// Between the row and its blob others may delete both and make them again: a blob that is not there
-// is damage only when its row still is.
-constexpr int kReadAttempts = 3;
-
-// A row that was found, or nothing. Blocks.
-template <typename Result>
-absl::StatusOr<Result> Ask(CommitThread* thread,
-                           const std::function<absl::StatusOr<Result>(Database&)>& work) {
-  absl::StatusOr<Result> result;
-  const absl::Status status = thread->Run({.work = [&](Database& database) {
-    result = work(database);
-    return result.status();
-  }});
-  return status.ok() ? std::move(result) : status;
-}
-
-// Writes the blob, then the row. When the row fails the blob goes, unless another claims it.
-absl::Status PutClaimed(CommitThread* thread, BlobStore* blobs, const std::string& sha256,
-                        const std::vector<absl::string_view>& parts,
-                        const std::function<absl::Status(Database&)>& claim) {
-  absl::Status status;
-  {
-    TF_ASSIGN_OR_RETURN(const BlobStore::Pin pin, blobs->Put(sha256, parts));
-    TF_FAULT_POINT("claim.blob_kept");
-    status = thread->Run({.work = claim});
-  }
-  if (!status.ok()) {
-    const auto nothing = [](Database&) { return absl::OkStatus(); };
-    thread
-        ->Run({.work = nothing,
-               .after =
-                   [&](Database& database) { return RemoveUnclaimed(database, *blobs, sha256); }})
-        .IgnoreError();
-  }
-  return status;
-}
-
-// What stands in a page, after `limit` of them.
-template <typename Page, typename Read, typename Name>
-absl::StatusOr<Page> ReadPage(Database::Query* query, int limit, Read read, Name name) {
-  Page page;
-  for (;;) {
-    TF_ASSIGN_OR_RETURN(const bool row, query->Step());
-    if (!row) return page;
-    auto record = read(*query);
-    if (!record.ok()) continue;  // damaged: whoever asks for it hears so
-    if (page.records.size() == static_cast<size_t>(limit)) {
-      page.next = name(page.records.back());
-      return page;
-    }
-    page.records.push_back(*std::move(record));
-  }
-}
 
 absl::StatusOr<MeshRecord> FindMesh(Database& database, const std::string& sha256) {
   Database::Query query = database.Prepare(TF_SELECT_MESHES "WHERE sha256 = ?");
@@ -99,38 +45,15 @@ absl::Status DeleteMeshRow(Database& database, const std::string& sha256) {
   return database.total_changes() > before ? absl::OkStatus() : NoMesh(sha256);
 }
 
-// Rows of a damaged blob go, and the blob is set aside.
-absl::Status SetAside(CommitThread* thread, BlobStore* blobs, const std::string& sha256,
-                      const absl::Status& damage) {
-  const absl::Status status = thread->Run(
-      {.work = [&](Database& database) -> absl::Status {
-         TF_RETURN_IF_ERROR(
-             database.Prepare("DELETE FROM meshes WHERE sha256 = ?").Bind(sha256).Run());
-         return database.Prepare("DELETE FROM predictions WHERE positions_sha256 = ?")
-             .Bind(sha256)
-             .Run();
-       },
-       .after = [&](Database&) { return blobs->SetAside(sha256).status(); }});
-  if (!status.ok()) return status;
-  return damage;
-}
-
-absl::Status CheckSize(const BlobStore& blobs, const std::string& sha256, int64_t wanted) {
-  TF_ASSIGN_OR_RETURN(const int64_t bytes, blobs.Size(sha256));
-  if (bytes == wanted) return absl::OkStatus();
-  return Damaged(absl::StrCat("the file of ", sha256),
-                 absl::StrCat("it has ", bytes, " bytes, not ", wanted));
-}
-
 }  // namespace
 
 absl::Status CheckMeshBlobSize(const BlobStore& blobs, const MeshRecord& record) {
-  return CheckSize(blobs, record.sha256,
-                   static_cast<int64_t>(record.shape.Text().size()) + record.total_bytes);
+  return CheckBlobSize(blobs, record.sha256,
+                       static_cast<int64_t>(record.shape.Text().size()) + record.total_bytes);
 }
 
 absl::Status CheckPositionsSize(const BlobStore& blobs, const PredictionRow& row) {
-  return CheckSize(blobs, row.positions_sha256, row.record.vertex_count * kVertexBytes);
+  return CheckBlobSize(blobs, row.positions_sha256, row.record.vertex_count * kVertexBytes);
 }
 
 absl::Status DurableMeshStore::Put(const MeshRecord& record, const MeshPayloadView& payload) {
@@ -139,16 +62,17 @@ absl::Status DurableMeshStore::Put(const MeshRecord& record, const MeshPayloadVi
   std::vector<absl::string_view> parts = {text};
   parts.insert(parts.end(), payload.segments.begin(), payload.segments.end());
   const std::string bytes = Seal(SerializeMesh(record));
-  return PutClaimed(thread_, blobs_, record.sha256, parts, [&](Database& database) {
-    return database
-        .Prepare(
-            "INSERT INTO meshes (sha256, record, last_used_s) VALUES (?, ?, ?) ON CONFLICT "
-            "(sha256) DO UPDATE SET last_used_s = max(last_used_s, excluded.last_used_s)")
-        .Bind(record.sha256)
-        .BindBytes(bytes)
-        .Bind(record.last_used_s)
-        .Run();
-  });
+  return Claim(
+      thread_, blobs_, record.sha256, blobs_->Put(record.sha256, parts), [&](Database& database) {
+        return database
+            .Prepare(
+                "INSERT INTO meshes (sha256, record, last_used_s) VALUES (?, ?, ?) ON CONFLICT "
+                "(sha256) DO UPDATE SET last_used_s = max(last_used_s, excluded.last_used_s)")
+            .Bind(record.sha256)
+            .BindBytes(bytes)
+            .Bind(record.last_used_s)
+            .Run();
+      });
 }
 
 absl::StatusOr<MeshRecord> DurableMeshStore::Find(const std::string& sha256) {
@@ -162,13 +86,13 @@ absl::StatusOr<MeshPayload> DurableMeshStore::Read(const std::string& sha256) {
     absl::StatusOr<MeshPayload> payload = ReadBlob(record);
     if (!absl::IsNotFound(payload.status())) {
       if (absl::IsDataLoss(payload.status())) {
-        return SetAside(thread_, blobs_, sha256, payload.status());
+        return SetBlobAside(thread_, blobs_, sha256, payload.status());
       }
       return payload;
     }
     status = Damaged(absl::StrCat("mesh ", sha256), "its file is gone; upload it again");
   }
-  return SetAside(thread_, blobs_, sha256, status);
+  return SetBlobAside(thread_, blobs_, sha256, status);
 }
 
 absl::StatusOr<MeshPayload> DurableMeshStore::ReadBlob(const MeshRecord& record) {
@@ -242,19 +166,22 @@ absl::Status DurablePredictionStore::Create(const PredictionRecord& record,
   TF_RETURN_IF_ERROR(CheckPrediction(record, positions));
   const std::string sha256 = Sha256Hex({positions});
   const std::string bytes = Seal(SerializePrediction({record, sha256}));
-  return PutClaimed(thread_, blobs_, sha256, {positions}, [&](Database& database) -> absl::Status {
-    if (FindPrediction(database, record.id).ok()) return PredictionExists(record.id);
-    return database
-        .Prepare(
-            "INSERT INTO predictions (id, owner, session, positions_sha256, record) VALUES "
-            "(?, ?, ?, ?, ?)")
-        .Bind(record.id)
-        .Bind(record.owner)
-        .Bind(record.session)
-        .Bind(sha256)
-        .BindBytes(bytes)
-        .Run();
-  });
+  return Claim(thread_, blobs_, sha256, blobs_->Put(sha256, {positions}),
+               [&](Database& database) -> absl::Status {
+                 if (FindPrediction(database, record.id).ok()) return PredictionExists(record.id);
+                 return database
+                     .Prepare(
+                         "INSERT INTO predictions (id, owner, session, case_sha256, "
+                         "positions_sha256, record) "
+                         "VALUES (?, ?, ?, ?, ?, ?)")
+                     .Bind(record.id)
+                     .Bind(record.owner)
+                     .Bind(record.session)
+                     .Bind(record.case_sha256)
+                     .Bind(sha256)
+                     .BindBytes(bytes)
+                     .Run();
+               });
 }
 
 absl::StatusOr<PredictionRow> DurablePredictionStore::Find(const std::string& id) {
@@ -281,11 +208,11 @@ absl::StatusOr<std::string> DurablePredictionStore::Positions(const std::string&
       });
     }
     if (status.ok()) return positions;
-    if (absl::IsDataLoss(status)) return SetAside(thread_, blobs_, sha256, status);
+    if (absl::IsDataLoss(status)) return SetBlobAside(thread_, blobs_, sha256, status);
     if (!absl::IsNotFound(status)) return status;
   }
-  return SetAside(thread_, blobs_, sha256,
-                  Damaged(absl::StrCat("prediction \"", id, "\""), "its file is gone"));
+  return SetBlobAside(thread_, blobs_, sha256,
+                      Damaged(absl::StrCat("prediction \"", id, "\""), "its file is gone"));
 }
 
 absl::StatusOr<PredictionStore::Page> DurablePredictionStore::List(const ListRequest& request) {
@@ -293,12 +220,15 @@ absl::StatusOr<PredictionStore::Page> DurablePredictionStore::List(const ListReq
   return Ask<Page>(thread_, [&](Database& database) {
     Database::Query query =
         database.Prepare(TF_SELECT_PREDICTIONS
-                         "WHERE id > ? AND (? OR owner = ?) AND (? OR session = ?) ORDER BY id");
+                         "WHERE id > ? AND (? OR owner = ?) AND (? OR session = ?) AND (? OR "
+                         "case_sha256 = ?) ORDER BY id");
     const std::string owner = request.owner.value_or("");
     const std::string session = request.session.value_or("");
+    const std::string case_sha256 = request.case_sha256.value_or("");
     query.Bind(request.after);
     query.Bind(int64_t{!request.owner.has_value()}).Bind(owner);
     query.Bind(int64_t{!request.session.has_value()}).Bind(session);
+    query.Bind(int64_t{!request.case_sha256.has_value()}).Bind(case_sha256);
     return ReadPage<Page>(&query, request.limit, ReadPredictionRecord,
                           [](const PredictionRecord& record) { return record.id; });
   });

@@ -18,8 +18,7 @@
 
 namespace tissueform {
 
-// Rows of a database that claim blobs. A blob is written on the caller's thread before its row and
-// removed on the database's thread after the last row that claims it.
+// Meshes and predictions: rows of a database that claim blobs (claimed_blobs.h).
 
 // The blob of a mesh begins with the text of its shape, so that its SHA-256 is the mesh's name.
 class DurableMeshStore final : public MeshStore {

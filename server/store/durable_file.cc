@@ -142,9 +142,14 @@ absl::Status WriteDurably(const std::string& path, const std::vector<absl::strin
   const std::string temporary = absl::StrCat(path, ".", counter++, ".new");
   absl::Cleanup remove_temporary = [&temporary] { unlink(temporary.c_str()); };
   TF_RETURN_IF_ERROR(WriteParts(temporary, parts));
+  TF_RETURN_IF_ERROR(RenameDurably(temporary, path));
+  std::move(remove_temporary).Cancel();
+  return absl::OkStatus();
+}
+
+absl::Status RenameDurably(const std::string& temporary, const std::string& path) {
   TF_FAULT_POINT("file.synced");
   if (rename(temporary.c_str(), path.c_str()) != 0) return FileError(errno, "cannot rename", path);
-  std::move(remove_temporary).Cancel();
   TF_FAULT_POINT("file.renamed");
   TF_RETURN_IF_ERROR(SyncFolder(std::filesystem::path(path).parent_path().string()));
   TF_FAULT_POINT("file.folder_synced");

@@ -61,6 +61,9 @@ absl::Status SyncFolder(const std::string& path);
 // folder is synced. An old file of that name stays until then.
 absl::Status WriteDurably(const std::string& path, const std::vector<absl::string_view>& parts);
 
+// Gives a file that was synced its name, in the same folder, which is then synced.
+absl::Status RenameDurably(const std::string& temporary, const std::string& path);
+
 // NotFound when it is not there. The folder is not synced.
 absl::Status RemoveFile(const std::string& path);
 

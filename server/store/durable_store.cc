@@ -12,6 +12,7 @@
 #include "server/store/blob_store.h"
 #include "server/store/commit_thread.h"
 #include "server/store/durable_blob_stores.h"
+#include "server/store/durable_case_store.h"
 #include "server/store/durable_file.h"
 #include "server/store/durable_session_store.h"
 #include "server/store/store_check.h"
@@ -51,7 +52,8 @@ struct DurableStore::Parts {
         thread(std::move(database), StillThere(folder)),
         sessions(&thread, std::move(clock)),
         meshes(&thread, blobs.get()),
-        predictions(&thread, blobs.get()) {}
+        predictions(&thread, blobs.get()),
+        cases(&thread, blobs.get()) {}
 
   const DataFolder folder;
   const std::unique_ptr<BlobStore> blobs;
@@ -61,6 +63,7 @@ struct DurableStore::Parts {
   DurableSessionStore sessions;
   DurableMeshStore meshes;
   DurablePredictionStore predictions;
+  DurableCaseStore cases;
 };
 
 absl::StatusOr<std::unique_ptr<DurableStore>> DurableStore::Open(DataFolder folder,
@@ -91,6 +94,7 @@ SessionStore& DurableStore::sessions() { return parts_->sessions; }
 MeshStore& DurableStore::meshes() { return parts_->meshes; }
 UploadStore& DurableStore::uploads() { return *parts_->uploads; }
 PredictionStore& DurableStore::predictions() { return parts_->predictions; }
+CaseStore& DurableStore::cases() { return parts_->cases; }
 const std::vector<DamagedItem>& DurableStore::damaged() const { return parts_->damaged; }
 
 }  // namespace tissueform

@@ -30,15 +30,15 @@ struct DurableStoreOptions {
   int64_t max_checked_bytes = int64_t{4} << 30;
 };
 
-// What the server keeps for good: rows in one SQLite database, meshes and positions as files beside
-// it (docs/operations.md, "What the server keeps, and where").
+// What the server keeps for good: rows in one SQLite database, meshes, positions and cases as files
+// beside it (docs/operations.md, "What the server keeps, and where").
 //
 // One thread writes and reads rows, in the order of the calls; what waits is committed together. A
 // call is answered after its commit, on that thread for SessionStore. From such an answer the
 // blocking stores must not be called: they would wait for themselves.
 class DurableStore final : public Stores {
  public:
-  // Opens the store, or makes it. A store of the version before is brought to this one's. Checks
+  // Opens the store, or makes it. A store of a version before is brought to this one's. Checks
   // all of it: what is damaged is moved to the folder `damaged` and stands in damaged(), the rest
   // serves. Blobs that nothing claims are removed.
   //
@@ -53,6 +53,7 @@ class DurableStore final : public Stores {
   MeshStore& meshes() override;
   UploadStore& uploads() override;
   PredictionStore& predictions() override;
+  CaseStore& cases() override;
 
   const std::vector<DamagedItem>& damaged() const;
 

@@ -10,6 +10,7 @@
 #include "absl/strings/str_join.h"
 
 #include "core/base/status_macros.h"
+#include "server/store/in_memory_case_store.h"
 #include "server/store/in_memory_session_store.h"
 #include "server/store/store_errors.h"
 
@@ -25,12 +26,14 @@ class InMemoryStores final : public Stores {
   MeshStore& meshes() override { return meshes_; }
   UploadStore& uploads() override { return *uploads_; }
   PredictionStore& predictions() override { return predictions_; }
+  CaseStore& cases() override { return cases_; }
 
  private:
   InMemorySessionStore sessions_;
   InMemoryMeshStore meshes_;
   const std::unique_ptr<UploadStore> uploads_;
   InMemoryPredictionStore predictions_;
+  InMemoryCaseStore cases_;
 };
 
 }  // namespace
@@ -151,6 +154,7 @@ absl::StatusOr<PredictionStore::Page> InMemoryPredictionStore::List(const ListRe
     const PredictionRecord& record = next->second.record;
     if (request.owner.has_value() && record.owner != *request.owner) continue;
     if (request.session.has_value() && record.session != *request.session) continue;
+    if (request.case_sha256.has_value() && record.case_sha256 != *request.case_sha256) continue;
     if (page.records.size() == static_cast<size_t>(request.limit)) {
       page.next = page.records.back().id;
       break;

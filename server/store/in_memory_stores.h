@@ -72,7 +72,7 @@ class InMemoryPredictionStore final : public PredictionStore {
   std::map<std::string, Prediction> predictions_ ABSL_GUARDED_BY(mutex_);
 };
 
-// All four. Partial uploads lie in a temporary folder of their own meanwhile.
+// All five. Partial uploads lie in a temporary folder of their own meanwhile.
 // Errors: those of UploadStore::OpenTemporary.
 absl::StatusOr<std::unique_ptr<Stores>> OpenInMemoryStores(UnixClock clock = SystemUnixSeconds,
                                                            UploadLimits limits = {});

@@ -17,10 +17,11 @@ namespace tissueform {
 struct PredictionRecord {
   std::string id;  // one in a store
   std::string owner;
-  std::string session;      // id of the session that made it; it may be gone
-  std::string mesh_sha256;  // the mesh may be gone, too
-  int64_t created_s = 0;    // unix seconds
-  std::string metadata;     // the server's bytes: poses, model, version, quality
+  std::string session;           // id of the session that made it; it may be gone
+  std::string mesh_sha256;       // the mesh may be gone, too
+  std::string case_sha256 = {};  // that it was planned in, or empty; it need not be here
+  int64_t created_s = 0;         // unix seconds
+  std::string metadata;          // the server's bytes: poses, model, version, quality
   int64_t vertex_count = 0;
 };
 
@@ -30,10 +31,11 @@ struct PredictionRecord {
 class PredictionStore {
  public:
   struct ListRequest {
-    std::optional<std::string> owner = {};    // of this one only; unset: of all
-    std::optional<std::string> session = {};  // of this one only; unset: of all
-    std::string after = {};                   // ids greater than this
-    int limit = 100;                          // at least 1
+    std::optional<std::string> owner = {};        // of this one only; unset: of all
+    std::optional<std::string> session = {};      // of this one only; unset: of all
+    std::optional<std::string> case_sha256 = {};  // of this one only; unset: of all
+    std::string after = {};                       // ids greater than this
+    int limit = 100;                              // at least 1
   };
   struct Page {
     std::vector<PredictionRecord> records;  // by id, rising

@@ -15,6 +15,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "server/store/claimed_blobs.h"
 #include "server/store/durable_blob_stores.h"
 #include "server/store/durable_file.h"
 #include "server/store/session_record.h"
@@ -127,6 +128,20 @@ absl::Status CheckPredictions(Database& database, const BlobStore& blobs, const 
                       damaged);
 }
 
+absl::Status CheckCases(Database& database, const BlobStore& blobs, const DataFolder& folder,
+                        Claims* claims, std::vector<DamagedItem>* damaged) {
+  TF_ASSIGN_OR_RETURN(const std::vector<BadRow> rows,
+                      BadRows(database, TF_SELECT_CASES, 1, 3, [&](const Database::Query& row) {
+                        const absl::StatusOr<CaseRecord> record = ReadCaseRow(row);
+                        if (record.ok()) {
+                          (*claims)[record->sha256] =
+                              CheckBlobSize(blobs, record->sha256, record->total_bytes);
+                        }
+                        return record.status();
+                      }));
+  return SetRowsAside(database, folder, "case", rows, "DELETE FROM cases WHERE key = ?", damaged);
+}
+
 // The rows that claim a damaged blob are of no use without it.
 absl::Status SetClaimsAside(Database& database, const DataFolder& folder, const std::string& sha256,
                             const absl::Status& why, std::vector<DamagedItem>* damaged) {
@@ -139,6 +154,10 @@ absl::Status SetClaimsAside(Database& database, const DataFolder& folder, const 
                       BadRows(database, TF_SELECT_MESHES, 1, 2, claims(1)));
   TF_RETURN_IF_ERROR(
       SetRowsAside(database, folder, "mesh", meshes, "DELETE FROM meshes WHERE key = ?", damaged));
+  TF_ASSIGN_OR_RETURN(const std::vector<BadRow> cases,
+                      BadRows(database, TF_SELECT_CASES, 1, 3, claims(1)));
+  TF_RETURN_IF_ERROR(
+      SetRowsAside(database, folder, "case", cases, "DELETE FROM cases WHERE key = ?", damaged));
   TF_ASSIGN_OR_RETURN(const std::vector<BadRow> predictions,
                       BadRows(database, TF_SELECT_PREDICTIONS, 1, 5, claims(4)));
   return SetRowsAside(database, folder, "prediction", predictions,
@@ -247,6 +266,7 @@ absl::Status CheckRowsAndBlobs(OpenedDatabase& opened, BlobStore& blobs, const D
   TF_RETURN_IF_ERROR(CheckSessions(database, folder, damaged));
   TF_RETURN_IF_ERROR(CheckMeshes(database, blobs, folder, &claims, damaged));
   TF_RETURN_IF_ERROR(CheckPredictions(database, blobs, folder, &claims, damaged));
+  TF_RETURN_IF_ERROR(CheckCases(database, blobs, folder, &claims, damaged));
   TF_RETURN_IF_ERROR(
       CheckBlobs(database, blobs, folder, std::move(claims), max_checked_bytes, damaged));
   return RemoveLeftovers(opened, blobs, damaged);

@@ -67,6 +67,18 @@ absl::Status NoPrediction(absl::string_view id) {
                     ErrorReason::kPredictionNotFound);
 }
 
+absl::Status NoCase(absl::string_view sha256) {
+  return WithReason(absl::NotFoundError(absl::StrCat("no case ", sha256, " is kept; upload it")),
+                    ErrorReason::kCaseNotFound);
+}
+
+absl::Status TooManyCases(int most) {
+  return WithReason(
+      absl::ResourceExhaustedError(absl::StrCat(
+          "the server keeps ", most, " cases, which is its limit (max_cases); delete some")),
+      ErrorReason::kTooManyCases, {{"limit", absl::StrCat(most)}});
+}
+
 absl::Status PredictionExists(absl::string_view id) {
   return absl::AlreadyExistsError(
       absl::StrCat("a prediction \"", id, "\" exists already; choose another id"));

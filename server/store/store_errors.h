@@ -24,6 +24,8 @@ absl::Status CheckPoseCount(absl::string_view id, size_t poses, size_t handles);
 
 absl::Status NoMesh(absl::string_view sha256);                        // NotFound
 absl::Status NoPrediction(absl::string_view id);                      // NotFound
+absl::Status NoCase(absl::string_view sha256);                        // NotFound
+absl::Status TooManyCases(int most);                                  // ResourceExhausted
 absl::Status PredictionExists(absl::string_view id);                  // AlreadyExists
 absl::Status NoUpload(absl::string_view sha256);                      // NotFound
 absl::Status BadLimit(int limit);                                     // InvalidArgument

@@ -99,6 +99,7 @@ std::string SerializePrediction(const PredictionRow& row) {
   proto.set_metadata(row.record.metadata);
   proto.set_vertex_count(row.record.vertex_count);
   proto.set_positions_sha256(row.positions_sha256);
+  proto.set_case_sha256(row.record.case_sha256);
   return proto.SerializeAsString();
 }
 
@@ -118,8 +119,33 @@ absl::StatusOr<PredictionRow> ParsePrediction(absl::string_view bytes) {
   row.record.created_s = proto.created_s();
   row.record.metadata = proto.metadata();
   row.record.vertex_count = proto.vertex_count();
+  row.record.case_sha256 = proto.case_sha256();
   row.positions_sha256 = proto.positions_sha256();
   return row;
+}
+
+std::string SerializeCaseRecord(const CaseRecord& record) {
+  store::v1::CaseRecord proto;
+  proto.set_sha256(record.sha256);
+  proto.set_owner(record.owner);
+  proto.set_title(record.title);
+  proto.set_total_bytes(record.total_bytes);
+  proto.set_created_s(record.created_s);
+  return proto.SerializeAsString();
+}
+
+absl::StatusOr<CaseRecord> ParseCaseRecord(absl::string_view bytes) {
+  store::v1::CaseRecord proto;
+  if (!Parse(bytes, &proto)) return Damaged("a case's record", "its bytes are none");
+  CaseRecord record{.sha256 = proto.sha256(),
+                    .owner = proto.owner(),
+                    .title = proto.title(),
+                    .total_bytes = proto.total_bytes(),
+                    .created_s = proto.created_s()};
+  if (const absl::Status status = CheckCaseRecord(record); !status.ok()) {
+    return Damaged("a case's record", status.message());
+  }
+  return record;
 }
 
 absl::Status CheckAnnouncement(const UploadAnnouncement& announcement) {

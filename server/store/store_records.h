@@ -8,6 +8,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
+#include "server/store/case_store.h"
 #include "server/store/mesh_store.h"
 #include "server/store/prediction_store.h"
 #include "server/store/upload_store.h"
@@ -31,6 +32,10 @@ struct PredictionRow {
 };
 std::string SerializePrediction(const PredictionRow& row);
 absl::StatusOr<PredictionRow> ParsePrediction(absl::string_view bytes);
+
+// Without last_used_s, which changes.
+std::string SerializeCaseRecord(const CaseRecord& record);
+absl::StatusOr<CaseRecord> ParseCaseRecord(absl::string_view bytes);
 
 // InvalidArgument when a mesh of this shape cannot have that name and size.
 absl::Status CheckAnnouncement(const UploadAnnouncement& announcement);

@@ -55,15 +55,26 @@ absl::StatusOr<PredictionRow> ReadPrediction(const Database::Query& row) {
   TF_ASSIGN_OR_RETURN(PredictionRow prediction, ParsePrediction(bytes));
   const PredictionRecord& record = prediction.record;
   if (record.id != row.Text(1) || record.owner != row.Text(2) || record.session != row.Text(3) ||
-      prediction.positions_sha256 != row.Text(4)) {
+      prediction.positions_sha256 != row.Text(4) || record.case_sha256 != row.Text(6)) {
     return Damaged("a prediction's record", "it is that of another");
   }
   return prediction;
 }
 
+absl::StatusOr<CaseRecord> ReadCaseRow(const Database::Query& row) {
+  TF_ASSIGN_OR_RETURN(const absl::string_view bytes, Unseal(row.Bytes(3)));
+  TF_ASSIGN_OR_RETURN(CaseRecord record, ParseCaseRecord(bytes));
+  if (record.sha256 != row.Text(1) || record.owner != row.Text(2)) {
+    return Damaged("a case's record", "it is that of another");
+  }
+  record.last_used_s = row.Integer(4);
+  return record;
+}
+
 absl::StatusOr<bool> IsClaimed(Database& database, const std::string& sha256) {
   Database::Query query = database.Prepare(
       "SELECT EXISTS (SELECT 1 FROM meshes WHERE sha256 = ?1) OR "
+      "EXISTS (SELECT 1 FROM cases WHERE sha256 = ?1) OR "
       "EXISTS (SELECT 1 FROM predictions WHERE positions_sha256 = ?1)");
   TF_RETURN_IF_ERROR(query.Bind(sha256).Step().status());
   return query.Integer(0) != 0;
@@ -72,6 +83,15 @@ absl::StatusOr<bool> IsClaimed(Database& database, const std::string& sha256) {
 absl::Status RemoveUnclaimed(Database& database, BlobStore& blobs, const std::string& sha256) {
   TF_ASSIGN_OR_RETURN(const bool claimed, IsClaimed(database, sha256));
   return claimed ? absl::OkStatus() : blobs.Remove(sha256);
+}
+
+absl::Status DeleteClaims(Database& database, const std::string& sha256) {
+  for (const char* statement :
+       {"DELETE FROM meshes WHERE sha256 = ?", "DELETE FROM cases WHERE sha256 = ?",
+        "DELETE FROM predictions WHERE positions_sha256 = ?"}) {
+    TF_RETURN_IF_ERROR(database.Prepare(statement).Bind(sha256).Run());
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace tissueform

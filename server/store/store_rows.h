@@ -22,16 +22,20 @@ namespace tissueform {
   "last_used_s FROM sessions LEFT JOIN session_states ON session_states.key = sessions.key "
 #define TF_SELECT_MESHES "SELECT key, sha256, record, last_used_s FROM meshes "
 #define TF_SELECT_PREDICTIONS \
-  "SELECT key, id, owner, session, positions_sha256, record FROM predictions "
+  "SELECT key, id, owner, session, positions_sha256, record, case_sha256 FROM predictions "
+#define TF_SELECT_CASES "SELECT key, sha256, owner, record, last_used_s FROM cases "
 
 // At rest: without its poses, which may be damaged alone.
 absl::StatusOr<SessionRecord> ReadSessionAtRest(const Database::Query& row);
 absl::StatusOr<SessionRecord> ReadSession(const Database::Query& row);
 absl::StatusOr<MeshRecord> ReadMesh(const Database::Query& row);
 absl::StatusOr<PredictionRow> ReadPrediction(const Database::Query& row);
+absl::StatusOr<CaseRecord> ReadCaseRow(const Database::Query& row);
 
 // Removes the blob when no row claims it.
 absl::Status RemoveUnclaimed(Database& database, BlobStore& blobs, const std::string& sha256);
 absl::StatusOr<bool> IsClaimed(Database& database, const std::string& sha256);
+// Deletes all rows that claim it.
+absl::Status DeleteClaims(Database& database, const std::string& sha256);
 
 }  // namespace tissueform

@@ -35,6 +35,11 @@ constexpr char kVersion2[] =
     "record BLOB NOT NULL) STRICT;"
     "CREATE INDEX predictions_by_positions ON predictions(positions_sha256);";
 
+constexpr char kVersion3[] =
+    "ALTER TABLE predictions ADD COLUMN case_sha256 TEXT NOT NULL DEFAULT '';"
+    "CREATE TABLE cases (key INTEGER PRIMARY KEY, sha256 TEXT NOT NULL UNIQUE, "
+    "owner TEXT NOT NULL, record BLOB NOT NULL, last_used_s INTEGER NOT NULL) STRICT;";
+
 absl::StatusOr<int64_t> Pragma(Database& database, const char* sql) {
   Database::Query query = database.Prepare(sql);
   TF_ASSIGN_OR_RETURN(const bool row, query.Step());
@@ -49,6 +54,7 @@ absl::Status Change(Database& database, int64_t version, int64_t now_s) {
         absl::StrCat("UPDATE session_states SET created_s = ", now_s, ", last_used_s = ", now_s,
                      ";", "UPDATE meshes SET last_used_s = ", now_s)));
   }
+  if (version < 3) TF_RETURN_IF_ERROR(database.Execute(kVersion3));
   TF_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA application_id=", kApplicationId,
                                                    ";PRAGMA user_version=", kSchemaVersion)));
   TF_FAULT_POINT("schema.changed");
@@ -62,7 +68,7 @@ struct Table {
   int columns;
 };
 
-constexpr std::array<Table, 4> kTables = {{
+constexpr std::array<Table, 5> kTables = {{
     {"SELECT key, id, owner, record FROM sessions ORDER BY key",
      "SELECT key, id, owner, record FROM sessions ORDER BY key DESC",
      "INSERT OR IGNORE INTO sessions (key, id, owner, record) VALUES (?, ?, ?, ?)", 4},
@@ -77,11 +83,17 @@ constexpr std::array<Table, 4> kTables = {{
     {"SELECT key, sha256, record, last_used_s FROM meshes ORDER BY key",
      "SELECT key, sha256, record, last_used_s FROM meshes ORDER BY key DESC",
      "INSERT OR IGNORE INTO meshes (key, sha256, record, last_used_s) VALUES (?, ?, ?, ?)", 4},
-    {"SELECT key, id, owner, session, positions_sha256, record FROM predictions ORDER BY key",
-     "SELECT key, id, owner, session, positions_sha256, record FROM predictions ORDER BY key DESC",
-     "INSERT OR IGNORE INTO predictions (key, id, owner, session, positions_sha256, record) VALUES "
-     "(?, ?, ?, ?, ?, ?)",
-     6},
+    {"SELECT key, id, owner, session, positions_sha256, record, case_sha256 FROM predictions ORDER "
+     "BY key",
+     "SELECT key, id, owner, session, positions_sha256, record, case_sha256 FROM predictions ORDER "
+     "BY key DESC",
+     "INSERT OR IGNORE INTO predictions (key, id, owner, session, positions_sha256, record, "
+     "case_sha256) VALUES (?, ?, ?, ?, ?, ?, ?)",
+     7},
+    {"SELECT key, sha256, owner, record, last_used_s FROM cases ORDER BY key",
+     "SELECT key, sha256, owner, record, last_used_s FROM cases ORDER BY key DESC",
+     "INSERT OR IGNORE INTO cases (key, sha256, owner, record, last_used_s) VALUES (?, ?, ?, ?, ?)",
+     5},
 }};
 
 // True at the end of the table, false at a page that cannot be read.

@@ -19,12 +19,14 @@ namespace tissueform {
 //   session_states  what a session's writes change: etag, epoch, poses, times. A row of its own, so
 //                   that the commit of a pose writes one small page and not the record.
 //   meshes          sha256, record, last_used_s; the payload is the blob sha256
-//   predictions     id, owner, session, record; the positions are the blob positions_sha256
+//   predictions     id, owner, session, case_sha256, record; the positions are the blob
+//                   positions_sha256
+//   cases           sha256, owner, record, last_used_s; the file is the blob sha256
 //
-// Version 1 had neither times nor predictions.
-inline constexpr int64_t kSchemaVersion = 2;
+// Version 1 had neither times nor predictions, version 2 no cases.
+inline constexpr int64_t kSchemaVersion = 3;
 
-// Makes the tables in an empty database, or brings those of the version before up to date, in one
+// Makes the tables in an empty database, or brings those of a version before up to date, in one
 // transaction; rows that had no times get `now_s`.
 //
 // Errors: FailedPrecondition (a newer version, or not a database of ours), or those of Database.

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include "server/store/case_store.h"
 #include "server/store/mesh_store.h"
 #include "server/store/prediction_store.h"
 #include "server/store/session_store.h"
@@ -21,6 +22,7 @@ class Stores {
   virtual MeshStore& meshes() = 0;
   virtual UploadStore& uploads() = 0;
   virtual PredictionStore& predictions() = 0;
+  virtual CaseStore& cases() = 0;
 };
 
 }  // namespace tissueform

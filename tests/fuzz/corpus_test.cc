@@ -61,8 +61,9 @@ INSTANTIATE_TEST_SUITE_P(
         Target{"volume_header", FuzzVolumeHeader}, Target{"recipe", FuzzRecipe},
         Target{"medit", FuzzMeditLines}, Target{"displacements", FuzzDisplacements},
         Target{"store_record", FuzzStoreRecord}, Target{"deform_stream", FuzzDeformStream},
-        Target{"socket_frame", FuzzSocketFrame}, Target{"web_request", FuzzWebRequest},
-        Target{"gateway_connection", FuzzGatewayConnection}),
+        Target{"case_file", FuzzCaseFile}, Target{"case_upload", FuzzCaseUpload},
+        Target{"answers", FuzzAnswers}, Target{"socket_frame", FuzzSocketFrame},
+        Target{"web_request", FuzzWebRequest}, Target{"gateway_connection", FuzzGatewayConnection}),
     [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

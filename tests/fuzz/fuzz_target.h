@@ -36,6 +36,10 @@ void FuzzRecipe(const uint8_t* data, size_t size);
 // A step and packed displacements as a client takes them from the network (DecodeDisplacements).
 void FuzzDisplacements(const uint8_t* data, size_t size);
 
+// A case, or a plan's surfaces for viewers (ParseCase, ParseViewer): what is accepted can be
+// written again, and no number in it leads outside.
+void FuzzCaseFile(const uint8_t* data, size_t size);
+
 // A MEDIT text, before Gmsh sees it (CheckMeditLines).
 void FuzzMeditLines(const uint8_t* data, size_t size);
 
@@ -50,6 +54,13 @@ void FuzzDeformStream(const uint8_t* data, size_t size);
 // client has, and serves the next one.
 void FuzzGatewayConnection(const uint8_t* data, size_t size);
 
+// Messages of an UploadCase stream, and parts of cases that are read. What is kept must be what its
+// name says.
+void FuzzCaseUpload(const uint8_t* data, size_t size);
+
+// Prepared answers as bytes (ReadAnswers), and poses for those that are accepted (AnswerEvaluator).
+void FuzzAnswers(const uint8_t* data, size_t size);
+
 // One message of a WebSocket as the gateway takes it from a browser, as a start's payload, and as a
 // message of a server whose longest bytes are looked for (ParseClientFrame, ParseStart,
 // MessageFrame): what is accepted may be given to gRPC.
@@ -61,8 +72,8 @@ void FuzzSocketFrame(const uint8_t* data, size_t size);
 void FuzzWebRequest(const uint8_t* data, size_t size);
 
 // Rows of a store's database and announcements of uploads, the first byte says of what
-// (ParseRecord, ParsePoses, ParseMesh, ParseAnnouncement, ParsePrediction, Unseal): what is
-// accepted comes back from its own bytes.
+// (ParseRecord, ParsePoses, ParseMesh, ParseAnnouncement, ParsePrediction, Unseal,
+// ParseCaseRecord): what is accepted comes back from its own bytes.
 void FuzzStoreRecord(const uint8_t* data, size_t size);
 
 }  // namespace tissueform::fuzz

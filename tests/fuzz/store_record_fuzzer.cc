@@ -42,7 +42,7 @@ void CheckSession(const SessionRecord& record) {
 void FuzzStoreRecord(const uint8_t* data, size_t size) {
   if (size == 0) return;
   const absl::string_view bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
-  switch (data[0] % 6) {
+  switch (data[0] % 7) {
     case 0:
       if (const auto record = ParseRecord(bytes); record.ok()) CheckSession(*record);
       RoundTrip(bytes, ParseRecord, SerializeRecord);
@@ -62,6 +62,9 @@ void FuzzStoreRecord(const uint8_t* data, size_t size) {
     case 5:
       if (Unseal(bytes).ok() && bytes.size() < 64) std::abort();
       if (Unseal(Seal(bytes)).value() != bytes) std::abort();
+      break;
+    case 6:
+      RoundTrip(bytes, ParseCaseRecord, SerializeCaseRecord);
       break;
   }
 }

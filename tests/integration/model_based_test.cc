@@ -22,6 +22,7 @@
 #include "core/base/status_macros.h"
 #include "tests/integration/durable_server.h"
 #include "tests/integration/model_answer_calls.h"
+#include "tests/integration/model_case_calls.h"
 #include "tests/integration/model_comparison.h"
 #include "tests/integration/model_session_calls.h"
 
@@ -53,6 +54,10 @@ const Kind kKinds[] = {
     {2, ListPredictions},
     {2, DeletePrediction},
     {5, ComparePredictions},
+    {4, UploadCase},
+    {2, ReadCase},
+    {1, ListCases},
+    {2, DeleteCase},
     {1, nullptr, End::kDrain},
     {1, nullptr, End::kKill},
     {2, nullptr, End::kKillWithinACall},
@@ -118,7 +123,7 @@ class ModelRun {
     ServedModel after = state_.model;
     const Change change = SomeChange(state_, numbers, &after);
     if (change == nullptr) return Restart(End::kKill);
-    state_.told.push_back(absl::StrCat("kill -9 within call ", numbers[0] % 3));
+    state_.told.push_back(absl::StrCat("kill -9 within call ", numbers[0] % 4));
     TF_ASSIGN_OR_RETURN(const auto other_client, server_.Connect());
     absl::Status outcome;
     std::thread caller([&] { outcome = change(); });
@@ -141,7 +146,7 @@ class ModelRun {
 
   DurableServer server_{"model",
                         {"--log-level", "off", "--workers", "2", "--max-stored-sessions",
-                         std::to_string(kMaxSessions)}};
+                         std::to_string(kMaxSessions), "--max-cases", std::to_string(kMaxCases)}};
   ModelState state_;
   size_t steps_made_ = 0;
 };

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <optional>
 #include <utility>
 
@@ -14,6 +15,7 @@
 #include "proto/conversion/mesh_conversion.h"
 #include "proto/conversion/prediction_conversion.h"
 #include "tests/integration/model_answer_calls.h"
+#include "tests/integration/model_case_calls.h"
 #include "tests/integration/model_choices.h"
 
 namespace tissueform::testing {
@@ -24,12 +26,14 @@ struct Listed {
   std::vector<v1::Mesh> meshes;
   std::vector<v1::Session> sessions;
   std::vector<v1::Prediction> predictions;
+  std::vector<v1::Case> cases;
 };
 absl::StatusOr<Listed> ListAll(ModelState& state) {
   Listed listed;
   TF_ASSIGN_OR_RETURN(listed.meshes, state.client->ListMeshes());
   TF_ASSIGN_OR_RETURN(listed.sessions, state.client->ListSessions());
   TF_ASSIGN_OR_RETURN(listed.predictions, state.client->predictions().List());
+  TF_ASSIGN_OR_RETURN(listed.cases, state.client->cases().List());
   return listed;
 }
 
@@ -57,7 +61,7 @@ absl::Status Matches(const std::set<std::string>& etags, const Listed& listed, S
     if (known == model->predictions.end()) return Wrong(told.name(), " must not be there");
     TF_RETURN_IF_ERROR(CheckSame(known->second.told, told));
   }
-  return absl::OkStatus();
+  return CheckCases(listed.cases, model);
 }
 
 }  // namespace
@@ -92,16 +96,41 @@ absl::Status CompareAll(ModelState& state, const std::vector<ServedModel>& possi
     TF_ASSIGN_OR_RETURN(const Positions answer, state.client->predictions().ReadPositions(name));
     TF_RETURN_IF_ERROR(state.answers.Check(prediction.key, answer));
   }
+  for (const auto& [name, told] : state.model.cases) {
+    TF_RETURN_IF_ERROR(state.client->cases().Read(name).status());  // compares the digest
+  }
   return absl::OkStatus();
 }
 
+namespace {
+
+// A case that the model does not have yet, or nothing where the server takes no more.
+Change SendCase(const ModelState& state, int number, ServedModel* after) {
+  const std::string name = NameOfCase(number);
+  if (state.model.cases.contains(name) || state.model.cases.size() == kMaxCases) return nullptr;
+  std::string bytes = BytesOfCase(number);
+  v1::Case& sent = after->cases[name];
+  sent.set_name(name);
+  sent.set_total_bytes(static_cast<int64_t>(bytes.size()));
+  return [client = state.client.get(), bytes = std::move(bytes)] {
+    UploadOptions options;
+    options.give_up_after = std::chrono::milliseconds(0);
+    return client->cases().Upload(bytes, "", options).status();
+  };
+}
+
+}  // namespace
+
 Change SomeChange(const ModelState& state, const Numbers& numbers, ServedModel* after) {
+  if (numbers[0] % 4 == 3) {
+    return SendCase(state, static_cast<int>(numbers[1] % kModelCases), after);
+  }
   TissueformClient* const client = state.client.get();
   const std::string name =
       state.model.sessions.empty() ? "" : NthName(state.model.sessions, numbers[1]);
   ServedSession* session = after->Find(name);
   if (session == nullptr) return nullptr;
-  switch (numbers[0] % 3) {
+  switch (numbers[0] % 4) {
     case 0:
       after->sessions.erase(name);
       return [=] { return client->DeleteSession(name); };

@@ -21,10 +21,12 @@ absl::Status ModelState::Connect(const DurableServer& server) {
   meshes = v1::MeshService::NewStub(channel);
   sessions = v1::SessionService::NewStub(channel);
   predictions = v1::PredictionService::NewStub(channel);
+  cases = v1::CaseService::NewStub(channel);
   return absl::OkStatus();
 }
 
 void ModelState::Disconnect() {
+  cases.reset();
   predictions.reset();
   sessions.reset();
   meshes.reset();

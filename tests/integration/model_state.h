@@ -49,6 +49,7 @@ struct ModelState {
   std::unique_ptr<v1::MeshService::Stub> meshes;
   std::unique_ptr<v1::SessionService::Stub> sessions;
   std::unique_ptr<v1::PredictionService::Stub> predictions;
+  std::unique_ptr<v1::CaseService::Stub> cases;
   ServedModel model;
   ModelAnswers answers;
   std::set<std::string> etags;    // all that were

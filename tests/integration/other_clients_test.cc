@@ -24,7 +24,7 @@ using ::testing::Not;
 
 constexpr int kModulesMissing = 77;
 constexpr char kHowToGetModules[] =
-    "python3-grpcio or python3-protobuf is missing: deploy/packages.txt lists them";
+    "python3-grpcio, python3-protobuf or python3-vtk9 is missing: deploy/packages.txt lists them";
 
 class OtherClientsTest : public ServedCliTest {
  protected:
@@ -66,6 +66,26 @@ TEST_F(OtherClientsTest, PythonGoesOnWithAnUploadAndPreparesASession) {
             "mesh: True 225 768\n"
             "progress: True in order: True\n"
             "session: True True ['top']\n");
+}
+
+TEST_F(OtherClientsTest, PythonKeepsACaseAndGetsTheSurfaceThatVtkFinds) {
+  const int exit_code = RunPython("case_and_surface.py");
+  const std::string out = Read("out.txt");
+  if (exit_code == kModulesMissing) GTEST_SKIP() << kHowToGetModules;
+  EXPECT_EQ(exit_code, 0) << out;
+  EXPECT_EQ(out,
+            "damaged: DATA_LOSS\n"
+            "case: True head False\n"
+            "case: True head True\n"
+            "listed: True ''\n"
+            "read: True\n"
+            "part: True 1000 250000\n"
+            "deleted: NOT_FOUND\n"
+            "hash: True True\n"
+            "counts: 162 320 euler: 2\n"
+            "positions: True rising: True\n"
+            "volume: 1024.0\n"
+            "VTK's: True 320\n");
 }
 
 TEST_F(OtherClientsTest, BufListsAndCallsRpcsByReflection) {

@@ -25,6 +25,7 @@ using Json = nlohmann::json;
 using ::testing::AllOf;
 using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 const std::string kTonguePlan = SourcePath("tests/data/plans/tongue/plan.json");
@@ -50,6 +51,18 @@ class PredictionCommandTest : public ServedCliTest {
   }
   Json ReadJson(const std::string& name) const { return Json::parse(Read(name)); }
 };
+
+TEST_F(PredictionCommandTest, TitleAndCaseAreKeptAndListed) {
+  const std::string digest(64, 'c');
+  const std::string titled = Create({"--title", "Chin 8 mm", "--case", digest});
+  const std::string plain = Create({});
+  const std::string listed = Prediction({"list", "--case", "cases/" + digest}).out;
+  EXPECT_THAT(listed, AllOf(HasSubstr(titled), HasSubstr("Chin 8 mm"), Not(HasSubstr(plain))));
+  const Json told = Json::parse(Prediction({"show", titled, "--json"}).out);
+  EXPECT_EQ(told["title"], "Chin 8 mm");
+  EXPECT_EQ(told["case"], "cases/" + digest);
+  EXPECT_THAT(Prediction({"list", "--case", "none"}), FailsWith(1, HasSubstr("name of a case")));
+}
 
 TEST_F(PredictionCommandTest, ListsShowsComparesAndDeletes) {
   const std::string field = Create({});

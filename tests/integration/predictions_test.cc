@@ -119,6 +119,44 @@ TEST_F(PredictionsTest, TheSameRequestFromManyAtOnceIsOnePrediction) {
   EXPECT_EQ(all.size(), 1U);
 }
 
+TEST_F(PredictionsTest, CaseAndTitleAreKeptAndListedBy) {
+  const std::string of_one = "cases/" + std::string(64, 'a');
+  const auto create = [&](const PredictionLabel& label, const std::string& request_id = "") {
+    return calls().Create(session_.name(), TopPose(SomePose(1)), {}, request_id, label);
+  };
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction made,
+                       create({.case_name = of_one, .title = "Kinn 8 mm vor, \u00fcber alles"}));
+  EXPECT_EQ(made.case_(), of_one);
+  EXPECT_EQ(made.title(), "Kinn 8 mm vor, \u00fcber alles");
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction kept, calls().Get(made.name()));
+  EXPECT_EQ(kept.DebugString(), made.DebugString());
+  ASSERT_OK_AND_ASSIGN(const v1::Prediction plain, Predict(2));
+  EXPECT_EQ(plain.case_(), "");
+  EXPECT_EQ(plain.title(), "");
+  ASSERT_OK_AND_ASSIGN(std::vector<v1::Prediction> listed, calls().List("", of_one));
+  ASSERT_EQ(listed.size(), 1U);
+  EXPECT_EQ(listed[0].DebugString(), made.DebugString());
+  ASSERT_OK_AND_ASSIGN(listed, calls().List(session_.name(), "cases/" + std::string(64, 'b')));
+  EXPECT_THAT(listed, IsEmpty());
+  // The title is part of the request.
+  ASSERT_THAT(create({.title = "a"}, "one"), IsOk());
+  EXPECT_THAT(create({.title = "b"}, "one"), Because(ErrorReason::kRequestIdReused));
+}
+
+TEST_F(PredictionsTest, ACaseOrTitleThatIsNoneIsRefused) {
+  const auto refused = [&](const PredictionLabel& label, const std::string& why) {
+    EXPECT_THAT(calls().Create(session_.name(), TopPose(SomePose(1)), {}, "", label),
+                StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(why)));
+  };
+  refused({.case_name = "cases/of a patient"}, "not the name of a case");
+  refused({.case_name = session_.mesh()}, "not the name of a case");
+  refused({.title = std::string(257, 'x')}, "256");
+  refused({.title = "\x1b[2J"}, "control character");
+  EXPECT_THAT(calls().List("", "cases/none"), StatusIs(absl::StatusCode::kInvalidArgument));
+  ASSERT_OK_AND_ASSIGN(const auto all, calls().List());
+  EXPECT_THAT(all, IsEmpty());
+}
+
 TEST_F(PredictionsTest, ListsAllOrThoseOfASession) {
   const BarProblem other(8);
   ASSERT_OK_AND_ASSIGN(const v1::Prediction theirs, PredictOf(other));

@@ -16,6 +16,7 @@
 #include "core/base/error_reason.h"
 #include "proto/conversion/session_conversion.h"
 #include "tests/integration/model_answers.h"
+#include "tissueform/v1/case.pb.h"
 #include "tissueform/v1/prediction.pb.h"
 #include "tissueform/v1/session.pb.h"
 #include "tissueform/v1/session_service.pb.h"
@@ -70,6 +71,7 @@ struct ServedModel {
   std::set<std::string> meshes;                          // names
   std::map<std::string, ServedSession> sessions;         // by name
   std::map<std::string, ServedPrediction> predictions;   // by name
+  std::map<std::string, v1::Case> cases;                 // by name, as told when sent
   std::map<std::string, std::string> names_of_requests;  // of predictions, deleted ones too
 
   int CountMadeFrom(const std::string& mesh) const;

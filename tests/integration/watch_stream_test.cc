@@ -1,6 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -59,6 +60,35 @@ TEST_F(WatchStreamTest, AnotherClientSeesADragInItsVerticesAndEncoding) {
   const absl::Status end = watch->Finish();
   EXPECT_TRUE(HasReason(end, ErrorReason::kSessionNotFound)) << end;
   EXPECT_TRUE(Eventually([this] { return server().watches().size() == 0; }));
+}
+
+TEST_F(WatchStreamTest, ADragHearsThatSomebodyFollowsAndThatNobodyDoesAnyLonger) {
+  int followers = -1;
+  DeformStream::Options options;
+  options.on_notice = [&followers](const v1::DeformNotice& notice) {
+    if (notice.has_followers()) followers = notice.followers().count();
+  };
+  ASSERT_OK_AND_ASSIGN(const auto drag, client_->OpenStream(session_, options));
+  uint64_t sequence = 0;
+  // Notices come with frames.
+  const auto drags_until = [&](int expected) {
+    return Eventually([&] {
+      EXPECT_THAT(drag->SendPoses(++sequence, TopPose(SomePose(1))), IsOk());
+      const auto frame = drag->Receive();
+      if (frame.has_value()) {
+        EXPECT_THAT(drag->Ack(*frame), IsOk());
+      }
+      return followers == expected;
+    });
+  };
+  {
+    const auto other = Connect();
+    ASSERT_OK_AND_ASSIGN(const auto watch, other->Watch(session_, {}));
+    EXPECT_TRUE(drags_until(1));
+  }
+  EXPECT_TRUE(drags_until(0)) << "a watch whose client is gone is no follower";
+  drag->CloseSending();
+  EXPECT_THAT(drag->Finish(), IsOk());
 }
 
 TEST_F(WatchStreamTest, ADrainSaysWhenItEndsAndDoesNotWaitForThoseWhoWatch) {

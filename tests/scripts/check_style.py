@@ -15,7 +15,9 @@ import re
 import sys
 
 FOLDERS = (".ci", "cmake", "client", "core", "deploy", "proto", "server", "tests")
-SUFFIXES = {".h", ".cc", ".py", ".sh", ".cmake", ".proto", ".toml"}
+SUFFIXES = {".h", ".cc", ".py", ".sh", ".cmake", ".proto", ".toml", ".ts", ".mjs"}
+# What npm and protoc put there.
+FOREIGN = ("node_modules", "generated")
 MAX_LINES = 600
 COPYRIGHT = re.compile(r"(//|#) Copyright 20\d\d The Tissueform Authors\.")
 LICENCE = re.compile(r"(//|#) SPDX-License-Identifier: AGPL-3\.0-or-later")
@@ -50,7 +52,7 @@ def main():
     count = 0
     for path in paths:
         name = path.relative_to(root).as_posix()
-        if name.startswith("tests/data/") or (path.suffix not in SUFFIXES and name != ".ci/run"):
+        if name.startswith("tests/data/") or any(part in FOREIGN for part in path.parts) or (path.suffix not in SUFFIXES and name != ".ci/run"):
             continue
         for number, message in errors_of(name, path.read_text(encoding="utf-8")):
             print(f"{name}:{number}: {message}", file=sys.stderr)

@@ -231,7 +231,7 @@ def plan_build(side, plan, other_data):
     out = side.out / "build" / plan
     side.tissueform("plan", "build", "--ct", side.data / RECIPE_CT, "--recipe", folder / "recipe.json", "--out", out,
                     "--threads", "2", "--no-pictures")
-    return [out / "plan.json", out / "head.vtu", out / "report.json", *sorted(out.glob("segments/*.stl"))]
+    return [out / "plan.json", out / "head.vtu", out / "report.json", *sorted(out.glob("segments/*.stl")), *out.glob("viewer.glb")]
 
 
 def skin_of(mesh, path):

@@ -18,8 +18,9 @@ seconds=${1:-20}
 build_dir=${TISSUEFORM_BUILD_DIR:-$PWD/build/fuzz}
 declare -A corpora=([FuzzPlan]=plan [FuzzMeshValidation]=mesh_validation [FuzzMeshPayload]=mesh_payload
   [FuzzDicomSeries]=dicom_series [FuzzVolumeHeader]=volume_header [FuzzRecipe]=recipe [FuzzMeditLines]=medit
-  [FuzzDisplacements]=displacements [FuzzStoreRecord]=store_record [FuzzDeformStream]=deform_stream
-  [FuzzSocketFrame]=socket_frame [FuzzWebRequest]=web_request [FuzzGatewayConnection]=gateway_connection)
+  [FuzzDisplacements]=displacements [FuzzStoreRecord]=store_record [FuzzDeformStream]=deform_stream [FuzzCaseFile]=case_file
+  [FuzzCaseUpload]=case_upload [FuzzAnswers]=answers [FuzzSocketFrame]=socket_frame [FuzzWebRequest]=web_request
+  [FuzzGatewayConnection]=gateway_connection)
 
 cmake -S . -B "$build_dir" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O1 -g1" \
   -DCMAKE_C_COMPILER=clang -DCMAKE_CXX_COMPILER=clang++ \

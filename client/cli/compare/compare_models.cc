@@ -88,6 +88,7 @@ absl::StatusOr<ModelResult> RunModel(const std::string& name, const PlanProblem&
   result.model = name;
   DeformerOptions options = problem.deformer;
   TF_ASSIGN_OR_RETURN(options.model, ModelFromName(name));
+  options.neo_hookean.newton_blas_threads = solver_threads;
   Stopwatch stopwatch;
   std::unique_ptr<Deformer> deformer;
   {

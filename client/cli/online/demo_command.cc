@@ -56,6 +56,8 @@ struct DemoOptions {
   std::string encoding = "float32";
   bool no_browser = false;
   bool serve = false;
+  int web_port = 8080;
+  OpenPlanner open_planner;
   DragOptions drag;
 
   std::string Path(const std::string& name) const { return out + "/" + name; }
@@ -92,6 +94,7 @@ absl::Status MakeOutFolder(const DemoOptions& options) {
 
 // A plan with what is dragged: to the plan's pose, the bundled head farther.
 struct DemoCase {
+  std::string path;
   Plan plan;
   PlanProblem problem;
   std::vector<ComparedRegion> face;
@@ -107,7 +110,7 @@ absl::StatusOr<DemoCase> ReadCase(const DemoOptions& options) {
   }
   absl::PrintF("plan %s: %d vertices, %d tets\n", path, problem.mesh->num_vertices(),
                problem.mesh->num_tets());
-  return DemoCase{std::move(plan), std::move(problem), std::move(face)};
+  return DemoCase{path, std::move(plan), std::move(problem), std::move(face)};
 }
 
 absl::StatusOr<DragResult> Drag(const PlanProblem& problem, const DragOptions& options,
@@ -194,8 +197,16 @@ void DrawPictures(const DemoOptions& options, const PlanProblem& problem,
 // How often it is looked whether the server has ended by itself.
 constexpr std::chrono::milliseconds kServeStep{200};
 
-// Until Ctrl-C, which is its regular end.
-absl::Status Serve(ServerProcess* server) {
+// Until Ctrl-C, which is its regular end. Without the planner's pages, which a build without Node
+// has not, the server is served all the same.
+absl::Status Serve(const DemoOptions& options, const DemoCase& demo, ServerProcess* server) {
+  const absl::StatusOr<OpenedPlanner> planner =
+      options.open_planner(server->address(), demo.path, options.web_port);
+  if (planner.ok()) {
+    absl::PrintF("\nthe planner, in a browser: %s\n", planner->url);
+  } else {
+    absl::PrintF("\nno planner: %s\n", planner.status().message());
+  }
   absl::PrintF(
       "\nthe server keeps running at %s, with its session and predictions, until Ctrl-C. In "
       "another terminal:\n  tissueform prediction list --server %s\n",
@@ -232,7 +243,7 @@ absl::Status DragAndPredict(const DemoOptions& options, const DemoCase& demo, Se
   TF_RETURN_IF_ERROR(WriteResults(options, demo, drags.skin, summary, prediction));
   DrawPictures(options, demo.problem, prediction, display);
   TF_RETURN_IF_ERROR(CheckNotInterrupted());
-  return options.serve ? Serve(server) : absl::OkStatus();
+  return options.serve ? Serve(options, demo, server) : absl::OkStatus();
 }
 
 absl::Status RunDemo(const DemoOptions& options) {
@@ -257,8 +268,9 @@ absl::Status RunDemo(const DemoOptions& options) {
 
 }  // namespace
 
-void AddDemoCommand(CLI::App& app, CommandWork* work) {
+void AddDemoCommand(CLI::App& app, OpenPlanner open_planner, CommandWork* work) {
   auto options = std::make_shared<DemoOptions>();
+  options->open_planner = std::move(open_planner);
   CLI::App* command = app.add_subcommand(kDemoCommand.name, kDemoCommand.description);
   command
       ->add_option("--out", options->out,
@@ -281,7 +293,13 @@ void AddDemoCommand(CLI::App& app, CommandWork* work) {
   command->add_flag("--no-browser", options->no_browser,
                     "for scripts: never open a browser (this version opens none)");
   command->add_flag("--serve", options->serve,
-                    "keep the server running at the end, until Ctrl-C, and tell its address");
+                    "keep the server running at the end, until Ctrl-C, with the planner for "
+                    "browsers in front of it, and tell their addresses");
+  command
+      ->add_option("--web-port", options->web_port,
+                   "of --serve: port of the planner; 0 takes a free one")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
   command->footer(
       "Starts the tissueform-server that lies beside this program on loopback and ends it again.\n"
       "It keeps the prediction at the end of the drag, and one that neo_hookean has refined.\n"

@@ -83,6 +83,7 @@ ReattachingStream::Options StreamOptions(const PlanProblem& problem,
     if (notice.has_draining()) absl::PrintF("the server is about to end\n");
     if (notice.has_evicted()) absl::PrintF("the session had left the server's memory ...\n");
     if (notice.has_restored()) absl::PrintF("... and is back\n");
+    if (notice.has_followers()) absl::PrintF("watched by %d\n", notice.followers().count());
     if (notice.has_committed() && !notice.committed().failure().empty()) {
       absl::PrintF("pose %d was not kept: %s\n", notice.committed().sequence(),
                    notice.committed().failure());

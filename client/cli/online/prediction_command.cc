@@ -49,7 +49,11 @@ struct PredictionOptions {
   bool json = false;
   bool skin = false;
   std::string vertices;  // a file
+  std::string case_name;
+  std::string title;
 
+  PredictionLabel Label() const { return {.case_name = FullCase(), .title = title}; }
+  std::string FullCase() const { return case_name.empty() ? "" : FullName("cases", case_name); }
   std::string FullPrediction() const { return FullName("predictions", name); }
 };
 
@@ -81,16 +85,16 @@ absl::StatusOr<v1::Prediction> MakePrediction(const PredictionOptions& options,
   const std::string session = FullSessionName(options.session);
   if (options.plan.empty()) {
     TF_ASSIGN_OR_RETURN(const std::vector<NamedPose> poses, CommittedPoses(client, session));
-    return client->predictions().Create(session, poses, model);
+    return client->predictions().Create(session, poses, model, "", options.Label());
   }
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan, options.reading));
   TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
   if (!options.session.empty()) {
-    return client->predictions().Create(session, NamedPoses(problem), model);
+    return client->predictions().Create(session, NamedPoses(problem), model, "", options.Label());
   }
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<PlanSession> own,
                       MakePlanSession(client, problem, /*stop=*/nullptr));
-  return client->predictions().Create(own->name(), NamedPoses(problem), model);
+  return client->predictions().Create(own->name(), NamedPoses(problem), model, "", options.Label());
 }
 
 absl::Status Create(const PredictionOptions& options) {
@@ -113,18 +117,18 @@ absl::Status List(const PredictionOptions& options) {
   TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
   const std::string session = options.session.empty() ? "" : FullSessionName(options.session);
   TF_ASSIGN_OR_RETURN(const std::vector<v1::Prediction> predictions,
-                      client->predictions().List(session));
-  absl::PrintF("%-46s %-16s %-20s %9s %9s %s\n", "prediction", "model", "made", "max mm",
-               "inverted", "handles");
+                      client->predictions().List(session, options.FullCase()));
+  absl::PrintF("%-46s %-16s %-20s %9s %9s %-24s %s\n", "prediction", "model", "made", "max mm",
+               "inverted", "handles", "title");
   for (const v1::Prediction& prediction : predictions) {
     const auto add_handle = [](std::string* text, const v1::HandlePose& pose) {
       *text += pose.handle();
     };
-    absl::PrintF("%-46s %-16s %-20s %9.3g %9d %s\n", prediction.name(),
+    absl::PrintF("%-46s %-16s %-20s %9.3g %9d %-24s %s\n", prediction.name(),
                  ModelText(prediction.model()), TimeText(prediction.create_time()),
                  prediction.quality().max_displacement_mm(),
                  prediction.quality().inverted_tet_count(),
-                 absl::StrJoin(prediction.poses(), ", ", add_handle));
+                 absl::StrJoin(prediction.poses(), ", ", add_handle), prediction.title());
   }
   absl::PrintF("%d predictions\n", predictions.size());
   return absl::OkStatus();
@@ -255,10 +259,13 @@ void AddPredictionCommand(CLI::App& app, CommandWork* work) {
   create->add_option("--session", options->session,
                      "the session that answers; without a plan at its committed poses");
   AddModelOption(create, "use this model instead of the session's", &options->model);
+  create->add_option("--title", options->title, "what lists call it");
+  create->add_option("--case", options->case_name, "the case that it was planned in");
   AddAllowOutside(create, &options->reading);
 
-  add("list", "all predictions", false, List)
-      ->add_option("--session", options->session, "those of this session only");
+  CLI::App* list = add("list", "all predictions", false, List);
+  list->add_option("--session", options->session, "those of this session only");
+  list->add_option("--case", options->case_name, "those of this case only");
   add("show", "what is known of one", true, Show)->add_flag("--json", options->json, "as JSON");
 
   CLI::App* compare = add("compare", "how far another one lies from it, in mm", true, Compare);

@@ -134,6 +134,8 @@ OrderedJson ProvenanceJson(const v1::Prediction& prediction) {
                       {"poisson_ratio", prediction.poisson_ratio()},
                       {"recipe_sha256", prediction.recipe_sha256()},
                       {"poses", PosesJson(prediction)}};
+  if (!prediction.title().empty()) json["title"] = prediction.title();
+  if (!prediction.case_().empty()) json["case"] = prediction.case_();
   if (prediction.stiffness().has_uniform_pa()) {
     json["stiffness"] = {{"uniform_pa", prediction.stiffness().uniform_pa()}};
   } else {

@@ -87,6 +87,7 @@ absl::Status RunDeform(const DeformOptions& options) {
   double read_seconds = 0;
   TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolveWithProgress(plan, &read_seconds));
   problem.deformer.preparation.threads = options.threads;
+  problem.deformer.neo_hookean.newton_blas_threads = options.solver_threads;
   PredictionStats stats = StatsOf(problem);
   stats.solver_threads = options.solver_threads;
   stats.read_seconds = read_seconds;

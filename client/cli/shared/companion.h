@@ -43,6 +43,8 @@ inline constexpr CompanionCommand kWatchCommand = {
 inline constexpr CompanionCommand kPredictionCommand = {
     "prediction", "make, list, compare, export and delete the predictions that a server keeps",
     "tissueform-online"};
+inline constexpr CompanionCommand kCaseCommand = {"case", "cases: what the browser planner opens",
+                                                  "tissueform-online"};
 inline constexpr CompanionCommand kServerInfoCommand = {
     "server-info", "tell what a server is: version, models, limits", "tissueform-online"};
 inline constexpr CompanionCommand kExperimentsCommand = {

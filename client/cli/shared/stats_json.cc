@@ -82,6 +82,7 @@ PredictionStats StatsOf(const PlanProblem& problem) {
   stats.fixed_vertices = static_cast<Eigen::Index>(problem.constraints.fixed().size());
   stats.handle_vertices = constrained - stats.fixed_vertices;
   stats.free_vertices = stats.vertices - constrained;
+  stats.has_ranges = problem.uncertainty.has_value();
   return stats;
 }
 
@@ -127,7 +128,11 @@ void PrintOutcome(const std::string& out, const PredictionStats& stats) {
   absl::PrintF("%s: %d vertices, largest displacement %.3f mm, volume x %.4f, %d inverted tets\n",
                out, stats.vertices, quality.max_displacement_mm, quality.total_volume_ratio,
                quality.inverted_tets);
-  if (stats.band) absl::PrintF("%s\n", MaterialBandText(*stats.band));
+  if (stats.band) {
+    absl::PrintF("%s\n", MaterialBandText(*stats.band));
+  } else if (stats.has_ranges) {
+    absl::PrintF("material uncertainty: not told; linear_elastic and neo_hookean tell theirs\n");
+  }
   if (quality.inverted_tets > 0) {
     absl::FPrintF(stderr,
                   "warning: tets are inverted, the worst is tet %d (volume x %.3g); move less, or "

@@ -33,7 +33,8 @@ struct PredictionStats {
   SolveSummary solve;
   DeformationQuality quality;
   std::optional<ElasticSummary> elastic;  // of the elastic models
-  std::optional<MaterialBand> band;       // where the plan gives ranges of the material
+  bool has_ranges = false;                // the plan gives ranges of the material
+  std::optional<MaterialBand> band;       // where it does, of the elastic models
 };
 
 // The counts, model and mode of a problem; the rest is left for the caller to fill.

@@ -119,13 +119,7 @@ absl::StatusOr<std::optional<MaterialBand>> FindMaterialBand(
 std::optional<MaterialBand> FindMaterialBandOrWarn(const PlanProblem& problem,
                                                    const Positions& deformed,
                                                    std::shared_ptr<MeshPreparation> preparation) {
-  if (!problem.uncertainty) return std::nullopt;
-  if (!IsElastic(problem)) {
-    absl::FPrintF(stderr,
-                  "warning: the plan gives ranges of the material, but only linear_elastic and "
-                  "neo_hookean tell their uncertainty; use --model\n");
-    return std::nullopt;
-  }
+  if (!problem.uncertainty || !IsElastic(problem)) return std::nullopt;
   const StageProgress progress("finding the uncertainty from the material");
   absl::StatusOr<std::optional<MaterialBand>> band =
       FindMaterialBand(problem, deformed, std::move(preparation));

@@ -44,7 +44,7 @@ TEST(MovementTableTest, MovementIsToldInTheDirectionsOfThePatient) {
   const std::string csv = table.Csv();
   // The corner at (0, 0, 0), not vertex 3, which lies behind it; the mean is over both.
   EXPECT_THAT(csv, HasSubstr("\nbar_bend,0.3,known,chin,0,2,1,0,2.23607,2,1,2\n"));
-  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 1 + 6);
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 1 + 7);
 }
 
 TEST(MovementTableTest, SummaryTellsForemostAndMeanOfEachModel) {

@@ -4,6 +4,7 @@
 #include "core/anatomy/tet_stiffness.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -250,8 +251,23 @@ TEST(StiffnessTableTest, EveryNumberHasOneClass) {
   for (const TissueClass& tissue : table) EXPECT_THAT(tissue.source, HasSubstr("doi"));
 }
 
+// Of a log-normal variable whose mean and deviation are those of the study.
+TEST(StiffnessTableTest, FactorsAreThoseOfTheSpreadsThatWereMeasured) {
+  const std::array<double, 3> deviations_pa = {5e3, 11e3, 21e3};
+  const StiffnessTable table = DefaultStiffnessTable();
+  for (size_t t = 0; t < table.size(); ++t) {
+    const double part = deviations_pa[t] / table[t].youngs_modulus_pa;
+    EXPECT_NEAR(table[t].factor_95, std::exp(1.96 * std::sqrt(std::log1p(part * part))), 0.05);
+  }
+}
+
 TEST(StiffnessTableTest, WrongTablesAreRefusedByName) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
+  StiffnessTable many;
+  for (int t = 0; t < 17; ++t) many.push_back({"tissue", 1.0 * t, 3e3, "", 2});
+  EXPECT_THAT(CheckStiffnessTable(many), StatusIs(kInvalid, HasSubstr("at most 16")));
+  EXPECT_THAT(CheckStiffnessTable({{"fat", 10, 3e3, "", 2}, {"skin", kNone, 3e3, ""}}),
+              StatusIs(kInvalid, HasSubstr("\"skin\" differs")));
   EXPECT_THAT(CheckStiffnessTable({{"fat", 10, 3e3, ""}, {"skin", 5, 3e3, ""}}),
               StatusIs(kInvalid, HasSubstr("\"skin\" must be larger")));
   EXPECT_THAT(CheckStiffnessTable({{"fat", std::nan(""), 3e3, ""}, {"skin", kNone, 3e3, ""}}),

@@ -182,6 +182,17 @@ TEST(NewtonFallbackTest, FindsTheEquilibriumOfLbfgsInFewerStepsWithoutRaisingThe
   ExpectFallingEnergies(newton.summary);
 }
 
+TEST(NewtonFallbackTest, MoreThreadsForItsFactorsFindTheSameEquilibrium) {
+  const auto preparation = PrepareBar({}, 2).value();
+  const std::vector<HandlePose> poses = {Pose({0.3, 0, 0.4}, {1, 0, 1.5}),
+                                         Pose({0, 0, 0}, {0, 1, -1})};
+  const Deformation one = Solve(preparation, {.tolerance = 1e-9, .newton_after = 0}, poses);
+  const Deformation two =
+      Solve(preparation, {.tolerance = 1e-9, .newton_after = 0, .newton_blas_threads = 2}, poses);
+  EXPECT_EQ(two.summary.newton_steps, one.summary.newton_steps);
+  EXPECT_LT((two.positions - one.positions).cwiseAbs().maxCoeff(), 1e-9);
+}
+
 TEST(NewtonFallbackTest, EnergyNeverRisesOnOneTet) {
   const TetMesh mesh = testing::SingleTet();
   const auto constraints = ConstraintSet::Create(mesh, {0}, {{"edge", {1, 2}}}).value();

@@ -3,7 +3,9 @@
 
 #include "core/mesh/tet_topology.h"
 
+#include <cstdint>
 #include <set>
+#include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -54,6 +56,20 @@ TEST(BoundaryFacetsTest, OfTheTongueAreThoseItsSourceCounts) {
   EXPECT_EQ(
       BoundaryFacets(testing::LoadTestMesh("meshes/tet_sofa_tongue/volumetricTongue.vtu")).rows(),
       1940);
+}
+
+TEST(TetsBehindTest, HaveTheFacetsThatTheyAreBehind) {
+  for (const TetMesh& mesh :
+       {testing::SingleTet(), testing::Bar({2, 3, 4}),
+        testing::LoadTestMesh("meshes/tet_sofa_tongue/volumetricTongue.vtu")}) {
+    const TriangleIndices facets = BoundaryFacets(mesh);
+    const std::vector<int32_t> tets = TetsBehind(facets, mesh);
+    ASSERT_EQ(static_cast<Eigen::Index>(tets.size()), facets.rows());
+    for (Eigen::Index f = 0; f < facets.rows(); ++f) {
+      const auto corners = mesh.tets().row(tets[f]);
+      for (int k = 0; k < 3; ++k) EXPECT_TRUE((corners.array() == facets(f, k)).any());
+    }
+  }
 }
 
 TEST(ConnectedComponentsTest, AreCountedAndUnusedVerticesLeftOut) {

@@ -14,11 +14,13 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/case_file/viewer_file.h"
 #include "core/deformation/deformation_quality.h"
 #include "core/linear_solvers/blas_threads.h"
 #include "core/mesh/skin_region.h"
 #include "core/mesh/validation.h"
 #include "core/mesh_io/tet_mesh_io.h"
+#include "core/plan_building/viewer_surfaces.h"
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
 #include "core/planning/skin_places.h"
@@ -49,6 +51,46 @@ Recipe CoarseRecipe() {
 }
 
 std::string BundledCt() { return TestDataPath("ct/headsq/headsq_quarter.nhdr"); }
+
+// Whole, inside each other, and moving with the right bone.
+void ExpectSurfacesOfAHead(const ViewerFile& viewer) {
+  ASSERT_GE(viewer.surfaces.size(), 5U);
+  const CaseSurface& skin = viewer.surfaces[0];
+  EXPECT_EQ(skin.kind, SurfaceKind::kSkin);
+  const Eigen::RowVector3f low = skin.positions.colwise().minCoeff();
+  const Eigen::RowVector3f high = skin.positions.colwise().maxCoeff();
+  Eigen::Index triangles = 0;
+  int teeth = 0;
+  int segments = 0;
+  for (const CaseSurface& surface : viewer.surfaces) {
+    triangles += surface.triangles.rows();
+    teeth += surface.kind == SurfaceKind::kTeeth ? 1 : 0;
+    segments += surface.kind == SurfaceKind::kSegment ? 1 : 0;
+    if (surface.kind == SurfaceKind::kSkin) continue;
+    EXPECT_TRUE((surface.positions.colwise().minCoeff().array() > low.array()).all());
+    EXPECT_TRUE((surface.positions.colwise().maxCoeff().array() < high.array()).all());
+  }
+  EXPECT_EQ(teeth, 2);  // the upper ones of the skull, the lower ones of the jaw
+  EXPECT_EQ(segments, 1);
+  EXPECT_LE(triangles, kSkinTriangles + kBoneTriangles + 5000);
+  const auto find = [&](const std::string& name) {
+    return std::find_if(viewer.landmarks.begin(), viewer.landmarks.end(),
+                        [&](const CaseLandmark& landmark) { return landmark.name == name; });
+  };
+  for (const char* name : {"pogonion", "lower_incisor", "menton"}) {
+    ASSERT_NE(find(name), viewer.landmarks.end());
+    EXPECT_EQ(find(name)->handle, "mandible") << name;
+  }
+  ASSERT_NE(find("upper_incisor"), viewer.landmarks.end());
+  EXPECT_EQ(find("upper_incisor")->handle, "");
+  for (const char* name : {"pronasale", "subnasale", "labrale_superius", "soft_pogonion"}) {
+    const auto landmark = find(name);
+    ASSERT_TRUE(landmark != viewer.landmarks.end() && landmark->skin_vertex.has_value()) << name;
+    const Eigen::Vector3d vertex =
+        skin.positions.row(*landmark->skin_vertex).cast<double>().transpose();
+    EXPECT_LT((vertex - landmark->position_mm).norm(), 4) << name;
+  }
+}
 
 TEST(PlanBuilderTest, BundledHeadBecomesAUsablePlan) {
   double last = 0;
@@ -85,6 +127,10 @@ TEST(PlanBuilderTest, BundledHeadBecomesAUsablePlan) {
   }
   EXPECT_NE(FindAttribute(problem.point_data, "skin_region"), nullptr);
   EXPECT_TRUE(std::filesystem::is_regular_file(folder + "/segments/mandible.stl"));
+  ASSERT_OK_AND_ASSIGN(const ViewerFile viewer, ReadViewer(folder + "/viewer.glb"));
+  ASSERT_OK_AND_ASSIGN(const std::string mesh_sha256, MeshFileSha256(folder + "/head.vtu"));
+  EXPECT_EQ(viewer.mesh_file_sha256, mesh_sha256);
+  ExpectSurfacesOfAHead(viewer);
   std::filesystem::remove_all(folder);
 }
 
@@ -95,6 +141,15 @@ void ExpectSameArrays(const std::vector<Attribute>& a, const std::vector<Attribu
     EXPECT_EQ(a[i].components, b[i].components);
     EXPECT_EQ(a[i].values, b[i].values) << a[i].name;  // type and every bit
   }
+}
+
+// Upright, in the scanner's axes: 1.4 degrees of it, which do not matter here.
+TEST(PlanBuilderTest, PlanesOfTheHeadFrameCanBeGiven) {
+  Recipe recipe = CoarseRecipe();
+  recipe.horizontal = Plane{{-97, 113, -33}, Eigen::Vector3d::UnitZ()};
+  ASSERT_OK_AND_ASSIGN(const PlanBuild build, BuildPlan(BundledCt(), recipe));
+  EXPECT_EQ(build.head_frame.source, "recipe");
+  EXPECT_GT(build.head_frame.superior.z(), 0.999);
 }
 
 TEST(PlanBuilderTest, ProblemOfABuildEqualsThatOfItsFilesToTheLastBit) {
@@ -200,7 +255,7 @@ TEST(PlanBuilderTest, BytesDoNotDependOnThreads) {
     std::filesystem::create_directories(folder);
     ASSERT_THAT(WritePlan(build, folder), IsOk());
     plans.push_back(BytesOf(folder + "/plan.json"));
-    meshes.push_back(BytesOf(folder + "/head.vtu"));
+    meshes.push_back(BytesOf(folder + "/head.vtu") + BytesOf(folder + "/viewer.glb"));
   }
   std::filesystem::remove_all(folder);
   EXPECT_GT(meshes[0].size(), 100000U);

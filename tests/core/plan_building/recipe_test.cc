@@ -3,6 +3,7 @@
 
 #include "core/plan_building/recipe.h"
 
+#include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
@@ -139,12 +140,42 @@ TEST(RecipeTest, KeysOfVersion2ArriveAndAreWrittenAgain) {
   EXPECT_THAT(parse(R"("metal": 1500)"), StatusIs(kInvalid, HasSubstr("/metal")));
 }
 
+TEST(RecipeTest, KeysOfVersion3ArriveAndAreWrittenAgain) {
+  const auto parse = [](int version, const std::string& frame) {
+    return ParseRecipe(absl::StrCat(R"({"format": "tissueform-recipe", "version": )", version,
+                                    R"(, "segments": [{"name": "chin", "osteotomy": "genioplasty"}],
+                                    "head_frame": )",
+                                    frame, "}"),
+                       "r");
+  };
+  const std::string horizontal =
+      R"({"horizontal": {"point_mm": [1, 2, 3], "normal": [0, -0.3, 2]}})";
+  ASSERT_OK_AND_ASSIGN(const Recipe given, parse(3, horizontal));
+  ASSERT_TRUE(given.horizontal.has_value());
+  EXPECT_FALSE(given.midsagittal.has_value());
+  EXPECT_NEAR(given.horizontal->normal.norm(), 1, 1e-12);
+  EXPECT_THAT(RecipeToJson(given),
+              ::testing::AllOf(HasSubstr("\"horizontal\""), HasSubstr("\"version\": 3")));
+  EXPECT_THAT(parse(2, horizontal), StatusIs(kInvalid, HasSubstr("version")));
+  EXPECT_THAT(parse(3, "{}"), StatusIs(kInvalid, HasSubstr("/head_frame")));
+  EXPECT_THAT(parse(3, R"({"midsagittal": {"point_mm": [0, 0, 0], "normal": [0, 0, 0]}})"),
+              StatusIs(kInvalid, HasSubstr("/head_frame/midsagittal")));
+}
+
 TEST(RecipeTest, Version1HasTheDefaultsOfLaterKeysAndRefusesThem) {
   ASSERT_OK_AND_ASSIGN(const Recipe recipe, Parse(""));
   EXPECT_EQ(recipe.ct.join_series, JoinSeries::kAuto);
   EXPECT_TRUE(recipe.metal.correct);
-  EXPECT_THAT(RecipeToJson(recipe), HasSubstr("\"version\": 1"));
+  // The tissues' defaults tell how far they are known, which version 1 cannot.
+  EXPECT_THAT(RecipeToJson(recipe), HasSubstr("\"version\": 2"));
+  constexpr char kTissues[] = R"("tissues": [{"name": "all", "youngs_modulus_pa": 20000}])";
+  ASSERT_OK_AND_ASSIGN(const Recipe known, Parse(kTissues));
+  EXPECT_THAT(RecipeToJson(known), HasSubstr("\"version\": 1"));
   EXPECT_THAT(Parse(R"("metal": "off")"), StatusIs(kInvalid, HasSubstr("version")));
+  EXPECT_THAT(
+      Parse(
+          R"("tissues": [{"name": "all", "youngs_modulus_pa": 2e4, "youngs_modulus_factor_95": 2}])"),
+      StatusIs(kInvalid, HasSubstr("version")));
 }
 
 TEST(RecipeTest, TwoSegmentsOfOneNameAreRefused) {

@@ -3,6 +3,7 @@
 
 #include "server/rpc/message_stream.h"
 
+#include <atomic>
 #include <chrono>
 #include <future>
 #include <optional>
@@ -165,6 +166,40 @@ TEST_F(MessageStreamTest, AClientThatTakesItsMessagesIsNotGivenUp) {
   EXPECT_EQ(call.offsets().size(), 50U);
   EXPECT_TRUE(status->ok());
   EXPECT_EQ(call.cancellations(), 0);
+}
+
+// On a worker, so that a message may wait for the disk.
+TEST_F(MessageStreamTest, MessagesAreMadeWhereTheyArePosted) {
+  WorkerPool workers(1);
+  std::atomic<int> posted = 0;
+  LeavingClientCall call(&reactions_, 100);
+  MessageStream<Message>* stream = NewStream();
+  call.Bind(stream);
+  stream->Send(Offsets(4), [&](WorkerPool::Job job) {
+    ++posted;
+    workers.Post(Lane::kStore, std::move(job));
+  });
+  const std::optional<grpc::Status> status = call.WaitUntilDone();
+  ASSERT_TRUE(status.has_value());
+  EXPECT_TRUE(status->ok());
+  EXPECT_THAT(call.offsets(), ElementsAre(0, 1, 2, 3));
+  EXPECT_EQ(posted, 5) << "the last finds none";
+}
+
+TEST_F(MessageStreamTest, AMessageThatCannotBeMadeIsItsEnd) {
+  LeavingClientCall call(&reactions_, 100);
+  MessageStream<Message>* stream = NewStream();
+  call.Bind(stream);
+  stream->Send([next = int64_t{0}](Message* message) mutable -> absl::StatusOr<bool> {
+    if (next == 2) return absl::DataLossError("damaged");
+    message->mutable_chunk()->set_offset(next++);
+    return true;
+  });
+  const std::optional<grpc::Status> status = call.WaitUntilDone();
+  ASSERT_TRUE(status.has_value());
+  EXPECT_EQ(status->error_code(), grpc::StatusCode::DATA_LOSS);
+  EXPECT_THAT(call.offsets(), ElementsAre(0, 1));
+  EXPECT_TRUE(Idle());
 }
 
 TEST_F(MessageStreamTest, AnErrorInPlaceOfMessagesIsItsEnd) {

@@ -8,6 +8,8 @@
 #include <optional>
 #include <random>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include "gmock/gmock.h"
@@ -106,17 +108,30 @@ class WatchTest : public ReactorsTest {
     EXPECT_TRUE(stream->Receive()->has_started());
     return stream;
   }
+  // The next message, but for who follows.
+  static std::optional<v1::DeformResponse> Next(FakeStream* stream) {
+    for (;;) {
+      std::optional<v1::DeformResponse> response = stream->Receive();
+      if (!response.has_value() || !response->notice().has_followers()) return response;
+    }
+  }
+  // The next number of followers that the drag is told.
+  static int Followers(FakeStream* stream) {
+    const std::optional<v1::DeformResponse> response = stream->Receive();
+    EXPECT_TRUE(response.has_value() && response->notice().has_followers());
+    return response.has_value() ? response->notice().followers().count() : -1;
+  }
   // Sends a pose and returns what the drag is shown.
   static v1::DeformFrame Move(FakeStream* stream, uint64_t sequence) {
     stream->Send(Pose(sequence));
-    const auto response = stream->Receive();
+    const auto response = Next(stream);
     EXPECT_TRUE(response.has_value() && response->has_frame());
     stream->Send(Ack(sequence));
     return response.value_or(v1::DeformResponse()).frame();
   }
   static void EndDrag(std::unique_ptr<FakeStream> stream) {
     stream->CloseSending();
-    EXPECT_FALSE(stream->Receive().has_value());
+    EXPECT_FALSE(Next(stream.get()).has_value());
     EXPECT_TRUE(stream->WaitUntilDone()->ok());
   }
 };
@@ -148,6 +163,62 @@ TEST_F(WatchTest, EveryFrameOfADragIsSeenAsItWasSentByTwoWhoShareIt) {
   other->Cancel();
   EXPECT_EQ(one->WaitUntilDone()->error_code(), grpc::StatusCode::CANCELLED);
   EXPECT_EQ(other->WaitUntilDone()->error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_EQ(watches_.size(), 0);
+}
+
+TEST_F(WatchTest, ADragHearsHowManyFollow) {
+  const std::string session = MakeSession();
+  const std::unique_ptr<WatchCall> first = Watch(session);
+  first->Begin(v1::WATCH_ORIGIN_REST);
+  std::unique_ptr<FakeStream> drag = Drag(session);
+  EXPECT_EQ(Followers(drag.get()), 1) << "who was there before it";
+  const std::unique_ptr<WatchCall> second = Watch(session);
+  EXPECT_EQ(Followers(drag.get()), 2);
+  std::unique_ptr<FakeStream> other_drag = Drag(session);
+  EXPECT_EQ(Followers(other_drag.get()), 2);
+  second->Cancel();
+  second->WaitUntilDone();
+  EXPECT_EQ(Followers(drag.get()), 1);
+  EXPECT_EQ(Followers(other_drag.get()), 1);
+  first->Cancel();
+  first->WaitUntilDone();
+  EXPECT_EQ(Followers(drag.get()), 0);
+  Move(drag.get(), 1);
+  EndDrag(std::move(drag));
+  EndDrag(std::move(other_drag));
+}
+
+TEST_F(WatchTest, ADragThatNobodyFollowsHearsNothingOfIt) {
+  const std::string session = MakeSession();
+  const std::unique_ptr<FakeStream> drag = Drag(session);
+  drag->Send(Pose(1));
+  EXPECT_TRUE(drag->Receive()->has_frame());
+  drag->CloseSending();
+  EXPECT_FALSE(drag->Receive().has_value());
+  EXPECT_TRUE(drag->WaitUntilDone()->ok());
+}
+
+// Whatever is under way when it ends.
+TEST_F(WatchTest, DragsAndFollowersComeAndGoAtOnce) {
+  const std::string session = MakeSession();
+  std::vector<std::thread> threads;
+  threads.reserve(4);
+  for (int i = 0; i < 4; ++i) {
+    threads.emplace_back([&, i] {
+      for (int round = 0; round < 10; ++round) {
+        if (i % 2 == 0) {
+          const std::unique_ptr<FakeStream> drag = Drag(session);
+          drag->Cancel();
+          drag->WaitUntilDone();
+        } else {
+          const std::unique_ptr<WatchCall> watch = Watch(session);
+          watch->Cancel();
+          watch->WaitUntilDone();
+        }
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(watches_.size(), 0);
 }
 

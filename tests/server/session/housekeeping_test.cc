@@ -12,6 +12,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/mesh_payload/sha256.h"
 #include "server/store/in_memory_stores.h"
 #include "tests/testing/fake_clock.h"
 #include "tests/testing/meshes.h"
@@ -116,8 +117,21 @@ class HousekeepingTest : public ::testing::Test {
     catalog_->RemoveIdle(SessionRegistry::kInUse);
   }
 
-  void Predict(const std::string& id, const std::string& session, const std::string& mesh) {
+  // Of a case of one byte; returns its name.
+  std::string KeepCase(char byte) {
+    const std::string bytes(1, byte);
+    absl::StatusOr<std::unique_ptr<CaseWriter>> writer = stores_->cases().Begin(
+        {.sha256 = Sha256Hex({bytes}), .total_bytes = 1, .last_used_s = unix_s_}, 100);
+    EXPECT_THAT(writer, IsOk());
+    EXPECT_THAT((*writer)->Write(0, bytes), IsOk());
+    EXPECT_THAT((*writer)->Finish(), IsOk());
+    return Sha256Hex({bytes});
+  }
+
+  void Predict(const std::string& id, const std::string& session, const std::string& mesh,
+               const std::string& of_case = "") {
     PredictionRecord record;
+    record.case_sha256 = of_case;
     record.id = id;
     record.session = session;
     record.mesh_sha256 = mesh;
@@ -247,6 +261,24 @@ TEST_F(HousekeepingTest, PredictionsGoWithTheirAgeOnceTheirSessionIsGoneAndKeepT
   EXPECT_THAT(stores_->predictions().Get("of gone"), StatusIs(absl::StatusCode::kNotFound));
   EXPECT_THAT(stores_->predictions().Get("of held"), IsOk());
   EXPECT_THAT(stores_->meshes().Find(mesh), IsOk());
+}
+
+TEST_F(HousekeepingTest, CasesThatNobodyOpenedGoUnlessAPredictionNamesThem) {
+  const std::string unused = KeepCase('a');
+  const std::string opened = KeepCase('b');
+  const std::string predicted = KeepCase('c');
+  Pass(20 * kDay);
+  ASSERT_THAT(stores_->cases().Open(opened, unix_s_).status(), IsOk());
+  Predict("p", "gone", bar_->sha256, predicted);
+  Pass(10 * kDay);
+  EXPECT_EQ(housekeeping_->RunOnce().cases, 0) << "not a second early";
+  Pass(1);
+  EXPECT_EQ(housekeeping_->RunOnce().cases, 1);
+  EXPECT_THAT(stores_->cases().Find(unused), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_THAT(stores_->cases().Find(opened), IsOk());
+  EXPECT_THAT(stores_->cases().Find(predicted), IsOk());
+  Pass(21 * kDay);
+  EXPECT_EQ(housekeeping_->RunOnce().cases, 2) << "the prediction has gone with its age";
 }
 
 TEST_F(HousekeepingTest, AMeshOfNoSessionStaysWhileAPredictionNamesIt) {

@@ -21,6 +21,7 @@
 #include "core/mesh_payload/sha256.h"
 #include "server/store/database.h"
 #include "tests/server/store/store_samples.h"
+#include "tests/server/store/store_workload.h"
 #include "tests/server/store/stores_case.h"
 #include "tests/server/store/waiting_calls.h"
 #include "tests/testing/status_matchers.h"
@@ -350,7 +351,7 @@ TEST_F(DurableStoreTest, AStoreOfANewerServerOrAnotherProgramIsRefused) {
   Fill(1);
   Sql("PRAGMA user_version=99");
   EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("newer server")));
-  Sql("PRAGMA user_version=2; PRAGMA application_id=7");
+  Sql("PRAGMA user_version=3; PRAGMA application_id=7");
   EXPECT_THAT(Open(),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("not one of tissueform")));
   Sql("PRAGMA application_id=" + absl::StrCat(0x54697346));
@@ -380,6 +381,32 @@ TEST_F(DurableStoreTest, AStoreOfTheVersionBeforeIsBroughtUpToDate) {
   EXPECT_THAT(store_->predictions().Create(SamplePrediction("p"), SamplePositions(1)), IsOk());
   ASSERT_THAT(Open(), IsOk());
   ExpectSession(1);
+}
+
+// A folder as a server before this one left it (tests/data/store/SOURCE.md).
+TEST_F(DurableStoreTest, AFolderFromBeforeThereWereCasesKeepsAllThatItHadAndTakesCases) {
+  constexpr int kStepsOfVersion2 = 16;
+  std::filesystem::copy(testing::SourcePath("tests/data/store/version2"), path_,
+                        std::filesystem::copy_options::recursive);
+  std::filesystem::permissions(path_, std::filesystem::perms::owner_all);
+  StoreModel model;
+  for (int number = 0; number < kStepsOfVersion2; ++number) {
+    ApplyStep(number, /*bursts=*/true, &model);
+  }
+  model.uploads.clear();  // not copied
+  ASSERT_FALSE(model.predictions.empty());
+  ASSERT_THAT(Open(), IsOk());
+  EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
+  ASSERT_OK_AND_ASSIGN(const PredictionStore::Page of_no_case,
+                       store_->predictions().List({.case_sha256 = ""}));
+  EXPECT_THAT(of_no_case.records, SizeIs(model.predictions.size()));
+  for (int number = kStepsOfVersion2; number < kStepsOfARound; ++number) {
+    ASSERT_THAT(RunStep(number, /*bursts=*/true, *store_), IsOk());
+    ApplyStep(number, /*bursts=*/true, &model);
+  }
+  EXPECT_THAT(model.cases, SizeIs(1));
+  ASSERT_THAT(Open(), IsOk());
+  EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
 }
 
 TEST_F(DurableStoreTest, ASecondServerIsRefused) {

@@ -107,6 +107,20 @@ TEST_P(PredictionStoreContractTest, ListsByOwnerAndSessionInOrderPageAfterPage) 
   EXPECT_THAT(store_->List({.limit = 0}), StatusIs(absl::StatusCode::kInvalidArgument));
 }
 
+TEST_P(PredictionStoreContractTest, ListsThoseOfACase) {
+  for (const char* id : {"a", "b", "c"}) {
+    PredictionRecord record = SamplePrediction(id);
+    if (*id != 'b') record.case_sha256 = std::string(64, 'f');
+    ASSERT_THAT(store_->Create(record, SamplePositions(1)), IsOk());
+  }
+  ASSERT_OK_AND_ASSIGN(PredictionStore::Page page,
+                       store_->List({.case_sha256 = std::string(64, 'f')}));
+  EXPECT_THAT(Ids(page), ElementsAre("a", "c"));
+  EXPECT_EQ(page.records[0].case_sha256, std::string(64, 'f'));
+  ASSERT_OK_AND_ASSIGN(page, store_->List({.case_sha256 = ""}));
+  EXPECT_THAT(Ids(page), ElementsAre("b"));
+}
+
 TEST(InMemoryPredictionStoreTest, HoldsSoManyBytesAndAgainWhenSomeAreDeleted) {
   const auto bytes =
       static_cast<int64_t>(SamplePositions(1).size() + SamplePrediction("a").metadata.size());

@@ -3,11 +3,15 @@
 
 #include "tests/server/store/store_samples.h"
 
+#include <memory>
 #include <numeric>
 #include <random>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+
+#include "core/base/status_macros.h"
+#include "core/mesh_payload/sha256.h"
 
 namespace tissueform {
 namespace {
@@ -85,6 +89,40 @@ PredictionRecord SamplePrediction(const std::string& id, const std::string& owne
 
 std::string SamplePositions(int number, int64_t vertex_count) {
   return SampleBytes(number, static_cast<size_t>(vertex_count) * 12);
+}
+
+std::string SampleCase(int number, size_t size) { return SampleBytes(number, size); }
+
+CaseRecord CaseRecordOf(const std::string& bytes) {
+  return {.sha256 = Sha256Hex({bytes}),
+          .owner = "planner",
+          .title = "head, from the right",
+          .total_bytes = static_cast<int64_t>(bytes.size()),
+          .created_s = 1234,
+          .last_used_s = 1234};
+}
+
+absl::StatusOr<CaseRecord> KeepCase(CaseStore& store, const CaseRecord& record,
+                                    const std::string& bytes, int most) {
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<CaseWriter> writer, store.Begin(record, most));
+  const size_t half = bytes.size() / 2;
+  TF_RETURN_IF_ERROR(writer->Write(0, absl::string_view(bytes).substr(0, half)));
+  TF_RETURN_IF_ERROR(
+      writer->Write(static_cast<int64_t>(half), absl::string_view(bytes).substr(half)));
+  return writer->Finish();
+}
+
+absl::StatusOr<std::string> ReadWholeCase(CaseStore& store, const std::string& sha256,
+                                          int64_t now_s) {
+  constexpr int64_t kPieceBytes = 999;
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<CaseReader> reader, store.Open(sha256, now_s));
+  std::string bytes;
+  while (static_cast<int64_t>(bytes.size()) < reader->total_bytes()) {
+    TF_ASSIGN_OR_RETURN(const std::string piece,
+                        reader->Read(static_cast<int64_t>(bytes.size()), kPieceBytes));
+    bytes += piece;
+  }
+  return bytes;
 }
 
 }  // namespace tissueform

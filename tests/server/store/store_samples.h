@@ -6,7 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "absl/status/statusor.h"
+
 #include "core/mesh_payload/mesh_payload.h"
+#include "server/store/case_store.h"
 #include "server/store/mesh_store.h"
 #include "server/store/prediction_store.h"
 #include "server/store/session_record.h"
@@ -30,5 +33,15 @@ std::vector<HandlePose> SamplePoses(int number);
 PredictionRecord SamplePrediction(const std::string& id, const std::string& owner = "planner",
                                   const std::string& session = "s", int64_t vertex_count = 40);
 std::string SamplePositions(int number, int64_t vertex_count = 40);
+
+// The file of a case, and what is said of it.
+std::string SampleCase(int number, size_t size = 5000);
+CaseRecord CaseRecordOf(const std::string& bytes);
+// Sends it in two pieces.
+absl::StatusOr<CaseRecord> KeepCase(CaseStore& store, const CaseRecord& record,
+                                    const std::string& bytes, int most = 100);
+// All of it, in pieces.
+absl::StatusOr<std::string> ReadWholeCase(CaseStore& store, const std::string& sha256,
+                                          int64_t now_s = 0);
 
 }  // namespace tissueform

@@ -38,6 +38,9 @@ enum Step {
   kDeletePrediction,
   kDropUpload,
   kBurst,
+  kKeepErasedCase,
+  kKeepCase,
+  kDeleteCase,
 };
 
 constexpr int kBurstCalls = 6;
@@ -56,6 +59,16 @@ int UploadMesh(int round) { return 1002 + 10 * round; }
 int DroppedMesh(int round) { return 1003 + 10 * round; }
 int KeptPositions(int round) { return 1004 + 10 * round; }
 int ErasedPositions(int round) { return 1005 + 10 * round; }
+
+int KeptCase(int round) { return 1006 + 10 * round; }
+int ErasedCase(int round) { return 1007 + 10 * round; }
+
+std::string NameOfCase(int number) { return CaseRecordOf(SampleCase(number)).sha256; }
+
+absl::Status Keep(int number, Stores& stores) {
+  const std::string bytes = SampleCase(number);
+  return KeepCase(stores.cases(), CaseRecordOf(bytes), bytes).status();
+}
 
 SessionRecord KeptSession(int round) { return SampleSession(Kept(round), round); }
 
@@ -174,6 +187,25 @@ absl::Status CheckPredictions(const StoreModel& acknowledged, const StoreModel& 
   return absl::OkStatus();
 }
 
+absl::Status CheckCases(const StoreModel& acknowledged, const StoreModel& begun,
+                        DurableStore& store) {
+  for (const int number : acknowledged.cases) {
+    const absl::StatusOr<std::string> read = ReadWholeCase(store.cases(), NameOfCase(number));
+    if (absl::IsNotFound(read.status()) && begun.cases.count(number) == 0) continue;
+    TF_RETURN_IF_ERROR(read.status());
+    if (*read != SampleCase(number)) return Differs("a case");
+  }
+  TF_ASSIGN_OR_RETURN(const CaseStore::Page page, store.cases().List({.limit = 10000}));
+  std::set<std::string> allowed;
+  for (const int number : acknowledged.cases) allowed.insert(NameOfCase(number));
+  for (const int number : begun.cases) allowed.insert(NameOfCase(number));
+  for (const CaseRecord& record : page.records) {
+    if (allowed.count(record.sha256) == 0) return Differs("the list of cases");
+    TF_RETURN_IF_ERROR(ReadWholeCase(store.cases(), record.sha256).status());
+  }
+  return absl::OkStatus();
+}
+
 // Goes on with each upload to its end: its digest proves every byte before.
 absl::Status CheckUploads(const StoreModel& acknowledged, const StoreModel& begun,
                           DurableStore& store) {
@@ -258,6 +290,17 @@ void ApplyStep(int number, bool bursts, StoreModel* model) {
             SerializeRecord(SampleSession(Burst(round, call), call));
       }
       break;
+    case kKeepErasedCase:
+      model->cases.insert(ErasedCase(round));
+      break;
+    case kKeepCase:
+      model->cases.insert(KeptCase(round));
+      break;
+    case kDeleteCase:
+      model->cases.erase(ErasedCase(round));
+      model->erased.insert(NameOfCase(ErasedCase(round)));
+      model->erased_blobs.insert(NameOfCase(ErasedCase(round)));
+      break;
   }
 }
 
@@ -298,6 +341,12 @@ absl::Status RunStep(int number, bool bursts, Stores& stores) {
       return stores.uploads().Drop(NameOf(DroppedMesh(round)));
     case kBurst:
       return bursts ? RunBurst(round, stores) : absl::OkStatus();
+    case kKeepErasedCase:
+      return Keep(ErasedCase(round), stores);
+    case kKeepCase:
+      return Keep(KeptCase(round), stores);
+    case kDeleteCase:
+      return stores.cases().Delete(NameOfCase(ErasedCase(round)));
   }
   return absl::OkStatus();
 }
@@ -308,6 +357,7 @@ absl::Status CheckAgainst(const StoreModel& acknowledged, const StoreModel& begu
   TF_RETURN_IF_ERROR(CheckSessions(acknowledged, begun, store));
   TF_RETURN_IF_ERROR(CheckMeshes(acknowledged, begun, store));
   TF_RETURN_IF_ERROR(CheckPredictions(acknowledged, begun, store));
+  TF_RETURN_IF_ERROR(CheckCases(acknowledged, begun, store));
   return CheckUploads(acknowledged, begun, store);
 }
 

@@ -19,6 +19,7 @@ struct StoreModel {
   std::map<std::string, std::string> sessions;  // id -> SerializeRecord
   std::set<int> meshes;                         // numbers of SamplePayload
   std::map<std::string, int> predictions;       // id -> number of SamplePositions
+  std::set<int> cases;                          // numbers of SampleCase
   std::map<int, int64_t> uploads;               // number of SamplePayload -> bytes committed
   std::set<std::string> erased;                 // texts that nobody may find any longer
   std::set<std::string> erased_blobs;           // names of their files
@@ -27,7 +28,7 @@ struct StoreModel {
 // The writes of a server, one after the other: step `number` is always the same. Every kind of
 // write comes once in kStepsOfARound. What is deleted was written in the same round, and something
 // that stays was written between, so that a lost deletion shows.
-inline constexpr int kStepsOfARound = 16;
+inline constexpr int kStepsOfARound = 19;
 
 // Tells the model. `bursts`: steps of several calls at once are made, too.
 void ApplyStep(int number, bool bursts, StoreModel* model);

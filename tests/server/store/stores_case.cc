@@ -27,6 +27,7 @@ class ScratchDurableStore final : public Stores {
   MeshStore& meshes() override { return store_->meshes(); }
   UploadStore& uploads() override { return store_->uploads(); }
   PredictionStore& predictions() override { return store_->predictions(); }
+  CaseStore& cases() override { return store_->cases(); }
 
  private:
   const ScratchFolder folder_;

@@ -96,7 +96,7 @@ TEST_F(PlanBuildTest, PlanIsBuiltReportedAndCanBeRun) {
               ElementsAre("head.vtu", "pictures/bone.png", "pictures/constraints.png",
                           "pictures/coverage.png", "pictures/quality.png", "pictures/skin.png",
                           "pictures/slices.png", "pictures/tets.png", "plan.json", "report.html",
-                          "report.json", "segments/mandible.stl"));
+                          "report.json", "segments/mandible.stl", "viewer.glb"));
   const auto report = nlohmann::json::parse(Read("head/report.json"));
   EXPECT_EQ(report["format"], "tissueform-plan-report");
   EXPECT_EQ(report["input"]["size_voxels"], nlohmann::json({64, 64, 93}));
@@ -127,7 +127,7 @@ TEST_F(PlanBuildTest, SameInputGivesTheSameBytesWithAnyNumberOfThreads) {
   ASSERT_THAT(Build({"--out", "two", "--no-pictures", "--accept-defects", "--threads", "2"}),
               Succeeds());
   ASSERT_THAT(AllFiles("one"), ElementsAre("head.vtu", "plan.json", "report.html", "report.json",
-                                           "segments/mandible.stl"));
+                                           "segments/mandible.stl", "viewer.glb"));
   EXPECT_EQ(AllFiles("one"), AllFiles("two"));
   for (const std::string& file : AllFiles("one")) {
     EXPECT_TRUE(Read("one/" + file) == Read("two/" + file)) << file;
@@ -144,7 +144,7 @@ TEST_F(PlanBuildTest, PlanThatMissesARequirementIsKeptAndNotReady) {
   EXPECT_THAT(refused.out, AllOf(HasSubstr("NOT ready"), Not(HasSubstr("plan is ready"))));
   EXPECT_EQ(nlohmann::json::parse(Read("head/report.json"))["ready"], false);
   EXPECT_THAT(AllFiles("head"), ElementsAre("head.vtu", "plan.json", "report.html", "report.json",
-                                            "segments/mandible.stl"));
+                                            "segments/mandible.stl", "viewer.glb"));
 
   const ProcessResult accepted = Build({"--out", "accepted", "--no-pictures", "--accept-defects"});
   EXPECT_THAT(accepted, Succeeds());

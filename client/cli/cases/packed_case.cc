@@ -1,0 +1,89 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/cases/packed_case.h"
+
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+
+#include "client/cli/cases/plan_case.h"
+#include "client/cli/online/upload_lines.h"
+#include "core/base/software_version.h"
+#include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
+#include "core/case_file/case_writer.h"
+#include "core/case_file/viewer_file.h"
+#include "core/json/json_file.h"
+#include "core/mesh_payload/sha256.h"
+
+namespace tissueform {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Of the segments, for a folder may be named after a patient.
+std::string TitleOf(const CaseFile& contents) {
+  const auto add_label = [](std::string* text, const CaseHandle& h) { *text += h.label; };
+  return absl::StrJoin(contents.handles, ", ", add_label).substr(0, 256);
+}
+
+// What lies beside the mesh and belongs to it. Nothing where there is none.
+absl::StatusOr<std::optional<ViewerFile>> FindViewer(const std::string& mesh_path) {
+  const fs::path path = fs::path(mesh_path).parent_path() / kViewerFile;
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) return std::nullopt;
+  TF_ASSIGN_OR_RETURN(ViewerFile viewer, ReadViewer(path.string()));
+  TF_ASSIGN_OR_RETURN(const std::string mesh_sha256, MeshFileSha256(mesh_path));
+  if (viewer.mesh_file_sha256 == mesh_sha256) return viewer;
+  return absl::FailedPreconditionError(
+      absl::StrCat(path.string(), " belongs to another mesh than ", mesh_path,
+                   "; build the plan again, or take the file away to show the mesh alone"));
+}
+
+MeshPayloadView PayloadOf(const CaseMesh& mesh) {
+  return {.shape = {mesh.vertex_count, mesh.tet_count, mesh.cell_arrays},
+          .segments = {mesh.payload}};
+}
+
+}  // namespace
+
+absl::StatusOr<PackedCase> PackPlan(const std::string& plan_path, const PlanReadOptions& reading,
+                                    const std::string& title) {
+  TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(plan_path, "plan", kMaxPlanBytes));
+  TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(plan_path, reading));
+  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
+  TF_ASSIGN_OR_RETURN(std::optional<ViewerFile> viewer, FindViewer(plan.mesh_path));
+  CaseFile about;
+  about.title = title;
+  about.software = absl::StrCat("tissueform ", SoftwareVersion());
+  about.commit = SoftwareCommit();
+  about.created = absl::FormatTime("%Y-%m-%dT%H:%M:%SZ", absl::Now(), absl::UTCTimeZone());
+  about.plan_sha256 = Sha256Hex({text});
+  PackedCase packed;
+  TF_ASSIGN_OR_RETURN(packed.contents, CaseOfPlan(problem, std::move(about), std::move(viewer)));
+  if (packed.contents.title.empty()) packed.contents.title = TitleOf(packed.contents);
+  TF_ASSIGN_OR_RETURN(packed.bytes, SerializeCase(packed.contents));
+  return packed;
+}
+
+absl::StatusOr<v1::Case> PublishCase(TissueformClient* client, const CaseFile& contents,
+                                     const std::string& bytes, const std::string& title) {
+  const Stopwatch stopwatch;
+  const auto print = [](const std::string& line) { absl::FPrintF(stderr, "%s\n", line); };
+  const auto seconds = [&stopwatch] { return stopwatch.Seconds(); };
+  UploadLines mesh_lines(print, seconds);
+  TF_RETURN_IF_ERROR(client->UploadMesh(PayloadOf(contents.mesh), mesh_lines.Options()).status());
+  UploadLines case_lines(print, seconds);
+  return client->cases().Upload(bytes, title, case_lines.Options());
+}
+
+}  // namespace tissueform

@@ -1,0 +1,34 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+
+#include "absl/status/statusor.h"
+
+#include "client/cpp/tissueform_client.h"
+#include "core/case_file/case_file.h"
+#include "core/planning/plan_io.h"
+
+namespace tissueform {
+
+struct PackedCase {
+  CaseFile contents;
+  std::string bytes;  // of the file
+};
+
+// The case of the plan in a file, with what lies beside its mesh for viewers. An empty title
+// becomes the segments' names.
+//
+// Errors: those of ReadPlan, ResolvePlan, CaseOfPlan and SerializeCase; FailedPrecondition (what
+// lies beside the mesh belongs to another one).
+absl::StatusOr<PackedCase> PackPlan(const std::string& plan_path, const PlanReadOptions& reading,
+                                    const std::string& title);
+
+// Gives a server the case and first the mesh in it, so that whoever sees the case can open it.
+// Lines about what takes long go to stderr. Errors: those of TissueformClient.
+absl::StatusOr<v1::Case> PublishCase(TissueformClient* client, const CaseFile& contents,
+                                     const std::string& bytes, const std::string& title);
+
+}  // namespace tissueform

@@ -1,0 +1,21 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// Fails when the built planner is larger, gzipped, than a slow network takes in a second or so.
+
+import { readFileSync, readdirSync } from "node:fs";
+import { gzipSync } from "node:zlib";
+
+const MOST_BYTES = 300 * 1024;
+const folder = new URL("../../build/web/", import.meta.url);
+
+let total = 0;
+for (const entry of readdirSync(folder, { recursive: true, withFileTypes: true })) {
+  if (!entry.isFile()) continue;
+  const path = `${entry.parentPath ?? entry.path}/${entry.name}`;
+  const bytes = gzipSync(readFileSync(path), { level: 9 }).length;
+  total += bytes;
+  console.log(`${String(bytes).padStart(8)}  ${entry.name}`);
+}
+console.log(`${String(total).padStart(8)}  in all; at most ${MOST_BYTES}`);
+process.exit(total <= MOST_BYTES ? 0 : 1);

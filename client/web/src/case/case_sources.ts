@@ -1,0 +1,74 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { Code, toCallError } from "../calls/call_error";
+import type { Gateway } from "../calls/gateway";
+import type { Case } from "../generated/tissueform/v1/case_pb";
+import type { CaseSource } from "./case_file";
+
+const PAGE_SIZE = 200;
+
+/** A file of this computer. */
+export function fileSource(file: Blob): CaseSource {
+  return {
+    totalBytes: file.size,
+    async read(offset, length, onBytes) {
+      const bytes = new Uint8Array(await file.slice(offset, offset + length).arrayBuffer());
+      if (bytes.length !== length) throw new Error("the file has become shorter: drop it again");
+      onBytes?.(length);
+      return bytes;
+    },
+  };
+}
+
+/** A case that a server keeps. A download that breaks off goes on where it was, three times. */
+export function serverSource(gateway: Gateway, entry: Pick<Case, "name" | "totalBytes">): CaseSource {
+  return {
+    totalBytes: Number(entry.totalBytes),
+    async read(offset, length, onBytes) {
+      const bytes = new Uint8Array(length);
+      let done = 0;
+      for (let attempt = 0; done < length; ++attempt) {
+        try {
+          const request = { name: entry.name, readOffset: BigInt(offset + done), readLimit: BigInt(length - done) };
+          for await (const { data } of gateway.cases.readCase(request, { timeoutMs: 0 })) {
+            if (done + data.length > length) throw new Error("the server sent more of the case than it was asked for");
+            bytes.set(data, done);
+            done += data.length;
+            onBytes?.(done);
+          }
+          if (done < length) throw new Error("the server sent less of the case than it was asked for");
+        } catch (thrown) {
+          const error = toCallError(thrown);
+          if (attempt >= 3 || error.code !== Code.Unavailable) throw error;
+        }
+      }
+      return bytes;
+    },
+  };
+}
+
+/** All cases of the server. Rejects with a CallError. */
+export async function listCases(gateway: Gateway): Promise<Case[]> {
+  const cases: Case[] = [];
+  let pageToken = "";
+  try {
+    do {
+      const page = await gateway.cases.listCases({ pageSize: PAGE_SIZE, pageToken });
+      cases.push(...page.cases);
+      pageToken = page.nextPageToken;
+    } while (pageToken !== "");
+  } catch (thrown) {
+    throw toCallError(thrown);
+  }
+  return cases;
+}
+
+/** In hexadecimal digits. Browsers do this on pages of https and of this computer only. */
+export async function sha256Of(file: Blob): Promise<string> {
+  if (crypto.subtle === undefined) {
+    throw new Error("this browser checks files on https pages only: open the planner by https, or publish the case by tissueform case publish");
+  }
+  const digest = await crypto.subtle.digest("SHA-256", await file.arrayBuffer());
+  return Array.from(new Uint8Array(digest), (byte) => byte.toString(16).padStart(2, "0")).join("");
+}

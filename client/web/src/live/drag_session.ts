@@ -1,0 +1,162 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { create } from "@bufbuild/protobuf";
+import { CallError, Code } from "../calls/call_error";
+import type { CallSocket } from "../calls/call_socket";
+import { type Frame, asFloats } from "../calls/frame";
+import { type Gateway, sessionMetadata } from "../calls/gateway";
+import {
+  type DeformConfiguration,
+  type DeformFrame,
+  type DeformNotice,
+  type DeformResponse,
+  DeformRequestSchema,
+  DeformService,
+  type DeformStarted,
+} from "../generated/tissueform/v1/deform_service_pb";
+import type { HandlePose } from "../generated/tissueform/v1/geometry_pb";
+import { Backoff, type Timer, browserTimer } from "./backoff";
+
+/** A frame as the page shows it. */
+export interface Picture {
+  frame: DeformFrame;
+  /** Three of each vertex of the configuration, mm. */
+  positions: Float32Array;
+  /** One of each vertex, mm; null where the frame tells none. */
+  uncertainty: Float32Array | null;
+  /** From sending its pose to now. */
+  roundTripMs: number;
+}
+
+/** What a drag tells its owner. */
+export interface DragListener {
+  onStarted(started: DeformStarted): void;
+  /** `used` is to be called once the picture was shown: the server waits for it. */
+  onPicture(picture: Picture, used: () => void): void;
+  onNotice(notice: DeformNotice): void;
+  /** The connection broke off; the drag goes on in `delayMs`. */
+  onBroken(error: CallError, delayMs: number): void;
+  /** The drag is over, for a reason that trying again does not mend. */
+  onEnd(error: CallError): void;
+}
+
+/** Answers that were not acknowledged by a picture of this age are no longer waited for. */
+const KEPT_SEND_TIMES = 256;
+
+/**
+ * A drag of one session over one socket at a time: the newest poses are sent, frames come back, and where the connection breaks
+ * off another one is opened, which is sent the newest poses again. Commits are repeated until the server says that it keeps them.
+ */
+export class DragSession {
+  private call: CallSocket<typeof DeformService.method.deform> | null = null;
+  private stopTimer: (() => void) | null = null;
+  private readonly backoff = new Backoff();
+  private isClosed = false;
+  private isStarted = false;
+
+  private sequence = 0n;
+  private poses: HandlePose[] | null = null;
+  /** Of the newest pose that is to be kept and of which the server has not said so. */
+  private uncommitted: bigint | null = null;
+  private readonly sendTimes = new Map<bigint, number>();
+
+  constructor(
+    private readonly gateway: Pick<Gateway, "open">,
+    private readonly configuration: DeformConfiguration,
+    private readonly listener: DragListener,
+    private readonly timer: Timer = browserTimer,
+    private readonly now: () => number = () => performance.now(),
+  ) {
+    this.connect();
+  }
+
+  /** Replaces poses that wait. `commit`: they are to be kept, as at the end of a movement. */
+  sendPoses(poses: HandlePose[], commit: boolean): void {
+    this.poses = poses;
+    this.sequence += 1n;
+    if (commit) this.uncommitted = this.sequence;
+    // Without a server that listens the newest poses wait: they are sent when it does.
+    if (this.isStarted) this.sendNewest(commit);
+  }
+
+  /** Whether the newest poses were told to be kept. */
+  get isCommitted(): boolean {
+    return this.uncommitted === null;
+  }
+
+  /** Nothing is told afterwards. */
+  close(): void {
+    this.isClosed = true;
+    this.stopTimer?.();
+    this.call?.cancel();
+  }
+
+  private connect(): void {
+    this.isStarted = false;
+    const call = this.gateway.open(
+      DeformService.method.deform,
+      { onMessage: (message, frame) => this.receive(message, frame), onEnd: (error) => this.broken(error) },
+      { metadata: sessionMetadata(this.configuration.session) },
+    );
+    call.send(create(DeformRequestSchema, { message: { case: "configuration", value: this.configuration } }));
+    this.call = call;
+  }
+
+  private sendNewest(commit: boolean): void {
+    if (this.poses === null) return;
+    this.sendTimes.set(this.sequence, this.now());
+    if (this.sendTimes.size > KEPT_SEND_TIMES) this.sendTimes.delete(this.sendTimes.keys().next().value ?? 0n);
+    const value = { $typeName: "tissueform.v1.PoseUpdate" as const, sequence: this.sequence, poses: this.poses, commit };
+    this.call?.send(create(DeformRequestSchema, { message: { case: "pose", value } }));
+  }
+
+  private receive(response: DeformResponse, frame: Frame): void {
+    const { message } = response;
+    if (message.case === "started") this.start(message.value);
+    else if (message.case === "frame") this.show(message.value, frame);
+    else if (message.case === "notice") this.notice(message.value);
+  }
+
+  private start(started: DeformStarted): void {
+    this.isStarted = true;
+    this.backoff.reset();
+    this.listener.onStarted(started);
+    this.sendNewest(this.uncommitted !== null);
+  }
+
+  private show(frame: DeformFrame, raw: Frame): void {
+    const uncertainty = frame.uncertaintyP95Mm.length === 0 ? null : asFloats(raw, frame.uncertaintyP95Mm);
+    const picture = {
+      frame,
+      positions: asFloats(raw, frame.positions),
+      uncertainty,
+      roundTripMs: this.now() - (this.sendTimes.get(frame.sequence) ?? this.now()),
+    };
+    const call = this.call;
+    this.listener.onPicture(picture, () => {
+      const value = { $typeName: "tissueform.v1.FrameAck" as const, sequence: frame.sequence, refinement: frame.refinement };
+      call?.send(create(DeformRequestSchema, { message: { case: "ack", value } }));
+    });
+  }
+
+  private notice(notice: DeformNotice): void {
+    const { notice: what } = notice;
+    if (what.case === "committed" && this.uncommitted !== null && what.value.sequence >= this.uncommitted) this.uncommitted = null;
+    this.listener.onNotice(notice);
+  }
+
+  private broken(error: CallError | null): void {
+    if (this.isClosed) return;
+    this.isStarted = false;
+    const cause = error ?? new CallError(Code.Unavailable, "the server has ended the drag");
+    if (!cause.isPassing) {
+      this.isClosed = true;
+      this.listener.onEnd(cause);
+      return;
+    }
+    const delay = this.backoff.next();
+    this.stopTimer = this.timer(() => this.connect(), delay);
+    this.listener.onBroken(cause, delay);
+  }
+}

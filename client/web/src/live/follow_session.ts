@@ -1,0 +1,111 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { create } from "@bufbuild/protobuf";
+import { CallError, Code } from "../calls/call_error";
+import type { CallSocket } from "../calls/call_socket";
+import { type Frame, asFloats } from "../calls/frame";
+import { type Gateway, sessionMetadata } from "../calls/gateway";
+import {
+  type DeformNotice,
+  DeformService,
+  type WatchForm,
+  type WatchFrame,
+  WatchOrigin,
+  WatchRequestSchema,
+  type WatchResponse,
+} from "../generated/tissueform/v1/deform_service_pb";
+import { PositionEncoding } from "../generated/tissueform/v1/geometry_pb";
+import { Backoff, type Timer, browserTimer } from "./backoff";
+
+/** What a follower is shown. */
+export interface FollowedPicture {
+  frame: WatchFrame;
+  origin: WatchOrigin;
+  /** Vertices of the tet mesh in the order of `positions`; empty: all. */
+  vertices: number[];
+  positions: Float32Array;
+}
+
+export interface FollowListener {
+  /** `used` is to be called once the picture was shown. */
+  onPicture(picture: FollowedPicture, used: () => void): void;
+  onNotice(notice: DeformNotice): void;
+  onStarted(): void;
+  onBroken(error: CallError, delayMs: number): void;
+  onEnd(error: CallError): void;
+}
+
+/** Follows a session that somebody else drags; opens the watch again where the connection breaks off. */
+export class FollowSession {
+  private call: CallSocket<typeof DeformService.method.watch> | null = null;
+  private stopTimer: (() => void) | null = null;
+  private readonly backoff = new Backoff();
+  private isClosed = false;
+  private watch = "";
+  private form: WatchForm | null = null;
+
+  constructor(
+    private readonly gateway: Pick<Gateway, "open"> & { deform: Pick<Gateway["deform"], "acknowledgeWatch"> },
+    private readonly session: string,
+    private readonly listener: FollowListener,
+    private readonly timer: Timer = browserTimer,
+  ) {
+    this.connect();
+  }
+
+  /** Nothing is told afterwards. */
+  close(): void {
+    this.isClosed = true;
+    this.stopTimer?.();
+    this.call?.cancel();
+  }
+
+  private connect(): void {
+    this.call = this.gateway.open(
+      DeformService.method.watch,
+      { onMessage: (message, frame) => this.receive(message, frame), onEnd: (error) => this.broken(error) },
+      { metadata: sessionMetadata(this.session) },
+    );
+    this.call.send(create(WatchRequestSchema, { session: this.session }));
+    this.call.halfClose();
+  }
+
+  private receive(response: WatchResponse, raw: Frame): void {
+    const { message } = response;
+    if (message.case === "started") {
+      this.watch = message.value.watch;
+      this.form = message.value.form ?? null;
+      this.backoff.reset();
+      this.listener.onStarted();
+    } else if (message.case === "form") this.form = message.value;
+    else if (message.case === "frame") this.show(message.value, raw);
+    else if (message.case === "notice") this.listener.onNotice(message.value);
+  }
+
+  private show(frame: WatchFrame, raw: Frame): void {
+    if (frame.frame === undefined || this.form === null) return;
+    if (this.form.encoding === PositionEncoding.INT16_ZSTD) {
+      throw new CallError(Code.Unimplemented, "who drags this session packs the frames, which this page cannot unpack: ask for another link");
+    }
+    const positions = asFloats(raw, frame.frame.positions);
+    const watch = this.watch;
+    this.listener.onPicture({ frame, origin: frame.origin, vertices: this.form.vertices, positions }, () => {
+      // A watch that has ended meanwhile needs no acknowledgement; its end is told by itself.
+      this.gateway.deform.acknowledgeWatch({ watch, number: frame.number }, { headers: sessionMetadata(this.session) }).catch(() => {});
+    });
+  }
+
+  private broken(error: CallError | null): void {
+    if (this.isClosed) return;
+    const cause = error ?? new CallError(Code.Unavailable, "the server has ended the watch");
+    if (!cause.isPassing) {
+      this.isClosed = true;
+      this.listener.onEnd(cause);
+      return;
+    }
+    const delay = this.backoff.next();
+    this.stopTimer = this.timer(() => this.connect(), delay);
+    this.listener.onBroken(cause, delay);
+  }
+}

@@ -1,0 +1,109 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import type { Gateway } from "../calls/gateway";
+import type { CaseFile } from "../case/case_file";
+import { button, el, onceAPicture } from "../panels/dom";
+import { exportPanel } from "../panels/export_panel";
+import { bindKeys, helpDialog } from "../panels/keyboard";
+import { legendBox, mapPanel, modelPanel } from "../panels/maps_panel";
+import { movementsPanel } from "../panels/movements_panel";
+import { predictionsPanel } from "../panels/predictions_panel";
+import { segmentsPanel } from "../panels/segments_panel";
+import { noticeBox, statusBar } from "../panels/status_bar";
+import { pictureMarks, viewBar } from "../panels/view_bar";
+import { HeadView } from "../scene/head_view";
+import { Workbench } from "../workbench/workbench";
+import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
+
+/** Where a head is drawn, with what lies over the picture; both pages with a head have it. */
+export function pictureBox(file: CaseFile, onNotice: (text: string) => void): { element: HTMLElement; view: HeadView } {
+  const element = el("div", { class: "picture", attributes: { role: "region", "aria-label": "Picture of the head" } });
+  let update = () => {};
+  const view = new HeadView(element, file, {
+    onDrawn: () => update(),
+    onContext: (isLost) => onNotice(isLost ? "The browser took the graphics card away; the picture comes back by itself." : "The picture is back."),
+  });
+  view.stage.canvas.setAttribute("aria-label", "Head in three dimensions. Press the question mark for keys.");
+  view.stage.canvas.setAttribute("role", "application");
+  const marks = pictureMarks(view);
+  update = onceAPicture(marks.update);
+  element.append(marks.element);
+  if (!view.stage.hasRenderer) {
+    const text = "This browser shows no 3D pictures (WebGL is off or missing). Numbers, predictions and export work all the same.";
+    element.append(el("p", { class: "no-picture", text, attributes: { role: "alert" } }));
+  }
+  marks.update();
+  return { element, view };
+}
+
+/** An answer that takes longer than this is waited for in words. */
+const LATE_MS = 500;
+
+/** The planner of one case. `followLink`: for who follows this session. */
+export function plannerPage(
+  gateway: Gateway,
+  file: CaseFile,
+  caseName: string,
+  models: readonly ModelInfo[],
+  followLink: (session: string) => string,
+  onLeave: () => void,
+): { element: HTMLElement; bench: Workbench } {
+  const notice = noticeBox();
+  const { element: picture, view } = pictureBox(file, notice.show);
+  const bench = new Workbench(gateway, file, caseName, view, models);
+  const leave = () => void bench.live.end().then(onLeave);
+  const status = statusBar(file.manifest.title === "" ? "Case" : file.manifest.title, () => followLink(bench.live.session), leave, () => void bench.live.retry());
+  bench.connection.watch(status.connection);
+  bench.followers.watch(status.followers);
+  const showAge = () => {
+    if (bench.waitingMs > LATE_MS) status.waiting(bench.waitingMs);
+    else if (bench.picture.value !== null) status.answered(bench.picture.value.roundTripMs);
+  };
+  bench.picture.watch(onceAPicture(showAge));
+  setInterval(showAge, LATE_MS);
+  bench.notice.watch(notice.show);
+
+  const help = helpDialog();
+  bindKeys(bench, help);
+  bindPicking(bench);
+  picture.append(legendBox(bench), gizmoModes(bench, help), notice.element);
+  const panel = el("aside", { attributes: { "aria-label": "Plan" } }, [
+    segmentsPanel(bench),
+    movementsPanel(bench),
+    modelPanel(bench),
+    mapPanel(bench),
+    predictionsPanel(bench),
+    exportPanel(bench),
+  ]);
+  const element = el("div", { class: "planner" }, [status.element, el("main", {}, [picture, viewBar(view)]), panel, help]);
+  return { element, bench };
+}
+
+function gizmoModes(bench: Workbench, help: HTMLDialogElement): HTMLElement {
+  const shift = button("Shift", () => set(true));
+  const turn = button("Turn", () => set(false));
+  const set = (isShift: boolean) => {
+    bench.gizmo.setMode(isShift ? "translate" : "rotate");
+    shift.setAttribute("aria-pressed", String(isShift));
+    turn.setAttribute("aria-pressed", String(!isShift));
+  };
+  set(true);
+  const keys = button("Keys", () => help.showModal());
+  return el("div", { class: "gizmo-modes", attributes: { role: "group", "aria-label": "Gizmo" } }, [shift, turn, keys]);
+}
+
+const CLICK_PX = 4;
+
+/** A click on a segment, not a turn of the picture, takes it in the hand. */
+function bindPicking(bench: Workbench): void {
+  const { canvas } = bench.view.stage;
+  let from: [number, number] | null = null;
+  canvas.addEventListener("pointerdown", (event) => (from = bench.gizmo.isTouched ? null : [event.offsetX, event.offsetY]));
+  canvas.addEventListener("pointerup", (event) => {
+    if (from === null || Math.hypot(event.offsetX - from[0], event.offsetY - from[1]) > CLICK_PX) return;
+    const handle = bench.view.segmentAt(event.offsetX, event.offsetY);
+    const index = bench.plan.handles.findIndex(({ name }) => name === handle);
+    if (index >= 0) bench.selected.value = index;
+  });
+}

@@ -1,0 +1,37 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { sentenceOf } from "../calls/call_error";
+import { download, toPly, toPng, toStl } from "../exports/files";
+import { exportedSurfaces, planDocument, provenanceLines } from "../exports/plan_export";
+import type { Workbench } from "../workbench/workbench";
+import { button, el, section } from "./dom";
+
+/** What is shown, as files. Names of files hold nothing of the patient. */
+export function exportPanel(bench: Workbench): HTMLElement {
+  const tell = (run: () => void | Promise<void>) => async () => {
+    try {
+      await run();
+    } catch (thrown) {
+      bench.notice.value = sentenceOf(thrown);
+    }
+  };
+  const save = (name: string, type: string, content: BlobPart) => download(name, new Blob([content], { type }));
+  const remark = () => `Model ${bench.modelInfo(bench.model.value)?.name ?? "unknown"}`;
+  const png = async () => {
+    const picture = bench.view.stage.snapshot();
+    if (picture === null) throw new Error("this browser draws no 3D pictures");
+    const background = getComputedStyle(document.body).backgroundColor;
+    download("tissueform.png", await toPng(picture, background, remark()));
+  };
+  return section("Export", [
+    el("div", { class: "buttons" }, [
+      button("Face STL", tell(() => save("tissueform-face.stl", "model/stl", toStl(exportedSurfaces(bench, "skin"), remark())))),
+      button("All STL", tell(() => save("tissueform-all.stl", "model/stl", toStl(exportedSurfaces(bench, "all"), remark())))),
+      button("Face PLY", tell(() => save("tissueform-face.ply", "application/octet-stream", toPly(exportedSurfaces(bench, "skin"), provenanceLines(bench))))),
+      button("Picture", tell(png)),
+      button("Plan JSON", tell(() => save("tissueform-plan.json", "application/json", planDocument(bench)))),
+    ]),
+    el("p", { class: "quiet", text: "In mm, LPS, as it is shown. Every file says: not a medical device." }),
+  ]);
+}

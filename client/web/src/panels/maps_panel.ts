@@ -1,0 +1,122 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { sentenceOf } from "../calls/call_error";
+import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
+import { VIRIDIS, colorTable } from "../geometry/color_map";
+import { formatNumber } from "../planning/numbers";
+import type { MapLegend } from "../workbench/face_colors";
+import type { MapChoice, Workbench } from "../workbench/workbench";
+import { type Choice, el, newId, onceAPicture, section, select } from "./dom";
+
+interface ModelText {
+  label: string;
+  text: string;
+}
+
+const MODELS: Record<string, ModelText> = {
+  gradient_field: { label: "Gradient field", text: "Shape only, at once. Good for a first look while the bone is in the hand." },
+  arap: { label: "As rigid as possible", text: "Keeps small shapes stiff and iterates. Good where segments only shift; slower." },
+  linear_elastic: { label: "Linear elastic", text: "Tissue as springs by its stiffness, at once. Good to about 5 mm; tells its band of uncertainty." },
+  neo_hookean: { label: "Neo-Hookean", text: "Tissue that keeps its volume under large moves. An estimate while you drag, the full answer when the hand rests." },
+};
+
+export function modelText(name: string): ModelText {
+  return MODELS[name] ?? { label: name, text: "" };
+}
+
+/** Which model answers, in words. */
+export function modelPanel(bench: Workbench): HTMLElement {
+  const name = newId("model");
+  const items = bench.models.map((info) => {
+    const { label, text } = modelText(info.name);
+    const input = el("input", { attributes: { type: "radio", name }, on: { change: () => void bench.chooseModel(info.model) } });
+    bench.model.watch((model) => (input.checked = model === info.model));
+    return el("label", { class: "model" }, [input, el("span", {}, [el("strong", { text: label }), el("small", { text })])]);
+  });
+  const answer = el("p", { class: "quiet" });
+  const show = () => {
+    const text = bench.picture.value === null ? "" : describeAnswer(bench.picture.value);
+    if (answer.textContent !== text) answer.textContent = text;
+  };
+  bench.picture.watch(onceAPicture(show));
+  return section("Model", [el("div", { attributes: { role: "radiogroup", "aria-label": "Model" } }, items), answer]);
+}
+
+function describeAnswer({ summary, isRefining }: NonNullable<Workbench["picture"]["value"]>): string {
+  if (summary === null) return "";
+  if (isRefining) return `Estimate, within about ${formatNumber(Math.max(summary.errorEstimateMm, 0.01), 2)} mm; the full answer follows.`;
+  if (summary.prepared) return `Prepared answer, within ${formatNumber(Math.max(summary.errorBoundMm, 0.01), 2)} mm of the full one.`;
+  if (!summary.converged) return `The full answer was not reached (${formatNumber(100 * summary.load, 0)} % of the move)${summary.obstacle === "" ? "." : `: ${summary.obstacle}.`}`;
+  return "Full answer.";
+}
+
+/** Which map lies on the skin, and what its colours mean. */
+export function mapPanel(bench: Workbench): HTMLElement {
+  const choose = (choice: MapChoice) => {
+    bench.chooseMap(choice).catch((thrown) => (bench.notice.value = sentenceOf(thrown)));
+  };
+  const field = select<MapChoice>("Colours show", mapChoices(bench), choose);
+  const show = () => {
+    const choices = mapChoices(bench);
+    field.set(choices, Math.max(0, choices.findIndex((choice) => isSame(choice.value, bench.map.value))));
+  };
+  bench.map.watch(show);
+  bench.model.watch(show);
+  bench.predictions.watch(show);
+  return section("Map", [field.element]);
+}
+
+function mapChoices(bench: Workbench): Choice<MapChoice>[] {
+  const choices: Choice<MapChoice>[] = [
+    { value: { kind: "none" }, label: "Skin as it looks" },
+    { value: { kind: "movement" }, label: "Movement of the skin" },
+  ];
+  if (bench.hasBand) choices.push({ value: { kind: "band" }, label: "Band of uncertainty" });
+  for (const { model, name } of bench.models) {
+    const { label } = modelText(name);
+    if (model !== bench.model.value) choices.push({ value: { kind: "model", model, label }, label: `Difference to ${label}` });
+  }
+  for (const prediction of bench.predictions.value) {
+    choices.push({ value: { kind: "prediction", prediction }, label: `Difference to “${prediction.title}”` });
+  }
+  return choices;
+}
+
+function isSame(a: MapChoice, b: MapChoice): boolean {
+  const key = (map: MapChoice): DeformationModel | string => {
+    if (map.kind === "model") return map.model;
+    return map.kind === "prediction" ? map.prediction.name : "";
+  };
+  return a.kind === b.kind && key(a) === key(b);
+}
+
+const BAR_WIDTH = 256;
+
+/** The legend over the picture: title, colours, range in mm. */
+export function legendBox(bench: Workbench): HTMLElement {
+  const bar = el("canvas", { attributes: { width: String(BAR_WIDTH), height: "1", role: "img", "aria-label": "Colours from none to most" } });
+  drawBar(bar);
+  const title = el("strong");
+  const ticks = el("div", { class: "ticks" });
+  const largest = el("small");
+  const box = el("div", { class: "legend", attributes: { role: "group", "aria-label": "Legend of the map" } }, [title, bar, ticks, largest]);
+  bench.legend.watch((legend: MapLegend | null) => {
+    box.hidden = legend === null;
+    if (legend === null) return;
+    title.textContent = `${legend.title}, mm`;
+    const decimals = legend.mostMm < 1 ? 2 : 1;
+    ticks.replaceChildren(...[0, 0.5, 1].map((share) => el("span", { text: formatNumber(share * legend.mostMm, decimals) })));
+    largest.textContent = `largest ${formatNumber(legend.largestMm, 2)} mm`;
+  });
+  return box;
+}
+
+function drawBar(bar: HTMLCanvasElement): void {
+  const context = bar.getContext("2d");
+  if (context === null) return;
+  const image = context.createImageData(BAR_WIDTH, 1);
+  const table = colorTable(VIRIDIS);
+  for (let i = 0; i < BAR_WIDTH; ++i) image.data.set([table[3 * i], table[3 * i + 1], table[3 * i + 2], 255], 4 * i);
+  context.putImageData(image, 0, 0);
+}

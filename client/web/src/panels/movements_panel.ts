@@ -1,0 +1,36 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { cell, describeMovement, landmarkMovement } from "../planning/landmarks";
+import type { Workbench } from "../workbench/workbench";
+import { el, onceAPicture, section } from "./dom";
+
+function captionOf(source: string): string {
+  const frame = source === "scanner" ? " Directions are the scanner’s: no head frame was found." : "";
+  return `In mm of the head frame; a dot is less than 0.05.${frame}`;
+}
+
+/** Where landmarks go, in mm of the head frame. */
+export function movementsPanel(bench: Workbench): HTMLElement {
+  const { landmarks, headFrame } = bench.file.manifest;
+  const rows = landmarks.map((landmark) => {
+    const cells = Array.from({ length: 4 }, () => el("td"));
+    const row = el("tr", {}, [el("th", { text: landmark.label, attributes: { scope: "row" } }), ...cells]);
+    return { landmark, row, cells };
+  });
+  const show = () => {
+    for (const { landmark, row, cells } of rows) {
+      const movement = landmarkMovement(landmark, bench.shownPoses, bench.skinPoint, headFrame);
+      const values = [movement.forwardMm, movement.leftMm, movement.upMm, movement.totalMm];
+      values.forEach((value, index) => {
+        const text = cell(value);
+        if (cells[index].textContent !== text) cells[index].textContent = text;
+      });
+      row.title = describeMovement(movement);
+    }
+  };
+  bench.shown.watch(onceAPicture(show));
+  const heads = ["Landmark", "Forward", "Left", "Up", "In all"].map((text) => el("th", { text, attributes: { scope: "col" } }));
+  const table = el("table", {}, [el("caption", { text: captionOf(headFrame.source) }), el("thead", {}, [el("tr", {}, heads)]), el("tbody", {}, rows.map(({ row }) => row))]);
+  return section("Movements", [landmarks.length === 0 ? el("p", { class: "quiet", text: "The case has no landmarks." }) : table]);
+}

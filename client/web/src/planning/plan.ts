@@ -1,0 +1,155 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import type { CaseFile } from "../case/case_file";
+import type { HandleEntry } from "../case/manifest";
+import { History } from "./history";
+import { type MoveKey, NO_MOVE, type Pose, type SegmentMove, between, toMove, toPose } from "../geometry/pose";
+import type { Vector } from "../geometry/rotation";
+
+/** A move for each handle, in the case's order. */
+export type Moves = readonly SegmentMove[];
+
+/** Who changed the plan: so that what shows it need not answer itself. */
+export type PlanListener = (plan: Plan, change: { isFinal: boolean }) => void;
+
+export const MOVE_KEYS: readonly MoveKey[] = ["forwardMm", "leftMm", "upMm", "pitchDeg", "rollDeg", "yawDeg"];
+
+interface State {
+  moves: Moves;
+  pivots: readonly Vector[];
+}
+
+/**
+ * What the planner wants of the bone: a move for each segment about a pivot, within the case's limits, with all that was
+ * before. A change that is not final is a step of a movement of the hand: the final one that ends it is what undo takes back.
+ */
+export class Plan {
+  readonly handles: readonly HandleEntry[];
+  private readonly history: History<State>;
+  private state: State;
+  private readonly listeners: PlanListener[] = [];
+
+  constructor(private readonly file: CaseFile) {
+    this.handles = file.manifest.handles;
+    this.state = { moves: this.handles.map(() => ({ ...NO_MOVE })), pivots: this.handles.map((handle) => handle.pivotMm) };
+    this.history = new History(this.state);
+  }
+
+  get moves(): Moves {
+    return this.state.moves;
+  }
+
+  get canUndo(): boolean {
+    return this.history.canUndo;
+  }
+
+  get canRedo(): boolean {
+    return this.history.canRedo;
+  }
+
+  get isAtRest(): boolean {
+    return this.moves.every((move) => MOVE_KEYS.every((key) => move[key] === 0) && move.scale === 1);
+  }
+
+  pivot(handle: number): Vector {
+    return this.state.pivots[handle];
+  }
+
+  /** Largest value of `key` either way. */
+  limit(handle: number, key: MoveKey): number {
+    const { translationMm, rotationDeg } = this.handles[handle].limits;
+    return key.endsWith("Mm") ? translationMm : rotationDeg;
+  }
+
+  poses(moves: Moves = this.moves): Pose[] {
+    return moves.map((move, index) => toPose(move, this.pivot(index), this.file.manifest.headFrame));
+  }
+
+  /** Nothing moves. */
+  restPoses(): Pose[] {
+    return this.poses(this.handles.map(() => ({ ...NO_MOVE })));
+  }
+
+  /** Between two poses of one segment: share 0 is `a`, 1 is `b`. */
+  poseBetween(handle: number, a: Pose, b: Pose, share: number): Pose {
+    const frame = this.file.manifest.headFrame;
+    const pivot = this.pivot(handle);
+    return toPose(between(toMove(a, pivot, frame), toMove(b, pivot, frame), share), pivot, frame);
+  }
+
+  onChange(listener: PlanListener): void {
+    this.listeners.push(listener);
+  }
+
+  /** What lies beyond a limit is brought to it. True where nothing was. */
+  change(handle: number, part: Partial<SegmentMove>, isFinal: boolean): boolean {
+    const move = { ...this.moves[handle], ...part };
+    let isWithin = true;
+    for (const key of MOVE_KEYS) {
+      if (part[key] === undefined) continue;
+      const limit = this.limit(handle, key);
+      // Beyond it by rounding is not beyond it.
+      if (Math.abs(move[key]) > limit + 1e-9) isWithin = false;
+      move[key] = Math.min(limit, Math.max(-limit, move[key]));
+    }
+    this.set({ ...this.state, moves: this.moves.map((old, index) => (index === handle ? move : old)) }, isFinal);
+    return isWithin;
+  }
+
+  /** The segment stays where it is; its numbers are told about another point from now on. */
+  setPivot(handle: number, pivotMm: Vector): void {
+    const move = toMove(this.poses()[handle], pivotMm, this.file.manifest.headFrame);
+    this.set(
+      {
+        moves: this.moves.map((old, index) => (index === handle ? move : old)),
+        pivots: this.state.pivots.map((old, index) => (index === handle ? pivotMm : old)),
+      },
+      true,
+    );
+  }
+
+  /** Poses of some handles by name, as a server or the case has them; the others are at rest. */
+  setPoses(poses: ReadonlyMap<string, Pose>): void {
+    const moves = this.handles.map((handle, index) => {
+      const pose = poses.get(handle.name);
+      return pose === undefined ? { ...NO_MOVE } : toMove(pose, this.pivot(index), this.file.manifest.headFrame);
+    });
+    this.set({ ...this.state, moves }, true);
+  }
+
+  /** Of one segment, or of all. */
+  reset(handle?: number): void {
+    const moves = this.moves.map((move, index) => (handle === undefined || handle === index ? { ...NO_MOVE } : move));
+    this.set({ ...this.state, moves }, true);
+  }
+
+  undo(): void {
+    this.show(this.history.undo(), true);
+  }
+
+  redo(): void {
+    this.show(this.history.redo(), true);
+  }
+
+  private set(state: State, isFinal: boolean): void {
+    if (isFinal && JSON.stringify(state) !== JSON.stringify(this.history.now)) this.history.add(state);
+    this.show(state, isFinal);
+  }
+
+  private show(state: State, isFinal: boolean): void {
+    this.state = state;
+    this.listeners.forEach((listener) => listener(this, { isFinal }));
+  }
+}
+
+/** "the plan's pose" of the case. */
+export function posesOfCase(file: CaseFile): Map<string, Pose> {
+  const radians = (degrees: Vector): Vector => [(degrees[0] * Math.PI) / 180, (degrees[1] * Math.PI) / 180, (degrees[2] * Math.PI) / 180];
+  return new Map(
+    file.manifest.handles.map(({ name, pose }) => [
+      name,
+      { rotationVector: radians(pose.rotationVectorDeg), pivotMm: pose.pivotMm, translationMm: pose.translationMm, scale: pose.scale },
+    ]),
+  );
+}

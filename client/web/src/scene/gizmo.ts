@@ -1,0 +1,97 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import * as three from "three";
+import { TransformControls } from "three/examples/jsm/controls/TransformControls.js";
+import { type Pose } from "../geometry/pose";
+import { type Matrix, type Vector, add, apply, fromRotationVector, multiply, subtract, toRotationVector, transpose } from "../geometry/rotation";
+import type { Head } from "./head";
+import type { Stage } from "./stage";
+
+export type GizmoMode = "translate" | "rotate";
+
+/** The handle at a segment's pivot, by which it is taken in the hand. */
+export class Gizmo {
+  private readonly controls: TransformControls;
+  private readonly proxy = new three.Object3D();
+  private pivot: Vector = [0, 0, 0];
+  private scale = 1;
+
+  /** `onPose`: the segment is pulled there; `isFinal` when the hand lets go. */
+  constructor(
+    private readonly stage: Stage,
+    private readonly head: Head,
+    onPose: (pose: Pose, isFinal: boolean) => void,
+  ) {
+    this.controls = new TransformControls(stage.camera, stage.canvas);
+    this.controls.setSize(0.8);
+    this.controls.setColors(0xe0705f, 0x62b97c, 0x5b9be0, 0xffd34d);
+    this.controls.attach(this.proxy);
+    stage.scene.add(this.proxy, this.controls.getHelper());
+    this.controls.addEventListener("change", () => stage.invalidate());
+    this.controls.addEventListener("dragging-changed", (event) => {
+      stage.controls.enabled = event.value !== true;
+      if (event.value !== true) onPose(this.pose(), true);
+    });
+    this.controls.addEventListener("objectChange", () => onPose(this.pose(), false));
+  }
+
+  get isDragging(): boolean {
+    return this.controls.dragging;
+  }
+
+  /** Under the mouse is a part of the gizmo. */
+  get isTouched(): boolean {
+    return this.controls.axis !== null;
+  }
+
+  setMode(mode: GizmoMode): void {
+    this.controls.setMode(mode);
+    this.stage.invalidate();
+  }
+
+  setVisible(isVisible: boolean): void {
+    this.controls.getHelper().visible = isVisible;
+    this.controls.enabled = isVisible;
+    this.stage.invalidate();
+  }
+
+  /** At the pivot of a segment in this pose, whose `pivotMm` that is. */
+  place(pose: Pose): void {
+    this.pivot = pose.pivotMm;
+    this.scale = pose.scale;
+    this.proxy.position.copy(this.head.toWorld(add(pose.pivotMm, pose.translationMm)));
+    const axes = this.head.worldAxes;
+    this.proxy.quaternion.copy(quaternion(multiply(axes, multiply(fromRotationVector(pose.rotationVector), transpose(axes)))));
+    this.proxy.updateMatrixWorld();
+    this.stage.invalidate();
+  }
+
+  dispose(): void {
+    this.stage.scene.remove(this.proxy, this.controls.getHelper());
+    this.controls.detach();
+    this.controls.dispose();
+  }
+
+  private pose(): Pose {
+    const back = transpose(this.head.worldAxes);
+    const at = add(apply(back, this.proxy.position.toArray()), this.head.middle);
+    const turn = rotationOf(this.proxy.quaternion);
+    return {
+      rotationVector: toRotationVector(multiply(back, multiply(turn, this.head.worldAxes))),
+      pivotMm: this.pivot,
+      translationMm: subtract(at, this.pivot),
+      scale: this.scale,
+    };
+  }
+}
+
+function quaternion(m: Matrix): three.Quaternion {
+  const matrix = new three.Matrix4(m[0], m[1], m[2], 0, m[3], m[4], m[5], 0, m[6], m[7], m[8], 0, 0, 0, 0, 1);
+  return new three.Quaternion().setFromRotationMatrix(matrix);
+}
+
+function rotationOf(q: three.Quaternion): Matrix {
+  const e = new three.Matrix4().makeRotationFromQuaternion(q).elements;
+  return [e[0], e[4], e[8], e[1], e[5], e[9], e[2], e[6], e[10]];
+}

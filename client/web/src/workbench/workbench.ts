@@ -1,0 +1,282 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { sentenceOf } from "../calls/call_error";
+import type { Gateway } from "../calls/gateway";
+import type { CaseFile } from "../case/case_file";
+import type { SolveSummary } from "../generated/tissueform/v1/deform_service_pb";
+import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
+import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
+import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
+import { BoneSolid, type Penetration, PenetrationTest } from "../geometry/penetration";
+import { type Pose, toMove } from "../geometry/pose";
+import type { Vector } from "../geometry/rotation";
+import type { Picture } from "../live/drag_session";
+import { type Connection, LiveSession } from "../live/live_session";
+import { Plan } from "../planning/plan";
+import { Gizmo } from "../scene/gizmo";
+import type { HeadView } from "../scene/head_view";
+import { Answers } from "./answers";
+import { Comparer, type Comparison } from "./comparison";
+import { FaceColors, type MapLegend, followedRest, subtractInto } from "./face_colors";
+import { Signal } from "./signal";
+
+/** What the colours of the skin show. */
+export type MapChoice =
+  | { kind: "none" }
+  | { kind: "movement" }
+  | { kind: "band" }
+  | { kind: "model"; model: DeformationModel; label: string }
+  | { kind: "prediction"; prediction: Prediction };
+
+/** What a picture was answered with. */
+export interface PictureFacts {
+  roundTripMs: number;
+  summary: SolveSummary | null;
+  isRefining: boolean;
+}
+
+const SETTLE_MS = 150;
+
+/**
+ * A case on the table: the plan, the session that answers it, the head that shows the answer, and what is laid beside it. The
+ * panels show its signals and call it; it knows nothing of them.
+ */
+export class Workbench {
+  readonly plan: Plan;
+  readonly gizmo: Gizmo;
+  readonly answers: Answers;
+  readonly live: LiveSession;
+
+  readonly selected = new Signal(0);
+  readonly connection = new Signal<Connection>({ kind: "preparing", text: "Opening", share: null });
+  readonly followers = new Signal(0);
+  readonly notice = new Signal("");
+  readonly picture = new Signal<PictureFacts | null>(null);
+  readonly model = new Signal<DeformationModel>(0);
+  readonly map = new Signal<MapChoice>({ kind: "none" });
+  readonly legend = new Signal<MapLegend | null>(null);
+  readonly predictions = new Signal<Prediction[]>([]);
+  readonly comparison = new Signal<Comparison | null>(null);
+  readonly penetrations = new Signal<Penetration[]>([]);
+  /** The face or the bone on the stage changed. */
+  readonly shown = new Signal(0);
+
+  private readonly comparer: Comparer;
+  private readonly colors: FaceColors;
+  private readonly rest: Float32Array;
+  private readonly displacements: Float32Array;
+  private readonly penetrationTest: PenetrationTest;
+  private uncertainty: Float32Array | null = null;
+  private other: Float32Array | null = null;
+  private waitingFrom: number | null = null;
+  private settling: ReturnType<typeof setTimeout> | undefined;
+
+  /** `models`: of the server. */
+  constructor(
+    gateway: Gateway,
+    readonly file: CaseFile,
+    readonly caseName: string,
+    readonly view: HeadView,
+    readonly models: readonly ModelInfo[],
+  ) {
+    this.plan = new Plan(file);
+    this.rest = followedRest(file);
+    this.displacements = new Float32Array(this.rest.length);
+    this.colors = new FaceColors(view.head);
+    this.answers = new Answers(gateway, file, caseName, this.rest);
+    this.comparer = new Comparer(this.plan, this.answers);
+    const solids = file.surfaces.filter(({ entry }) => entry.kind === "bone" || entry.kind === "segment");
+    this.penetrationTest = new PenetrationTest(solids.map((s) => new BoneSolid(s.entry.name, s.entry.handle, s.positions, s.triangles)));
+    this.gizmo = new Gizmo(view.stage, view.head, (pose, isFinal) => this.pull(pose, isFinal));
+    this.model.value = models.find((model) => model.name === file.manifest.model)?.model ?? file.sessionRequest.model;
+    this.live = new LiveSession(gateway, file, caseName, {
+      onConnection: (connection) => (this.connection.value = connection),
+      onPicture: (picture, used) => this.show(picture, used),
+      onCommittedPoses: (poses) => this.plan.setPoses(poses),
+      onFollowers: (count) => (this.followers.value = count),
+      onNotice: (text) => (this.notice.value = text),
+    }, this.dragChoice());
+    this.plan.onChange((_, { isFinal }) => this.planChanged(isFinal));
+    this.selected.watch(() => this.placeGizmo());
+  }
+
+  async start(): Promise<void> {
+    this.view.setPoses(this.posesByHandle(this.plan.poses()));
+    await Promise.all([this.live.start(this.plan.poses()), this.loadPredictions()]);
+  }
+
+  /** For how long a pose has been waiting for its picture, in ms; 0: none is. */
+  get waitingMs(): number {
+    return this.waitingFrom === null ? 0 : performance.now() - this.waitingFrom;
+  }
+
+  modelInfo(model: DeformationModel): ModelInfo | undefined {
+    return this.models.find((info) => info.model === model);
+  }
+
+  async chooseModel(model: DeformationModel): Promise<void> {
+    this.model.value = model;
+    if (this.map.value.kind === "band" && !this.hasBand) this.map.value = { kind: "none" };
+    await this.live.choose(this.dragChoice());
+  }
+
+  /** Rejects where what is compared with could not be had; the map is off then. */
+  async chooseMap(choice: MapChoice): Promise<void> {
+    const hadBand = this.map.value.kind === "band";
+    this.map.value = choice;
+    this.other = null;
+    if (hadBand !== (choice.kind === "band")) void this.live.choose(this.dragChoice());
+    try {
+      await this.loadOther();
+    } catch (thrown) {
+      this.map.value = { kind: "none" };
+      throw thrown;
+    } finally {
+      this.redraw();
+    }
+  }
+
+  /** The band needs ranges of the material and a model whose prepared answers know them. */
+  get hasBand(): boolean {
+    const info = this.modelInfo(this.model.value);
+    return this.file.materialRanges !== null && info !== undefined && info.hasPreparedAnswers && info.name !== "gradient_field";
+  }
+
+  async compare(comparison: Comparison | null): Promise<void> {
+    if (comparison !== null) {
+      await this.answers.ofPrediction(comparison.to);
+      if (typeof comparison.from === "object") await this.answers.ofPrediction(comparison.from);
+    }
+    this.comparison.value = comparison;
+    this.gizmo.setVisible(comparison === null);
+    await this.redraw();
+  }
+
+  /** Solves in full and keeps it. */
+  async storePrediction(title: string): Promise<Prediction> {
+    const prediction = await this.answers.store(this.live.session, this.model.value, this.plan.poses(), title);
+    this.predictions.value = [prediction, ...this.predictions.value];
+    return prediction;
+  }
+
+  async removePrediction(prediction: Prediction): Promise<void> {
+    await this.answers.remove(prediction);
+    this.predictions.value = this.predictions.value.filter((other) => other.name !== prediction.name);
+    if (this.comparison.value?.to.name === prediction.name) await this.compare(null);
+  }
+
+  /** Where a vertex of the first skin is now, LPS. */
+  skinPoint = (vertex: number): Vector | null => {
+    const positions = this.view.head.skins[0]?.shape.positions;
+    return positions === undefined ? null : [positions[3 * vertex], positions[3 * vertex + 1], positions[3 * vertex + 2]];
+  };
+
+  posesByHandle(poses: readonly Pose[]): Map<string, Pose> {
+    return new Map(this.plan.handles.map((handle, index) => [handle.name, poses[index]]));
+  }
+
+  /** Poses of the bone as it is shown. */
+  shownPoses: ReadonlyMap<string, Pose> = new Map();
+
+  private dragChoice() {
+    const info = this.modelInfo(this.model.value);
+    const isPrepared = info?.hasPreparedAnswers ?? false;
+    return { model: this.model.value, isPrepared, ranges: this.map.value.kind === "band" ? this.file.materialRanges : null };
+  }
+
+  private async loadPredictions(): Promise<void> {
+    try {
+      this.predictions.value = await this.answers.list();
+    } catch (thrown) {
+      this.notice.value = `The stored predictions cannot be listed: ${sentenceOf(thrown)}`;
+    }
+  }
+
+  private pull(pose: Pose, isFinal: boolean): void {
+    const index = this.selected.value;
+    this.plan.change(index, toMove(pose, this.plan.pivot(index), this.file.manifest.headFrame), isFinal);
+  }
+
+  private planChanged(isFinal: boolean): void {
+    const poses = this.plan.poses();
+    this.live.sendPoses(poses, isFinal);
+    this.waitingFrom ??= performance.now();
+    if (this.comparison.value === null) this.setPoses(poses);
+    if (!this.gizmo.isDragging) this.placeGizmo();
+    clearTimeout(this.settling);
+    this.settling = setTimeout(() => this.settled(), SETTLE_MS);
+  }
+
+  /** The hand rests: what takes longer than a picture is done now. */
+  private settled(): void {
+    this.penetrations.value = this.penetrationTest.find(this.posesByHandle(this.plan.poses()));
+    this.view.setMarks(this.penetrations.value.flatMap((penetration) => penetration.points));
+    if (this.map.value.kind === "model") {
+      this.loadOther().then(
+        () => this.redraw(),
+        (thrown) => (this.notice.value = sentenceOf(thrown)),
+      );
+    }
+  }
+
+  private placeGizmo(): void {
+    this.gizmo.place(this.plan.poses()[this.selected.value]);
+    this.view.select(this.plan.handles[this.selected.value]?.name ?? "");
+  }
+
+  private show(picture: Picture, used: () => void): void {
+    if (picture.positions.length !== this.rest.length) throw new Error("a picture came that has other vertices than the case");
+    subtractInto(picture.positions, this.rest, this.displacements);
+    this.waitingFrom = null;
+    if (picture.frame.refinement === 0) this.uncertainty = picture.uncertainty;
+    this.picture.value = { roundTripMs: picture.roundTripMs, summary: picture.frame.summary ?? null, isRefining: picture.frame.refining };
+    if (this.comparison.value !== null) used();
+    else this.lay(this.displacements, used);
+  }
+
+  private lay(displacements: Float32Array, used?: () => void): void {
+    this.view.head.setDisplacements(displacements);
+    const legend = this.color(displacements);
+    if (legend !== null || this.legend.value !== null) this.legend.value = legend;
+    this.view.stage.invalidate(used);
+    this.shown.value += 1;
+  }
+
+  private setPoses(poses: readonly Pose[]): void {
+    this.shownPoses = this.posesByHandle(poses);
+    this.view.setPoses(this.shownPoses);
+    this.shown.value += 1;
+  }
+
+  private color(displacements: Float32Array): MapLegend | null {
+    const map = this.map.value;
+    if (map.kind === "movement") return this.colors.showLengths("Movement of the skin", displacements);
+    if (map.kind === "band" && this.uncertainty !== null) return this.colors.showNumbers("Band of 95 in 100 (stiffness only; excludes model and surgical error)", this.uncertainty);
+    if ((map.kind === "model" || map.kind === "prediction") && this.other !== null) {
+      const title = map.kind === "model" ? `Difference to ${map.label}` : `Difference to “${map.prediction.title}”`;
+      return this.colors.showLengths(title, subtractInto(displacements, this.other, new Float32Array(displacements.length)));
+    }
+    this.colors.clear();
+    return null;
+  }
+
+  private async loadOther(): Promise<void> {
+    const map = this.map.value;
+    let other: Float32Array | null = null;
+    if (map.kind === "model") other = await this.answers.ofModel(this.live.session, map.model, this.plan.poses());
+    if (map.kind === "prediction") other = await this.answers.ofPrediction(map.prediction);
+    // Another map may have been chosen meanwhile.
+    if (map === this.map.value) this.other = other;
+  }
+
+  private async redraw(): Promise<void> {
+    const comparison = this.comparison.value;
+    const planned = { displacements: this.displacements, poses: this.plan.poses() };
+    const shape = comparison === null ? planned : await this.comparer.between(comparison, planned);
+    // Another comparison may have been chosen meanwhile.
+    if (comparison !== this.comparison.value) return;
+    this.lay(shape.displacements);
+    this.setPoses(shape.poses);
+  }
+}

@@ -1,0 +1,94 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { create, toBinary } from "@bufbuild/protobuf";
+import { expect, test, vi } from "vitest";
+import { CallSocket } from "../../src/calls/call_socket";
+import { FrameKind, encodeFrame } from "../../src/calls/frame";
+import { WatchOrigin, WatchResponseSchema } from "../../src/generated/tissueform/v1/deform_service_pb";
+import { PositionEncoding } from "../../src/generated/tissueform/v1/geometry_pb";
+import { FollowSession, type FollowedPicture } from "../../src/live/follow_session";
+import { FakeSocket } from "../testing/fake_socket";
+import type { MessageInitShape } from "@bufbuild/protobuf";
+
+function follow() {
+  const sockets: FakeSocket[] = [];
+  const told: string[] = [];
+  const pictures: { picture: FollowedPicture; used: () => void }[] = [];
+  const timers: (() => void)[] = [];
+  const acknowledgeWatch = vi.fn(() => Promise.resolve({}));
+  const gateway = {
+    deform: { acknowledgeWatch },
+    open: (method: any, handlers: any, options: any) => {
+      const socket = new FakeSocket();
+      sockets.push(socket);
+      const call = new CallSocket(() => socket, method, handlers, options);
+      socket.onopen?.();
+      return call;
+    },
+  };
+  new FollowSession(
+    gateway as never,
+    "sessions/abc",
+    {
+      onStarted: () => told.push("started"),
+      onPicture: (picture, used) => pictures.push({ picture, used }),
+      onNotice: () => told.push("notice"),
+      onBroken: () => told.push("broken"),
+      onEnd: (error) => told.push(error.message),
+    },
+    (action) => (timers.push(action), () => {}),
+  );
+  const answer = (message: MessageInitShape<typeof WatchResponseSchema>["message"]) => {
+    const payload = toBinary(WatchResponseSchema, create(WatchResponseSchema, { message }));
+    sockets[sockets.length - 1].onmessage?.({ data: encodeFrame(FrameKind.Message, payload).buffer });
+  };
+  return { sockets, told, pictures, timers, acknowledgeWatch, answer };
+}
+
+const started = (vertices: number[], encoding = PositionEncoding.FLOAT32) => ({
+  case: "started" as const,
+  value: { watch: "watches/1", form: { vertexCount: BigInt(vertices.length), vertices, encoding } },
+});
+const frame = (number: bigint, floats: number[]) => ({
+  case: "frame" as const,
+  value: { number, origin: WatchOrigin.DRAG, frame: { positions: new Uint8Array(Float32Array.from(floats).buffer) } },
+});
+
+test("a watch asks once, and acknowledges what was used", () => {
+  const { sockets, answer, pictures, acknowledgeWatch } = follow();
+  expect(sockets[0].kinds).toEqual([FrameKind.Start, FrameKind.Message, FrameKind.HalfClose]);
+  answer(started([4]));
+  answer(frame(7n, [1, 2, 3]));
+  expect(Array.from(pictures[0].picture.positions)).toEqual([1, 2, 3]);
+  expect(pictures[0].picture.vertices).toEqual([4]);
+  expect(acknowledgeWatch).not.toHaveBeenCalled();
+  pictures[0].used();
+  expect(acknowledgeWatch.mock.calls[0]).toMatchObject([{ watch: "watches/1", number: 7n }, {}]);
+});
+
+test("another form holds for the frames after it", () => {
+  const { answer, pictures } = follow();
+  answer(started([4]));
+  answer({ case: "form", value: { vertexCount: 2n, vertices: [1, 2] } });
+  answer(frame(8n, [1, 2, 3, 4, 5, 6]));
+  expect(pictures[0].picture.vertices).toEqual([1, 2]);
+});
+
+test("packed frames are refused in words", () => {
+  const { answer, told } = follow();
+  answer(started([4], PositionEncoding.INT16_ZSTD));
+  answer(frame(1n, [1, 2, 3]));
+  expect(told[told.length - 1]).toContain("cannot unpack");
+});
+
+test("a watch that breaks off begins again, one whose session is gone ends", () => {
+  const { sockets, told, timers, answer } = follow();
+  answer(started([4]));
+  sockets[0].onclose?.({ code: 1006, reason: "" });
+  timers[0]();
+  expect(sockets).toHaveLength(2);
+  sockets[1].end(5, "no such session");
+  expect(told).toEqual(["started", "broken", "no such session"]);
+  expect(timers).toHaveLength(1);
+});

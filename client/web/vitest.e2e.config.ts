@@ -1,0 +1,24 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { fileURLToPath } from "node:url";
+import { defineConfig } from "vitest/config";
+
+const path = (relative: string) => fileURLToPath(new URL(relative, import.meta.url));
+
+// The suite that drives a browser: tests/e2e, with the packages of this folder. With --mode measure or pictures: figures and
+// pictures of docs/planner.md.
+export default defineConfig(({ mode }) => ({
+  root: path("../../tests/e2e"),
+  cacheDir: path("node_modules/.vite-e2e"),
+  resolve: { alias: { "playwright-core": path("node_modules/playwright-core/index.mjs") } },
+  server: { fs: { strict: false } },
+  test: {
+    globals: true,
+    include: mode === "test" ? ["**/*.test.ts"] : [`${mode}.ts`],
+    testTimeout: 120_000,
+    hookTimeout: 90_000,
+    // Browsers without a graphics card take all processors that they get.
+    fileParallelism: false,
+  },
+}));

@@ -1,0 +1,120 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+// This folder includes the standard library only, so that whoever has prepared answers as bytes can
+// evaluate them without what made them. docs/prepared-answers.md tells the same in words.
+namespace tissueform {
+
+enum class AnswerModel { kGradientField = 1, kLinearElastic = 2, kNeoHookean = 3 };
+
+// All that is one number. Doubles, so that they are one section; lengths and angles in mm and rad.
+struct AnswerNumbers {
+  double model = 0;  // an AnswerModel
+  double num_vertices = 0;
+  double num_handles = 0;
+
+  // What is covered.
+  double tolerance_mm = 0;
+  double max_rotation_rad = 0;  // of linear_elastic no limit: that of poses that digits suffice for
+  double max_scale_change = 0;  // |s - 1|; of gradient_field
+  double max_estimate_mm = 0;   // of neo_hookean
+
+  double largest_rest_mm = 0;  // distance of a free vertex from zero; not of neo_hookean
+
+  // Of gradient_field.
+  double num_polynomials = 0;  // that are answered with
+  double degree = 0;           // of all that are expanded
+  double simplex_width = 0;
+  double largest_gain_mm = 0;
+
+  // Of neo_hookean.
+  double size_mm = 0;
+  double estimate_scale = 0;
+  double cut_per_mm = 0;
+  double rounding_mm = 0;
+};
+
+// A matrix of fixed-point numbers, column-major: an entry is (65536 upper + lower) step, and upper
+// alone stands for 65536 upper step. Of the last columns there are lower halves.
+struct PackedColumns {
+  std::vector<double> steps;  // a column each
+  std::vector<int16_t> upper;
+  std::vector<int16_t> lower;
+};
+
+// Prepared answers of one model with everything that their evaluation needs.
+struct PortableAnswers {
+  static constexpr int32_t kFixed = -1;
+  static constexpr int32_t kFree = -2;
+
+  AnswerNumbers numbers;
+
+  // Of every vertex of an answer: kFree, kFixed or its handle. Rest positions of each kind in the
+  // order of the answer, x y z in mm.
+  std::vector<int32_t> regions;
+  std::vector<float> free_rest;
+  std::vector<float> fixed_rest;
+  std::vector<double> handle_rest;
+
+  // How poses become factors of columns. Matrices are row-major.
+  std::vector<double> origins;        // of gradient_field a point each handle, otherwise one
+  std::vector<double> centroids;      // of neo_hookean: the middle of every handle
+  std::vector<double> nodes;          // of gradient_field: harmonic values, a row each
+  std::vector<double> interpolation;  // from values at the nodes to coefficients
+  std::vector<double> simplex_low;
+  std::vector<double> guard_gains;
+
+  // Compressed columns of gradient_field (a row for each free vertex) and linear_elastic (three).
+  std::vector<double> map;  // #columns by #factors
+  std::vector<double> gains;
+  std::vector<float> cut_map;  // any number of rows by #factors
+  std::vector<float> tail;     // #factors
+  // Of neo_hookean the columns of all clusters, one cluster after the other, three rows a vertex.
+  PackedColumns columns;
+
+  // Of neo_hookean.
+  PackedColumns cluster_map;              // #columns of all clusters by #factors
+  std::vector<int32_t> clusters;          // of each: vertices, columns, columns with lower halves
+  std::vector<int32_t> cluster_vertices;  // their numbers among the free ones
+  std::vector<double> first_gains;
+  std::vector<double> second_gains;
+  std::vector<float> probes;  // three rows for each by #pairs
+};
+
+// Calls visit(number, what) for all that travels, in the order of the bytes. The numbers are those
+// of the sections in docs/prepared-answers.md and stay.
+template <typename Answers, typename Visitor>
+void VisitSections(Answers& answers, const Visitor& visit) {
+  visit(2, answers.regions);
+  visit(3, answers.free_rest);
+  visit(4, answers.fixed_rest);
+  visit(5, answers.handle_rest);
+  visit(10, answers.origins);
+  visit(11, answers.centroids);
+  visit(12, answers.nodes);
+  visit(13, answers.interpolation);
+  visit(14, answers.simplex_low);
+  visit(15, answers.guard_gains);
+  visit(20, answers.map);
+  visit(21, answers.gains);
+  visit(22, answers.cut_map);
+  visit(23, answers.tail);
+  visit(24, answers.columns.steps);
+  visit(25, answers.columns.upper);
+  visit(26, answers.columns.lower);
+  visit(30, answers.cluster_map.steps);
+  visit(31, answers.cluster_map.upper);
+  visit(32, answers.cluster_map.lower);
+  visit(33, answers.clusters);
+  visit(34, answers.cluster_vertices);
+  visit(40, answers.first_gains);
+  visit(41, answers.second_gains);
+  visit(42, answers.probes);
+}
+
+}  // namespace tissueform

@@ -1,0 +1,21 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <span>
+
+#include "core/answer_evaluator/answer_pose.h"
+#include "core/answer_evaluator/portable_answers.h"
+
+namespace tissueform {
+
+// Whether there is a pose for every handle, with a positive scale, and with numbers so far from
+// overflowing (1e6 rad, 1e9 mm, a scale of 1e6) that positions are finite.
+bool AreLegal(const PortableAnswers& answers, std::span<const AnswerPose> poses);
+
+// Whether legal poses with that error are answered: within the prepared range, and the error within
+// what was asked for. The edge of the range belongs to it.
+bool AreCovered(const PortableAnswers& answers, std::span<const AnswerPose> poses, double error_mm);
+
+}  // namespace tissueform

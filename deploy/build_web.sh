@@ -1,0 +1,58 @@
+#!/usr/bin/env bash
+# Copyright 2026 The Tissueform Authors.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+#
+# Builds the browser planner (client/web) into build/web: what `tissueform-gateway --web build/web` gives out. Does nothing
+# where that is newer than all it is made from.
+#
+#   deploy/build_web.sh [--tools]      --tools: packages and generated messages only, as tests need them
+#
+# Fetches what client/web/package-lock.json names, from npm's registry, and Debian's nodejs and npm where there is no Node
+# of version 18 or later.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+web=client/web
+generated=$web/src/generated
+target=build/web
+
+major=$(node --version 2>/dev/null | sed -n 's/^v\([0-9]*\)\..*/\1/p' || true)
+if [[ ${major:-0} -lt 18 ]] || ! command -v npm >/dev/null; then
+  deploy/install_packages.sh protocol
+fi
+command -v protoc >/dev/null || deploy/install_packages.sh build
+
+# Whether $1 is there and nothing of the others was changed after it.
+is_newer() {
+  local made=$1
+  shift
+  [[ -e $made && -z $(find "$@" -newer "$made" -print -quit) ]]
+}
+
+if ! is_newer "$web/node_modules/.package-lock.json" "$web/package-lock.json"; then
+  (cd "$web" && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error)
+fi
+
+if ! is_newer "$generated/made" proto/tissueform/v1 deploy/build_web.sh "$web/package-lock.json"; then
+  google_protos=
+  for folder in "${GOOGLE_RPC_PROTOS:-}" /usr/share/gocode/src/github.com/gogo/googleapis /usr/share/googleapis; do
+    if [[ -z $google_protos && -e $folder/google/rpc/error_details.proto ]]; then
+      google_protos=$folder
+    fi
+  done
+  if [[ -z $google_protos ]]; then
+    echo "build_web.sh: google/rpc/error_details.proto is missing: install golang-github-gogo-googleapis-dev, or set GOOGLE_RPC_PROTOS" >&2
+    exit 1
+  fi
+  rm -rf "$generated"
+  mkdir -p "$generated"
+  protoc --plugin=protoc-gen-es="$web/node_modules/.bin/protoc-gen-es" --es_out="$generated" --es_opt=target=ts \
+    -I proto -I "$google_protos" proto/tissueform/v1/*.proto \
+    "$google_protos"/google/rpc/status.proto "$google_protos"/google/rpc/error_details.proto
+  touch "$generated/made"
+fi
+
+if [[ ${1:-} == --tools ]] || is_newer "$target/index.html" "$web/src" "$web/index.html" "$web/public" "$web/vite.config.ts" "$web/package-lock.json"; then
+  exit 0
+fi
+(cd "$web" && npm run --silent build -- --logLevel warn)

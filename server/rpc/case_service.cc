@@ -1,0 +1,149 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/rpc/case_service.h"
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "proto/conversion/case_conversion.h"
+#include "server/rpc/case_upload_stream.h"
+#include "server/rpc/message_stream.h"
+#include "server/rpc/resource_conversion.h"
+#include "server/store/session_store.h"
+
+namespace tissueform {
+namespace {
+
+// A part of a case that is sent.
+struct CasePart {
+  std::shared_ptr<CaseReader> reader;
+  int64_t offset = 0;
+  int64_t end = 0;
+};
+
+// Blocks on the disk.
+absl::StatusOr<CasePart> OpenPart(const v1::ReadCaseRequest& request, CaseStore* store) {
+  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseCaseName(request.name()));
+  if (request.read_limit() < 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("read_limit is ", request.read_limit(), "; it must be 0 (all) or more"));
+  }
+  TF_ASSIGN_OR_RETURN(std::unique_ptr<CaseReader> reader, store->Open(sha256, SystemUnixSeconds()));
+  const int64_t total = reader->total_bytes();
+  const int64_t offset = request.read_offset();
+  if (offset < 0 || offset > total) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("read_offset is ", offset, "; the case has ", total, " bytes"));
+  }
+  const int64_t rest = total - offset;
+  const int64_t size = request.read_limit() == 0 ? rest : std::min(rest, request.read_limit());
+  return CasePart{.reader = std::move(reader), .offset = offset, .end = offset + size};
+}
+
+// The next chunk of the part; false when nothing is left. Blocks on the disk.
+absl::StatusOr<bool> NextOfCase(int64_t max_chunk_bytes, CasePart* part,
+                                v1::ReadCaseResponse* message) {
+  if (part->offset >= part->end) return false;
+  const int64_t size = std::min(max_chunk_bytes, part->end - part->offset);
+  TF_ASSIGN_OR_RETURN(*message->mutable_data(), part->reader->Read(part->offset, size));
+  message->set_offset(part->offset);
+  message->set_total_bytes(part->reader->total_bytes());
+  part->offset += size;
+  return true;
+}
+
+}  // namespace
+
+grpc::ServerReadReactor<v1::UploadCaseRequest>* CaseService::UploadCase(
+    grpc::CallbackServerContext* context, v1::UploadCaseResponse* response) {
+  auto* call =
+      new CaseUploadStream(CallScope(context, "CaseService.UploadCase", CallKind::kNewWork, gate_),
+                           limits_, store_, pool_, timer_, &uploads_under_way_, response);
+  call->Start();
+  return call;
+}
+
+grpc::ServerWriteReactor<v1::ReadCaseResponse>* CaseService::ReadCase(
+    grpc::CallbackServerContext* context, const v1::ReadCaseRequest* request) {
+  auto* call = new MessageStream<v1::ReadCaseResponse>(
+      CallScope(context, "CaseService.ReadCase", CallKind::kUpkeep, gate_), CancelOf(context),
+      timer_, limits_.upload_silence);
+  const auto post = [pool = pool_](WorkerPool::Job job) {
+    pool->Post(Lane::kStore, std::move(job));
+  };
+  post([call, request, post, store = store_, most = limits_.max_chunk_bytes] {
+    absl::StatusOr<CasePart> part = OpenPart(*request, store);
+    if (!part.ok()) {
+      call->End(part.status());
+      return;
+    }
+    auto next = [part = *std::move(part), most](v1::ReadCaseResponse* message) mutable {
+      return NextOfCase(most, &part, message);
+    };
+    call->Send(std::move(next), post);
+  });
+  return call;
+}
+
+grpc::ServerUnaryReactor* CaseService::Run(
+    grpc::CallbackServerContext* context, std::string_view method,
+    std::function<absl::Status(const Principal& caller)> work) {
+  return RunUpkeep(context, method, gate_, [&, this](const CallScope& scope, const EndCall& end) {
+    pool_->Post(Lane::kStore,
+                [end, caller = scope.principal(), work = std::move(work)] { end(work(caller)); });
+    return absl::OkStatus();
+  });
+}
+
+grpc::ServerUnaryReactor* CaseService::GetCase(grpc::CallbackServerContext* context,
+                                               const v1::GetCaseRequest* request,
+                                               v1::Case* response) {
+  return Run(context, "CaseService.GetCase",
+             [=, this](const Principal& /*caller*/) { return Find(*request, response); });
+}
+
+grpc::ServerUnaryReactor* CaseService::ListCases(grpc::CallbackServerContext* context,
+                                                 const v1::ListCasesRequest* request,
+                                                 v1::ListCasesResponse* response) {
+  return Run(context, "CaseService.ListCases",
+             [=, this](const Principal& caller) { return List(*request, caller, response); });
+}
+
+grpc::ServerUnaryReactor* CaseService::DeleteCase(grpc::CallbackServerContext* context,
+                                                  const v1::DeleteCaseRequest* request,
+                                                  google::protobuf::Empty* /*response*/) {
+  return Run(context, "CaseService.DeleteCase",
+             [=, this](const Principal& /*caller*/) { return Remove(*request); });
+}
+
+absl::Status CaseService::Find(const v1::GetCaseRequest& request, v1::Case* response) {
+  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseCaseName(request.name()));
+  TF_ASSIGN_OR_RETURN(const CaseRecord record, store_->Find(sha256));
+  *response = ToProto(record);
+  return absl::OkStatus();
+}
+
+absl::Status CaseService::List(const v1::ListCasesRequest& request, const Principal& caller,
+                               v1::ListCasesResponse* response) {
+  TF_ASSIGN_OR_RETURN(const PageRequest page,
+                      ReadPageRequest(request.page_size(), request.page_token()));
+  TF_ASSIGN_OR_RETURN(
+      const CaseStore::Page found,
+      store_->List({.owner = caller.name, .after = page.after, .limit = page.size}));
+  for (const CaseRecord& record : found.records) *response->add_cases() = ToProto(record);
+  response->set_next_page_token(found.next);
+  return absl::OkStatus();
+}
+
+absl::Status CaseService::Remove(const v1::DeleteCaseRequest& request) {
+  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseCaseName(request.name()));
+  return store_->Delete(sha256);
+}
+
+}  // namespace tissueform

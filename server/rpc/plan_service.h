@@ -1,0 +1,25 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "server/rpc/call_scope.h"
+#include "server/session/session_registry.h"
+#include "tissueform/v1/plan_service.grpc.pb.h"
+
+namespace tissueform {
+
+// tissueform.v1.PlanService over the registry. Stateless; all pointers must outlive it.
+class PlanService final : public v1::PlanService::CallbackService {
+ public:
+  PlanService(ServiceGate* gate, SessionRegistry* registry) : gate_(gate), registry_(registry) {}
+
+  grpc::ServerUnaryReactor* Fit(grpc::CallbackServerContext* context, const v1::FitRequest* request,
+                                v1::FitResponse* response) override;
+
+ private:
+  ServiceGate* const gate_;
+  SessionRegistry* const registry_;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,167 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "gtest/gtest.h"
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+
+#include "core/answer_evaluator/answer_bytes.h"
+#include "core/answer_evaluator/answer_evaluator.h"
+#include "tests/core/answer_evaluator/evaluated_problem.h"
+#include "tests/testing/meshes.h"
+#include "tests/testing/status_matchers.h"
+#include "tests/testing/test_paths.h"
+
+// tests/data/prepared_answers: what ports of the evaluator are tried with. Made anew here and
+// compared; with TISSUEFORM_GOLDEN_ANSWERS=FOLDER written there.
+namespace tissueform::testing {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr double kToleranceMm = 5e-5;  // of a bound; positions agree to twice that
+constexpr double kAgreementMm = 1e-4;
+
+Json ToJson(const HandlePose& pose) {
+  return {{"rotation_vector", pose.rotation_vector},
+          {"pivot_mm", pose.pivot_mm},
+          {"translation_mm", pose.translation_mm},
+          {"scale", pose.scale}};
+}
+
+std::vector<AnswerPose> PosesOf(const Json& json) {
+  std::vector<AnswerPose> poses;
+  for (const Json& pose : json) {
+    poses.push_back(
+        {pose["rotation_vector"], pose["pivot_mm"], pose["translation_mm"], pose["scale"]});
+  }
+  return poses;
+}
+
+std::string ReadBytes(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+class GoldenAnswersTest : public ::testing::TestWithParam<DeformationModel> {
+ protected:
+  // A jittered bar with two handles, every other vertex of it.
+  GoldenAnswersTest() : preparation_(PrepareMesh(Bar({4, 6, 10}, 2.0, 0.2), 2)) {
+    std::vector<int32_t> vertices;
+    for (int32_t v = 0; v < preparation_->mesh().num_vertices(); v += 2) vertices.push_back(v);
+    response_ = *CreateResponse(preparation_, vertices,
+                                {.model = GetParam(),
+                                 .tolerance_mm = kToleranceMm,
+                                 .max_rotation_rad = 0.4,
+                                 .max_estimate_mm = 1});
+  }
+
+  // Rest, poses in the range, and one beyond it.
+  Json MakeCases() const {
+    RandomNumbers random(21);
+    Json cases = Json::array();
+    for (int number = 0; number < 8; ++number) {
+      std::vector<HandlePose> poses = DragPoses(*preparation_, GetParam(), 0, &random);
+      if (number == 0) poses.assign(poses.size(), HandlePose{});
+      if (number > 0 && number < 7) {
+        for (HandlePose& pose : poses) pose = PartOfPose(pose, 0.7);
+      }
+      if (number == 7) {
+        poses[0].rotation_vector.x() = 0.7;
+        poses[0].translation_mm.x() = 1000;
+      }
+      FloatPositions positions;
+      Json one = {{"poses", Json::array()}};
+      for (const HandlePose& pose : poses) one["poses"].push_back(ToJson(pose));
+      const bool covered = response_->Answer(poses, &positions).has_value();
+      one["covered"] = covered;
+      one["error_mm"] = AnswerEvaluator(response_->Describe()).ErrorMm(ToAnswerPoses(poses));
+      one["positions_mm"] = Json::array();
+      for (Eigen::Index i = 0; covered && i < positions.size(); ++i) {
+        one["positions_mm"].push_back(std::round(1e6 * double{positions.data()[i]}) / 1e6);
+      }
+      cases.push_back(std::move(one));
+    }
+    return cases;
+  }
+
+  static std::string PathOf(const std::string& folder, const char* suffix) {
+    return absl::StrCat(folder, "/", NameOf(GetParam()), suffix);
+  }
+
+  // Whether an evaluator gives what the cases tell.
+  static void Compare(const AnswerEvaluator& evaluator, const Json& cases) {
+    ASSERT_EQ(cases.size(), 8U);
+    for (size_t number = 0; number < cases.size(); ++number) {
+      const Json& one = cases[number];
+      const std::vector<AnswerPose> poses = PosesOf(one["poses"]);
+      std::vector<float> positions;
+      double error_mm = 0;
+      ASSERT_EQ(evaluator.Answer(poses, &positions, &error_mm), one["covered"]) << number;
+      EXPECT_EQ(one["covered"], number != 7);
+      const std::vector<double> expected = one["positions_mm"];
+      ASSERT_EQ(positions.size(), expected.size());
+      for (size_t i = 0; i < expected.size(); ++i) {
+        ASSERT_NEAR(double{positions[i]}, expected[i], kAgreementMm) << number << ", " << i;
+      }
+    }
+  }
+
+  std::shared_ptr<MeshPreparation> preparation_;
+  std::unique_ptr<VertexResponse> response_;
+};
+
+TEST_P(GoldenAnswersTest, AreWhatIsMadeToday) {
+  const std::string bytes = WriteAnswers(response_->Describe());
+  const Json file = {{"answers", NameOf(GetParam()) + ".bin"}, {"cases", MakeCases()}};
+  if (const char* folder = std::getenv("TISSUEFORM_GOLDEN_ANSWERS")) {
+    std::ofstream(PathOf(folder, ".bin"), std::ios::binary) << bytes;
+    std::ofstream(PathOf(folder, ".json")) << file.dump() << "\n";
+  }
+  const std::string golden = ReadBytes(TestDataPath(PathOf("prepared_answers", ".bin")));
+  AnswerReading reading = ReadAnswers(golden);
+  ASSERT_EQ(reading.error, AnswerError::kNone) << reading.message;
+  EXPECT_EQ(reading.answers.regions, response_->Describe().regions);
+  const Json golden_file =
+      Json::parse(ReadBytes(TestDataPath(PathOf("prepared_answers", ".json"))));
+  EXPECT_EQ(golden_file["answers"], file["answers"]);
+  // Kept bytes with kept and with new poses, new bytes with the kept ones.
+  const AnswerEvaluator kept(std::move(reading.answers));
+  Compare(kept, golden_file["cases"]);
+  Compare(kept, file["cases"]);
+  Compare(AnswerEvaluator(response_->Describe()), golden_file["cases"]);
+  for (size_t number = 0; number < golden_file["cases"].size(); ++number) {
+    const Json& one = golden_file["cases"][number];
+    const double error_mm = one["error_mm"];
+    EXPECT_NEAR(kept.ErrorMm(PosesOf(one["poses"])), error_mm, 1e-9 + 1e-6 * error_mm);
+  }
+  EXPECT_LT(golden.size() + golden_file.dump().size(), 340000U) << "under 1 MB together";
+}
+
+// By numpy alone, from the format's description.
+TEST_P(GoldenAnswersTest, AProgramThatIsNotOursGivesTheSame) {
+  const std::string command = absl::StrCat(
+      "/usr/bin/python3 ", SourcePath("tests/core/answer_evaluator/evaluate_golden_answers.py"),
+      " ", TestDataPath(PathOf("prepared_answers", ".json")));
+  const int exit_code = WEXITSTATUS(std::system(command.c_str()));
+  if (exit_code == 77) GTEST_SKIP() << "numpy is not installed";
+  EXPECT_EQ(exit_code, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, GoldenAnswersTest,
+                         ::testing::Values(DeformationModel::kGradientField,
+                                           DeformationModel::kLinearElastic,
+                                           DeformationModel::kNeoHookean),
+                         [](const auto& test) { return NameOf(test.param); });
+
+}  // namespace
+}  // namespace tissueform::testing

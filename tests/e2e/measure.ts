@@ -1,0 +1,95 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { type Hook, Planner, openCase } from "./planner";
+
+// Figures of docs/planner.md: by hand, on a machine that does nothing else.
+//
+//   TISSUEFORM_MEASURE_SECONDS=60 TISSUEFORM_CASE=CASE.tfcase npm --prefix client/web run measure
+
+const SECONDS = Number(process.env.TISSUEFORM_MEASURE_SECONDS ?? 60);
+/** 20 Mbit/s, as the network panel of a browser has it. */
+const SLOW = { offline: false, latency: 10, downloadThroughput: 20e6 / 8, uploadThroughput: 20e6 / 8 };
+
+let planner: Planner;
+beforeAll(async () => (planner = await Planner.start(process.env.TISSUEFORM_CASE)));
+afterAll(() => planner.stop());
+
+test("pose sent to positions and normals in the geometry buffers, memory and pauses of a drag", async () => {
+  const { page } = await openCase(await planner.browse(["--js-flags=--expose-gc"]), planner);
+  const session = await page.context().newCDPSession(page);
+  const heap = async () => {
+    await session.send("HeapProfiler.collectGarbage");
+    return (await session.send("Runtime.getHeapUsage")).usedSize / 2 ** 20;
+  };
+  const before = await heap();
+  await session.send("Tracing.start", { categories: "v8,disabled-by-default-v8.gc,devtools.timeline" } as never);
+  const result = await page.evaluate(drag, SECONDS);
+  const pauses = await collectPauses(session as never);
+  const after = await heap();
+  console.log(JSON.stringify({ ...result, heapBeforeMiB: before, heapAfterMiB: after, longestGcMs: Math.max(0, ...pauses), collections: pauses.length }, null, 1));
+}, 1000 * SECONDS + 120_000);
+
+test.each([["loopback", null], ["20 Mbit/s", SLOW]] as const)("first picture over %s", async (name, network) => {
+  const { page } = await openCase(await planner.browse(), planner);
+  const session = await page.context().newCDPSession(page);
+  await session.send("Network.enable");
+  await session.send("Network.setCacheDisabled", { cacheDisabled: true });
+  if (network !== null) await session.send("Network.emulateNetworkConditions", network);
+  await page.reload();
+  await page.waitForFunction(() => ((globalThis as unknown as Hook).tissueform?.view?.stage.drawnCount ?? 0) > 0);
+  console.log(name, await page.evaluate(() => `${Math.round(performance.now())} ms to the first picture`));
+});
+
+/** Runs in the page: a drag at 60 poses a second with drawing off; times are of the page. */
+async function drag(seconds: number) {
+  const { bench, view } = (globalThis as unknown as { tissueform: { bench: any; view: any } }).tissueform;
+  view.stage.setDrawing(false);
+  const times: number[] = [];
+  const shape = view.head.skins[0].shape;
+  const { lay } = Object.getPrototypeOf(bench);
+  let sentAt = 0;
+  // After the picture was laid positions and normals are in the buffers.
+  bench.lay = function (...words: unknown[]) {
+    lay.apply(this, words);
+    if (sentAt > 0) times.push(performance.now() - sentAt);
+    sentAt = 0;
+  };
+  const end = performance.now() + 1000 * seconds;
+  let step = 0;
+  let longestGapMs = 0;
+  let last = performance.now();
+  while (performance.now() < end) {
+    await new Promise((done) => setTimeout(done, 16));
+    const now = performance.now();
+    longestGapMs = Math.max(longestGapMs, now - last);
+    last = now;
+    if (sentAt === 0) sentAt = now;
+    bench.plan.change(bench.plan.handles.length > 1 ? 1 : 0, { forwardMm: 6 * Math.sin(step++ / 40), pitchDeg: 3 * Math.sin(step / 70) }, false);
+  }
+  delete bench.lay;
+  view.stage.setDrawing(true);
+  times.sort((a, b) => a - b);
+  const at = (share: number) => Math.round(100 * times[Math.floor(share * (times.length - 1))]) / 100;
+  return { pictures: times.length, p50Ms: at(0.5), p99Ms: at(0.99), maxMs: at(1), longestGapMs, movingVertices: shape.movingCount, skinVertices: shape.positions.length / 3 };
+}
+
+interface Tracing {
+  send(method: "Tracing.end"): Promise<void>;
+  on(event: "Tracing.dataCollected", listener: (data: { value: { name: string; ph: string; dur?: number }[] }) => void): void;
+  once(event: "Tracing.tracingComplete", listener: () => void): void;
+}
+
+/** Milliseconds of each garbage collection of the main thread. */
+async function collectPauses(session: Tracing): Promise<number[]> {
+  const pauses: number[] = [];
+  session.on("Tracing.dataCollected", ({ value }) => {
+    for (const { name, ph, dur } of value) {
+      if (ph === "X" && (name === "MinorGC" || name === "MajorGC")) pauses.push((dur ?? 0) / 1000);
+    }
+  });
+  const complete = new Promise<void>((done) => session.once("Tracing.tracingComplete", done));
+  await session.send("Tracing.end");
+  await complete;
+  return pauses;
+}

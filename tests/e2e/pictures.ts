@@ -1,0 +1,90 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { join } from "node:path";
+import type { Page } from "playwright-core";
+import { type Hook, Planner, live, moved, openCase, openPage, state, takeSegment, typeMove } from "./planner";
+
+// The pictures of docs/planner.md, of a case of a whole head:
+//
+//   TISSUEFORM_CASE=CASE.tfcase TISSUEFORM_PICTURES=FOLDER npm --prefix client/web run pictures
+
+const FOLDER = process.env.TISSUEFORM_PICTURES ?? ".";
+
+let planner: Planner;
+beforeAll(async () => (planner = await Planner.start(process.env.TISSUEFORM_CASE)));
+afterAll(() => planner.stop());
+
+/** When all is drawn and no notice lies over it. */
+async function picture(page: Page, name: string): Promise<void> {
+  await page.locator(".notice").waitFor({ state: "hidden" });
+  await page.evaluate(() => {
+    (document.activeElement as HTMLElement | null)?.blur();
+    const { view } = (globalThis as unknown as Hook).tissueform;
+    return new Promise<void>((done) => view.stage.invalidate(done));
+  });
+  await page.waitForTimeout(600);
+  await page.screenshot({ path: join(FOLDER, `${name}.jpg`), type: "jpeg", quality: 90 });
+}
+
+test("six pictures", async () => {
+  const context = await planner.browse();
+  const { page } = await openCase(context, planner);
+  await page.emulateMedia({ colorScheme: "dark" });
+  await picture(page, "first-sight");
+
+  await takeSegment(page, "Lower jaw");
+  await typeMove(page, "Forward", "8");
+  await moved(page, 6, 12);
+  await page.getByRole("button", { name: "Rest shape" }).click();
+  await page.getByRole("button", { name: "Left", exact: true }).click();
+  await picture(page, "jaw-8-mm-forward");
+  await page.getByRole("button", { name: "Rest shape" }).click();
+
+  await page.getByRole("button", { name: "3/4" }).click();
+  await page.getByLabel("Opacity of the skin").fill("0.35");
+  await picture(page, "skin-over-bone");
+  await page.getByLabel("Opacity of the skin").fill("1");
+
+  await page.getByLabel("Colours show").selectOption({ label: "Movement of the skin" });
+  await page.getByLabel("Colours show").scrollIntoViewIfNeeded();
+  await picture(page, "map");
+  await page.getByLabel("Colours show").selectOption({ label: "Skin as it looks" });
+
+  await page.getByLabel("Name of the prediction").fill("Jaw 8 mm forward");
+  await page.locator(".store button").click();
+  await page.locator(".predictions li", { hasText: "Jaw 8 mm forward" }).waitFor();
+  await typeMove(page, "Pitch", "4");
+  await page.getByLabel("Name of the prediction").fill("8 mm forward, chin up");
+  await page.locator(".store button").click();
+  await page.locator(".predictions li", { hasText: "chin up" }).waitFor();
+  await page.getByRole("button", { name: "Compare Jaw 8 mm forward" }).click();
+  await page.getByLabel("From", { exact: true }).selectOption({ label: "The face at rest" });
+  await page.getByLabel("From one to the other").fill("0.6");
+  await page.locator(".comparison").scrollIntoViewIfNeeded();
+  await picture(page, "comparison");
+  await page.getByText("Back to the plan").click();
+
+  const { session } = await state(page);
+  const link = page.url().replace("#case=", `#follow=${session.replace("sessions/", "")}&case=`);
+  const { page: follower } = await openPage(await planner.browse(), link);
+  await follower.emulateMedia({ colorScheme: "light" });
+  await moved(follower, 6, 14);
+  await follower.getByLabel("Opacity of the skin").fill("0.6");
+  await picture(follower, "follower");
+  await live(page);
+});
+
+// README's animation, by ImageMagick: convert -delay 12 FOLDER/jaw-*.jpg -resize 800x -layers Optimize -colors 96 jaw.gif
+test("the lower jaw goes forward, in frames", async () => {
+  const { page } = await openCase(await planner.browse(), planner);
+  await page.emulateMedia({ colorScheme: "dark" });
+  await takeSegment(page, "Lower jaw");
+  await page.getByLabel("Opacity of the skin").fill("0.75");
+  const forth = [0, 1, 2, 3, 4, 5, 6, 7, 8, 8, 8];
+  for (const [frame, mm] of [...forth, ...forth.slice(1, 8).reverse()].entries()) {
+    await typeMove(page, "Forward", String(mm));
+    await moved(page, 0.8 * mm, mm + 0.1);
+    await picture(page, `jaw-${String(frame).padStart(2, "0")}`);
+  }
+});

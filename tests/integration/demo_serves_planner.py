@@ -1,0 +1,69 @@
+#!/usr/bin/env python3
+# Copyright 2026 The Tissueform Authors.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+"""Runs `tissueform demo --serve`, opens the address that it prints as a browser would, and ends it by Ctrl-C.
+
+  demo_serves_planner.py TISSUEFORM OUT_FOLDER
+
+Exit code 1 and a sentence when something is not as it should be.
+"""
+
+import re
+import signal
+import subprocess
+import sys
+import urllib.request
+
+PATIENCE_S = 120
+
+
+def fetch(url):
+    with urllib.request.urlopen(url, timeout=30) as answer:
+        return answer.status, answer.headers, answer.read().decode()
+
+
+def check_planner(url):
+    address, case = re.fullmatch(r"(http://127\.0\.0\.1:\d+)/#case=([0-9a-f]{64})", url).groups()
+    status, headers, page = fetch(address + "/")
+    script = re.search(r'src="(/assets/[^"]+\.js)"', page)
+    if status != 200 or script is None or "script-src" not in headers["content-security-policy"]:
+        sys.exit(f"the page is not the planner's: {status}, {page[:200]}")
+    if fetch(address + script.group(1))[0] != 200:
+        sys.exit("the page's script is not there")
+    if fetch(address + "/readyz")[0] != 200:
+        sys.exit("no server behind the gateway")
+    # GetCase as gRPC-Web: what a browser sends for it.
+    name = b"cases/" + case.encode()
+    message = b"\x0a" + bytes([len(name)]) + name
+    request = urllib.request.Request(address + "/tissueform.v1.CaseService/GetCase", method="POST",
+                                     data=b"\0" + len(message).to_bytes(4, "big") + message,
+                                     headers={"content-type": "application/grpc-web+proto"})
+    with urllib.request.urlopen(request, timeout=30) as answer:
+        body = answer.read()
+    if name not in body or b"grpc-status: 0" not in body.replace(b":0", b": 0"):
+        sys.exit(f"the case is not the server's: {body[:200]}")
+
+
+def main():
+    program, out = sys.argv[1:]
+    demo = subprocess.Popen([program, "demo", "--serve", "--web-port", "0", "--seconds", "0.3", "--out", out],
+                            stdout=subprocess.PIPE, text=True)
+    signal.alarm(PATIENCE_S)  # ends this script, and the demo with it: its standard output closes
+    told = ""
+    for line in demo.stdout:
+        told += line
+        if line.startswith("no planner: "):
+            demo.send_signal(signal.SIGINT)
+            sys.exit(line)
+        address = re.match(r"the planner, in a browser: (\S+)", line)
+        if address is not None:
+            check_planner(address.group(1))
+            demo.send_signal(signal.SIGINT)
+            break
+    rest = demo.communicate()[0]
+    if demo.returncode != 0:
+        sys.exit(f"the demo ended with {demo.returncode}: {told}{rest}")
+
+
+if __name__ == "__main__":
+    main()
