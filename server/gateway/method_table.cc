@@ -13,6 +13,7 @@
 #include "tissueform/v1/case_service.pb.h"
 #include "tissueform/v1/deform_service.pb.h"
 #include "tissueform/v1/mesh_service.pb.h"
+#include "tissueform/v1/plan_service.pb.h"
 #include "tissueform/v1/prediction_service.pb.h"
 #include "tissueform/v1/server_info.pb.h"
 #include "tissueform/v1/session_service.pb.h"
@@ -39,6 +40,7 @@ void LinkServices() {
   google::protobuf::LinkMessageReflection<v1::GetCaseRequest>();
   google::protobuf::LinkMessageReflection<v1::DeformRequest>();
   google::protobuf::LinkMessageReflection<v1::GetMeshRequest>();
+  google::protobuf::LinkMessageReflection<v1::FitRequest>();
   google::protobuf::LinkMessageReflection<v1::GetPredictionRequest>();
   google::protobuf::LinkMessageReflection<v1::GetServerInfoRequest>();
   google::protobuf::LinkMessageReflection<v1::GetSessionRequest>();
