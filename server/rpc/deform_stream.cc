@@ -122,16 +122,26 @@ void DeformStreamReactor::FollowersChanged(int count) {
   followers_word_ = timer_->Start(std::chrono::steady_clock::now(), [this] { TellFollowers(); });
 }
 
+// Until nothing new is to be told: then one word at a time is under way, the one that OnDone waits
+// for.
 void DeformStreamReactor::TellFollowers() {
-  int count = 0;
-  {
+  for (bool is_due = true; is_due;) {
+    int count = 0;
+    {
+      MutexLock lock(followers_mutex_);
+      count = followers_;
+    }
+    Tell(count);
     MutexLock lock(followers_mutex_);
-    followers_due_ = false;
-    count = followers_;
+    is_due = followers_ != count;
+    followers_due_ = is_due;
   }
+}
+
+void DeformStreamReactor::Tell(int followers) {
   MutexLock lock(mutex_);
-  if (std::exchange(told_followers_, count) == count) return;
-  notices_.emplace_back().mutable_followers()->set_count(count);
+  if (std::exchange(told_followers_, followers) == followers) return;
+  notices_.emplace_back().mutable_followers()->set_count(followers);
   Advance();
 }
 

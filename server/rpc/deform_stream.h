@@ -57,6 +57,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   // By the channel, with its lock: leaves word for the timer's thread, which tells the client.
   void FollowersChanged(int count) override ABSL_LOCKS_EXCLUDED(followers_mutex_);
   void TellFollowers() ABSL_LOCKS_EXCLUDED(mutex_, followers_mutex_);
+  void Tell(int followers) ABSL_LOCKS_EXCLUDED(mutex_);
 
   // The client has had its time for the configuration.
   void EndUnlessConfigured() ABSL_LOCKS_EXCLUDED(mutex_);
