@@ -12,6 +12,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import urllib.request
 
 PATIENCE_S = 120
@@ -25,10 +26,11 @@ def fetch(url):
 def check_planner(url):
     address, case = re.fullmatch(r"(http://127\.0\.0\.1:\d+)/#case=([0-9a-f]{64})", url).groups()
     status, headers, page = fetch(address + "/")
-    script = re.search(r'src="(/assets/[^"]+\.js)"', page)
-    if status != 200 or script is None or "script-src" not in headers["content-security-policy"]:
-        sys.exit(f"the page is not the planner's: {status}, {page[:200]}")
-    if fetch(address + script.group(1))[0] != 200:
+    script = re.search(r'src="\.?/(assets/[^"]+\.js)"', page)
+    policy = headers["content-security-policy"]
+    if status != 200 or script is None or "default-src" not in policy or "unsafe" in policy:
+        sys.exit(f"the page is not the planner's: {status}, {policy}, {page[:200]}")
+    if fetch(f"{address}/{script.group(1)}")[0] != 200:
         sys.exit("the page's script is not there")
     if fetch(address + "/readyz")[0] != 200:
         sys.exit("no server behind the gateway")
@@ -48,21 +50,25 @@ def main():
     program, out = sys.argv[1:]
     demo = subprocess.Popen([program, "demo", "--serve", "--web-port", "0", "--seconds", "0.3", "--out", out],
                             stdout=subprocess.PIPE, text=True)
-    signal.alarm(PATIENCE_S)  # ends this script, and the demo with it: its standard output closes
+    patience = threading.Timer(PATIENCE_S, demo.kill)
+    patience.start()
     told = ""
-    for line in demo.stdout:
-        told += line
-        if line.startswith("no planner: "):
-            demo.send_signal(signal.SIGINT)
-            sys.exit(line)
-        address = re.match(r"the planner, in a browser: (\S+)", line)
-        if address is not None:
-            check_planner(address.group(1))
-            demo.send_signal(signal.SIGINT)
-            break
-    rest = demo.communicate()[0]
+    address = None
+    try:
+        for line in demo.stdout:
+            told += line
+            address = re.match(r"the planner, in a browser: (\S+)", line)
+            if address is not None or line.startswith("no planner: "):
+                break
+        if address is None:
+            sys.exit(f"no address: {told}")
+        check_planner(address.group(1))
+    finally:
+        demo.send_signal(signal.SIGINT)
+        demo.communicate()
+        patience.cancel()
     if demo.returncode != 0:
-        sys.exit(f"the demo ended with {demo.returncode}: {told}{rest}")
+        sys.exit(f"the demo ended with {demo.returncode}: {told}")
 
 
 if __name__ == "__main__":
