@@ -22,15 +22,15 @@
 namespace tissueform {
 
 // What a connection lets others do with it.
-class Strand {
+class ConnectionStrand {
  public:
-  virtual ~Strand() = default;
+  virtual ~ConnectionStrand() = default;
   // Any thread. Runs `job` on the strand, later.
   virtual void Post(std::function<void()> job) = 0;
 };
 
 // A reply that is sent in pieces.
-class ReplyStream : public Strand {
+class ReplyStream : public ConnectionStrand {
  public:
   // Once, before the first piece: what the reply begins with; its body is not looked at.
   virtual void Begin(const HttpReply& head) = 0;
@@ -59,7 +59,7 @@ enum class SocketClose : uint16_t {
   kTooLarge = 1009,
 };
 
-class Socket : public Strand {
+class Socket : public ConnectionStrand {
  public:
   // Asks for one message: OnMessage, OnBadMessage or OnGone follow.
   virtual void Receive() = 0;

@@ -12,7 +12,7 @@
 namespace tissueform {
 
 std::shared_ptr<UpstreamCall> UpstreamCall::Begin(CallSlot slot, const CallStart& start,
-                                                  std::shared_ptr<Strand> strand,
+                                                  std::shared_ptr<ConnectionStrand> strand,
                                                   std::shared_ptr<UpstreamUser> user) {
   std::shared_ptr<UpstreamCall> call(
       new UpstreamCall(std::move(slot), std::move(strand), std::move(user)));
@@ -31,7 +31,7 @@ std::shared_ptr<UpstreamCall> UpstreamCall::Begin(CallSlot slot, const CallStart
   return call;
 }
 
-UpstreamCall::UpstreamCall(CallSlot slot, std::shared_ptr<Strand> strand,
+UpstreamCall::UpstreamCall(CallSlot slot, std::shared_ptr<ConnectionStrand> strand,
                            std::shared_ptr<UpstreamUser> user)
     : slot_(std::move(slot)), strand_(std::move(strand)), user_(std::move(user)) {}
 
@@ -82,7 +82,7 @@ void UpstreamCall::OnDone(const grpc::Status& status) {
   if (!begun_) return;
   CallEnd end = {.status = status, .trailers = AllowedTrailers(context_)};
   // `this` may be gone before Post returns.
-  const std::shared_ptr<Strand> strand = strand_;
+  const std::shared_ptr<ConnectionStrand> strand = strand_;
   strand->Post([self = std::move(self_), end = std::move(end)]() mutable {
     if (const auto user = std::move(self->user_); user != nullptr) user->OnEnd(std::move(end));
   });

@@ -50,7 +50,7 @@ class UpstreamCall final : public std::enable_shared_from_this<UpstreamCall>,
                            private grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
   static std::shared_ptr<UpstreamCall> Begin(CallSlot slot, const CallStart& start,
-                                             std::shared_ptr<Strand> strand,
+                                             std::shared_ptr<ConnectionStrand> strand,
                                              std::shared_ptr<UpstreamUser> user);
 
   // One at a time; OnAnswer or OnEnd follows.
@@ -63,7 +63,8 @@ class UpstreamCall final : public std::enable_shared_from_this<UpstreamCall>,
   void Cancel();
 
  private:
-  UpstreamCall(CallSlot slot, std::shared_ptr<Strand> strand, std::shared_ptr<UpstreamUser> user);
+  UpstreamCall(CallSlot slot, std::shared_ptr<ConnectionStrand> strand,
+               std::shared_ptr<UpstreamUser> user);
 
   // gRPC's threads; they hand on to the strand.
   void OnReadDone(bool ok) override;
@@ -74,7 +75,7 @@ class UpstreamCall final : public std::enable_shared_from_this<UpstreamCall>,
 
   // Constant.
   const CallSlot slot_;
-  const std::shared_ptr<Strand> strand_;
+  const std::shared_ptr<ConnectionStrand> strand_;
   // The strand's.
   std::shared_ptr<UpstreamUser> user_;
   bool released_ = false;
