@@ -227,7 +227,7 @@ class ResponseBasis : public VertexResponse {
           continue;
         }
         for (Eigen::Index axis = 0; axis < 3; ++axis) {
-          columns_.col(ColumnOfPolynomial(n) + axis) = chosen.col(axis);
+          columns_.col(ColumnOfPolynomial(n) + axis) = responses(free, 3 * (n - first) + axis);
         }
       }
     }

@@ -18,8 +18,8 @@ namespace tissueform {
 inline CaseFile SampleCase() {
   const TetMesh bar = testing::Bar({2, 2, 4}, 10);
   const ConstraintSet constraints = testing::BarEnds(bar);
-  const MeshPayloadView view = ViewMeshPayload(
-      bar.positions(), bar.tets(), {{"stiffness", Eigen::VectorXd::Ones(bar.num_tets())}});
+  const std::vector<CellArray> arrays = {{"stiffness", Eigen::VectorXd::Ones(bar.num_tets())}};
+  const MeshPayloadView view = ViewMeshPayload(bar.positions(), bar.tets(), arrays);
   CaseFile contents;
   contents.title = "Upper end";
   contents.software = "tissueform 0.1.0";
