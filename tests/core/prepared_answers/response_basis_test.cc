@@ -263,6 +263,7 @@ TEST(ResponseBasisProgressTest, ColumnsAreCountedUpToTheLastAndTheWorkCanEndBetw
   const auto preparation = testing::PrepareMesh(mesh, 2, {});
   std::vector<int64_t> steps;
   ResponseBasisOptions options;
+  options.tolerance_mm = 1e-6;  // so that there are several passes
   options.observer = [&steps](const PreparationProgress& progress) {
     EXPECT_EQ(progress.stage, PreparationStage::kAnswers);
     steps.push_back(progress.step);
