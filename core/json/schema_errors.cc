@@ -147,10 +147,8 @@ std::string Meaning(const Json& subschema) {
   return description.empty() ? "" : absl::StrCat(" (", description, ")");
 }
 
-}  // namespace
-
-std::string ExplainViolations(const std::vector<SchemaViolation>& violations, const Json& schema,
-                              const Json& newest, const Json& document) {
+std::string Explain(const std::vector<SchemaViolation>& violations, const Json& schema,
+                    const Json& newest, const Json& document) {
   const SchemaViolation& violation = NearestToMistake(violations);
   const std::string pointer = JsonPointer(violation.path);
   const Json& subschema = SubschemaAt(violation.path, schema);
@@ -180,6 +178,26 @@ std::string ExplainViolations(const std::vector<SchemaViolation>& violations, co
     description[0] = absl::ascii_tolower(static_cast<unsigned char>(description[0]));
   return absl::StrCat("wrong value at ", pointer, ": ", value, ", ", description,
                       Meaning(subschema));
+}
+
+// A key is whatever its writer put into it: line breaks, and commands to a terminal.
+std::string OnOneLine(const std::string& text) {
+  std::string line;
+  for (const char c : text) {
+    if (absl::ascii_iscntrl(static_cast<unsigned char>(c))) {
+      absl::StrAppend(&line, "\\x", absl::Hex(static_cast<unsigned char>(c), absl::kZeroPad2));
+    } else {
+      line += c;
+    }
+  }
+  return line;
+}
+
+}  // namespace
+
+std::string ExplainViolations(const std::vector<SchemaViolation>& violations, const Json& schema,
+                              const Json& newest, const Json& document) {
+  return OnOneLine(Explain(violations, schema, newest, document));
 }
 
 }  // namespace tissueform

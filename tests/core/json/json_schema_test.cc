@@ -104,6 +104,11 @@ TEST(JsonSchemaTest, AKeyOfNoVersionIsUnknownInEachAndWhatIsAllowedIsOfThatVersi
   EXPECT_THAT(Grown().Check(House(2, R"("roof": 1)")), IsRefused("colour"));
 }
 
+TEST(JsonSchemaTest, KeysWithLineBreaksAndCommandsToATerminalAreToldOnOneLine) {
+  EXPECT_THAT(Grown().Check(House(1, R"("roof\n\u001b[2J": 1)")),
+              IsRefused(R"(unknown key "roof\x0a\x1b[2J" at /)"));
+}
+
 TEST(JsonSchemaTest, AFileOfANewerProgramIsRefusedAsSuch) {
   EXPECT_THAT(
       Grown().Check(House(4, R"("cellar": true)")),
