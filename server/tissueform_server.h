@@ -10,7 +10,7 @@
 #include "grpcpp/server.h"
 #include "grpcpp/server_builder.h"
 
-#include "server/rpc/call_scope.h"
+#include "server/calls/call_scope.h"
 #include "server/rpc/case_service.h"
 #include "server/rpc/deform_service.h"
 #include "server/rpc/deform_streams.h"

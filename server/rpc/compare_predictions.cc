@@ -18,7 +18,7 @@
 #include "proto/conversion/mesh_conversion.h"
 #include "proto/conversion/model_conversion.h"
 #include "proto/conversion/prediction_conversion.h"
-#include "server/rpc/message_stream.h"
+#include "server/calls/message_stream.h"
 #include "server/rpc/prediction_record.h"
 #include "server/rpc/single_answer.h"
 

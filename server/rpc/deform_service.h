@@ -3,7 +3,7 @@
 
 #pragma once
 
-#include "server/rpc/call_scope.h"
+#include "server/calls/call_scope.h"
 #include "server/rpc/deform_streams.h"
 #include "server/rpc/session_watches.h"
 #include "server/session/deadline_timer.h"

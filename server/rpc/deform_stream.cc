@@ -164,6 +164,8 @@ absl::Status DeformStreamReactor::Take() {
                                                     ? std::optional<int32_t>(ack.refinement())
                                                     : std::nullopt);
     }
+    case v1::DeformRequest::kToken:
+      return scope_.Renew(request_.token());
     case v1::DeformRequest::kConfiguration:
       return absl::InvalidArgumentError("a second configuration; open another stream for it");
     case v1::DeformRequest::MESSAGE_NOT_SET:

@@ -13,7 +13,7 @@
 #include "grpcpp/support/server_callback.h"
 
 #include "core/base/mutex.h"
-#include "server/rpc/call_scope.h"
+#include "server/calls/call_scope.h"
 #include "server/rpc/deform_streams.h"
 #include "server/rpc/session_watches.h"
 #include "server/rpc/stream_answers.h"

@@ -6,7 +6,7 @@
 #include <functional>
 #include <string_view>
 
-#include "server/rpc/call_scope.h"
+#include "server/calls/call_scope.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"

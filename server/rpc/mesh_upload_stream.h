@@ -8,8 +8,8 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "server/rpc/call_scope.h"
-#include "server/rpc/upload_stream.h"
+#include "server/calls/call_scope.h"
+#include "server/calls/upload_stream.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"

@@ -3,7 +3,7 @@
 
 #pragma once
 
-#include "server/rpc/call_scope.h"
+#include "server/calls/call_scope.h"
 #include "server/session/session_registry.h"
 #include "tissueform/v1/plan_service.grpc.pb.h"
 

@@ -7,7 +7,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "server/rpc/call_scope.h"
+#include "server/calls/call_scope.h"
 #include "server/session/clock.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"

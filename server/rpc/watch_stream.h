@@ -17,7 +17,7 @@
 
 #include "core/base/mutex.h"
 #include "core/constraints/handle_pose.h"
-#include "server/rpc/call_scope.h"
+#include "server/calls/call_scope.h"
 #include "server/rpc/session_watches.h"
 #include "server/session/limits.h"
 #include "server/session/session_registry.h"

@@ -14,13 +14,22 @@
 #include "grpcpp/support/status.h"
 
 #include "core/base/mutex.h"
-#include "server/auth/identity.h"
+#include "server/auth/authenticator.h"
+#include "server/calls/call_observer.h"
 
 namespace tissueform {
 
-// Whether the server takes new work, and how many calls are open. Thread-safe.
+// What stands before every call: who makes it, who is told of it, whether the server takes new
+// work; and how many calls are open. Thread-safe.
 class ServiceGate {
  public:
+  // Both may be null, and must outlive the calls. Without an authenticator everybody is anonymous.
+  explicit ServiceGate(Authenticator* authenticator = nullptr, CallObserver* observer = nullptr)
+      : authenticator_(authenticator), observer_(observer) {}
+
+  Authenticator* authenticator() const { return authenticator_; }
+  CallObserver* observer() const { return observer_; }
+
   void StartDraining() { draining_ = true; }
   bool draining() const { return draining_; }
 
@@ -33,17 +42,13 @@ class ServiceGate {
   void Enter();
   void Leave();
 
+  Authenticator* const authenticator_;
+  CallObserver* const observer_;
   std::atomic<bool> draining_ = false;
 
   Mutex mutex_;
   ConditionVariable idle_;
   int open_calls_ ABSL_GUARDED_BY(mutex_) = 0;
-};
-
-// What a call asks for.
-enum class CallKind {
-  kNewWork,  // refused while the server drains
-  kUpkeep,   // looks or tidies up: always welcome
 };
 
 // The header in which a client may send an id of its own for a call, so that it finds the call in
@@ -55,7 +60,7 @@ inline constexpr char kRequestIdHeader[] = "x-request-id";
 std::string RequestIdOr(std::string_view from_client);
 
 // The common beginning and end of every rpc: made first, asked for its admission, ended once with
-// the outcome. The place where a caller is authenticated.
+// the outcome. The place where a caller is authenticated and observers are told.
 //
 // Logs method, code, duration and request id, and nothing else that came from the client: names and
 // messages may identify a patient. One thread at a time.
@@ -70,20 +75,36 @@ class CallScope {
   CallScope(CallScope&& other) noexcept;
   CallScope& operator=(CallScope&&) = delete;
 
-  // OK, or why the call is not served: Unavailable.
+  // OK, or why the call is not served: Unavailable, Unauthenticated, or what the observer says.
   const absl::Status& admission() const { return admission_; }
-  const Principal& principal() const { return principal_; }
+  const Principal& principal() const { return *authenticated_.principal; }
+  const Authenticated& authenticated() const { return authenticated_; }
   const std::string& request_id() const { return request_id_; }
+
+  // The call stands on this token from now on. Errors: those of the authenticator;
+  // Unauthenticated (it is another's). Nothing to do where nobody logs in.
+  absl::Status Renew(const std::string& token);
+
+  // Says what the call is about ("sessions/{id}"), once it is known that its caller may use it.
+  void SetResource(std::string resource);
 
   // What the rpc is finished with. Call it once.
   grpc::Status End(const absl::Status& outcome);
 
  private:
+  ObservedCall Observed() const;
+  void TellEnd(const absl::Status& outcome) const;
+  absl::Status Admit(const grpc::CallbackServerContext* context);
+
   std::string_view method_;
+  CallKind kind_;
   ServiceGate* gate_;  // null once ended, or moved from
   std::chrono::steady_clock::time_point start_;
-  Principal principal_;
+  Authenticated authenticated_;
+  std::string address_;
   std::string request_id_;
+  std::string traceparent_;
+  std::string resource_;
   absl::Status admission_;
 };
 

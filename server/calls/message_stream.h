@@ -13,7 +13,7 @@
 #include "grpcpp/server_context.h"
 #include "grpcpp/support/server_callback.h"
 
-#include "server/rpc/call_scope.h"
+#include "server/calls/call_scope.h"
 #include "server/session/deadline_timer.h"
 
 namespace tissueform {
@@ -104,8 +104,8 @@ class MessageStream : public grpc::ServerWriteReactor<Response> {
   Post post_;         // null: where it is asked
   Response message_;  // gRPC's while a write is under way
   DeadlineTimer::Id deadline_;
-  // A write begins on one thread and ends on another. gRPC orders the two, but inside a library that
-  // ThreadSanitizer cannot see into; this it sees.
+  // A write begins on one thread and ends on another. gRPC orders the two, but inside a library
+  // that ThreadSanitizer cannot see into; this it sees.
   std::atomic<bool> handed_over_ = false;
 };
 

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/rpc/message_stream.h"
+#include "server/calls/message_stream.h"
 
 #include <atomic>
 #include <chrono>

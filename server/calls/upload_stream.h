@@ -11,7 +11,7 @@
 #include "grpcpp/support/server_callback.h"
 
 #include "core/base/mutex.h"
-#include "server/rpc/call_scope.h"
+#include "server/calls/call_scope.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/worker_pool.h"
 

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/rpc/call_scope.h"
+#include "server/calls/call_scope.h"
 
 #include <chrono>
 #include <memory>
@@ -9,7 +9,10 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
+#include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "spdlog/sinks/ostream_sink.h"
@@ -68,6 +71,77 @@ TEST(CallScopeTest, EverybodyIsAnonymous) {
   ServiceGate gate;
   const CallScope scope(nullptr, "Test.Call", CallKind::kNewWork, &gate);
   EXPECT_TRUE(scope.principal().anonymous());
+}
+
+// Takes "Bearer NAME" for the token of NAME.
+class TrustingAuthenticator : public Authenticator {
+ public:
+  absl::StatusOr<Authenticated> Authenticate(const Credentials& credentials) override {
+    if (credentials.authorization.size() != 1) return absl::UnauthenticatedError("no token");
+    Principal principal{
+        .name = std::string(absl::StripPrefix(credentials.authorization[0], "Bearer "))};
+    return Authenticated{.principal = std::make_shared<const Principal>(std::move(principal))};
+  }
+  absl::Status StillGood(const Authenticated& /*authenticated*/) override {
+    return absl::OkStatus();
+  }
+};
+
+TEST(CallScopeTest, AServerWithLoginsServesNobodyElse) {
+  TrustingAuthenticator authenticator;
+  ServiceGate gate(&authenticator);
+  EXPECT_EQ(AdmissionOf(CallKind::kUpkeep, &gate), absl::StatusCode::kUnauthenticated);
+}
+
+TEST(CallScopeTest, AStreamGoesOnWithATokenOfTheSamePrincipalOnly) {
+  TrustingAuthenticator authenticator;
+  ServiceGate gate(&authenticator);
+  CallScope scope(nullptr, "Test.Call", CallKind::kNewWork, &gate);
+  EXPECT_TRUE(absl::IsUnauthenticated(scope.Renew("somebody")));
+  ServiceGate without_logins;
+  CallScope open(nullptr, "Test.Call", CallKind::kNewWork, &without_logins);
+  EXPECT_TRUE(open.Renew("somebody").ok());
+  EXPECT_TRUE(open.principal().anonymous());
+}
+
+// Writes down what it is told.
+class Notes : public CallObserver {
+ public:
+  absl::Status OnBegin(const ObservedCall& call) override {
+    told.push_back(
+        absl::StrCat("begin ", std::string(call.method), " ", std::string(call.resource)));
+    return refusal;
+  }
+  void OnResource(const ObservedCall& call) override {
+    told.push_back(absl::StrCat("resource ", std::string(call.resource)));
+  }
+  void OnEnd(const ObservedCall& call, const absl::Status& outcome,
+             std::chrono::steady_clock::duration /*elapsed*/) override {
+    told.push_back(absl::StrCat("end ", std::string(call.resource), " ",
+                                absl::StatusCodeToString(outcome.code())));
+  }
+
+  absl::Status refusal;
+  std::vector<std::string> told;
+};
+
+TEST(CallScopeTest, AnObserverHearsOfEveryCallOnce) {
+  Notes notes;
+  ServiceGate gate(nullptr, &notes);
+  CallScope scope(nullptr, "Test.Call", CallKind::kNewWork, &gate);
+  CallScope moved = std::move(scope);
+  moved.SetResource("sessions/a");
+  EXPECT_FALSE(moved.End(absl::NotFoundError("gone")).ok());
+  EXPECT_THAT(notes.told, ::testing::ElementsAre("begin Test.Call ", "resource sessions/a",
+                                                 "end sessions/a NOT_FOUND"));
+}
+
+TEST(CallScopeTest, AnObserverCanRefuseACall) {
+  Notes notes;
+  notes.refusal = absl::UnavailableError("the audit log cannot be written");
+  ServiceGate gate(nullptr, &notes);
+  EXPECT_EQ(AdmissionOf(CallKind::kUpkeep, &gate), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(notes.told.size(), 2);
 }
 
 TEST(CallScopeTest, ACallWithoutRequestIdGetsOneOfItsOwn) {

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/rpc/status_conversion.h"
+#include "server/calls/status_conversion.h"
 
 #include <cerrno>
 #include <string>

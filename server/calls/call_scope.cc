@@ -1,0 +1,214 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/calls/call_scope.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
+#include "grpcpp/security/auth_context.h"
+#include "grpcpp/server_context.h"
+#include "spdlog/spdlog.h"
+
+#include "core/base/error_reason.h"
+#include "core/base/status_macros.h"
+#include "server/auth/identity.h"
+#include "server/calls/status_conversion.h"
+
+namespace tissueform {
+namespace {
+
+constexpr char kAuthorizationHeader[] = "authorization";
+constexpr size_t kMaxRequestIdBytes = 64;
+
+std::string_view Header(const grpc::CallbackServerContext* context, const char* name) {
+  if (context == nullptr) return {};
+  const auto found = context->client_metadata().find(name);
+  if (found == context->client_metadata().end()) return {};
+  return {found->second.data(), found->second.size()};
+}
+
+Credentials CredentialsOf(const grpc::CallbackServerContext* context) {
+  Credentials credentials;
+  if (context == nullptr) return credentials;
+  const auto [begin, end] = context->client_metadata().equal_range(kAuthorizationHeader);
+  for (auto header = begin; header != end; ++header) {
+    credentials.authorization.emplace_back(header->second.data(), header->second.size());
+  }
+  const std::shared_ptr<const grpc::AuthContext> tls = context->auth_context();
+  if (tls == nullptr || !tls->IsPeerAuthenticated()) return credentials;
+  for (const grpc::string_ref& name : tls->GetPeerIdentity()) {
+    credentials.certificate_names.emplace_back(name.data(), name.size());
+  }
+  return credentials;
+}
+
+// "ipv4:192.0.2.1:1234", "ipv6:%5B::1%5D:1234" and "unix:" as gRPC says them: without the port.
+std::string AddressOf(const grpc::CallbackServerContext* context) {
+  if (context == nullptr) return {};
+  std::string peer = context->peer();
+  peer.resize(std::min(peer.rfind(':'), peer.size()));
+  return absl::StrReplaceAll(peer.substr(std::min(peer.find(':') + 1, peer.size())),
+                             {{"%5B", ""}, {"%5D", ""}});
+}
+
+// As the W3C has it: "00-", 32 hexadecimal digits, "-", 16, "-", 2. Others go to no log.
+std::string TraceparentOr(std::string_view from_client) {
+  constexpr std::string_view kForm = "00-................................-................-..";
+  if (from_client.size() != kForm.size()) return {};
+  for (size_t i = 0; i < kForm.size(); ++i) {
+    const char c = from_client[i];
+    const bool digit = absl::ascii_isdigit(c) || (c >= 'a' && c <= 'f');
+    if (kForm[i] == '.' ? !digit : c != kForm[i]) return {};
+  }
+  return std::string(from_client);
+}
+
+std::shared_ptr<const Principal> Nobody() {
+  static const auto* nobody =
+      new std::shared_ptr<const Principal>(std::make_shared<const Principal>());
+  return *nobody;
+}
+
+}  // namespace
+
+bool ServiceGate::WaitUntilIdle(std::chrono::steady_clock::time_point deadline) {
+  MutexLock lock(mutex_);
+  while (open_calls_ > 0) {
+    if (!idle_.WaitUntil(mutex_, deadline)) {
+      return open_calls_ == 0;
+    }
+  }
+  return true;
+}
+
+void ServiceGate::Enter() {
+  MutexLock lock(mutex_);
+  ++open_calls_;
+}
+
+void ServiceGate::Leave() {
+  MutexLock lock(mutex_);
+  if (--open_calls_ == 0) {
+    idle_.NotifyAll();
+  }
+}
+
+std::string RequestIdOr(std::string_view from_client) {
+  const bool well_formed = !from_client.empty() && from_client.size() <= kMaxRequestIdBytes &&
+                           std::all_of(from_client.begin(), from_client.end(), [](unsigned char c) {
+                             return absl::ascii_isalnum(c) || c == '-' || c == '_' || c == '.';
+                           });
+  return well_formed ? std::string(from_client) : RandomId();
+}
+
+CallScope::CallScope(const grpc::CallbackServerContext* context, std::string_view method,
+                     CallKind kind, ServiceGate* gate)
+    : method_(method),
+      kind_(kind),
+      gate_(gate),
+      start_(std::chrono::steady_clock::now()),
+      authenticated_({.principal = Nobody()}),
+      address_(AddressOf(context)),
+      request_id_(RequestIdOr(Header(context, kRequestIdHeader))),
+      traceparent_(TraceparentOr(Header(context, "traceparent"))),
+      admission_(Admit(context)) {}
+
+absl::Status CallScope::Admit(const grpc::CallbackServerContext* context) {
+  gate_->Enter();
+  if (gate_->authenticator() != nullptr) {
+    TF_ASSIGN_OR_RETURN(authenticated_,
+                        gate_->authenticator()->Authenticate(CredentialsOf(context)));
+  }
+  if (kind_ == CallKind::kNewWork && gate_->draining()) {
+    return WithReason(
+        absl::UnavailableError(
+            "the server is draining and takes no new work; try another one, or again in a minute"),
+        ErrorReason::kServerDraining);
+  }
+  return gate_->observer() == nullptr ? absl::OkStatus() : gate_->observer()->OnBegin(Observed());
+}
+
+CallScope::CallScope(CallScope&& other) noexcept
+    : method_(other.method_),
+      kind_(other.kind_),
+      gate_(std::exchange(other.gate_, nullptr)),
+      start_(other.start_),
+      authenticated_(other.authenticated_),  // not moved: what is left still has a principal
+      address_(std::move(other.address_)),
+      request_id_(std::move(other.request_id_)),
+      traceparent_(std::move(other.traceparent_)),
+      resource_(std::move(other.resource_)),
+      admission_(std::move(other.admission_)) {}
+
+ObservedCall CallScope::Observed() const {
+  return {.method = method_,
+          .kind = kind_,
+          .principal = principal(),
+          .resource = resource_,
+          .address = address_,
+          .request_id = request_id_,
+          .traceparent = traceparent_};
+}
+
+absl::Status CallScope::Renew(const std::string& token) {
+  if (gate_->authenticator() == nullptr) return absl::OkStatus();
+  const std::string bearer = absl::StrCat("Bearer ", token);
+  TF_ASSIGN_OR_RETURN(Authenticated renewed,
+                      gate_->authenticator()->Authenticate({.authorization = {bearer}}));
+  if (*renewed.principal != principal()) {
+    return absl::UnauthenticatedError(
+        "the new token is another's, or allows something else; open another stream with it");
+  }
+  authenticated_ = std::move(renewed);
+  return absl::OkStatus();
+}
+
+void CallScope::SetResource(std::string resource) {
+  resource_ = std::move(resource);
+  if (gate_->observer() != nullptr) gate_->observer()->OnResource(Observed());
+}
+
+CallScope::~CallScope() {
+  if (gate_ == nullptr) return;
+  spdlog::warn("{} was left without an outcome, request {}", method_, request_id_);
+  TellEnd(absl::CancelledError("left without an outcome"));
+  gate_->Leave();
+}
+
+void CallScope::TellEnd(const absl::Status& outcome) const {
+  if (gate_->observer() == nullptr) return;
+  gate_->observer()->OnEnd(Observed(), outcome, std::chrono::steady_clock::now() - start_);
+}
+
+grpc::Status CallScope::End(const absl::Status& outcome) {
+  const std::chrono::duration<double, std::milli> elapsed =
+      std::chrono::steady_clock::now() - start_;
+  const auto level = outcome.ok() || outcome.code() == absl::StatusCode::kCancelled
+                         ? spdlog::level::debug
+                         : spdlog::level::info;
+  spdlog::log(level, "{} {} {:.1f} ms, request {}", method_,
+              absl::StatusCodeToString(outcome.code()), elapsed.count(), request_id_);
+  TellEnd(outcome);
+  std::exchange(gate_, nullptr)->Leave();
+  return ToGrpcStatus(outcome);
+}
+
+grpc::ServerUnaryReactor* RunUpkeep(
+    grpc::CallbackServerContext* context, std::string_view method, ServiceGate* gate,
+    const std::function<absl::Status(const CallScope& scope, const EndCall& end)>& start) {
+  auto scope = std::make_shared<CallScope>(context, method, CallKind::kUpkeep, gate);
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const EndCall end = [scope, reactor](const absl::Status& outcome) {
+    reactor->Finish(scope->End(outcome));
+  };
+  const absl::Status started = scope->admission().ok() ? start(*scope, end) : scope->admission();
+  if (!started.ok()) end(started);
+  return reactor;
+}
+
+}  // namespace tissueform
