@@ -87,6 +87,24 @@ void AddLimits(CLI::App& app, ServerOptions* options) {
             Into(&options->max_connections_per_address));
 }
 
+void AddQuotas(CLI::App& app, Quotas* quotas) {
+  AddNumber(app, "--quota-calls-per-second", quotas->calls_per_second, 1, kMaxCount,
+            "of one principal, as all quotas: calls a second on average, twice as many at once",
+            Into(&quotas->calls_per_second));
+  AddNumber(app, "--quota-waiting-calls", quotas->waiting_calls, 1, kMaxCount,
+            "calls that are answered or wait for it at the same time",
+            Into(&quotas->waiting_calls));
+  AddNumber(app, "--quota-streams", quotas->streams, 1, kMaxCount,
+            "drags and watches open at the same time", Into(&quotas->streams));
+  AddNumber(app, "--quota-sessions", quotas->sessions, 1, kMaxCount, "sessions kept",
+            Into(&quotas->sessions));
+  AddNumber(app, "--quota-memory-mib", quotas->memory_bytes / kMebibyte, 0, kMaxMebibytes,
+            "memory of sessions and what they need; 0: half of --memory-budget-mib",
+            MebibytesInto(&quotas->memory_bytes));
+  AddNumber(app, "--quota-disk-mib", quotas->disk_bytes / kMebibyte, 1, kMaxMebibytes,
+            "meshes, cases and predictions kept", MebibytesInto(&quotas->disk_bytes));
+}
+
 }  // namespace
 
 ServerOptions ServerOptions::Defaults() {
@@ -120,6 +138,7 @@ void AddServerOptions(CLI::App& app, ServerOptions* options) {
       ->type_name("DIR")
       ->excludes(in_memory);
   AddLimits(app, options);
+  AddQuotas(app, &options->quotas);
   AddNumber(app, "--drain-seconds", options->drain_deadline.count(), 0, 3600,
             "after SIGTERM or SIGINT, how long open calls may go on",
             SecondsInto(&options->drain_deadline));

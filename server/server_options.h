@@ -10,6 +10,7 @@
 #include "CLI/CLI.hpp"
 
 #include "server/session/limits.h"
+#include "server/session/quotas.h"
 
 namespace tissueform {
 
@@ -20,6 +21,7 @@ struct ServerOptions {
   int64_t memory_budget_bytes = 0;
   int workers = 1;
   ServiceLimits limits;
+  Quotas quotas = {};
   int max_calls_per_connection = 128;
   int max_connections = 1024;
   int max_connections_per_address = 512;

@@ -78,13 +78,24 @@ ConnectionListener::Options ListenerOptions(const ServerOptions& options) {
           .most_of_address = options.max_connections_per_address};
 }
 
+int64_t MemoryQuota(const ServerOptions& options) {
+  return options.quotas.memory_bytes > 0 ? options.quotas.memory_bytes
+                                         : options.memory_budget_bytes / 2;
+}
+
 // Every option by its place: one that is added does not compile here until it was decided whether
 // it is a limit.
 NamedLimits LimitsOf(const ServerOptions& options) {
-  const auto& [host, port, memory_budget_bytes, workers, service, max_calls_per_connection,
+  const auto& [host, port, memory_budget_bytes, workers, service, quotas, max_calls_per_connection,
                max_connections, max_connections_per_address, drain_deadline, in_memory, data_dir,
                log_level] = options;
   NamedLimits limits = ToNamedLimits(service);
+  limits["quota_calls_per_second"] = quotas.calls_per_second;
+  limits["quota_waiting_calls"] = quotas.waiting_calls;
+  limits["quota_streams"] = quotas.streams;
+  limits["quota_sessions"] = quotas.sessions;
+  limits["quota_memory_bytes"] = MemoryQuota(options);
+  limits["quota_disk_bytes"] = quotas.disk_bytes;
   limits["max_message_bytes"] = kMaxReceiveBytes;
   limits["memory_budget_bytes"] = memory_budget_bytes;
   limits["workers"] = workers;
@@ -125,6 +136,8 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
 
 TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores)
     : options_(options),
+      quotas_(options.quotas),
+      gate_(nullptr, nullptr, &quotas_),
       budget_(options.memory_budget_bytes),
       stores_(std::move(stores)),
       catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),
@@ -147,6 +160,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr
   registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
     watches_.OnSessionEvent(id, event);
   });
+  budget_.set_account_limit(MemoryQuota(options), [](const std::string& /*owner*/, int64_t) {});
   budget_.set_reclaimer([this](int64_t bytes) { Reclaim(bytes); });
 }
 

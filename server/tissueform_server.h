@@ -71,6 +71,7 @@ class TissueformServer {
 
   // Self-synchronised; each may use those before it. Destroyed from the last to the first: calls
   // end, then jobs, then what they used.
+  CallQuotas quotas_;
   ServiceGate gate_;
   MemoryBudget budget_;
   std::unique_ptr<Stores> stores_;

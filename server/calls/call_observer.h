@@ -17,6 +17,7 @@ namespace tissueform {
 enum class CallKind {
   kNewWork,  // refused while the server drains
   kUpkeep,   // looks or tidies up: always welcome
+  kStream,   // new work for as long as its client likes: a drag, a watch
 };
 
 // What is known of a call. Views and references live as long as the call of the observer.

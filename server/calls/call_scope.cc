@@ -124,13 +124,18 @@ absl::Status CallScope::Admit(const grpc::CallbackServerContext* context) {
     TF_ASSIGN_OR_RETURN(authenticated_,
                         gate_->authenticator()->Authenticate(CredentialsOf(context)));
   }
-  if (kind_ == CallKind::kNewWork && gate_->draining()) {
+  if (kind_ != CallKind::kUpkeep && gate_->draining()) {
     return WithReason(
         absl::UnavailableError(
             "the server is draining and takes no new work; try another one, or again in a minute"),
         ErrorReason::kServerDraining);
   }
-  return gate_->observer() == nullptr ? absl::OkStatus() : gate_->observer()->OnBegin(Observed());
+  if (gate_->observer() != nullptr) TF_RETURN_IF_ERROR(gate_->observer()->OnBegin(Observed()));
+  if (gate_->quotas() != nullptr && !principal().anonymous()) {
+    TF_RETURN_IF_ERROR(gate_->quotas()->Begin(principal().name, kind_));
+    counted_ = true;
+  }
+  return absl::OkStatus();
 }
 
 CallScope::CallScope(CallScope&& other) noexcept
@@ -139,6 +144,7 @@ CallScope::CallScope(CallScope&& other) noexcept
       gate_(std::exchange(other.gate_, nullptr)),
       start_(other.start_),
       authenticated_(other.authenticated_),  // not moved: what is left still has a principal
+      counted_(std::exchange(other.counted_, false)),
       address_(std::move(other.address_)),
       request_id_(std::move(other.request_id_)),
       traceparent_(std::move(other.traceparent_)),
@@ -180,7 +186,8 @@ CallScope::~CallScope() {
   gate_->Leave();
 }
 
-void CallScope::TellEnd(const absl::Status& outcome) const {
+void CallScope::TellEnd(const absl::Status& outcome) {
+  if (std::exchange(counted_, false)) gate_->quotas()->End(principal().name, kind_);
   if (gate_->observer() == nullptr) return;
   gate_->observer()->OnEnd(Observed(), outcome, std::chrono::steady_clock::now() - start_);
 }

@@ -16,19 +16,23 @@
 #include "core/base/mutex.h"
 #include "server/auth/authenticator.h"
 #include "server/calls/call_observer.h"
+#include "server/calls/call_quotas.h"
 
 namespace tissueform {
 
-// What stands before every call: who makes it, who is told of it, whether the server takes new
-// work; and how many calls are open. Thread-safe.
+// What stands before every call: who makes it, who is told of it, how many a principal may make,
+// whether the server takes new work; and how many calls are open. Thread-safe.
 class ServiceGate {
  public:
-  // Both may be null, and must outlive the calls. Without an authenticator everybody is anonymous.
-  explicit ServiceGate(Authenticator* authenticator = nullptr, CallObserver* observer = nullptr)
-      : authenticator_(authenticator), observer_(observer) {}
+  // All may be null, and must outlive the calls. Without an authenticator everybody is anonymous,
+  // and of nobody's quotas.
+  explicit ServiceGate(Authenticator* authenticator = nullptr, CallObserver* observer = nullptr,
+                       CallQuotas* quotas = nullptr)
+      : authenticator_(authenticator), observer_(observer), quotas_(quotas) {}
 
   Authenticator* authenticator() const { return authenticator_; }
   CallObserver* observer() const { return observer_; }
+  CallQuotas* quotas() const { return quotas_; }
 
   void StartDraining() { draining_ = true; }
   bool draining() const { return draining_; }
@@ -44,6 +48,7 @@ class ServiceGate {
 
   Authenticator* const authenticator_;
   CallObserver* const observer_;
+  CallQuotas* const quotas_;
   std::atomic<bool> draining_ = false;
 
   Mutex mutex_;
@@ -75,7 +80,8 @@ class CallScope {
   CallScope(CallScope&& other) noexcept;
   CallScope& operator=(CallScope&&) = delete;
 
-  // OK, or why the call is not served: Unavailable, Unauthenticated, or what the observer says.
+  // OK, or why the call is not served: Unavailable, Unauthenticated, ResourceExhausted
+  // (a quota), or what the observer says.
   const absl::Status& admission() const { return admission_; }
   const Principal& principal() const { return *authenticated_.principal; }
   const Authenticated& authenticated() const { return authenticated_; }
@@ -93,7 +99,7 @@ class CallScope {
 
  private:
   ObservedCall Observed() const;
-  void TellEnd(const absl::Status& outcome) const;
+  void TellEnd(const absl::Status& outcome);
   absl::Status Admit(const grpc::CallbackServerContext* context);
 
   std::string_view method_;
@@ -101,6 +107,7 @@ class CallScope {
   ServiceGate* gate_;  // null once ended, or moved from
   std::chrono::steady_clock::time_point start_;
   Authenticated authenticated_;
+  bool counted_ = false;  // by the quotas
   std::string address_;
   std::string request_id_;
   std::string traceparent_;

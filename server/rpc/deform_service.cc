@@ -92,15 +92,14 @@ grpc::ServerUnaryReactor* DeformService::DeformOnce(grpc::CallbackServerContext*
 grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* DeformService::Deform(
     grpc::CallbackServerContext* context) {
   return new DeformStreamReactor(
-      CallScope(context, "DeformService.Deform", CallKind::kNewWork, gate_), limits_, registry_,
+      CallScope(context, "DeformService.Deform", CallKind::kStream, gate_), limits_, registry_,
       streams_, watches_, timer_);
 }
 
 grpc::ServerWriteReactor<grpc::ByteBuffer>* DeformService::Watch(
     grpc::CallbackServerContext* context, const grpc::ByteBuffer* request) {
-  return new WatchStreamReactor(
-      CallScope(context, "DeformService.Watch", CallKind::kNewWork, gate_), *request, limits_,
-      registry_, watches_);
+  return new WatchStreamReactor(CallScope(context, "DeformService.Watch", CallKind::kStream, gate_),
+                                *request, limits_, registry_, watches_);
 }
 
 grpc::ServerUnaryReactor* DeformService::AcknowledgeWatch(
