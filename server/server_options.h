@@ -10,6 +10,7 @@
 #include "CLI/CLI.hpp"
 
 #include "server/session/limits.h"
+#include "server/transport/tls_options.h"
 
 namespace tissueform {
 
@@ -17,6 +18,7 @@ namespace tissueform {
 struct ServerOptions {
   std::string host = "127.0.0.1";
   int port = 50051;  // 0: any free one
+  TlsOptions tls = {};
   int64_t memory_budget_bytes = 0;
   int workers = 1;
   ServiceLimits limits;

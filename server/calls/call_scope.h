@@ -8,6 +8,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "grpcpp/support/server_callback.h"
@@ -24,11 +25,16 @@ namespace tissueform {
 class ServiceGate {
  public:
   // Both may be null, and must outlive the calls. Without an authenticator everybody is anonymous.
-  explicit ServiceGate(Authenticator* authenticator = nullptr, CallObserver* observer = nullptr)
-      : authenticator_(authenticator), observer_(observer) {}
+  // `gateway_name`: see ClientAddress.
+  explicit ServiceGate(Authenticator* authenticator = nullptr, CallObserver* observer = nullptr,
+                       std::string gateway_name = {})
+      : authenticator_(authenticator),
+        observer_(observer),
+        gateway_name_(std::move(gateway_name)) {}
 
   Authenticator* authenticator() const { return authenticator_; }
   CallObserver* observer() const { return observer_; }
+  const std::string& gateway_name() const { return gateway_name_; }
 
   void StartDraining() { draining_ = true; }
   bool draining() const { return draining_; }
@@ -44,6 +50,7 @@ class ServiceGate {
 
   Authenticator* const authenticator_;
   CallObserver* const observer_;
+  const std::string gateway_name_;
   std::atomic<bool> draining_ = false;
 
   Mutex mutex_;
