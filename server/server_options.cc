@@ -118,12 +118,13 @@ ServerOptions ServerOptions::Defaults() {
 void AddServerOptions(CLI::App& app, ServerOptions* options) {
   app.set_config("--config", "", "file with any of these options, as `name = value` lines");
   app.add_option("--host", options->host,
-                 "address to listen on; anything but loopback is open to the network: there is no "
-                 "login yet")
+                 "address to listen on; anything but loopback needs encryption and logins, or "
+                 "--insecure")
       ->capture_default_str();
   app.add_option("--port", options->port, "port to listen on; 0 takes a free one")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
+  AddTlsOptions(app, &options->tls);
   app.add_option("--workers", options->workers,
                  "threads that compute, in each lane (default: one a core); sessions share them")
       ->check(CLI::Range(1, 1024))

@@ -11,6 +11,7 @@
 
 #include "server/session/limits.h"
 #include "server/session/quotas.h"
+#include "server/transport/tls_options.h"
 
 namespace tissueform {
 
@@ -18,6 +19,7 @@ namespace tissueform {
 struct ServerOptions {
   std::string host = "127.0.0.1";
   int port = 50051;  // 0: any free one
+  TlsOptions tls = {};
   int64_t memory_budget_bytes = 0;
   int workers = 1;
   ServiceLimits limits;

@@ -12,7 +12,6 @@
 #include "grpcpp/ext/proto_server_reflection_plugin.h"
 #include "grpcpp/health_check_service_interface.h"
 #include "grpcpp/resource_quota.h"
-#include "grpcpp/security/server_credentials.h"
 #include "grpcpp/server_builder.h"
 #include "spdlog/spdlog.h"
 
@@ -22,6 +21,7 @@
 #include "server/store/data_folder.h"
 #include "server/store/durable_store.h"
 #include "server/store/in_memory_stores.h"
+#include "server/transport/tls_credentials.h"
 
 namespace tissueform {
 namespace {
@@ -86,7 +86,8 @@ int64_t MemoryQuota(const ServerOptions& options) {
 // Every option by its place: one that is added does not compile here until it was decided whether
 // it is a limit.
 NamedLimits LimitsOf(const ServerOptions& options) {
-  const auto& [host, port, memory_budget_bytes, workers, service, quotas, max_calls_per_connection,
+  const auto& [host, port, tls, memory_budget_bytes, workers, service, quotas,
+               max_calls_per_connection,
                max_connections, max_connections_per_address, drain_deadline, in_memory, data_dir,
                log_level] = options;
   NamedLimits limits = ToNamedLimits(service);
@@ -126,8 +127,17 @@ absl::StatusOr<std::unique_ptr<Stores>> OpenStores(const ServerOptions& options)
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
     const ServerOptions& options) {
+  // Nobody is asked for a token yet.
+  constexpr bool kHasTokens = false;
+  TF_RETURN_IF_ERROR(CheckExposure(options.host, options.tls, kHasTokens));
+  TF_ASSIGN_OR_RETURN(std::unique_ptr<RotatedFiles> tls_files, LoadServerFiles(options.tls));
   TF_ASSIGN_OR_RETURN(std::unique_ptr<Stores> stores, OpenStores(options));
   std::unique_ptr<TissueformServer> server(new TissueformServer(options, std::move(stores)));
+  server->tls_files_ = std::move(tls_files);
+  if (server->is_exposed()) {
+    spdlog::warn("INSECURE: {}, and strangers may reach it (--insecure)",
+                 options.tls.enabled() ? "nobody is asked to log in" : "calls are not encrypted");
+  }
   TF_RETURN_IF_ERROR(server->registry_.LearnKnown());
   server->housekeeping_.Start();
   TF_RETURN_IF_ERROR(server->Listen());
@@ -137,7 +147,7 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
 TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores)
     : options_(options),
       quotas_(options.quotas),
-      gate_(nullptr, nullptr, &quotas_),
+      gate_(nullptr, nullptr, &quotas_, options.tls.gateway_name),
       budget_(options.memory_budget_bytes),
       stores_(std::move(stores)),
       catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),
@@ -184,7 +194,7 @@ absl::Status TissueformServer::Listen() {
   SetTransportLimits(options_, &builder);
   acceptor_ = builder.experimental().AddExternalConnectionAcceptor(
       grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
-      grpc::InsecureServerCredentials());
+      MakeServerCredentials(options_.tls, tls_files_.get()));
   builder.RegisterService(&mesh_service_);
   builder.RegisterService(&session_service_);
   builder.RegisterService(&deform_service_);
@@ -201,6 +211,10 @@ absl::Status TissueformServer::Listen() {
     acceptor_->HandleNewConnection(&connection);
   });
   return absl::OkStatus();
+}
+
+bool TissueformServer::is_exposed() const {
+  return options_.tls.insecure && !IsLoopback(options_.host);
 }
 
 void TissueformServer::Reclaim(int64_t bytes) {

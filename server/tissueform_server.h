@@ -30,6 +30,7 @@
 #include "server/session/worker_pool.h"
 #include "server/store/stores.h"
 #include "server/transport/connection_listener.h"
+#include "server/transport/rotated_files.h"
 
 namespace tissueform {
 
@@ -38,8 +39,8 @@ class TissueformServer {
  public:
   // Listens when it returns. Several servers may live in one process.
   //
-  // Errors: Unavailable, naming the address, when it cannot be listened on; those of
-  // DataFolder::Open and DurableStore::Open.
+  // Errors: Unavailable, naming the address, when it cannot be listened on; those of CheckExposure,
+  // LoadServerFiles, DataFolder::Open and DurableStore::Open.
   static absl::StatusOr<std::unique_ptr<TissueformServer>> Start(const ServerOptions& options);
 
   // Cancels open calls, waits for them and ends.
@@ -59,6 +60,10 @@ class TissueformServer {
   const SessionRegistry& sessions() const { return registry_; }
   const DeformStreams& streams() const { return streams_; }
   const SessionWatches& watches() const { return watches_; }
+  // Null without TLS.
+  const RotatedFiles* tls_files() const { return tls_files_.get(); }
+  // Strangers may reach it, and it is not protected from them: --insecure.
+  bool is_exposed() const;
 
  private:
   TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores);
@@ -90,6 +95,7 @@ class TissueformServer {
   PlanService plan_service_;
   CaseService case_service_;
   ServerInfoService server_info_service_;
+  std::unique_ptr<RotatedFiles> tls_files_;  // null without TLS
   // gRPC gets its connections from the listener, through the acceptor. The server comes last: what
   // it is given goes to the acceptor of a server that lives.
   std::unique_ptr<ConnectionListener> listener_;

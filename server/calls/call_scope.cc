@@ -9,7 +9,6 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_replace.h"
 #include "grpcpp/security/auth_context.h"
 #include "grpcpp/server_context.h"
 #include "spdlog/spdlog.h"
@@ -17,6 +16,7 @@
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "server/auth/identity.h"
+#include "server/calls/client_address.h"
 #include "server/calls/status_conversion.h"
 
 namespace tissueform {
@@ -45,15 +45,6 @@ Credentials CredentialsOf(const grpc::CallbackServerContext* context) {
     credentials.certificate_names.emplace_back(name.data(), name.size());
   }
   return credentials;
-}
-
-// "ipv4:192.0.2.1:1234", "ipv6:%5B::1%5D:1234" and "unix:" as gRPC says them: without the port.
-std::string AddressOf(const grpc::CallbackServerContext* context) {
-  if (context == nullptr) return {};
-  std::string peer = context->peer();
-  peer.resize(std::min(peer.rfind(':'), peer.size()));
-  return absl::StrReplaceAll(peer.substr(std::min(peer.find(':') + 1, peer.size())),
-                             {{"%5B", ""}, {"%5D", ""}});
 }
 
 // As the W3C has it: "00-", 32 hexadecimal digits, "-", 16, "-", 2. Others go to no log.
@@ -113,7 +104,7 @@ CallScope::CallScope(const grpc::CallbackServerContext* context, std::string_vie
       gate_(gate),
       start_(std::chrono::steady_clock::now()),
       authenticated_({.principal = Nobody()}),
-      address_(AddressOf(context)),
+      address_(ClientAddress(context, CredentialsOf(context), gate->gateway_name())),
       request_id_(RequestIdOr(Header(context, kRequestIdHeader))),
       traceparent_(TraceparentOr(Header(context, "traceparent"))),
       admission_(Admit(context)) {}

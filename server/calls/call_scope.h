@@ -8,6 +8,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "grpcpp/support/server_callback.h"
@@ -25,14 +26,18 @@ namespace tissueform {
 class ServiceGate {
  public:
   // All may be null, and must outlive the calls. Without an authenticator everybody is anonymous,
-  // and of nobody's quotas.
+  // and of nobody's quotas. `gateway_name`: see ClientAddress.
   explicit ServiceGate(Authenticator* authenticator = nullptr, CallObserver* observer = nullptr,
-                       CallQuotas* quotas = nullptr)
-      : authenticator_(authenticator), observer_(observer), quotas_(quotas) {}
+                       CallQuotas* quotas = nullptr, std::string gateway_name = {})
+      : authenticator_(authenticator),
+        observer_(observer),
+        quotas_(quotas),
+        gateway_name_(std::move(gateway_name)) {}
 
   Authenticator* authenticator() const { return authenticator_; }
   CallObserver* observer() const { return observer_; }
   CallQuotas* quotas() const { return quotas_; }
+  const std::string& gateway_name() const { return gateway_name_; }
 
   void StartDraining() { draining_ = true; }
   bool draining() const { return draining_; }
@@ -49,6 +54,7 @@ class ServiceGate {
   Authenticator* const authenticator_;
   CallObserver* const observer_;
   CallQuotas* const quotas_;
+  const std::string gateway_name_;
   std::atomic<bool> draining_ = false;
 
   Mutex mutex_;
