@@ -83,7 +83,7 @@ ConnectionListener::Options ListenerOptions(const ServerOptions& options) {
 NamedLimits LimitsOf(const ServerOptions& options) {
   const auto& [host, port, memory_budget_bytes, workers, service, max_calls_per_connection,
                max_connections, max_connections_per_address, drain_deadline, in_memory, data_dir,
-               log_level] = options;
+               log_level, tokens] = options;
   NamedLimits limits = ToNamedLimits(service);
   limits["max_message_bytes"] = kMaxReceiveBytes;
   limits["memory_budget_bytes"] = memory_budget_bytes;
@@ -115,16 +115,24 @@ absl::StatusOr<std::unique_ptr<Stores>> OpenStores(const ServerOptions& options)
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
     const ServerOptions& options) {
+  std::unique_ptr<TokenAuthenticator> tokens;
+  if (options.tokens.configured()) {
+    TF_ASSIGN_OR_RETURN(tokens, TokenAuthenticator::Start(options.tokens));
+  }
   TF_ASSIGN_OR_RETURN(std::unique_ptr<Stores> stores, OpenStores(options));
-  std::unique_ptr<TissueformServer> server(new TissueformServer(options, std::move(stores)));
+  std::unique_ptr<TissueformServer> server(
+      new TissueformServer(options, std::move(stores), std::move(tokens)));
   TF_RETURN_IF_ERROR(server->registry_.LearnKnown());
   server->housekeeping_.Start();
   TF_RETURN_IF_ERROR(server->Listen());
   return server;
 }
 
-TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores)
+TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores,
+                                   std::unique_ptr<TokenAuthenticator> tokens)
     : options_(options),
+      tokens_(std::move(tokens)),
+      gate_(tokens_.get()),
       budget_(options.memory_budget_bytes),
       stores_(std::move(stores)),
       catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),

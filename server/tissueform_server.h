@@ -10,6 +10,7 @@
 #include "grpcpp/server.h"
 #include "grpcpp/server_builder.h"
 
+#include "server/auth/token_authenticator.h"
 #include "server/calls/call_scope.h"
 #include "server/rpc/case_service.h"
 #include "server/rpc/deform_service.h"
@@ -39,7 +40,7 @@ class TissueformServer {
   // Listens when it returns. Several servers may live in one process.
   //
   // Errors: Unavailable, naming the address, when it cannot be listened on; those of
-  // DataFolder::Open and DurableStore::Open.
+  // TokenAuthenticator::Start, DataFolder::Open and DurableStore::Open.
   static absl::StatusOr<std::unique_ptr<TissueformServer>> Start(const ServerOptions& options);
 
   // Cancels open calls, waits for them and ends.
@@ -59,9 +60,12 @@ class TissueformServer {
   const SessionRegistry& sessions() const { return registry_; }
   const DeformStreams& streams() const { return streams_; }
   const SessionWatches& watches() const { return watches_; }
+  // Null: nobody logs in.
+  const TokenAuthenticator* tokens() const { return tokens_.get(); }
 
  private:
-  TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores);
+  TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores,
+                   std::unique_ptr<TokenAuthenticator> tokens);
 
   absl::Status Listen();
   void Reclaim(int64_t bytes);
@@ -71,6 +75,7 @@ class TissueformServer {
 
   // Self-synchronised; each may use those before it. Destroyed from the last to the first: calls
   // end, then jobs, then what they used.
+  const std::unique_ptr<TokenAuthenticator> tokens_;
   ServiceGate gate_;
   MemoryBudget budget_;
   std::unique_ptr<Stores> stores_;
