@@ -138,6 +138,7 @@ void AddServerOptions(CLI::App& app, ServerOptions* options) {
          "this machine (default: $XDG_STATE_HOME/tissueform, or ~/.local/state/tissueform)")
       ->type_name("DIR")
       ->excludes(in_memory);
+  AddTokenOptions(app, &options->tokens);
   AddLimits(app, options);
   AddQuotas(app, &options->quotas);
   AddNumber(app, "--drain-seconds", options->drain_deadline.count(), 0, 3600,

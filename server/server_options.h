@@ -9,6 +9,7 @@
 
 #include "CLI/CLI.hpp"
 
+#include "server/auth/token_options.h"
 #include "server/session/limits.h"
 #include "server/session/quotas.h"
 #include "server/transport/tls_options.h"
@@ -33,6 +34,7 @@ struct ServerOptions {
   bool in_memory = true;
   std::string data_dir;  // empty: DefaultDataFolder
   std::string log_level = "info";
+  TokenOptions tokens = {};
 
   // Half of the machine's memory, one worker a core.
   static ServerOptions Defaults();

@@ -87,9 +87,8 @@ int64_t MemoryQuota(const ServerOptions& options) {
 // it is a limit.
 NamedLimits LimitsOf(const ServerOptions& options) {
   const auto& [host, port, tls, memory_budget_bytes, workers, service, quotas,
-               max_calls_per_connection,
-               max_connections, max_connections_per_address, drain_deadline, in_memory, data_dir,
-               log_level] = options;
+               max_calls_per_connection, max_connections, max_connections_per_address,
+               drain_deadline, in_memory, data_dir, log_level, tokens] = options;
   NamedLimits limits = ToNamedLimits(service);
   limits["quota_calls_per_second"] = quotas.calls_per_second;
   limits["quota_waiting_calls"] = quotas.waiting_calls;
@@ -127,12 +126,15 @@ absl::StatusOr<std::unique_ptr<Stores>> OpenStores(const ServerOptions& options)
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
     const ServerOptions& options) {
-  // Nobody is asked for a token yet.
-  constexpr bool kHasTokens = false;
-  TF_RETURN_IF_ERROR(CheckExposure(options.host, options.tls, kHasTokens));
+  TF_RETURN_IF_ERROR(CheckExposure(options.host, options.tls, options.tokens.configured()));
   TF_ASSIGN_OR_RETURN(std::unique_ptr<RotatedFiles> tls_files, LoadServerFiles(options.tls));
+  std::unique_ptr<TokenAuthenticator> tokens;
+  if (options.tokens.configured()) {
+    TF_ASSIGN_OR_RETURN(tokens, TokenAuthenticator::Start(options.tokens));
+  }
   TF_ASSIGN_OR_RETURN(std::unique_ptr<Stores> stores, OpenStores(options));
-  std::unique_ptr<TissueformServer> server(new TissueformServer(options, std::move(stores)));
+  std::unique_ptr<TissueformServer> server(
+      new TissueformServer(options, std::move(stores), std::move(tokens)));
   server->tls_files_ = std::move(tls_files);
   if (server->is_exposed()) {
     spdlog::warn("INSECURE: {}, and strangers may reach it (--insecure)",
@@ -144,10 +146,12 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
   return server;
 }
 
-TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores)
+TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores,
+                                   std::unique_ptr<TokenAuthenticator> tokens)
     : options_(options),
+      tokens_(std::move(tokens)),
       quotas_(options.quotas),
-      gate_(nullptr, nullptr, &quotas_, options.tls.gateway_name),
+      gate_(tokens_.get(), nullptr, &quotas_, options.tls.gateway_name),
       budget_(options.memory_budget_bytes),
       stores_(std::move(stores)),
       catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),

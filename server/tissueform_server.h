@@ -10,6 +10,7 @@
 #include "grpcpp/server.h"
 #include "grpcpp/server_builder.h"
 
+#include "server/auth/token_authenticator.h"
 #include "server/calls/call_scope.h"
 #include "server/rpc/case_service.h"
 #include "server/rpc/deform_service.h"
@@ -40,7 +41,7 @@ class TissueformServer {
   // Listens when it returns. Several servers may live in one process.
   //
   // Errors: Unavailable, naming the address, when it cannot be listened on; those of CheckExposure,
-  // LoadServerFiles, DataFolder::Open and DurableStore::Open.
+  // LoadServerFiles, TokenAuthenticator::Start, DataFolder::Open and DurableStore::Open.
   static absl::StatusOr<std::unique_ptr<TissueformServer>> Start(const ServerOptions& options);
 
   // Cancels open calls, waits for them and ends.
@@ -64,9 +65,12 @@ class TissueformServer {
   const RotatedFiles* tls_files() const { return tls_files_.get(); }
   // Strangers may reach it, and it is not protected from them: --insecure.
   bool is_exposed() const;
+  // Null: nobody logs in.
+  const TokenAuthenticator* tokens() const { return tokens_.get(); }
 
  private:
-  TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores);
+  TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores,
+                   std::unique_ptr<TokenAuthenticator> tokens);
 
   absl::Status Listen();
   void Reclaim(int64_t bytes);
@@ -76,6 +80,7 @@ class TissueformServer {
 
   // Self-synchronised; each may use those before it. Destroyed from the last to the first: calls
   // end, then jobs, then what they used.
+  const std::unique_ptr<TokenAuthenticator> tokens_;
   CallQuotas quotas_;
   ServiceGate gate_;
   MemoryBudget budget_;

@@ -29,8 +29,7 @@ v1::DeformConfiguration DeformStream::ConfigurationOf(const Options& options) {
 }
 
 absl::Status DeformStream::Start(v1::DeformService::Stub* stub, const std::string& session,
-                                 const Options& options,
-                                 const std::shared_ptr<TokenFile>& token) {
+                                 const Options& options, const std::shared_ptr<TokenFile>& token) {
   on_notice_ = options.on_notice;
   AddSessionHeader(session, &context_);
   // Before the call is made: it may be made with a newer one, which is then sent twice.

@@ -109,8 +109,9 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeServerChannel(
     }
     if (!options.insecure) {
       return absl::FailedPreconditionError(
-          absl::StrCat(address, " is another machine; give --tls or --tls-ca FILE, or --insecure "
-                                "if its network is yours alone"));
+          absl::StrCat(address,
+                       " is another machine; give --tls or --tls-ca FILE, or --insecure "
+                       "if its network is yours alone"));
     }
   }
   TF_ASSIGN_OR_RETURN(const std::shared_ptr<grpc::ChannelCredentials> credentials,

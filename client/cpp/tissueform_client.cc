@@ -47,9 +47,9 @@ absl::StatusOr<std::unique_ptr<TissueformClient>> TissueformClient::Connect(
         absl::StrCat("\"", address, "\" has no port; give the server as HOST:PORT"));
   }
   TF_ASSIGN_OR_RETURN(const std::shared_ptr<TokenFile> token, OpenTokenOf(options.connection));
-  TF_ASSIGN_OR_RETURN(const std::shared_ptr<grpc::Channel> channel,
-                      MakeServerChannel(address, options.connection, token,
-                                        ArgumentsOf(options.own_connection)));
+  TF_ASSIGN_OR_RETURN(
+      const std::shared_ptr<grpc::Channel> channel,
+      MakeServerChannel(address, options.connection, token, ArgumentsOf(options.own_connection)));
   if (!channel->WaitForConnected(std::chrono::system_clock::now() + options.connect_deadline)) {
     return absl::UnavailableError(absl::StrCat(
         "no tissueform-server answers at ", address, " within ",

@@ -52,8 +52,8 @@ class TissueformClient {
 
   // `address` is HOST:PORT. Connects directly: proxies of the environment are not used.
   //
-  // Errors: InvalidArgument (no port), Unavailable when nobody answers within the deadline; those of
-  // MakeServerChannel and OpenTokenOf.
+  // Errors: InvalidArgument (no port), Unavailable when nobody answers within the deadline; those
+  // of MakeServerChannel and OpenTokenOf.
   static absl::StatusOr<std::unique_ptr<TissueformClient>> Connect(const std::string& address,
                                                                    const Options& options);
 

@@ -23,8 +23,8 @@ constexpr std::chrono::seconds kLookInterval{1};
 
 // What RFC 6750 lets stand after "Bearer".
 bool IsTokenLetter(unsigned char c) {
-  return absl::ascii_isalnum(c) || absl::string_view("-._~+/=").find(static_cast<char>(c)) !=
-                                       absl::string_view::npos;
+  return absl::ascii_isalnum(c) ||
+         absl::string_view("-._~+/=").find(static_cast<char>(c)) != absl::string_view::npos;
 }
 
 absl::Status CheckOwnerOnly(const std::filesystem::path& path) {

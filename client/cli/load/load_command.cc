@@ -97,7 +97,8 @@ absl::Status Run(const LoadCommandOptions& options) {
 
 void AddOptions(CLI::App* command, LoadCommandOptions* options) {
   LoadOptions& load = options->load;
-  command->add_option("--server", options->server.address, "a server that runs; else one is started")
+  command
+      ->add_option("--server", options->server.address, "a server that runs; else one is started")
       ->type_name("HOST:PORT");
   AddConnectionOptions(command, &options->server.options);
   command->add_option("--plan", options->plan, "another plan than the bundled head");

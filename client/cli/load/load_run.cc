@@ -51,8 +51,7 @@ class LoadDrag {
                                                         const PlanProblem& problem,
                                                         const Kind& kind) {
     auto drag = std::unique_ptr<LoadDrag>(new LoadDrag(kind, NamedPoses(problem)));
-    TF_ASSIGN_OR_RETURN(drag->client_,
-                        ConnectTo(server, /*own_connection=*/true));
+    TF_ASSIGN_OR_RETURN(drag->client_, ConnectTo(server, /*own_connection=*/true));
     TF_ASSIGN_OR_RETURN(drag->session_, MakePlanSession(drag->client_.get(), problem, nullptr));
     DeformStream::Options stream;
     stream.vertices.kind = AnswerVertices::Kind::kSkin;
@@ -243,8 +242,7 @@ absl::StatusOr<LoadResult> RunLoad(const ServerConnection& server, const PlanPro
   std::vector<DragGroup> groups = GroupsOf(options);
   for (DragGroup& group : groups) TF_RETURN_IF_ERROR(Open(server, problem, &group));
   // Whatever drags there are, the mesh is on the server while churn makes sessions of it.
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client,
-                      ConnectTo(server));
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client, ConnectTo(server));
   TF_ASSIGN_OR_RETURN(const v1::Mesh mesh, UploadMeshOf(client.get(), problem));
   std::vector<std::unique_ptr<Churn>> churn;
   for (int i = 0; i < options.churn; ++i) {

@@ -181,8 +181,7 @@ absl::Status Run(const DragCommandOptions& options) {
   sigaction(SIGINT, &action, nullptr);
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan));
   TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client,
-                      ConnectTo(options.server));
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client, ConnectTo(options.server));
   return Drag(client.get(), problem, options);
 }
 

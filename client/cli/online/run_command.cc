@@ -35,8 +35,7 @@ struct RunOptions {
 // Fills `stats` as far as preparing and solving know it.
 absl::StatusOr<Positions> PredictOnServer(const RunOptions& options, const PlanProblem& problem,
                                           PredictionStats* stats) {
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client,
-                      ConnectTo(options.server));
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client, ConnectTo(options.server));
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<PlanSession> session,
                       MakePlanSession(client.get(), problem, /*stop=*/nullptr));
   const StageProgress progress("solving");

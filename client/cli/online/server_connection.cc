@@ -32,11 +32,12 @@ void AddConnectionOptions(CLI::App* command, ConnectionOptions* options) {
       ->type_name("FILE")
       ->envname("TISSUEFORM_TLS_CA")
       ->group(kGroup);
-  CLI::Option* certificate = command
-                                 ->add_option("--tls-cert", options->tls_certificate,
-                                              "one's own certificate, where the server asks for one")
-                                 ->type_name("FILE")
-                                 ->group(kGroup);
+  CLI::Option* certificate =
+      command
+          ->add_option("--tls-cert", options->tls_certificate,
+                       "one's own certificate, where the server asks for one")
+          ->type_name("FILE")
+          ->group(kGroup);
   CLI::Option* key = command->add_option("--tls-key", options->tls_key, "its key")
                          ->type_name("FILE")
                          ->needs(certificate)
@@ -80,8 +81,7 @@ ConnectionOptions ResolveConnection(const ServerConnection& server) {
 absl::StatusOr<std::unique_ptr<TissueformClient>> ConnectTo(const ServerConnection& server,
                                                             bool own_connection) {
   return TissueformClient::Connect(
-      server.address,
-      {.own_connection = own_connection, .connection = ResolveConnection(server)});
+      server.address, {.own_connection = own_connection, .connection = ResolveConnection(server)});
 }
 
 }  // namespace tissueform

@@ -66,10 +66,10 @@ TEST_F(ServerChannelTest, FilesAreCheckedBeforeAnythingIsSent) {
   const TestAuthority authority;
   const TestFiles files = authority.IssueFiles(folder_, "client");
   const TestFiles others = authority.IssueFiles(folder_, "other");
-  EXPECT_THAT(Make("a:1", {.tls_ca = files.roots,
-                           .tls_certificate = files.certificate,
-                           .tls_key = files.key}),
-              IsOk());
+  EXPECT_THAT(
+      Make("a:1",
+           {.tls_ca = files.roots, .tls_certificate = files.certificate, .tls_key = files.key}),
+      IsOk());
   EXPECT_THAT(Make("a:1", {.tls_ca = files.key}), StatusIs(kInvalid, HasSubstr(files.key)));
   EXPECT_THAT(Make("a:1", {.tls_ca = folder_ / "none"}), StatusIs(absl::StatusCode::kNotFound));
   EXPECT_THAT(Make("a:1", {.tls_certificate = files.certificate}), StatusIs(kInvalid));

@@ -15,10 +15,10 @@
 namespace tissueform::testing {
 namespace {
 
+using std::filesystem::perms;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
-using std::filesystem::perms;
 
 class TokenFileTest : public ::testing::Test {
  protected:
@@ -30,8 +30,8 @@ class TokenFileTest : public ::testing::Test {
     const std::filesystem::path next = folder_ / "next";
     WriteTestFile(next, token);
     std::filesystem::permissions(next, perms::owner_read | perms::owner_write);
-    std::filesystem::last_write_time(next, std::filesystem::file_time_type::clock::now() +
-                                               std::chrono::seconds(++written_));
+    std::filesystem::last_write_time(
+        next, std::filesystem::file_time_type::clock::now() + std::chrono::seconds(++written_));
     std::filesystem::rename(next, path_);
   }
 
