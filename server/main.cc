@@ -15,6 +15,7 @@
 #include <sys/syscall.h>
 
 #include "core/base/freed_memory.h"
+#include "server/backup_commands.h"
 #include "server/program/program_options.h"
 #include "server/server_options.h"
 #include "server/tissueform_server.h"
@@ -77,7 +78,9 @@ int main(int argc, char** argv) {
   CLI::App app(kDescription, "tissueform-server");
   tissueform::ServerOptions options = tissueform::ServerOptions::Defaults();
   tissueform::AddServerOptions(app, &options);
+  const tissueform::BackupCommands commands(app, &options);
   if (const std::optional<int> end = tissueform::ParseProgramOptions(app, argc, argv)) return *end;
+  if (const std::optional<int> end = commands.Run()) return *end;
   spdlog::set_default_logger(spdlog::stderr_color_mt("tissueform"));
   spdlog::set_level(spdlog::level::from_str(options.log_level));
   return Serve(options);
