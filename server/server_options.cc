@@ -9,6 +9,8 @@
 #include <thread>
 #include <unistd.h>
 
+#include "server/program/program_options.h"
+
 namespace tissueform {
 namespace {
 
@@ -116,7 +118,6 @@ ServerOptions ServerOptions::Defaults() {
 }
 
 void AddServerOptions(CLI::App& app, ServerOptions* options) {
-  app.set_config("--config", "", "file with any of these options, as `name = value` lines");
   app.add_option("--host", options->host,
                  "address to listen on; anything but loopback needs encryption and logins, or "
                  "--insecure")
@@ -148,6 +149,7 @@ void AddServerOptions(CLI::App& app, ServerOptions* options) {
                  "what is logged on stderr, without names or paths")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
+  AddConfiguration(app, "TISSUEFORM_SERVER_");  // last: it looks at all options
 }
 
 }  // namespace tissueform

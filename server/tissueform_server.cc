@@ -218,7 +218,7 @@ absl::Status TissueformServer::Listen() {
 }
 
 bool TissueformServer::is_exposed() const {
-  return options_.tls.insecure && !IsLoopback(options_.host);
+  return !IsLoopback(options_.host) && !(options_.tls.enabled() && tokens_ != nullptr);
 }
 
 void TissueformServer::Reclaim(int64_t bytes) {

@@ -9,6 +9,8 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/string_view.h"
 
+#include "server/program/program_options.h"
+
 namespace tissueform {
 namespace {
 
@@ -91,7 +93,6 @@ std::string SetListen(const std::string& text, GatewayOptions* options) {
 }  // namespace
 
 void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
-  app.set_config("--config", "", "file with any of these options, as `name = value` lines");
   app.add_option("--server", options->servers,
                  "address of a tissueform-server, HOST:PORT or unix:/PATH; several may be named")
       ->required()
@@ -123,6 +124,7 @@ void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
                  "what is logged on stderr, without names, paths or content")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
+  AddConfiguration(app, "TISSUEFORM_GATEWAY_");  // last: it looks at all options
 }
 
 }  // namespace tissueform

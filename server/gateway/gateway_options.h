@@ -26,8 +26,7 @@ struct GatewayOptions {
 };
 
 // Adds one option a setting to `app`, with its default in the help; parsing writes into `options`,
-// which must outlive it. A config file in TOML or INI form with the same names may be given by
-// --config.
+// which must outlive it. They may stand in a file and in the environment too (AddConfiguration).
 void AddGatewayOptions(CLI::App& app, GatewayOptions* options);
 
 }  // namespace tissueform

@@ -4,6 +4,7 @@
 #include <csignal>
 #include <cstdio>
 #include <ctime>
+#include <optional>
 #include <string>
 
 #include "CLI/CLI.hpp"
@@ -13,6 +14,7 @@
 
 #include "server/gateway/gateway.h"
 #include "server/gateway/gateway_options.h"
+#include "server/program/program_options.h"
 
 namespace {
 
@@ -23,7 +25,7 @@ constexpr char kDescription[] =
     "SIGTERM or SIGINT: tells every client, exit code 0.\n"
     "Research software, not a medical device: not for diagnosis or treatment.";
 
-enum ExitCode : int { kExitDone = 0, kExitFailed = 1, kExitWrongUse = 2 };
+enum ExitCode : int { kExitDone = 0, kExitFailed = 1 };
 
 // Between two lines of the log that tell what was counted.
 constexpr time_t kTellSeconds = 60;
@@ -72,14 +74,7 @@ int main(int argc, char** argv) {
   CLI::App app(kDescription, "tissueform-gateway");
   tissueform::GatewayOptions options;
   tissueform::AddGatewayOptions(app, &options);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::CallForHelp& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "tissueform-gateway: %s; see --help\n", error.what());
-    return kExitWrongUse;
-  }
+  if (const std::optional<int> end = tissueform::ParseProgramOptions(app, argc, argv)) return *end;
   spdlog::set_default_logger(spdlog::stderr_color_mt("tissueform-gateway"));
   spdlog::set_level(spdlog::level::from_str(options.log_level));
   // What clients and servers do wrong comes back as a status.
