@@ -15,7 +15,7 @@ struct LoginConfig {
   std::string issuer = {};  // "https://login.example.org/realms/clinic"; empty: no login
   std::string client_id = {};
   std::string audience = {};  // for whom tokens are asked for; empty: the provider's choice
-  std::string scopes = "openid profile offline_access";
+  std::string scopes = "openid profile";
 };
 
 // InvalidArgument, naming the option: an issuer that is no https URL (http on loopback), or has a

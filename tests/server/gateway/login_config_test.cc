@@ -71,7 +71,7 @@ TEST_F(LoginGatewayTest, ThePageIsToldOfTheProviderAndMayAskItAlone) {
   EXPECT_EQ(oidc["issuer"], clinic_.issuer);
   EXPECT_EQ(oidc["client_id"], "planner");
   EXPECT_EQ(oidc["audience"], "tissueform");
-  EXPECT_EQ(oidc["scope"], "openid profile offline_access");
+  EXPECT_EQ(oidc["scope"], "openid profile");
 }
 
 TEST_F(LoginGatewayTest, TheConfigurationIsReadOnly) {
