@@ -14,6 +14,7 @@
 namespace tissueform {
 
 absl::StatusOr<std::unique_ptr<Gateway>> Gateway::Start(const GatewayOptions& options) {
+  TF_RETURN_IF_ERROR(CheckLoginConfig(options.login));
   WebFiles files;
   if (!options.web.empty()) {
     TF_ASSIGN_OR_RETURN(files, WebFiles::Load(options.web));
@@ -31,7 +32,7 @@ Gateway::Gateway(const GatewayOptions& options, WebFiles files)
     : options_(options),
       pool_(options.servers, options.limits),
       routes_(AccessRules(options.host, options.allowed_hosts, options.allowed_origins),
-              std::move(files), &pool_, &counters_) {}
+              std::move(files), options.login, &pool_, &counters_) {}
 
 std::string Gateway::Url() const {
   const bool is_ipv6 = absl::StrContains(options_.host, ':');

@@ -22,7 +22,7 @@ class Gateway {
   // Listens when it returns; servers need not be there yet.
   //
   // Errors: Unavailable, naming the address, when it cannot be listened on; those of
-  // WebFiles::Load.
+  // CheckLoginConfig and WebFiles::Load.
   static absl::StatusOr<std::unique_ptr<Gateway>> Start(const GatewayOptions& options);
 
   // "http://127.0.0.1:8080", also when the options said port 0.

@@ -75,6 +75,22 @@ void AddLimits(CLI::App& app, GatewayLimits* limits) {
              "after SIGTERM or SIGINT, how long clients may take to read their last frames");
 }
 
+void AddLogin(CLI::App& app, LoginConfig* login) {
+  app.add_option("--oidc-issuer", login->issuer,
+                 "identity provider by which the planner logs its users in; without it there is no "
+                 "login")
+      ->type_name("URL");
+  app.add_option("--oidc-client-id", login->client_id,
+                 "the planner's name at the provider: a public client with PKCE")
+      ->type_name("ID");
+  app.add_option("--oidc-audience", login->audience,
+                 "for whom tokens are asked for: the server's --token-audience")
+      ->type_name("AUDIENCE");
+  app.add_option("--oidc-scope", login->scopes, "scopes that are asked for, in one argument")
+      ->capture_default_str()
+      ->type_name("SCOPES");
+}
+
 // "HOST:PORT", IPv6 in brackets.
 std::string SetListen(const std::string& text, GatewayOptions* options) {
   const size_t colon = text.rfind(':');
@@ -119,6 +135,7 @@ void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
   app.add_option("--threads", options->threads, "threads that read and write")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
+  AddLogin(app, &options->login);
   AddLimits(app, &options->limits);
   app.add_option("--log-level", options->log_level,
                  "what is logged on stderr, without names, paths or content")

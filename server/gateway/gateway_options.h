@@ -9,6 +9,7 @@
 #include "CLI/CLI.hpp"
 
 #include "server/gateway/gateway_limits.h"
+#include "server/gateway/login_config.h"
 
 namespace tissueform {
 
@@ -22,6 +23,7 @@ struct GatewayOptions {
   std::vector<std::string> allowed_origins;
   int threads = 2;
   GatewayLimits limits;
+  LoginConfig login = {};
   std::string log_level = "info";
 };
 

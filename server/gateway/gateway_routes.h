@@ -11,6 +11,7 @@
 #include "server/gateway/access_rules.h"
 #include "server/gateway/gateway_counters.h"
 #include "server/gateway/http_server.h"
+#include "server/gateway/login_config.h"
 #include "server/gateway/server_pool.h"
 #include "server/gateway/web_files.h"
 
@@ -20,7 +21,8 @@ namespace tissueform {
 class GatewayRoutes final : public HttpHandler {
  public:
   // `pool` and `counters` must outlive it.
-  GatewayRoutes(AccessRules rules, WebFiles files, ServerPool* pool, GatewayCounters* counters);
+  GatewayRoutes(AccessRules rules, WebFiles files, const LoginConfig& login, ServerPool* pool,
+                GatewayCounters* counters);
 
   HttpDecision Decide(const HttpHead& head) override;
   std::shared_ptr<ReplySource> Stream(const HttpHead& head, std::string body,
@@ -32,15 +34,20 @@ class GatewayRoutes final : public HttpHandler {
   HttpDecision Refuse(GatewayEvent event, int status);
   HttpDecision DecideSocket(const HttpHead& head);
   HttpDecision DecideCall(const HttpHead& head);
+  HttpDecision DecideConfig(const HttpHead& head);
   HttpDecision DecideFile(const HttpHead& head);
   // What a browser asks before a page of another origin may make a call.
   HttpDecision Preflight(const HttpHead& head);
   // For pages of other origins that are allowed.
   HttpFields OriginFields(const HttpHead& head) const;
+  // Of every answer.
+  HttpFields CommonFields() const;
 
   // Constant.
   const AccessRules rules_;
   const WebFiles files_;
+  const std::shared_ptr<const std::string> login_json_;
+  const std::string security_policy_;
 
   // Self-synchronised.
   ServerPool* const pool_;
