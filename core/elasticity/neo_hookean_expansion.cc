@@ -55,9 +55,8 @@ void FillLane(const PiecewiseLinearElements& elements, Eigen::Index tet,
     Matrix3d edges;
     edges << at(1) - base, at(2) - base, at(3) - base;
     const Matrix3d gradient = edges * hats.transpose();
-    double* const to =
-        f < num_first ? batch->first.data() + 9 * kLanes * f
-                      : batch->second.data() + 9 * kLanes * (f - num_first);
+    double* const to = f < num_first ? batch->first.data() + 9 * kLanes * f
+                                     : batch->second.data() + 9 * kLanes * (f - num_first);
     for (Eigen::Index i = 0; i < 9; ++i) to[i * kLanes + lane] = gradient(i / 3, i % 3);
   }
 }

@@ -19,8 +19,10 @@ inline __attribute__((always_inline)) size_t PairOf(size_t a, size_t b, size_t c
 // P_3 of one lane. With F = I + t G + t^2 H, C = cof F and J = det F,
 //   P = mu [J^(-2/3) F - J^(-5/3) |F|^2 C / 3] + K (J - 1) C,
 // each factor as a polynomial in t: j = J - 1, g = J^(-2/3), s = |F|^2 - 3, m = J^(-5/3) |F|^2.
-inline __attribute__((always_inline)) void ThirdOrderStress(double mu, double K, const double (&G)[3][3],
-                                const double (&H)[3][3], double (&P)[3][3]) {
+inline __attribute__((always_inline)) void ThirdOrderStress(double mu, double K,
+                                                            const double (&G)[3][3],
+                                                            const double (&H)[3][3],
+                                                            double (&P)[3][3]) {
   double C2[3][3];
   double C3[3][3];
   double minors = 0;
@@ -33,8 +35,7 @@ inline __attribute__((always_inline)) void ThirdOrderStress(double mu, double K,
     for (int j = 0; j < 3; ++j) {
       const int r = (j + 1) % 3, s = (j + 2) % 3;
       C2[i][j] = G[p][r] * G[q][s] - G[p][s] * G[q][r];
-      C3[i][j] =
-          G[p][r] * H[q][s] + H[p][r] * G[q][s] - G[p][s] * H[q][r] - H[p][s] * G[q][r];
+      C3[i][j] = G[p][r] * H[q][s] + H[p][r] * G[q][s] - G[p][s] * H[q][r] - H[p][s] * G[q][r];
       GG += G[i][j] * G[i][j];
       GH += G[i][j] * H[i][j];
     }
@@ -75,8 +76,10 @@ inline __attribute__((always_inline)) void ThirdOrderStress(double mu, double K,
 }
 
 // One direction n = e_a + e_b + e_c: v(n) and w(n), where every pair of the three counts.
-inline __attribute__((always_inline)) void EvaluateDirection(double shear, double bulk, const ThirdOrderBatch& batch,
-                                 const size_t (&n)[3], double* __restrict loads) {
+inline __attribute__((always_inline)) void EvaluateDirection(double shear, double bulk,
+                                                             const ThirdOrderBatch& batch,
+                                                             const size_t (&n)[3],
+                                                             double* __restrict loads) {
   const double* v[3];
   const double* w[6];
   for (size_t i = 0; i < 3; ++i) {
@@ -109,7 +112,8 @@ inline __attribute__((always_inline)) void EvaluateDirection(double shear, doubl
   }
 }
 
-inline __attribute__((always_inline)) void EvaluateDirections(double shear, double bulk, ThirdOrderBatch* batch) {
+inline __attribute__((always_inline)) void EvaluateDirections(double shear, double bulk,
+                                                              ThirdOrderBatch* batch) {
   double* loads = batch->loads.data();
   for (size_t a = 0; a < batch->num_fields; ++a) {
     for (size_t b = a; b < batch->num_fields; ++b) {

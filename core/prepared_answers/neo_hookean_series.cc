@@ -34,8 +34,7 @@ void SetAffine(const ElasticSystem& elastic, size_t handle, const Matrix3d& A,
 }
 
 // v1 of all vertices, 3 #V by #numbers.
-MatrixXd LinearFields(const ElasticSystem& elastic,
-                      const std::vector<Eigen::Vector3d>& centroids) {
+MatrixXd LinearFields(const ElasticSystem& elastic, const std::vector<Eigen::Vector3d>& centroids) {
   const Index numbers = kNumbersPerHandle * static_cast<Index>(centroids.size());
   MatrixXd coefficients = MatrixXd::Zero(elastic.response_columns().cols(), numbers);
   for (size_t h = 0; h < centroids.size(); ++h) {
@@ -130,12 +129,11 @@ absl::StatusOr<NeoHookeanSeries> MakeNeoHookeanSeries(const MeshPreparation& pre
 
   const MatrixXd linear = LinearFields(elastic, centroids);
   series.linear = RowsOfVertices(linear, vertices);
-  TF_ASSIGN_OR_RETURN(
-      MatrixXd second,
-      SolveAll(preparation, elastic,
-               SecondOrderForces(preparation.elements(), preparation.stiffness(), poisson_ratio,
-                                 linear),
-               &passes));
+  TF_ASSIGN_OR_RETURN(MatrixXd second,
+                      SolveAll(preparation, elastic,
+                               SecondOrderForces(preparation.elements(), preparation.stiffness(),
+                                                 poisson_ratio, linear),
+                               &passes));
   series.columns.middleCols(sizes.linear, sizes.pairs) = RowsOfVertices(second, vertices);
   if (sizes.triples == 0) return series;
 

@@ -53,7 +53,7 @@ std::vector<Eigen::Index> MostMoved(const Eigen::MatrixXd& columns) {
 }  // namespace
 
 SeriesEstimate::SeriesEstimate(const Eigen::MatrixXd& first, const Eigen::MatrixXd& second,
-                                       double size_mm)
+                               double size_mm)
     : size_mm_(size_mm), first_gains_(Gains(first)), second_gains_(Gains(second)) {
   const std::vector<Eigen::Index> vertices = MostMoved(second);
   probes_.resize(3 * static_cast<Eigen::Index>(vertices.size()), second.cols());
@@ -63,8 +63,7 @@ SeriesEstimate::SeriesEstimate(const Eigen::MatrixXd& first, const Eigen::Matrix
   }
 }
 
-double SeriesEstimate::UnscaledMm(const Eigen::VectorXd& pairs,
-                                  std::optional<double> ratio) const {
+double SeriesEstimate::UnscaledMm(const Eigen::VectorXd& pairs, std::optional<double> ratio) const {
   if (probes_.rows() == 0) return 0;
   const Eigen::VectorXf moves = probes_ * pairs.cast<float>();
   const double together = LargestMove(moves.cast<double>()).second;

@@ -28,8 +28,8 @@ class SeriesEstimate {
   // PoseNumbers), `second` of every pair (PairProducts).
   SeriesEstimate(const Eigen::MatrixXd& first, const Eigen::MatrixXd& second, double size_mm);
 
-  // With c = 1. Looks at the vertices that single pairs move most, at most 64 of them. `ratio` is q,
-  // or nothing where the second order is the last one.
+  // With c = 1. Looks at the vertices that single pairs move most, at most 64 of them. `ratio` is
+  // q, or nothing where the second order is the last one.
   double UnscaledMm(const Eigen::VectorXd& pairs, std::optional<double> ratio) const;
   // How far a pose moves vertices in the first order, roughly.
   double FirstOrderMm(const Eigen::VectorXd& numbers) const {

@@ -30,9 +30,8 @@ Eigen::MatrixXf LengthsOf(const Eigen::MatrixXd& columns) {
   while (first + 1 < count && values[first] <= kNegligible * values[count - 1]) ++first;
   const Eigen::Index kept = count - first;
   const Eigen::VectorXd roots = values.tail(kept).cwiseMax(0).cwiseSqrt();
-  const Eigen::MatrixXd rows = roots.asDiagonal() *
-                               axes.eigenvectors().rightCols(kept).transpose() *
-                               sizes.asDiagonal();
+  const Eigen::MatrixXd rows =
+      roots.asDiagonal() * axes.eigenvectors().rightCols(kept).transpose() * sizes.asDiagonal();
   return rows.cast<float>();
 }
 
