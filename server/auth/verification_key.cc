@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <utility>
 
 #include "absl/status/status.h"
@@ -18,6 +19,7 @@
 #include <openssl/evp.h>
 #include <openssl/param_build.h>
 #include <openssl/pem.h>
+#include <openssl/x509.h>
 
 #include "core/base/status_macros.h"
 #include "server/auth/token_text.h"
@@ -29,7 +31,7 @@ constexpr int kMinRsaBits = 2048;
 constexpr int kMaxRsaBits = 8192;     // a larger one would only cost time
 constexpr int kMaxExponentBits = 64;  // the same
 constexpr size_t kP256Bytes = 32;
-constexpr int kMaxPemKeys = 100;
+constexpr size_t kMaxPemKeys = 100;
 constexpr char kP256[] = "prime256v1";
 
 template <auto kFree>
@@ -134,6 +136,25 @@ std::string ToDer(absl::string_view signature) {
   return size > 0 ? std::string(der.data(), der.data() + size) : std::string();
 }
 
+struct PemBlock {
+  std::string name;
+  std::string content;
+};
+
+// What follows; empty at the end, and where the text is damaged.
+std::optional<PemBlock> NextBlock(BIO* text) {
+  char* name = nullptr;
+  char* header = nullptr;
+  unsigned char* content = nullptr;
+  long size = 0;
+  if (PEM_read_bio(text, &name, &header, &content, &size) != 1) return std::nullopt;
+  PemBlock block{.name = name, .content = std::string(content, content + size)};
+  OPENSSL_free(name);
+  OPENSSL_free(header);
+  OPENSSL_free(content);
+  return block;
+}
+
 }  // namespace
 
 absl::string_view AlgorithmName(TokenAlgorithm algorithm) {
@@ -207,10 +228,14 @@ absl::StatusOr<std::vector<VerificationKey::Pointer>> VerificationKey::FromPem(
   const std::unique_ptr<BIO, Free<BIO_free_all>> bio(
       BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
   std::vector<Pointer> keys;
-  for (int i = 0; i <= kMaxPemKeys; ++i) {
+  while (const std::optional<PemBlock> block = NextBlock(bio.get())) {
+    if (keys.size() == kMaxPemKeys) return absl::InvalidArgumentError("there are too many keys");
+    if (block->name != PEM_STRING_PUBLIC) {
+      return absl::InvalidArgumentError("there is something else than public keys; take it away");
+    }
+    const unsigned char* bytes = Bytes(block->content);
     auto evp = std::make_unique<Evp>();
-    evp->key.reset(PEM_read_bio_PUBKEY(bio.get(), nullptr, nullptr, nullptr));
-    if (evp->key == nullptr) break;
+    evp->key.reset(d2i_PUBKEY(nullptr, &bytes, static_cast<long>(block->content.size())));
     TF_ASSIGN_OR_RETURN(keys.emplace_back(), FromEvp(std::move(evp)));
   }
   const bool whole = ERR_GET_REASON(ERR_peek_last_error()) == PEM_R_NO_START_LINE;

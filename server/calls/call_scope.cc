@@ -165,6 +165,18 @@ absl::Status CallScope::Renew(const std::string& token) {
   return absl::OkStatus();
 }
 
+void CallScope::RenewFrom(const Authenticated& other) {
+  if (may_end_early() && *other.principal == principal() &&
+      other.expires > authenticated_.expires) {
+    authenticated_ = other;
+  }
+}
+
+absl::Status CallScope::StillGood() const {
+  if (!may_end_early()) return absl::OkStatus();
+  return gate_->authenticator()->StillGood(authenticated_);
+}
+
 void CallScope::SetResource(std::string resource) {
   resource_ = std::move(resource);
   if (gate_->observer() != nullptr) gate_->observer()->OnResource(Observed());

@@ -70,6 +70,10 @@ inline constexpr char kRequestIdHeader[] = "x-request-id";
 // what goes to the log must not carry anything else.
 std::string RequestIdOr(std::string_view from_client);
 
+// How often a call that lasts asks whether its caller is still good: what is revoked ends within a
+// second.
+inline constexpr std::chrono::milliseconds kStandingPeriod{500};
+
 // The common beginning and end of every rpc: made first, asked for its admission, ended once with
 // the outcome. The place where a caller is authenticated and observers are told.
 //
@@ -96,6 +100,13 @@ class CallScope {
   // The call stands on this token from now on. Errors: those of the authenticator;
   // Unauthenticated (it is another's). Nothing to do where nobody logs in.
   absl::Status Renew(const std::string& token);
+  // On that of another call, where it is the same caller's and ends later.
+  void RenewFrom(const Authenticated& other);
+
+  // For calls that last: whether this one may go on. Asked again every kStandingPeriod; not where
+  // nobody logs in.
+  bool may_end_early() const { return gate_ != nullptr && gate_->authenticator() != nullptr; }
+  absl::Status StillGood() const;
 
   // Says what the call is about ("sessions/{id}"), once it is known that its caller may use it.
   void SetResource(std::string resource);

@@ -99,19 +99,20 @@ grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* DeformService::D
 grpc::ServerWriteReactor<grpc::ByteBuffer>* DeformService::Watch(
     grpc::CallbackServerContext* context, const grpc::ByteBuffer* request) {
   return new WatchStreamReactor(CallScope(context, "DeformService.Watch", CallKind::kStream, gate_),
-                                *request, limits_, registry_, watches_);
+                                *request, limits_, registry_, watches_, timer_);
 }
 
 grpc::ServerUnaryReactor* DeformService::AcknowledgeWatch(
     grpc::CallbackServerContext* context, const v1::AcknowledgeWatchRequest* request,
     google::protobuf::Empty* /*response*/) {
-  return RunUpkeep(context, "DeformService.AcknowledgeWatch", gate_,
-                   [&](const CallScope& /*scope*/, const EndCall& end) -> absl::Status {
-                     TF_ASSIGN_OR_RETURN(const std::string watch, ParseWatchName(request->watch()));
-                     TF_RETURN_IF_ERROR(watches_->Acknowledge(watch, request->number()));
-                     end(absl::OkStatus());
-                     return absl::OkStatus();
-                   });
+  return RunUpkeep(
+      context, "DeformService.AcknowledgeWatch", gate_,
+      [&](const CallScope& scope, const EndCall& end) -> absl::Status {
+        TF_ASSIGN_OR_RETURN(const std::string watch, ParseWatchName(request->watch()));
+        TF_RETURN_IF_ERROR(watches_->Acknowledge(watch, request->number(), scope.authenticated()));
+        end(absl::OkStatus());
+        return absl::OkStatus();
+      });
 }
 
 }  // namespace tissueform

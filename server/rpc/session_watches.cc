@@ -77,10 +77,11 @@ void SessionWatches::Remove(const std::string& watch) {
   watches_.erase(found);
 }
 
-absl::Status SessionWatches::Acknowledge(const std::string& watch, uint64_t number) {
+absl::Status SessionWatches::Acknowledge(const std::string& watch, uint64_t number,
+                                         const Authenticated& by) {
   MutexLock lock(mutex_);
   const auto found = watches_.find(watch);
-  if (found != watches_.end()) return found->second.watcher->Acknowledge(number);
+  if (found != watches_.end()) return found->second.watcher->Acknowledge(number, by);
   return WithReason(absl::NotFoundError(absl::StrCat("no watch \"watches/", watch,
                                                      "\": it has ended; begin another one")),
                     ErrorReason::kWatchNotFound);
