@@ -42,8 +42,7 @@ class ClientAddressTest : public ::testing::Test, public v1::ServerInfoService::
  protected:
   ClientAddressTest() {
     const TestIdentity own = authority_.Issue();
-    grpc::SslServerCredentialsOptions tls(
-        GRPC_SSL_REQUEST_CLIENT_CERTIFICATE_AND_VERIFY);
+    grpc::SslServerCredentialsOptions tls(GRPC_SSL_REQUEST_CLIENT_CERTIFICATE_AND_VERIFY);
     tls.pem_root_certs = authority_.certificate();
     tls.pem_key_cert_pairs.push_back({own.key, own.certificate});
     grpc::ServerBuilder builder;
