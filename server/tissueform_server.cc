@@ -21,6 +21,7 @@
 #include "server/store/data_folder.h"
 #include "server/store/durable_store.h"
 #include "server/store/in_memory_stores.h"
+#include "server/transport/network_address.h"
 #include "server/transport/tls_credentials.h"
 
 namespace tissueform {

@@ -4,12 +4,11 @@
 #include "server/calls/client_address.h"
 
 #include <algorithm>
-#include <array>
+#include <iterator>
 
 #include "absl/strings/str_replace.h"
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
+
+#include "server/transport/network_address.h"
 
 namespace tissueform {
 namespace {
@@ -23,19 +22,6 @@ std::string PeerAddress(const grpc::CallbackServerContext& context) {
 }
 
 }  // namespace
-
-std::string AddressOr(absl::string_view text) {
-  if (text.size() >= INET6_ADDRSTRLEN) return {};
-  const std::string copy(text);
-  std::array<unsigned char, sizeof(in6_addr)> bytes{};
-  for (const int family : {AF_INET, AF_INET6}) {
-    if (inet_pton(family, copy.c_str(), bytes.data()) != 1) continue;
-    std::array<char, INET6_ADDRSTRLEN> written{};
-    const char* same = inet_ntop(family, bytes.data(), written.data(), written.size());
-    return same == nullptr ? "" : same;
-  }
-  return {};
-}
 
 std::string ClientAddress(const grpc::CallbackServerContext* context,
                           const Credentials& credentials, absl::string_view gateway_name) {

@@ -12,13 +12,6 @@
 
 namespace tissueform {
 
-// The header in which the gateway states from where a call has come to it: an address without a
-// port.
-inline constexpr char kClientAddressHeader[] = "x-tissueform-client-address";
-
-// "192.0.2.1" or "2001:db8::1"; empty when the text is no address.
-std::string AddressOr(absl::string_view text);
-
 // From where a call comes, without a port; empty where there is no network (`context` null, a Unix
 // socket). What the header states counts only of a peer whose certificate has the name
 // `gateway_name` (empty: of nobody).

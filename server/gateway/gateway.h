@@ -21,8 +21,9 @@ class Gateway {
  public:
   // Listens when it returns; servers need not be there yet.
   //
-  // Errors: Unavailable, naming the address, when it cannot be listened on; those of
-  // CheckLoginConfig and WebFiles::Load.
+  // Errors: Unavailable, naming the address, when it cannot be listened on; FailedPrecondition
+  // (servers on other machines without encryption); those of CheckLoginConfig, WebFiles::Load,
+  // RotatedFiles::Load and ForwardedAddresses::CheckProxies.
   static absl::StatusOr<std::unique_ptr<Gateway>> Start(const GatewayOptions& options);
 
   // "http://127.0.0.1:8080", also when the options said port 0.
@@ -36,12 +37,13 @@ class Gateway {
   void Drain() { http_->Drain(); }
 
  private:
-  Gateway(const GatewayOptions& options, WebFiles files);
+  Gateway(const GatewayOptions& options, WebFiles files, std::unique_ptr<RotatedFiles> tls_files);
 
   // Constant.
   const GatewayOptions options_;
 
   // Self-synchronised; each may use those before it, and is destroyed before them.
+  const std::unique_ptr<RotatedFiles> tls_files_;  // null: servers without encryption
   GatewayCounters counters_;
   ServerPool pool_;
   GatewayRoutes routes_;

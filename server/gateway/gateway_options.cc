@@ -91,6 +91,27 @@ void AddLogin(CLI::App& app, LoginConfig* login) {
       ->type_name("SCOPES");
 }
 
+void AddUpstreamOptions(CLI::App& app, GatewayOptions* options) {
+  CLI::Option* ca = app.add_option("--server-ca", options->upstream.roots,
+                                   "authorities in PEM of the servers' certificates: calls to them "
+                                   "are encrypted. Renewed by rewriting the file")
+                        ->type_name("FILE");
+  CLI::Option* certificate =
+      app.add_option("--cert", options->upstream.certificate,
+                     "the gateway's own certificate, for servers that ask for one")
+          ->type_name("FILE")
+          ->needs(ca);
+  CLI::Option* key = app.add_option("--key", options->upstream.key, "its key")
+                         ->type_name("FILE")
+                         ->needs(certificate);
+  certificate->needs(key);
+  app.add_flag("--insecure", options->insecure,
+               "without --server-ca also to servers on other machines");
+  app.add_option("--trust-forwarded-from", options->trusted_proxies,
+                 "address of a proxy before the gateway whose X-Forwarded-For counts")
+      ->type_name("ADDRESS");
+}
+
 // "HOST:PORT", IPv6 in brackets.
 std::string SetListen(const std::string& text, GatewayOptions* options) {
   const size_t colon = text.rfind(':');
@@ -123,6 +144,7 @@ void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
          "the network: there is no login and no TLS here")
       ->default_str("127.0.0.1:8080")
       ->type_name("HOST:PORT");
+  AddUpstreamOptions(app, options);
   app.add_option("--web", options->web, "folder of the built planner; without it none is served")
       ->type_name("DIR");
   app.add_option("--allow-host", options->allowed_hosts,

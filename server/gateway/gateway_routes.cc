@@ -68,9 +68,10 @@ bool OffersSubprotocol(const HttpHead& head) {
 
 }  // namespace
 
-GatewayRoutes::GatewayRoutes(AccessRules rules, WebFiles files, const LoginConfig& login,
-                             ServerPool* pool, GatewayCounters* counters)
+GatewayRoutes::GatewayRoutes(AccessRules rules, ForwardedAddresses addresses, WebFiles files,
+                             const LoginConfig& login, ServerPool* pool, GatewayCounters* counters)
     : rules_(std::move(rules)),
+      addresses_(std::move(addresses)),
       files_(std::move(files)),
       login_json_(std::make_shared<const std::string>(LoginConfigJson(login))),
       security_policy_(SecurityPolicy(login)),
@@ -174,13 +175,14 @@ std::shared_ptr<ReplySource> GatewayRoutes::Stream(const HttpHead& head, std::st
   HttpFields fields = CommonFields();
   for (auto& field : OriginFields(head)) fields.push_back(std::move(field));
   fields.emplace_back("access-control-expose-headers", std::string(kExposedHeaders));
-  auto call = std::make_shared<WebCall>(std::move(reply), std::move(fields));
+  auto call = std::make_shared<WebCall>(std::move(reply), std::move(fields), addresses_.Of(head));
   call->Begin(head, body, pool_, counters_);
   return call;
 }
 
-std::shared_ptr<SocketUser> GatewayRoutes::OpenSocket(std::shared_ptr<Socket> socket) {
-  return std::make_shared<SocketCall>(std::move(socket), pool_, counters_);
+std::shared_ptr<SocketUser> GatewayRoutes::OpenSocket(std::shared_ptr<Socket> socket,
+                                                      const HttpHead& head) {
+  return std::make_shared<SocketCall>(std::move(socket), addresses_.Of(head), pool_, counters_);
 }
 
 }  // namespace tissueform

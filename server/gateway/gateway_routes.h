@@ -9,6 +9,7 @@
 #include "absl/strings/string_view.h"
 
 #include "server/gateway/access_rules.h"
+#include "server/gateway/forwarded_addresses.h"
 #include "server/gateway/gateway_counters.h"
 #include "server/gateway/http_server.h"
 #include "server/gateway/login_config.h"
@@ -21,13 +22,15 @@ namespace tissueform {
 class GatewayRoutes final : public HttpHandler {
  public:
   // `pool` and `counters` must outlive it.
-  GatewayRoutes(AccessRules rules, WebFiles files, const LoginConfig& login, ServerPool* pool,
+  GatewayRoutes(AccessRules rules, ForwardedAddresses addresses, WebFiles files,
+                const LoginConfig& login, ServerPool* pool,
                 GatewayCounters* counters);
 
   HttpDecision Decide(const HttpHead& head) override;
   std::shared_ptr<ReplySource> Stream(const HttpHead& head, std::string body,
                                       std::shared_ptr<ReplyStream> reply) override;
-  std::shared_ptr<SocketUser> OpenSocket(std::shared_ptr<Socket> socket) override;
+  std::shared_ptr<SocketUser> OpenSocket(std::shared_ptr<Socket> socket,
+                                         const HttpHead& head) override;
   HttpReply ReplyWith(int status) override;
 
  private:
@@ -45,6 +48,7 @@ class GatewayRoutes final : public HttpHandler {
 
   // Constant.
   const AccessRules rules_;
+  const ForwardedAddresses addresses_;
   const WebFiles files_;
   const std::shared_ptr<const std::string> login_json_;
   const std::string security_policy_;

@@ -103,7 +103,8 @@ class HttpHandler {
   virtual HttpDecision Decide(const HttpHead& head) = 0;
   virtual std::shared_ptr<ReplySource> Stream(const HttpHead& head, std::string body,
                                               std::shared_ptr<ReplyStream> reply) = 0;
-  virtual std::shared_ptr<SocketUser> OpenSocket(std::shared_ptr<Socket> socket) = 0;
+  virtual std::shared_ptr<SocketUser> OpenSocket(std::shared_ptr<Socket> socket,
+                                                 const HttpHead& head) = 0;
   // A reply of the server itself (431, 413, 400), with the fields that all have.
   virtual HttpReply ReplyWith(int status) = 0;
 };

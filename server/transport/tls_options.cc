@@ -3,28 +3,11 @@
 
 #include "server/transport/tls_options.h"
 
-#include <memory>
-#include <netdb.h>
-
 #include "absl/strings/str_cat.h"
-#include <netinet/in.h>
-#include <sys/socket.h>
+
+#include "server/transport/network_address.h"
 
 namespace tissueform {
-namespace {
-
-bool IsOwnAddress(const sockaddr& address) {
-  if (address.sa_family == AF_INET) {
-    const auto& ipv4 = reinterpret_cast<const sockaddr_in&>(address);
-    return (ntohl(ipv4.sin_addr.s_addr) >> 24) == 127;
-  }
-  if (address.sa_family != AF_INET6) return false;
-  const auto& ipv6 = reinterpret_cast<const sockaddr_in6&>(address);
-  return IN6_IS_ADDR_LOOPBACK(&ipv6.sin6_addr) != 0;
-}
-
-}  // namespace
-
 void AddTlsOptions(CLI::App& app, TlsOptions* options) {
   CLI::Option* certificate =
       app.add_option("--tls-cert", options->certificate,
@@ -56,18 +39,6 @@ void AddTlsOptions(CLI::App& app, TlsOptions* options) {
       ->needs(client_ca);
   app.add_flag("--insecure", options->insecure,
                "off loopback serve without encryption or logins: to whoever reaches the port");
-}
-
-bool IsLoopback(const std::string& host) {
-  addrinfo hints{};
-  hints.ai_socktype = SOCK_STREAM;
-  addrinfo* found = nullptr;
-  if (getaddrinfo(host.c_str(), nullptr, &hints, &found) != 0) return false;
-  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> addresses(found, &freeaddrinfo);
-  for (const addrinfo* address = found; address != nullptr; address = address->ai_next) {
-    if (!IsOwnAddress(*address->ai_addr)) return false;
-  }
-  return found != nullptr;
 }
 
 absl::Status CheckExposure(const std::string& host, const TlsOptions& options, bool has_tokens) {

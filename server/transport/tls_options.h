@@ -27,9 +27,6 @@ struct TlsOptions {
 // `options` must outlive the parsing.
 void AddTlsOptions(CLI::App& app, TlsOptions* options);
 
-// Whether all addresses of a host are this machine's own; false also when it has none.
-bool IsLoopback(const std::string& host);
-
 // What is missing before strangers may reach a server that listens on `host`. `has_tokens`: it asks
 // callers for tokens. Errors: FailedPrecondition (see --insecure), InvalidArgument (options that do
 // not fit together).
