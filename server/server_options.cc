@@ -127,6 +127,7 @@ void AddServerOptions(CLI::App& app, ServerOptions* options) {
                  "what is logged on stderr, without names or paths")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
+  AddTelemetryOptions(app, &options->telemetry);
 }
 
 }  // namespace tissueform

@@ -10,6 +10,7 @@
 #include "CLI/CLI.hpp"
 
 #include "server/session/limits.h"
+#include "server/telemetry/telemetry_options.h"
 
 namespace tissueform {
 
@@ -29,6 +30,7 @@ struct ServerOptions {
   bool in_memory = true;
   std::string data_dir;  // empty: DefaultDataFolder
   std::string log_level = "info";
+  TelemetryOptions telemetry = {};
 
   // Half of the machine's memory, one worker a core.
   static ServerOptions Defaults();

@@ -16,12 +16,15 @@
 #include "grpcpp/server_builder.h"
 #include "spdlog/spdlog.h"
 
+#include "core/base/software_version.h"
 #include "core/base/status_macros.h"
 #include "core/linear_solvers/blas_threads.h"
 #include "server/library_logs.h"
+#include "server/monitoring/process_metrics.h"
 #include "server/store/data_folder.h"
 #include "server/store/durable_store.h"
 #include "server/store/in_memory_stores.h"
+#include "server/telemetry/server_metrics.h"
 
 namespace tissueform {
 namespace {
@@ -83,7 +86,7 @@ ConnectionListener::Options ListenerOptions(const ServerOptions& options) {
 NamedLimits LimitsOf(const ServerOptions& options) {
   const auto& [host, port, memory_budget_bytes, workers, service, max_calls_per_connection,
                max_connections, max_connections_per_address, drain_deadline, in_memory, data_dir,
-               log_level] = options;
+               log_level, telemetry] = options;
   NamedLimits limits = ToNamedLimits(service);
   limits["max_message_bytes"] = kMaxReceiveBytes;
   limits["memory_budget_bytes"] = memory_budget_bytes;
@@ -115,16 +118,23 @@ absl::StatusOr<std::unique_ptr<Stores>> OpenStores(const ServerOptions& options)
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
     const ServerOptions& options) {
+  TF_ASSIGN_OR_RETURN(std::unique_ptr<Telemetry> telemetry, Telemetry::Start(options.telemetry));
   TF_ASSIGN_OR_RETURN(std::unique_ptr<Stores> stores, OpenStores(options));
-  std::unique_ptr<TissueformServer> server(new TissueformServer(options, std::move(stores)));
+  std::unique_ptr<TissueformServer> server(
+      new TissueformServer(options, std::move(telemetry), std::move(stores)));
   TF_RETURN_IF_ERROR(server->registry_.LearnKnown());
   server->housekeeping_.Start();
+  TF_RETURN_IF_ERROR(server->ServeMetrics());
   TF_RETURN_IF_ERROR(server->Listen());
   return server;
 }
 
-TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores)
+TissueformServer::TissueformServer(const ServerOptions& options,
+                                   std::unique_ptr<Telemetry> telemetry,
+                                   std::unique_ptr<Stores> stores)
     : options_(options),
+      telemetry_(std::move(telemetry)),
+      gate_(nullptr, telemetry_->observer()),
       budget_(options.memory_budget_bytes),
       stores_(std::move(stores)),
       catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),
@@ -145,12 +155,14 @@ TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr
       server_info_service_(&gate_, LimitsOf(options)) {
   SetBlasThreads(1);  // the pool's workers share the cores already
   registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
+    telemetry_->session_events().Count(event);
     watches_.OnSessionEvent(id, event);
   });
   budget_.set_reclaimer([this](int64_t bytes) { Reclaim(bytes); });
 }
 
 TissueformServer::~TissueformServer() {
+  metrics_.reset();
   if (server_ != nullptr) {
     listener_->Stop();
     server_->Shutdown(std::chrono::system_clock::now());
@@ -161,6 +173,27 @@ TissueformServer::~TissueformServer() {
   registry_.Stop();
   pool_.reset();    // its last jobs may still use the registry and the store
   stores_.reset();  // its last answers may still use the registry
+}
+
+absl::Status TissueformServer::ServeMetrics() {
+  if (options_.telemetry.metrics_port < 0) return absl::OkStatus();
+  metrics_.emplace();
+  AddProcessMetrics("tissueform", SoftwareVersion(), &*metrics_);
+  telemetry_->AddTo(&*metrics_);
+  AddFrameMetrics(streams_.measures(), &*metrics_);
+  AddLaneMetrics(*pool_, &*metrics_);
+  AddSessionMetrics(registry_, telemetry_->session_events(), &*metrics_);
+  AddMemoryMetrics(budget_, catalog_, &*metrics_);
+  AddStoreMetrics(*stores_, &*metrics_);
+  metrics_->AddGauge("tissueform_streams", "Drags open.", {},
+                     [this] { return static_cast<double>(streams_.size()); });
+  metrics_->AddGauge("tissueform_watches", "Watches open.", {},
+                     [this] { return static_cast<double>(watches_.size()); });
+  metrics_->AddGauge("tissueform_draining", "1 while the server drains.", {},
+                     [this] { return gate_.draining() ? 1.0 : 0.0; });
+  TF_RETURN_IF_ERROR(metrics_->Serve(options_.telemetry.metrics_port));
+  spdlog::info("metrics on http://127.0.0.1:{}/metrics", metrics_->port());
+  return absl::OkStatus();
 }
 
 absl::Status TissueformServer::Listen() {

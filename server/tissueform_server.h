@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -29,6 +30,7 @@
 #include "server/session/session_registry.h"
 #include "server/session/worker_pool.h"
 #include "server/store/stores.h"
+#include "server/telemetry/telemetry.h"
 #include "server/transport/connection_listener.h"
 
 namespace tissueform {
@@ -48,6 +50,9 @@ class TissueformServer {
   // The port that is listened on, also when the options said 0.
   int port() const { return listener_->port(); }
 
+  // On which Prometheus finds the page of metrics; 0: there is none.
+  int metrics_port() const { return metrics_.has_value() ? metrics_->port() : 0; }
+
   // Ends in good order: health turns to NOT_SERVING, streams are told (with the time of the drain
   // deadline), new work is refused with
   // UNAVAILABLE; open calls may go on until the drain deadline and are then cancelled; the listener
@@ -61,16 +66,20 @@ class TissueformServer {
   const SessionWatches& watches() const { return watches_; }
 
  private:
-  TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores);
+  TissueformServer(const ServerOptions& options, std::unique_ptr<Telemetry> telemetry,
+                   std::unique_ptr<Stores> stores);
 
   absl::Status Listen();
   void Reclaim(int64_t bytes);
+  // Nothing is told without --metrics-port.
+  absl::Status ServeMetrics();
 
   // Constant.
   const ServerOptions options_;
 
   // Self-synchronised; each may use those before it. Destroyed from the last to the first: calls
   // end, then jobs, then what they used.
+  const std::unique_ptr<Telemetry> telemetry_;
   ServiceGate gate_;
   MemoryBudget budget_;
   std::unique_ptr<Stores> stores_;
@@ -94,6 +103,7 @@ class TissueformServer {
   std::unique_ptr<ConnectionListener> listener_;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
   std::unique_ptr<grpc::Server> server_;
+  std::optional<MetricsPage> metrics_;  // reads what the others count
 };
 
 }  // namespace tissueform

@@ -130,7 +130,9 @@ absl::Status CallScope::Admit(const grpc::CallbackServerContext* context) {
             "the server is draining and takes no new work; try another one, or again in a minute"),
         ErrorReason::kServerDraining);
   }
-  return gate_->observer() == nullptr ? absl::OkStatus() : gate_->observer()->OnBegin(Observed());
+  if (gate_->observer() != nullptr) TF_RETURN_IF_ERROR(gate_->observer()->OnBegin(Observed()));
+  served_ = true;
+  return absl::OkStatus();
 }
 
 CallScope::CallScope(CallScope&& other) noexcept
@@ -143,6 +145,7 @@ CallScope::CallScope(CallScope&& other) noexcept
       request_id_(std::move(other.request_id_)),
       traceparent_(std::move(other.traceparent_)),
       resource_(std::move(other.resource_)),
+      served_(other.served_),
       admission_(std::move(other.admission_)) {}
 
 ObservedCall CallScope::Observed() const {
@@ -152,7 +155,8 @@ ObservedCall CallScope::Observed() const {
           .resource = resource_,
           .address = address_,
           .request_id = request_id_,
-          .traceparent = traceparent_};
+          .traceparent = traceparent_,
+          .served = served_};
 }
 
 absl::Status CallScope::Renew(const std::string& token) {
