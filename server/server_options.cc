@@ -149,6 +149,7 @@ void AddServerOptions(CLI::App& app, ServerOptions* options) {
                  "what is logged on stderr, without names or paths")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
+  AddTelemetryOptions(app, &options->telemetry);
   AddConfiguration(app, "TISSUEFORM_SERVER_");  // last: it looks at all options
 }
 

@@ -12,6 +12,7 @@
 #include "server/auth/token_options.h"
 #include "server/session/limits.h"
 #include "server/session/quotas.h"
+#include "server/telemetry/telemetry_options.h"
 #include "server/transport/tls_options.h"
 
 namespace tissueform {
@@ -35,6 +36,7 @@ struct ServerOptions {
   std::string data_dir;  // empty: DefaultDataFolder
   std::string log_level = "info";
   TokenOptions tokens = {};
+  TelemetryOptions telemetry = {};
 
   // Half of the machine's memory, one worker a core.
   static ServerOptions Defaults();

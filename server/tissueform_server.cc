@@ -15,12 +15,15 @@
 #include "grpcpp/server_builder.h"
 #include "spdlog/spdlog.h"
 
+#include "core/base/software_version.h"
 #include "core/base/status_macros.h"
 #include "core/linear_solvers/blas_threads.h"
 #include "server/library_logs.h"
+#include "server/monitoring/process_metrics.h"
 #include "server/store/data_folder.h"
 #include "server/store/durable_store.h"
 #include "server/store/in_memory_stores.h"
+#include "server/telemetry/server_metrics.h"
 #include "server/transport/network_address.h"
 #include "server/transport/tls_credentials.h"
 
@@ -89,7 +92,7 @@ int64_t MemoryQuota(const ServerOptions& options) {
 NamedLimits LimitsOf(const ServerOptions& options) {
   const auto& [host, port, tls, memory_budget_bytes, workers, service, quotas,
                max_calls_per_connection, max_connections, max_connections_per_address,
-               drain_deadline, in_memory, data_dir, log_level, tokens] = options;
+               drain_deadline, in_memory, data_dir, log_level, tokens, telemetry] = options;
   NamedLimits limits = ToNamedLimits(service);
   limits["quota_calls_per_second"] = quotas.calls_per_second;
   limits["quota_waiting_calls"] = quotas.waiting_calls;
@@ -128,33 +131,34 @@ absl::StatusOr<std::unique_ptr<Stores>> OpenStores(const ServerOptions& options)
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
     const ServerOptions& options) {
   TF_RETURN_IF_ERROR(CheckExposure(options.host, options.tls, options.tokens.configured()));
-  TF_ASSIGN_OR_RETURN(std::unique_ptr<RotatedFiles> tls_files, LoadServerFiles(options.tls));
-  std::unique_ptr<TokenAuthenticator> tokens;
+  Parts parts;
+  TF_ASSIGN_OR_RETURN(parts.telemetry, Telemetry::Start(options.telemetry));
+  TF_ASSIGN_OR_RETURN(parts.tls_files, LoadServerFiles(options.tls));
   if (options.tokens.configured()) {
-    TF_ASSIGN_OR_RETURN(tokens, TokenAuthenticator::Start(options.tokens));
+    TF_ASSIGN_OR_RETURN(parts.tokens, TokenAuthenticator::Start(options.tokens));
   }
-  TF_ASSIGN_OR_RETURN(std::unique_ptr<Stores> stores, OpenStores(options));
-  std::unique_ptr<TissueformServer> server(
-      new TissueformServer(options, std::move(stores), std::move(tokens)));
-  server->tls_files_ = std::move(tls_files);
+  TF_ASSIGN_OR_RETURN(parts.stores, OpenStores(options));
+  std::unique_ptr<TissueformServer> server(new TissueformServer(options, std::move(parts)));
   if (server->is_exposed()) {
     spdlog::warn("INSECURE: {}, and strangers may reach it (--insecure)",
                  options.tls.enabled() ? "nobody is asked to log in" : "calls are not encrypted");
   }
   TF_RETURN_IF_ERROR(server->registry_.LearnKnown());
   server->housekeeping_.Start();
+  TF_RETURN_IF_ERROR(server->ServeMetrics());
   TF_RETURN_IF_ERROR(server->Listen());
   return server;
 }
 
-TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores,
-                                   std::unique_ptr<TokenAuthenticator> tokens)
+TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
     : options_(options),
-      tokens_(std::move(tokens)),
+      telemetry_(std::move(parts.telemetry)),
+      tls_files_(std::move(parts.tls_files)),
+      tokens_(std::move(parts.tokens)),
       quotas_(options.quotas),
-      gate_(tokens_.get(), nullptr, &quotas_, options.tls.gateway_name),
+      gate_(tokens_.get(), telemetry_->observer(), &quotas_, options.tls.gateway_name),
       budget_(options.memory_budget_bytes),
-      stores_(std::move(stores)),
+      stores_(std::move(parts.stores)),
       catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),
       uploads_(options.limits, &catalog_, &stores_->uploads()),
       pool_(std::make_unique<WorkerPool>(options.workers)),
@@ -173,6 +177,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr
       server_info_service_(&gate_, LimitsOf(options)) {
   SetBlasThreads(1);  // the pool's workers share the cores already
   registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
+    telemetry_->session_events().Count(event);
     watches_.OnSessionEvent(id, event);
   });
   budget_.set_account_limit(MemoryQuota(options), [](const std::string& /*owner*/, int64_t) {});
@@ -180,6 +185,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr
 }
 
 TissueformServer::~TissueformServer() {
+  metrics_.reset();
   if (server_ != nullptr) {
     listener_->Stop();
     server_->Shutdown(std::chrono::system_clock::now());
@@ -190,6 +196,27 @@ TissueformServer::~TissueformServer() {
   registry_.Stop();
   pool_.reset();    // its last jobs may still use the registry and the store
   stores_.reset();  // its last answers may still use the registry
+}
+
+absl::Status TissueformServer::ServeMetrics() {
+  if (options_.telemetry.metrics_port < 0) return absl::OkStatus();
+  metrics_.emplace();
+  AddProcessMetrics("tissueform", SoftwareVersion(), &*metrics_);
+  telemetry_->AddTo(&*metrics_);
+  AddFrameMetrics(streams_.measures(), &*metrics_);
+  AddLaneMetrics(*pool_, &*metrics_);
+  AddSessionMetrics(registry_, telemetry_->session_events(), &*metrics_);
+  AddMemoryMetrics(budget_, catalog_, &*metrics_);
+  AddStoreMetrics(*stores_, &*metrics_);
+  metrics_->AddGauge("tissueform_streams", "Drags open.", {},
+                     [this] { return static_cast<double>(streams_.size()); });
+  metrics_->AddGauge("tissueform_watches", "Watches open.", {},
+                     [this] { return static_cast<double>(watches_.size()); });
+  metrics_->AddGauge("tissueform_draining", "1 while the server drains.", {},
+                     [this] { return gate_.draining() ? 1.0 : 0.0; });
+  TF_RETURN_IF_ERROR(metrics_->Serve(options_.telemetry.metrics_port));
+  spdlog::info("metrics on http://127.0.0.1:{}/metrics", metrics_->port());
+  return absl::OkStatus();
 }
 
 absl::Status TissueformServer::Listen() {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -30,6 +31,7 @@
 #include "server/session/session_registry.h"
 #include "server/session/worker_pool.h"
 #include "server/store/stores.h"
+#include "server/telemetry/telemetry.h"
 #include "server/transport/connection_listener.h"
 #include "server/transport/rotated_files.h"
 
@@ -50,6 +52,9 @@ class TissueformServer {
   // The port that is listened on, also when the options said 0.
   int port() const { return listener_->port(); }
 
+  // On which Prometheus finds the page of metrics; 0: there is none.
+  int metrics_port() const { return metrics_.has_value() ? metrics_->port() : 0; }
+
   // Ends in good order: health turns to NOT_SERVING, streams are told (with the time of the drain
   // deadline), new work is refused with
   // UNAVAILABLE; open calls may go on until the drain deadline and are then cancelled; the listener
@@ -69,17 +74,28 @@ class TissueformServer {
   const TokenAuthenticator* tokens() const { return tokens_.get(); }
 
  private:
-  TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores,
-                   std::unique_ptr<TokenAuthenticator> tokens);
+  // What is made before the server itself.
+  struct Parts {
+    std::unique_ptr<Telemetry> telemetry;
+    std::unique_ptr<RotatedFiles> tls_files;     // null without TLS
+    std::unique_ptr<TokenAuthenticator> tokens;  // null: nobody logs in
+    std::unique_ptr<Stores> stores;
+  };
+
+  TissueformServer(const ServerOptions& options, Parts parts);
 
   absl::Status Listen();
   void Reclaim(int64_t bytes);
+  // Nothing is told without --metrics-port.
+  absl::Status ServeMetrics();
 
   // Constant.
   const ServerOptions options_;
 
   // Self-synchronised; each may use those before it. Destroyed from the last to the first: calls
   // end, then jobs, then what they used.
+  const std::unique_ptr<Telemetry> telemetry_;
+  const std::unique_ptr<RotatedFiles> tls_files_;  // null without TLS
   const std::unique_ptr<TokenAuthenticator> tokens_;
   CallQuotas quotas_;
   ServiceGate gate_;
@@ -100,12 +116,12 @@ class TissueformServer {
   PlanService plan_service_;
   CaseService case_service_;
   ServerInfoService server_info_service_;
-  std::unique_ptr<RotatedFiles> tls_files_;  // null without TLS
   // gRPC gets its connections from the listener, through the acceptor. The server comes last: what
   // it is given goes to the acceptor of a server that lives.
   std::unique_ptr<ConnectionListener> listener_;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
   std::unique_ptr<grpc::Server> server_;
+  std::optional<MetricsPage> metrics_;  // reads what the others count
 };
 
 }  // namespace tissueform

@@ -126,6 +126,7 @@ absl::Status CallScope::Admit(const grpc::CallbackServerContext* context) {
     TF_RETURN_IF_ERROR(gate_->quotas()->Begin(principal().name, kind_));
     counted_ = true;
   }
+  served_ = true;
   return absl::OkStatus();
 }
 
@@ -140,6 +141,7 @@ CallScope::CallScope(CallScope&& other) noexcept
       request_id_(std::move(other.request_id_)),
       traceparent_(std::move(other.traceparent_)),
       resource_(std::move(other.resource_)),
+      served_(other.served_),
       admission_(std::move(other.admission_)) {}
 
 ObservedCall CallScope::Observed() const {
@@ -149,7 +151,8 @@ ObservedCall CallScope::Observed() const {
           .resource = resource_,
           .address = address_,
           .request_id = request_id_,
-          .traceparent = traceparent_};
+          .traceparent = traceparent_,
+          .served = served_};
 }
 
 absl::Status CallScope::Renew(const std::string& token) {

@@ -129,6 +129,7 @@ class CallScope {
   std::string request_id_;
   std::string traceparent_;
   std::string resource_;
+  bool served_ = false;  // the observer let it begin
   absl::Status admission_;
 };
 

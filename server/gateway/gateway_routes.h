@@ -23,8 +23,7 @@ class GatewayRoutes final : public HttpHandler {
  public:
   // `pool` and `counters` must outlive it.
   GatewayRoutes(AccessRules rules, ForwardedAddresses addresses, WebFiles files,
-                const LoginConfig& login, ServerPool* pool,
-                GatewayCounters* counters);
+                const LoginConfig& login, ServerPool* pool, GatewayCounters* counters);
 
   HttpDecision Decide(const HttpHead& head) override;
   std::shared_ptr<ReplySource> Stream(const HttpHead& head, std::string body,

@@ -207,7 +207,7 @@ absl::Status DeformStreamReactor::TakeConfiguration() {
     return absl::InvalidArgumentError("the first message must be the configuration");
   }
   TF_ASSIGN_OR_RETURN(stream_request_, ReadStreamRequest(request_.configuration(), limits_));
-  flow_.emplace(stream_request_.max_unacked);
+  flow_.emplace(stream_request_.max_unacked, &streams_->measures());
   StartOpening();
   return absl::OkStatus();
 }

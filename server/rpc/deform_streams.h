@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 
 #include "core/base/mutex.h"
+#include "server/session/frame_flow.h"
 
 namespace tissueform {
 
@@ -29,8 +30,13 @@ class DeformStreams {
   void NotifyDraining(std::chrono::system_clock::time_point end);
   int size() const;
 
+  // Of all streams there were.
+  FrameMeasures& measures() { return measures_; }
+  const FrameMeasures& measures() const { return measures_; }
+
  private:
   const int max_streams_;
+  FrameMeasures measures_;
 
   mutable Mutex mutex_;
   std::set<DeformStreamReactor*> streams_ ABSL_GUARDED_BY(mutex_);

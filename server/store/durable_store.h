@@ -54,6 +54,8 @@ class DurableStore final : public Stores {
   UploadStore& uploads() override;
   PredictionStore& predictions() override;
   CaseStore& cases() override;
+  const DurationHistogram* latency() const override;
+  std::string folder() const override;
 
   const std::vector<DamagedItem>& damaged() const;
 

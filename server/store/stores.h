@@ -3,6 +3,9 @@
 
 #pragma once
 
+#include <string>
+
+#include "core/base/duration_histogram.h"
 #include "server/store/case_store.h"
 #include "server/store/mesh_store.h"
 #include "server/store/prediction_store.h"
@@ -23,6 +26,11 @@ class Stores {
   virtual UploadStore& uploads() = 0;
   virtual PredictionStore& predictions() = 0;
   virtual CaseStore& cases() = 0;
+
+  // Of each reading or writing of rows, until it is durable; null where nothing is.
+  virtual const DurationHistogram* latency() const { return nullptr; }
+  // Where it is kept; empty: in memory.
+  virtual std::string folder() const { return {}; }
 };
 
 }  // namespace tissueform
