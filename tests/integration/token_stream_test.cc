@@ -51,8 +51,9 @@ class BearerInterceptor : public grpc::experimental::Interceptor {
  public:
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
     const std::string token = CallersBearer().Get();
-    if (!token.empty() && methods->QueryInterceptionHookPoint(
-                              grpc::experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
+    if (!token.empty() &&
+        methods->QueryInterceptionHookPoint(
+            grpc::experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
       methods->GetSendInitialMetadata()->emplace("authorization", absl::StrCat("Bearer ", token));
     }
     methods->Proceed();
@@ -77,8 +78,7 @@ void BringBearers() {
 }
 
 double Now() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 std::string TokenUntil(double seconds) {
@@ -108,8 +108,8 @@ class TokenStreamTest : public ServiceTest {
   // Drags until the stream or the time ends.
   static void DragUntil(double seconds, DeformStream* stream) {
     for (int i = 1; Now() < seconds; ++i) {
-      if (!stream->SendPoses(i, TopPose(SomePose(i % 7))).ok() ||
-          !stream->Receive().has_value() || !stream->Ack(i).ok()) {
+      if (!stream->SendPoses(i, TopPose(SomePose(i % 7))).ok() || !stream->Receive().has_value() ||
+          !stream->Ack(i).ok()) {
         return;
       }
     }
