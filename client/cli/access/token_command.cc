@@ -69,9 +69,9 @@ void AddMake(CLI::App* token, CommandWork* work) {
   command->add_option("--subject", words.subject, "whose it is: 1 to 128 printable characters")
       ->required();
   command
-      ->add_option("--lifetime", words.lifetime_seconds,
-                   absl::StrCat("seconds until it ends, at most ", kMaxTokenLifetimeSeconds,
-                                " (12 hours)"))
+      ->add_option(
+          "--lifetime", words.lifetime_seconds,
+          absl::StrCat("seconds until it ends, at most ", kMaxTokenLifetimeSeconds, " (12 hours)"))
       ->check(CLI::Range(int64_t{1}, kMaxTokenLifetimeSeconds))
       ->capture_default_str();
   command->add_option("--role", words.roles, "publisher, bridge or admin; again for more")
@@ -79,7 +79,8 @@ void AddMake(CLI::App* token, CommandWork* work) {
   command->add_option("--project", words.projects, "a project that it opens; again for more");
   command->footer(
       "Keep a token as you keep a password, in a file that only you read:\n"
-      "  (umask 077; tissueform token make --key keys/private.pem --issuer https://keys.example \\\n"
+      "  (umask 077; tissueform token make --key keys/private.pem --issuer https://keys.example "
+      "\\\n"
       "     --audience tissueform --subject alice > token)\n"
       "It cannot be taken back but by the server's --token-revocations (docs/security.md).");
   command->callback([options, work] {
@@ -105,8 +106,7 @@ void AddShow(CLI::App* token, CommandWork* work) {
       std::string text(kMaxShownBytes, '\0');
       std::cin.read(text.data(), static_cast<std::streamsize>(text.size()));
       text.resize(static_cast<size_t>(std::cin.gcount()));
-      TF_ASSIGN_OR_RETURN(const nlohmann::json shown,
-                          ShowToken(absl::StripAsciiWhitespace(text)));
+      TF_ASSIGN_OR_RETURN(const nlohmann::json shown, ShowToken(absl::StripAsciiWhitespace(text)));
       std::cout << shown.dump(2, ' ', true) << "\n";
       std::cerr << "not verified: anybody can write this\n";
       return absl::OkStatus();

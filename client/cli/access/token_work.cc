@@ -45,7 +45,8 @@ absl::StatusOr<std::string> ReadKeyFile(const std::string& path) {
   std::string text(kMaxKeyFileBytes, '\0');
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (file.gcount() <= 0) {
-    return absl::NotFoundError(absl::StrCat("cannot read ", path, "; make keys with `tissueform "
+    return absl::NotFoundError(absl::StrCat("cannot read ", path,
+                                            "; make keys with `tissueform "
                                             "token keygen --out DIR`"));
   }
   text.resize(static_cast<size_t>(file.gcount()));
