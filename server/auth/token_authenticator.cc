@@ -6,6 +6,8 @@
 #include <atomic>
 #include <utility>
 
+#include "spdlog/spdlog.h"
+
 #include "core/base/status_macros.h"
 #include "server/auth/token_text.h"
 
@@ -15,6 +17,11 @@ namespace {
 constexpr char kKeysOption[] = "--token-keys";
 constexpr char kUrlOption[] = "--token-jwks-url";
 constexpr char kRevocationsOption[] = "--token-revocations";
+
+void LogAlarm(const absl::Status& taken) {
+  if (taken.ok()) return;
+  spdlog::error("{}; what was known before stays", std::string(taken.message()));
+}
 
 }  // namespace
 
@@ -38,7 +45,7 @@ absl::Status TokenAuthenticator::ReadAll() {
     TF_RETURN_IF_ERROR(trust_.TakeRevocations(
         kRevocationsOption, ReadBoundedFile(options_.revocations_file, RevocationList::kMaxBytes)));
     files_.Add(options_.revocations_file, RevocationList::kMaxBytes, [this](const auto& content) {
-      trust_.TakeRevocations(kRevocationsOption, content).IgnoreError();
+      LogAlarm(trust_.TakeRevocations(kRevocationsOption, content));
     });
   }
   if (!options_.keys_file.empty()) {
@@ -51,6 +58,7 @@ absl::Status TokenAuthenticator::ReadAll() {
     const absl::Status asked =
         trust_.TakeKeys(kUrlOption, DownloadJwks(options_.jwks_url, stopping));
     if (absl::IsInvalidArgument(asked)) return asked;
+    LogAlarm(asked);
     fetcher_ = std::make_unique<JwksFetcher>(
         options_.jwks_url, options_.jwks_times, asked.ok(),
         [this](const auto& answer) { return TakeKeys(kUrlOption, answer); });
@@ -61,9 +69,10 @@ absl::Status TokenAuthenticator::ReadAll() {
 
 bool TokenAuthenticator::TakeKeys(const char* option, const absl::StatusOr<std::string>& content) {
   const std::shared_ptr<const KeySet> before = trust_.keys();
-  const bool good = trust_.TakeKeys(option, content).ok();
+  const absl::Status taken = trust_.TakeKeys(option, content);
   if (trust_.keys() != before) cache_.Clear();
-  return good;
+  LogAlarm(taken);
+  return taken.ok();
 }
 
 absl::StatusOr<Authenticated> TokenAuthenticator::Authenticate(const Credentials& credentials) {

@@ -16,7 +16,6 @@ absl::Status TokenTrust::Alarm(const char* option, const absl::Status& why,
   MutexLock lock(mutex_);
   standing_.*alarm = true;
   ++standing_.alarms;
-  spdlog::error("{}; what was known before stays", std::string(named.message()));
   return named;
 }
 

@@ -27,7 +27,7 @@ struct TokenStanding {
 };
 
 // The keys and the revocations that count now. New ones are taken if they are of use; if not, the
-// old ones stay, and the log has an alarm. Thread-safe.
+// old ones stay, and the standing has an alarm, which the caller logs. Thread-safe.
 class TokenTrust {
  public:
   // Of a file or a URL, or why it told nothing. `option` names where from: "--token-keys".

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <thread>
 
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
@@ -66,6 +67,17 @@ inline std::string JwksOf(const SigningKey& first, const SigningKey& second) {
   nlohmann::json set = first.PublicJwks();
   set["keys"].push_back(second.PublicJwks()["keys"][0]);
   return set.dump();
+}
+
+// True as soon as `condition` holds; false when it does not within 30 s.
+template <typename Condition>
+bool Soon(const Condition& condition) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+    std::this_thread::yield();
+  }
+  return true;
 }
 
 // At once and whole, as a site should write it.
