@@ -4,10 +4,12 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <signal.h>
 #include <unistd.h>
+#include <utility>
 
 #include "CLI/CLI.hpp"
 #include "spdlog/sinks/stdout_color_sinks.h"
@@ -17,6 +19,7 @@
 #include "core/base/freed_memory.h"
 #include "server/backup_commands.h"
 #include "server/program/program_options.h"
+#include "server/program/systemd_notices.h"
 #include "server/server_options.h"
 #include "server/tissueform_server.h"
 
@@ -64,7 +67,11 @@ ExitCode Serve(const tissueform::ServerOptions& options) {
   }
   std::printf("listening on %s:%d\n", options.host.c_str(), (*server)->port());
   std::fflush(stdout);
+  const tissueform::SystemdWatchdog watchdog(
+      [&server](std::function<void()> answered) { (*server)->Ask(std::move(answered)); });
+  tissueform::TellSystemdReady();
   WaitForTerminationSignal();
+  tissueform::TellSystemdStopping();
   (*server)->Drain();
   spdlog::info("done");
   return kExitDone;

@@ -269,6 +269,13 @@ void TissueformServer::Reclaim(int64_t bytes) {
   if (meshes > 0) spdlog::info("{} meshes that nobody uses have left memory", meshes);
 }
 
+void TissueformServer::Ask(std::function<void()> answered) {
+  // Not the others: a factorisation, or a disk, may take long and is no reason to start again.
+  pool_->Post(Lane::kFrames, [this, answered = std::move(answered)]() mutable {
+    pool_->Post(Lane::kSolves, std::move(answered));
+  });
+}
+
 void TissueformServer::Drain() {
   const auto deadline = std::chrono::steady_clock::now() + options_.drain_deadline;
   spdlog::info("draining: {} open streams, at most {} s", streams_.size(),

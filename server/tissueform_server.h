@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -60,6 +61,9 @@ class TissueformServer {
   // UNAVAILABLE; open calls may go on until the drain deadline and are then cancelled; the listener
   // closes. Blocks until all calls have ended. One thread, once.
   void Drain();
+
+  // Calls `answered` later, when the lanes that planners wait for have each done a job.
+  void Ask(std::function<void()> answered);
 
   const MemoryBudget& memory_budget() const { return budget_; }
   Stores& stores() { return *stores_; }

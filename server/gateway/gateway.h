@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -29,6 +30,8 @@ class Gateway {
   // "http://127.0.0.1:8080", also when the options said port 0.
   std::string Url() const;
   int port() const { return http_->port(); }
+  // Calls `answered` on one of the threads that serve, later: proof that they do.
+  void Ask(std::function<void()> answered) { http_->Post(std::move(answered)); }
   const GatewayCounters& counters() const { return counters_; }
   const ServerPool& pool() const { return pool_; }
 

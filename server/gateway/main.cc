@@ -4,8 +4,10 @@
 #include <csignal>
 #include <cstdio>
 #include <ctime>
+#include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "CLI/CLI.hpp"
 #include "grpc/support/log.h"
@@ -15,6 +17,7 @@
 #include "server/gateway/gateway.h"
 #include "server/gateway/gateway_options.h"
 #include "server/program/program_options.h"
+#include "server/program/systemd_notices.h"
 
 namespace {
 
@@ -58,7 +61,11 @@ ExitCode Serve(const tissueform::GatewayOptions& options) {
   }
   std::printf("listening on %s\n", (*gateway)->Url().c_str());
   std::fflush(stdout);
+  const tissueform::SystemdWatchdog watchdog(
+      [&gateway](std::function<void()> answered) { (*gateway)->Ask(std::move(answered)); });
+  tissueform::TellSystemdReady();
   ServeUntilSignal(**gateway);
+  tissueform::TellSystemdStopping();
   (*gateway)->Drain();
   spdlog::info("done; counts: {}", (*gateway)->counters().Text());
   return kExitDone;
