@@ -9,6 +9,7 @@
 
 #include "CLI/CLI.hpp"
 
+#include "server/access/access_options.h"
 #include "server/session/limits.h"
 
 namespace tissueform {
@@ -29,6 +30,7 @@ struct ServerOptions {
   bool in_memory = true;
   std::string data_dir;  // empty: DefaultDataFolder
   std::string log_level = "info";
+  AccessOptions access = {};
 
   // Half of the machine's memory, one worker a core.
   static ServerOptions Defaults();

@@ -18,6 +18,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/linear_solvers/blas_threads.h"
+#include "server/access/access_watch_stores.h"
 #include "server/library_logs.h"
 #include "server/store/data_folder.h"
 #include "server/store/durable_store.h"
@@ -83,8 +84,11 @@ ConnectionListener::Options ListenerOptions(const ServerOptions& options) {
 NamedLimits LimitsOf(const ServerOptions& options) {
   const auto& [host, port, memory_budget_bytes, workers, service, max_calls_per_connection,
                max_connections, max_connections_per_address, drain_deadline, in_memory, data_dir,
-               log_level] = options;
+               log_level, access] = options;
   NamedLimits limits = ToNamedLimits(service);
+  limits["max_shares_per_resource"] = access.max_shares_per_resource;
+  limits["max_links_per_session"] = access.max_links_per_session;
+  limits["max_link_hours"] = access.max_link_lifetime.count();
   limits["max_message_bytes"] = kMaxReceiveBytes;
   limits["memory_budget_bytes"] = memory_budget_bytes;
   limits["workers"] = workers;
@@ -114,19 +118,29 @@ absl::StatusOr<std::unique_ptr<Stores>> OpenStores(const ServerOptions& options)
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
-    const ServerOptions& options) {
+    const ServerOptions& options, Authenticator* authenticator) {
   TF_ASSIGN_OR_RETURN(std::unique_ptr<Stores> stores, OpenStores(options));
-  std::unique_ptr<TissueformServer> server(new TissueformServer(options, std::move(stores)));
+  std::unique_ptr<TissueformServer> server(
+      new TissueformServer(options, std::move(stores), authenticator));
+  TF_RETURN_IF_ERROR(server->access_changes_.Learn());
+  TF_RETURN_IF_ERROR(TellWhatIsKept(server->stores_.get(), &server->access_changes_));
   TF_RETURN_IF_ERROR(server->registry_.LearnKnown());
   server->housekeeping_.Start();
   TF_RETURN_IF_ERROR(server->Listen());
   return server;
 }
 
-TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores)
+TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores,
+                                   Authenticator* authenticator)
     : options_(options),
+      access_store_(OpenAccessStore(stores.get())),
+      access_changes_(options.access, access_store_.get(), &access_),
+      authenticator_(authenticator == nullptr
+                         ? nullptr
+                         : std::make_unique<LinkAuthenticator>(&access_, authenticator)),
+      gate_(authenticator_.get(), /*observer=*/nullptr, &Access::MayCall),
       budget_(options.memory_budget_bytes),
-      stores_(std::move(stores)),
+      stores_(WatchStores(std::move(stores), &access_changes_)),
       catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),
       uploads_(options.limits, &catalog_, &stores_->uploads()),
       pool_(std::make_unique<WorkerPool>(options.workers)),
@@ -135,17 +149,25 @@ TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr
                     &catalog_),
       streams_(options.limits.max_streams),
       watches_(options.limits, pool_.get()),
-      mesh_service_(&gate_, options.limits, &catalog_, &uploads_, &registry_, pool_.get(), &timer_),
-      session_service_(&gate_, options.limits, &catalog_, &registry_),
-      deform_service_(&gate_, options.limits, &registry_, &streams_, &watches_, &timer_),
-      prediction_service_(&gate_, options.limits, &catalog_, &registry_, &stores_->predictions(),
-                          &timer_),
-      plan_service_(&gate_, &registry_),
-      case_service_(&gate_, options.limits, &stores_->cases(), pool_.get(), &timer_),
+      mesh_service_(&gate_, options.limits, &access_changes_, &catalog_, &uploads_, &registry_,
+                    pool_.get(), &timer_),
+      session_service_(&gate_, options.limits, &access_, &catalog_, &registry_),
+      deform_service_(&gate_, options.limits, &access_, &registry_, &streams_, &watches_, &timer_),
+      prediction_service_(&gate_, options.limits, &access_, &catalog_, &registry_,
+                          &stores_->predictions(), &timer_),
+      plan_service_(&gate_, &access_, &registry_),
+      case_service_(&gate_, options.limits, &access_, &stores_->cases(), pool_.get(), &timer_),
+      access_service_(&gate_, &access_changes_, &registry_, &streams_, &watches_),
       server_info_service_(&gate_, LimitsOf(options)) {
   SetBlasThreads(1);  // the pool's workers share the cores already
   registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
     watches_.OnSessionEvent(id, event);
+  });
+  catalog_.set_on_removed(
+      [this](const std::string& sha256) { access_changes_.MeshRemoved(sha256); });
+  access_changes_.set_on_revoked([this] {
+    streams_.AskAgain();
+    watches_.AskAgain();
   });
   budget_.set_reclaimer([this](int64_t bytes) { Reclaim(bytes); });
 }
@@ -177,6 +199,7 @@ absl::Status TissueformServer::Listen() {
   builder.RegisterService(&prediction_service_);
   builder.RegisterService(&plan_service_);
   builder.RegisterService(&case_service_);
+  builder.RegisterService(&access_service_);
   builder.RegisterService(&server_info_service_);
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) return absl::InternalError("gRPC does not start");

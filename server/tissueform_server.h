@@ -10,7 +10,13 @@
 #include "grpcpp/server.h"
 #include "grpcpp/server_builder.h"
 
+#include "server/access/access.h"
+#include "server/access/access_changes.h"
+#include "server/access/link_authenticator.h"
+#include "server/access_store/access_store.h"
+#include "server/auth/authenticator.h"
 #include "server/calls/call_scope.h"
+#include "server/rpc/access_service.h"
 #include "server/rpc/case_service.h"
 #include "server/rpc/deform_service.h"
 #include "server/rpc/deform_streams.h"
@@ -40,7 +46,10 @@ class TissueformServer {
   //
   // Errors: Unavailable, naming the address, when it cannot be listened on; those of
   // DataFolder::Open and DurableStore::Open.
-  static absl::StatusOr<std::unique_ptr<TissueformServer>> Start(const ServerOptions& options);
+  //
+  // `authenticator`, which must outlive the server, says who calls; null: what the options say.
+  static absl::StatusOr<std::unique_ptr<TissueformServer>> Start(
+      const ServerOptions& options, Authenticator* authenticator = nullptr);
 
   // Cancels open calls, waits for them and ends.
   ~TissueformServer();
@@ -61,7 +70,8 @@ class TissueformServer {
   const SessionWatches& watches() const { return watches_; }
 
  private:
-  TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores);
+  TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores,
+                   Authenticator* authenticator);
 
   absl::Status Listen();
   void Reclaim(int64_t bytes);
@@ -71,6 +81,10 @@ class TissueformServer {
 
   // Self-synchronised; each may use those before it. Destroyed from the last to the first: calls
   // end, then jobs, then what they used.
+  std::unique_ptr<AccessStore> access_store_;  // its rows are those of the stores
+  Access access_;
+  AccessChanges access_changes_;
+  std::unique_ptr<LinkAuthenticator> authenticator_;  // null: nobody logs in
   ServiceGate gate_;
   MemoryBudget budget_;
   std::unique_ptr<Stores> stores_;
@@ -88,6 +102,7 @@ class TissueformServer {
   PredictionService prediction_service_;
   PlanService plan_service_;
   CaseService case_service_;
+  AccessService access_service_;
   ServerInfoService server_info_service_;
   // gRPC gets its connections from the listener, through the acceptor. The server comes last: what
   // it is given goes to the acceptor of a server that lives.

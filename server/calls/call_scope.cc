@@ -123,6 +123,7 @@ absl::Status CallScope::Admit(const grpc::CallbackServerContext* context) {
   if (gate_->authenticator() != nullptr) {
     TF_ASSIGN_OR_RETURN(authenticated_,
                         gate_->authenticator()->Authenticate(CredentialsOf(context)));
+    if (gate_->may_call_) TF_RETURN_IF_ERROR(gate_->may_call_(principal(), method_));
   }
   if (kind_ == CallKind::kNewWork && gate_->draining()) {
     return WithReason(
@@ -200,7 +201,7 @@ grpc::Status CallScope::End(const absl::Status& outcome) {
 
 grpc::ServerUnaryReactor* RunUpkeep(
     grpc::CallbackServerContext* context, std::string_view method, ServiceGate* gate,
-    const std::function<absl::Status(const CallScope& scope, const EndCall& end)>& start) {
+    const std::function<absl::Status(CallScope& scope, const EndCall& end)>& start) {
   auto scope = std::make_shared<CallScope>(context, method, CallKind::kUpkeep, gate);
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   const EndCall end = [scope, reactor](const absl::Status& outcome) {

@@ -8,6 +8,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "grpcpp/support/server_callback.h"
@@ -23,9 +24,14 @@ namespace tissueform {
 // work; and how many calls are open. Thread-safe.
 class ServiceGate {
  public:
-  // Both may be null, and must outlive the calls. Without an authenticator everybody is anonymous.
-  explicit ServiceGate(Authenticator* authenticator = nullptr, CallObserver* observer = nullptr)
-      : authenticator_(authenticator), observer_(observer) {}
+  // Whether somebody who is known may call a method ("MeshService.GetMesh") at all.
+  using MayCall = std::function<absl::Status(const Principal& caller, std::string_view method)>;
+
+  // Both may be null, and must outlive the calls. Without an authenticator everybody is anonymous
+  // and may call everything, as where `may_call` is empty.
+  explicit ServiceGate(Authenticator* authenticator = nullptr, CallObserver* observer = nullptr,
+                       MayCall may_call = nullptr)
+      : authenticator_(authenticator), observer_(observer), may_call_(std::move(may_call)) {}
 
   Authenticator* authenticator() const { return authenticator_; }
   CallObserver* observer() const { return observer_; }
@@ -44,6 +50,7 @@ class ServiceGate {
 
   Authenticator* const authenticator_;
   CallObserver* const observer_;
+  const MayCall may_call_;
   std::atomic<bool> draining_ = false;
 
   Mutex mutex_;
@@ -75,7 +82,8 @@ class CallScope {
   CallScope(CallScope&& other) noexcept;
   CallScope& operator=(CallScope&&) = delete;
 
-  // OK, or why the call is not served: Unavailable, Unauthenticated, or what the observer says.
+  // OK, or why the call is not served: Unavailable, Unauthenticated, or what the gate's MayCall and
+  // the observer say.
   const absl::Status& admission() const { return admission_; }
   const Principal& principal() const { return *authenticated_.principal; }
   const Authenticated& authenticated() const { return authenticated_; }
@@ -113,6 +121,6 @@ class CallScope {
 using EndCall = std::function<void(const absl::Status& outcome)>;
 grpc::ServerUnaryReactor* RunUpkeep(
     grpc::CallbackServerContext* context, std::string_view method, ServiceGate* gate,
-    const std::function<absl::Status(const CallScope& scope, const EndCall& end)>& start);
+    const std::function<absl::Status(CallScope& scope, const EndCall& end)>& start);
 
 }  // namespace tissueform

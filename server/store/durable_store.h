@@ -54,6 +54,7 @@ class DurableStore final : public Stores {
   UploadStore& uploads() override;
   PredictionStore& predictions() override;
   CaseStore& cases() override;
+  CommitThread* commit_thread() override;
 
   const std::vector<DamagedItem>& damaged() const;
 

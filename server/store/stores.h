@@ -11,6 +11,8 @@
 
 namespace tissueform {
 
+class CommitThread;
+
 // All that a server keeps: OpenInMemoryStores (in_memory_stores.h) or DurableStore::Open.
 //
 // Its end waits for the calls that were made; none may be made any longer.
@@ -23,6 +25,10 @@ class Stores {
   virtual UploadStore& uploads() = 0;
   virtual PredictionStore& predictions() = 0;
   virtual CaseStore& cases() = 0;
+
+  // Of the database in which other rooms keep rows of theirs, too; null: nothing outlives the
+  // process.
+  virtual CommitThread* commit_thread() { return nullptr; }
 };
 
 }  // namespace tissueform
