@@ -107,6 +107,19 @@ void AddQuotas(CLI::App& app, Quotas* quotas) {
             "meshes, cases and predictions kept", MebibytesInto(&quotas->disk_bytes));
 }
 
+void AddAccessLimits(CLI::App& app, AccessOptions* access) {
+  AddNumber(app, "--max-shares-per-resource", access->max_shares_per_resource, 1, kMaxCount,
+            "principals with whom one session, prediction, case or project is shared",
+            Into(&access->max_shares_per_resource));
+  AddNumber(app, "--max-links-per-session", access->max_links_per_session, 1, kMaxCount,
+            "follow links of one session that have not ended",
+            Into(&access->max_links_per_session));
+  AddNumber(app, "--max-link-hours", access->max_link_lifetime.count(), 1, kMaxDays * 24,
+            "hours after which a follow link ends at the latest", [access](const int64_t& hours) {
+              access->max_link_lifetime = std::chrono::hours(hours);
+            });
+}
+
 }  // namespace
 
 ServerOptions ServerOptions::Defaults() {
@@ -142,6 +155,7 @@ void AddServerOptions(CLI::App& app, ServerOptions* options) {
   AddTokenOptions(app, &options->tokens);
   AddLimits(app, options);
   AddQuotas(app, &options->quotas);
+  AddAccessLimits(app, &options->access);
   AddNumber(app, "--drain-seconds", options->drain_deadline.count(), 0, 3600,
             "after SIGTERM or SIGINT, how long open calls may go on",
             SecondsInto(&options->drain_deadline));

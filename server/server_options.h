@@ -9,6 +9,7 @@
 
 #include "CLI/CLI.hpp"
 
+#include "server/access/access_options.h"
 #include "server/auth/token_options.h"
 #include "server/session/limits.h"
 #include "server/session/quotas.h"
@@ -37,6 +38,7 @@ struct ServerOptions {
   std::string log_level = "info";
   TokenOptions tokens = {};
   TelemetryOptions telemetry = {};
+  AccessOptions access = {};
 
   // Half of the machine's memory, one worker a core.
   static ServerOptions Defaults();

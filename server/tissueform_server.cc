@@ -18,6 +18,7 @@
 #include "core/base/software_version.h"
 #include "core/base/status_macros.h"
 #include "core/linear_solvers/blas_threads.h"
+#include "server/access/access_watch_stores.h"
 #include "server/library_logs.h"
 #include "server/monitoring/process_metrics.h"
 #include "server/store/data_folder.h"
@@ -92,7 +93,7 @@ int64_t MemoryQuota(const ServerOptions& options) {
 NamedLimits LimitsOf(const ServerOptions& options) {
   const auto& [host, port, tls, memory_budget_bytes, workers, service, quotas,
                max_calls_per_connection, max_connections, max_connections_per_address,
-               drain_deadline, in_memory, data_dir, log_level, tokens, telemetry] = options;
+               drain_deadline, in_memory, data_dir, log_level, tokens, telemetry, access] = options;
   NamedLimits limits = ToNamedLimits(service);
   limits["quota_calls_per_second"] = quotas.calls_per_second;
   limits["quota_waiting_calls"] = quotas.waiting_calls;
@@ -100,6 +101,9 @@ NamedLimits LimitsOf(const ServerOptions& options) {
   limits["quota_sessions"] = quotas.sessions;
   limits["quota_memory_bytes"] = MemoryQuota(options);
   limits["quota_disk_bytes"] = quotas.disk_bytes;
+  limits["max_shares_per_resource"] = access.max_shares_per_resource;
+  limits["max_links_per_session"] = access.max_links_per_session;
+  limits["max_link_hours"] = access.max_link_lifetime.count();
   limits["max_message_bytes"] = kMaxReceiveBytes;
   limits["memory_budget_bytes"] = memory_budget_bytes;
   limits["workers"] = workers;
@@ -129,20 +133,24 @@ absl::StatusOr<std::unique_ptr<Stores>> OpenStores(const ServerOptions& options)
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
-    const ServerOptions& options) {
-  TF_RETURN_IF_ERROR(CheckExposure(options.host, options.tls, options.tokens.configured()));
+    const ServerOptions& options, Authenticator* authenticator) {
+  const bool has_logins = authenticator != nullptr || options.tokens.configured();
+  TF_RETURN_IF_ERROR(CheckExposure(options.host, options.tls, has_logins));
   Parts parts;
   TF_ASSIGN_OR_RETURN(parts.telemetry, Telemetry::Start(options.telemetry));
   TF_ASSIGN_OR_RETURN(parts.tls_files, LoadServerFiles(options.tls));
   if (options.tokens.configured()) {
     TF_ASSIGN_OR_RETURN(parts.tokens, TokenAuthenticator::Start(options.tokens));
   }
+  parts.authenticator = authenticator != nullptr ? authenticator : parts.tokens.get();
   TF_ASSIGN_OR_RETURN(parts.stores, OpenStores(options));
   std::unique_ptr<TissueformServer> server(new TissueformServer(options, std::move(parts)));
   if (server->is_exposed()) {
     spdlog::warn("INSECURE: {}, and strangers may reach it (--insecure)",
                  options.tls.enabled() ? "nobody is asked to log in" : "calls are not encrypted");
   }
+  TF_RETURN_IF_ERROR(server->access_changes_.Learn());
+  TF_RETURN_IF_ERROR(TellWhatIsKept(server->stores_.get(), &server->access_changes_));
   TF_RETURN_IF_ERROR(server->registry_.LearnKnown());
   server->housekeeping_.Start();
   TF_RETURN_IF_ERROR(server->ServeMetrics());
@@ -156,9 +164,18 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       tls_files_(std::move(parts.tls_files)),
       tokens_(std::move(parts.tokens)),
       quotas_(options.quotas),
-      gate_(tokens_.get(), telemetry_->observer(), &quotas_, options.tls.gateway_name),
+      access_store_(OpenAccessStore(parts.stores.get())),
+      access_changes_(options.access, access_store_.get(), &access_),
+      authenticator_(parts.authenticator == nullptr
+                         ? nullptr
+                         : std::make_unique<LinkAuthenticator>(&access_, parts.authenticator)),
+      gate_({.authenticator = authenticator_.get(),
+             .may_call = &Access::MayCall,
+             .observer = telemetry_->observer(),
+             .quotas = &quotas_,
+             .gateway_name = options.tls.gateway_name}),
       budget_(options.memory_budget_bytes),
-      stores_(std::move(parts.stores)),
+      stores_(WatchStores(std::move(parts.stores), &access_changes_)),
       catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),
       uploads_(options.limits, &catalog_, &stores_->uploads()),
       pool_(std::make_unique<WorkerPool>(options.workers)),
@@ -167,18 +184,26 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
                     &catalog_),
       streams_(options.limits.max_streams),
       watches_(options.limits, pool_.get()),
-      mesh_service_(&gate_, options.limits, &catalog_, &uploads_, &registry_, pool_.get(), &timer_),
-      session_service_(&gate_, options.limits, &catalog_, &registry_),
-      deform_service_(&gate_, options.limits, &registry_, &streams_, &watches_, &timer_),
-      prediction_service_(&gate_, options.limits, &catalog_, &registry_, &stores_->predictions(),
-                          &timer_),
-      plan_service_(&gate_, &registry_),
-      case_service_(&gate_, options.limits, &stores_->cases(), pool_.get(), &timer_),
+      mesh_service_(&gate_, options.limits, &access_changes_, &catalog_, &uploads_, &registry_,
+                    pool_.get(), &timer_),
+      session_service_(&gate_, options.limits, &access_, &catalog_, &registry_),
+      deform_service_(&gate_, options.limits, &access_, &registry_, &streams_, &watches_, &timer_),
+      prediction_service_(&gate_, options.limits, &access_, &catalog_, &registry_,
+                          &stores_->predictions(), &timer_),
+      plan_service_(&gate_, &access_, &registry_),
+      case_service_(&gate_, options.limits, &access_, &stores_->cases(), pool_.get(), &timer_),
+      access_service_(&gate_, &access_changes_, &registry_, &streams_, &watches_),
       server_info_service_(&gate_, LimitsOf(options)) {
   SetBlasThreads(1);  // the pool's workers share the cores already
   registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
     telemetry_->session_events().Count(event);
     watches_.OnSessionEvent(id, event);
+  });
+  catalog_.set_on_removed(
+      [this](const std::string& sha256) { access_changes_.MeshRemoved(sha256); });
+  access_changes_.set_on_revoked([this] {
+    streams_.AskAgain();
+    watches_.AskAgain();
   });
   budget_.set_account_limit(MemoryQuota(options), [](const std::string& /*owner*/, int64_t) {});
   budget_.set_reclaimer([this](int64_t bytes) { Reclaim(bytes); });
@@ -233,6 +258,7 @@ absl::Status TissueformServer::Listen() {
   builder.RegisterService(&prediction_service_);
   builder.RegisterService(&plan_service_);
   builder.RegisterService(&case_service_);
+  builder.RegisterService(&access_service_);
   builder.RegisterService(&server_info_service_);
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) return absl::InternalError("gRPC does not start");

@@ -12,8 +12,14 @@
 #include "grpcpp/server.h"
 #include "grpcpp/server_builder.h"
 
+#include "server/access/access.h"
+#include "server/access/access_changes.h"
+#include "server/access/link_authenticator.h"
+#include "server/access_store/access_store.h"
+#include "server/auth/authenticator.h"
 #include "server/auth/token_authenticator.h"
 #include "server/calls/call_scope.h"
+#include "server/rpc/access_service.h"
 #include "server/rpc/case_service.h"
 #include "server/rpc/deform_service.h"
 #include "server/rpc/deform_streams.h"
@@ -45,7 +51,10 @@ class TissueformServer {
   //
   // Errors: Unavailable, naming the address, when it cannot be listened on; those of CheckExposure,
   // LoadServerFiles, TokenAuthenticator::Start, DataFolder::Open and DurableStore::Open.
-  static absl::StatusOr<std::unique_ptr<TissueformServer>> Start(const ServerOptions& options);
+  //
+  // `authenticator`, which must outlive the server, says who calls; null: what the options say.
+  static absl::StatusOr<std::unique_ptr<TissueformServer>> Start(
+      const ServerOptions& options, Authenticator* authenticator = nullptr);
 
   // Cancels open calls, waits for them and ends.
   ~TissueformServer();
@@ -82,7 +91,8 @@ class TissueformServer {
   struct Parts {
     std::unique_ptr<Telemetry> telemetry;
     std::unique_ptr<RotatedFiles> tls_files;     // null without TLS
-    std::unique_ptr<TokenAuthenticator> tokens;  // null: nobody logs in
+    std::unique_ptr<TokenAuthenticator> tokens;  // null: none are configured
+    Authenticator* authenticator = nullptr;      // null: nobody logs in
     std::unique_ptr<Stores> stores;
   };
 
@@ -102,6 +112,10 @@ class TissueformServer {
   const std::unique_ptr<RotatedFiles> tls_files_;  // null without TLS
   const std::unique_ptr<TokenAuthenticator> tokens_;
   CallQuotas quotas_;
+  std::unique_ptr<AccessStore> access_store_;  // its rows are those of the stores
+  Access access_;
+  AccessChanges access_changes_;
+  std::unique_ptr<LinkAuthenticator> authenticator_;  // null: nobody logs in
   ServiceGate gate_;
   MemoryBudget budget_;
   std::unique_ptr<Stores> stores_;
@@ -119,6 +133,7 @@ class TissueformServer {
   PredictionService prediction_service_;
   PlanService plan_service_;
   CaseService case_service_;
+  AccessService access_service_;
   ServerInfoService server_info_service_;
   // gRPC gets its connections from the listener, through the acceptor. The server comes last: what
   // it is given goes to the acceptor of a server that lives.

@@ -44,7 +44,8 @@ class MessageStream : public grpc::ServerWriteReactor<Response> {
                 std::chrono::milliseconds patience)
       : scope_(std::move(scope)), cancel_(std::move(cancel)), timer_(timer), patience_(patience) {}
 
-  const CallScope& scope() const { return scope_; }
+  // Of whoever works.
+  CallScope& scope() { return scope_; }
 
   // One of the two, once, from any thread. `next` is called from threads of gRPC, so not long; or
   // by `post`, where it may block.

@@ -71,6 +71,7 @@ class UploadStream : public grpc::ServerReadReactor<Request> {
   ~UploadStream() override = default;
 
   const CallScope& scope() const { return scope_; }
+  CallScope& scope() { return scope_; }  // of jobs
   std::chrono::milliseconds silence() const { return silence_; }
 
   // What comes after a message.

@@ -13,6 +13,7 @@
 #include "core/base/status_macros.h"
 #include "proto/conversion/case_conversion.h"
 #include "server/calls/message_stream.h"
+#include "server/rpc/allowed_resource.h"
 #include "server/rpc/case_upload_stream.h"
 #include "server/rpc/resource_conversion.h"
 #include "server/store/session_store.h"
@@ -28,13 +29,14 @@ struct CasePart {
 };
 
 // Blocks on the disk.
-absl::StatusOr<CasePart> OpenPart(const v1::ReadCaseRequest& request, CaseStore* store) {
-  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseCaseName(request.name()));
+absl::StatusOr<CasePart> OpenPart(const v1::ReadCaseRequest& request, const Access& access,
+                                  CallScope* scope, CaseStore* store) {
+  TF_ASSIGN_OR_RETURN(const CaseKey key, AllowedCase(access, scope, request.name(), Need::kLook));
   if (request.read_limit() < 0) {
     return absl::InvalidArgumentError(
         absl::StrCat("read_limit is ", request.read_limit(), "; it must be 0 (all) or more"));
   }
-  TF_ASSIGN_OR_RETURN(std::unique_ptr<CaseReader> reader, store->Open(sha256, SystemUnixSeconds()));
+  TF_ASSIGN_OR_RETURN(std::unique_ptr<CaseReader> reader, store->Open(key, SystemUnixSeconds()));
   const int64_t total = reader->total_bytes();
   const int64_t offset = request.read_offset();
   if (offset < 0 || offset > total) {
@@ -77,8 +79,12 @@ grpc::ServerWriteReactor<v1::ReadCaseResponse>* CaseService::ReadCase(
   const auto post = [pool = pool_](WorkerPool::Job job) {
     pool->Post(Lane::kStore, std::move(job));
   };
-  post([call, request, post, store = store_, most = limits_.max_chunk_bytes] {
-    absl::StatusOr<CasePart> part = OpenPart(*request, store);
+  if (!call->scope().admission().ok()) {
+    call->End(call->scope().admission());
+    return call;
+  }
+  post([call, request, post, access = &access_, store = store_, most = limits_.max_chunk_bytes] {
+    absl::StatusOr<CasePart> part = OpenPart(*request, *access, &call->scope(), store);
     if (!part.ok()) {
       call->End(part.status());
       return;
@@ -91,12 +97,11 @@ grpc::ServerWriteReactor<v1::ReadCaseResponse>* CaseService::ReadCase(
   return call;
 }
 
-grpc::ServerUnaryReactor* CaseService::Run(
-    grpc::CallbackServerContext* context, std::string_view method,
-    std::function<absl::Status(const Principal& caller)> work) {
-  return RunUpkeep(context, method, gate_, [&, this](const CallScope& scope, const EndCall& end) {
-    pool_->Post(Lane::kStore,
-                [end, caller = scope.principal(), work = std::move(work)] { end(work(caller)); });
+grpc::ServerUnaryReactor* CaseService::Run(grpc::CallbackServerContext* context,
+                                           std::string_view method,
+                                           std::function<absl::Status(CallScope* scope)> work) {
+  return RunUpkeep(context, method, gate_, [&, this](CallScope& scope, const EndCall& end) {
+    pool_->Post(Lane::kStore, [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
     return absl::OkStatus();
   });
 }
@@ -105,26 +110,27 @@ grpc::ServerUnaryReactor* CaseService::GetCase(grpc::CallbackServerContext* cont
                                                const v1::GetCaseRequest* request,
                                                v1::Case* response) {
   return Run(context, "CaseService.GetCase",
-             [=, this](const Principal& /*caller*/) { return Find(*request, response); });
+             [=, this](CallScope* scope) { return Find(scope, *request, response); });
 }
 
 grpc::ServerUnaryReactor* CaseService::ListCases(grpc::CallbackServerContext* context,
                                                  const v1::ListCasesRequest* request,
                                                  v1::ListCasesResponse* response) {
   return Run(context, "CaseService.ListCases",
-             [=, this](const Principal& caller) { return List(*request, caller, response); });
+             [=, this](CallScope* scope) { return List(*request, scope->principal(), response); });
 }
 
 grpc::ServerUnaryReactor* CaseService::DeleteCase(grpc::CallbackServerContext* context,
                                                   const v1::DeleteCaseRequest* request,
                                                   google::protobuf::Empty* /*response*/) {
   return Run(context, "CaseService.DeleteCase",
-             [=, this](const Principal& /*caller*/) { return Remove(*request); });
+             [=, this](CallScope* scope) { return Remove(scope, *request); });
 }
 
-absl::Status CaseService::Find(const v1::GetCaseRequest& request, v1::Case* response) {
-  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseCaseName(request.name()));
-  TF_ASSIGN_OR_RETURN(const CaseRecord record, store_->Find(sha256));
+absl::Status CaseService::Find(CallScope* scope, const v1::GetCaseRequest& request,
+                               v1::Case* response) {
+  TF_ASSIGN_OR_RETURN(const CaseKey key, AllowedCase(access_, scope, request.name(), Need::kLook));
+  TF_ASSIGN_OR_RETURN(const CaseRecord record, store_->Find(key));
   *response = ToProto(record);
   return absl::OkStatus();
 }
@@ -133,17 +139,19 @@ absl::Status CaseService::List(const v1::ListCasesRequest& request, const Princi
                                v1::ListCasesResponse* response) {
   TF_ASSIGN_OR_RETURN(const PageRequest page,
                       ReadPageRequest(request.page_size(), request.page_token()));
-  TF_ASSIGN_OR_RETURN(
-      const CaseStore::Page found,
-      store_->List({.owner = caller.name, .after = page.after, .limit = page.size}));
+  TF_ASSIGN_OR_RETURN(const CaseStore::Page found,
+                      store_->List({.owner = caller.name,
+                                    .also = access_.SharedCases(caller),
+                                    .after = page.after,
+                                    .limit = page.size}));
   for (const CaseRecord& record : found.records) *response->add_cases() = ToProto(record);
   response->set_next_page_token(found.next);
   return absl::OkStatus();
 }
 
-absl::Status CaseService::Remove(const v1::DeleteCaseRequest& request) {
-  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseCaseName(request.name()));
-  return store_->Delete(sha256);
+absl::Status CaseService::Remove(CallScope* scope, const v1::DeleteCaseRequest& request) {
+  TF_ASSIGN_OR_RETURN(const CaseKey key, AllowedCase(access_, scope, request.name(), Need::kOwn));
+  return store_->Delete(key);
 }
 
 }  // namespace tissueform

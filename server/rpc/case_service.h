@@ -9,6 +9,7 @@
 
 #include "absl/status/status.h"
 
+#include "server/access/access.h"
 #include "server/calls/call_scope.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
@@ -21,9 +22,9 @@ namespace tissueform {
 // tissueform.v1.CaseService over a store. All pointers must outlive it.
 class CaseService final : public v1::CaseService::CallbackService {
  public:
-  CaseService(ServiceGate* gate, const ServiceLimits& limits, CaseStore* store, WorkerPool* pool,
-              DeadlineTimer* timer)
-      : gate_(gate), limits_(limits), store_(store), pool_(pool), timer_(timer) {}
+  CaseService(ServiceGate* gate, const ServiceLimits& limits, const Access* access,
+              CaseStore* store, WorkerPool* pool, DeadlineTimer* timer)
+      : gate_(gate), limits_(limits), access_(*access), store_(store), pool_(pool), timer_(timer) {}
 
   grpc::ServerReadReactor<v1::UploadCaseRequest>* UploadCase(
       grpc::CallbackServerContext* context, v1::UploadCaseResponse* response) override;
@@ -41,16 +42,17 @@ class CaseService final : public v1::CaseService::CallbackService {
  private:
   // Finishes a call with what `work` says, which may block on the disk.
   grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::string_view method,
-                                std::function<absl::Status(const Principal& caller)> work);
+                                std::function<absl::Status(CallScope* scope)> work);
 
-  absl::Status Find(const v1::GetCaseRequest& request, v1::Case* response);
+  absl::Status Find(CallScope* scope, const v1::GetCaseRequest& request, v1::Case* response);
   absl::Status List(const v1::ListCasesRequest& request, const Principal& caller,
                     v1::ListCasesResponse* response);
-  absl::Status Remove(const v1::DeleteCaseRequest& request);
+  absl::Status Remove(CallScope* scope, const v1::DeleteCaseRequest& request);
 
   // Constant.
   ServiceGate* const gate_;
   const ServiceLimits limits_;
+  const Access& access_;
   CaseStore* const store_;
   WorkerPool* const pool_;
   DeadlineTimer* const timer_;

@@ -10,6 +10,7 @@
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/case_conversion.h"
+#include "server/access/access.h"
 #include "server/store/session_store.h"
 
 namespace tissueform {
@@ -20,6 +21,7 @@ v1::Case ToProto(const CaseRecord& record) {
   proto.set_title(record.title);
   proto.set_total_bytes(record.total_bytes);
   proto.mutable_create_time()->set_seconds(record.created_s);
+  proto.set_project(record.project);
   return proto;
 }
 
@@ -62,13 +64,16 @@ absl::StatusOr<CaseUploadStream::After> CaseUploadStream::TakeHeader(
   const int64_t now_s = SystemUnixSeconds();
   CaseRecord record{.sha256 = header.sha256(),
                     .owner = scope().principal().name,
+                    .project = header.project(),
                     .title = header.title(),
                     .total_bytes = header.total_bytes(),
                     .created_s = now_s,
                     .last_used_s = now_s};
   TF_RETURN_IF_ERROR(CheckCaseRecord(record));
-  if (const auto known = store_->Find(record.sha256); known.ok()) {
-    TF_RETURN_IF_ERROR(store_->Touch(record.sha256, now_s));
+  TF_RETURN_IF_ERROR(Access::MayPutInto(scope().principal(), header.project()));
+  scope().SetResource(CaseName(record.sha256));
+  if (const auto known = store_->Find(record.key()); known.ok()) {
+    TF_RETURN_IF_ERROR(store_->Touch(record.key(), now_s));
     *response_->mutable_case_() = ToProto(*known);
     response_->set_already_existed(true);
     return After::kEnd;

@@ -18,7 +18,9 @@
 #include "proto/conversion/mesh_conversion.h"
 #include "proto/conversion/model_conversion.h"
 #include "proto/conversion/prediction_conversion.h"
+#include "proto/conversion/session_conversion.h"
 #include "server/calls/message_stream.h"
+#include "server/rpc/allowed_resource.h"
 #include "server/rpc/prediction_record.h"
 #include "server/rpc/single_answer.h"
 
@@ -31,8 +33,7 @@ struct ReadPrediction {
 };
 
 // Blocks on the disk.
-absl::StatusOr<ReadPrediction> Read(const std::string& name, PredictionStore* store) {
-  TF_ASSIGN_OR_RETURN(const std::string id, ParsePredictionName(name));
+absl::StatusOr<ReadPrediction> Read(const std::string& id, PredictionStore* store) {
   TF_ASSIGN_OR_RETURN(const PredictionRecord record, store->Get(id));
   TF_ASSIGN_OR_RETURN(KeptPrediction kept, FromRecord(record));
   TF_ASSIGN_OR_RETURN(const std::string bytes, store->Positions(id));
@@ -54,9 +55,11 @@ std::string Encode(const Positions& positions, const VertexChoice& choice) {
 class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
  public:
   Comparison(CallScope scope, CancelCall cancel, DeadlineTimer* timer,
-             std::chrono::milliseconds patience, SessionRegistry* registry, MeshCatalog* catalog,
-             PredictionStore* store, const v1::ComparePredictionsRequest* request)
+             std::chrono::milliseconds patience, const Access* access, SessionRegistry* registry,
+             MeshCatalog* catalog, PredictionStore* store,
+             const v1::ComparePredictionsRequest* request)
       : MessageStream(std::move(scope), std::move(cancel), timer, patience),
+        access_(*access),
         registry_(registry),
         catalog_(catalog),
         store_(store),
@@ -80,7 +83,9 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
 
  private:
   absl::Status ReadBoth() {
-    TF_ASSIGN_OR_RETURN(one_, Read(request_.prediction(), store_));
+    TF_ASSIGN_OR_RETURN(const std::string one,
+                        AllowedPrediction(access_, &scope(), request_.prediction(), Need::kLook));
+    TF_ASSIGN_OR_RETURN(one_, Read(one, store_));
     if (!request_.vertices().has_skin()) {
       TF_ASSIGN_OR_RETURN(choice_, ToVertexChoice(request_.vertices(),
                                                   one_.prediction.vertex_count(), /*skin=*/{}));
@@ -89,6 +94,8 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
     told.set_prediction(one_.prediction.name());
     told.set_model(one_.prediction.model());
     if (request_.has_other_model()) {
+      TF_ASSIGN_OR_RETURN(const std::string session, ParseSessionName(one_.prediction.session()));
+      TF_RETURN_IF_ERROR(access_.MaySession(scope().principal(), session, Need::kLook));
       AskModel();
       return absl::OkStatus();
     }
@@ -96,7 +103,9 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
       return absl::InvalidArgumentError(
           "nothing to compare with; set other_prediction or other_model");
     }
-    TF_ASSIGN_OR_RETURN(ReadPrediction other, Read(request_.other_prediction(), store_));
+    TF_ASSIGN_OR_RETURN(const std::string id, ParsePredictionName(request_.other_prediction()));
+    TF_RETURN_IF_ERROR(access_.MayPrediction(scope().principal(), id, Need::kLook));
+    TF_ASSIGN_OR_RETURN(ReadPrediction other, Read(id, store_));
     if (other.prediction.mesh() != one_.prediction.mesh()) {
       return NotComparable(
           "the predictions are of different meshes, whose vertices do not correspond; compare two "
@@ -189,6 +198,7 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
     return NextChunk(differences_, &offset_, message->mutable_differences());
   }
 
+  const Access& access_;
   SessionRegistry* const registry_;
   MeshCatalog* const catalog_;
   PredictionStore* const store_;
@@ -206,10 +216,10 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
 
 grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* StartComparison(
     CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
-    std::chrono::milliseconds patience, SessionRegistry* registry, MeshCatalog* catalog,
-    PredictionStore* store, const v1::ComparePredictionsRequest* request) {
-  auto* call = new Comparison(std::move(scope), CancelOf(context), timer, patience, registry,
-                              catalog, store, request);
+    std::chrono::milliseconds patience, const Access* access, SessionRegistry* registry,
+    MeshCatalog* catalog, PredictionStore* store, const v1::ComparePredictionsRequest* request) {
+  auto* call = new Comparison(std::move(scope), CancelOf(context), timer, patience, access,
+                              registry, catalog, store, request);
   call->Start();
   return call;
 }

@@ -7,6 +7,7 @@
 
 #include "grpcpp/support/server_callback.h"
 
+#include "server/access/access.h"
 #include "server/calls/call_scope.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/mesh_catalog.h"
@@ -21,7 +22,7 @@ namespace tissueform {
 // `context` may be null (see CallScope); all other pointers must outlive the call.
 grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* StartComparison(
     CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
-    std::chrono::milliseconds patience, SessionRegistry* registry, MeshCatalog* catalog,
-    PredictionStore* store, const v1::ComparePredictionsRequest* request);
+    std::chrono::milliseconds patience, const Access* access, SessionRegistry* registry,
+    MeshCatalog* catalog, PredictionStore* store, const v1::ComparePredictionsRequest* request);
 
 }  // namespace tissueform

@@ -11,6 +11,7 @@
 #include "core/deformation/deformation_quality.h"
 #include "proto/conversion/answer_conversion.h"
 #include "proto/conversion/geometry_conversion.h"
+#include "server/rpc/allowed_resource.h"
 #include "server/rpc/deform_stream.h"
 #include "server/rpc/single_answer.h"
 #include "server/rpc/watch_stream.h"
@@ -25,8 +26,11 @@ class DeformOnceCall : public grpc::ServerUnaryReactor {
                  v1::DeformOnceResponse* response)
       : scope_(std::move(scope)), registry_(registry), request_(*request), response_(*response) {}
 
-  void Start() {
+  void Start(const Access& access) {
     absl::Status status = scope_.admission();
+    if (status.ok()) {
+      status = AllowedSession(access, &scope_, request_.session(), Need::kDrag).status();
+    }
     if (status.ok()) status = CheckEncoding(request_.encoding());
     if (!status.ok()) {
       End(status);
@@ -85,21 +89,21 @@ grpc::ServerUnaryReactor* DeformService::DeformOnce(grpc::CallbackServerContext*
   auto* call =
       new DeformOnceCall(CallScope(context, "DeformService.DeformOnce", CallKind::kNewWork, gate_),
                          registry_, request, response);
-  call->Start();
+  call->Start(access_);
   return call;
 }
 
 grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* DeformService::Deform(
     grpc::CallbackServerContext* context) {
   return new DeformStreamReactor(
-      CallScope(context, "DeformService.Deform", CallKind::kStream, gate_), limits_, registry_,
-      streams_, watches_, timer_);
+      CallScope(context, "DeformService.Deform", CallKind::kStream, gate_), limits_, access_,
+      registry_, streams_, watches_, timer_);
 }
 
 grpc::ServerWriteReactor<grpc::ByteBuffer>* DeformService::Watch(
     grpc::CallbackServerContext* context, const grpc::ByteBuffer* request) {
   return new WatchStreamReactor(CallScope(context, "DeformService.Watch", CallKind::kStream, gate_),
-                                *request, limits_, registry_, watches_, timer_);
+                                *request, limits_, access_, registry_, watches_, timer_);
 }
 
 grpc::ServerUnaryReactor* DeformService::AcknowledgeWatch(
@@ -107,7 +111,7 @@ grpc::ServerUnaryReactor* DeformService::AcknowledgeWatch(
     google::protobuf::Empty* /*response*/) {
   return RunUpkeep(
       context, "DeformService.AcknowledgeWatch", gate_,
-      [&](const CallScope& scope, const EndCall& end) -> absl::Status {
+      [&](CallScope& scope, const EndCall& end) -> absl::Status {
         TF_ASSIGN_OR_RETURN(const std::string watch, ParseWatchName(request->watch()));
         TF_RETURN_IF_ERROR(watches_->Acknowledge(watch, request->number(), scope.authenticated()));
         end(absl::OkStatus());

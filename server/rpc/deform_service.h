@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include "server/access/access.h"
 #include "server/calls/call_scope.h"
 #include "server/rpc/deform_streams.h"
 #include "server/rpc/session_watches.h"
@@ -22,10 +23,12 @@ using DeformServiceBase = v1::DeformService::WithCallbackMethod_DeformOnce<
 // it.
 class DeformService final : public DeformServiceBase {
  public:
-  DeformService(ServiceGate* gate, const ServiceLimits& limits, SessionRegistry* registry,
-                DeformStreams* streams, SessionWatches* watches, DeadlineTimer* timer)
+  DeformService(ServiceGate* gate, const ServiceLimits& limits, const Access* access,
+                SessionRegistry* registry, DeformStreams* streams, SessionWatches* watches,
+                DeadlineTimer* timer)
       : gate_(gate),
         limits_(limits),
+        access_(*access),
         registry_(registry),
         streams_(streams),
         watches_(watches),
@@ -45,6 +48,7 @@ class DeformService final : public DeformServiceBase {
  private:
   ServiceGate* const gate_;
   const ServiceLimits limits_;
+  const Access& access_;
   SessionRegistry* const registry_;
   DeformStreams* const streams_;
   SessionWatches* const watches_;

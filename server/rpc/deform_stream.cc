@@ -11,6 +11,7 @@
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/geometry_conversion.h"
+#include "server/rpc/allowed_resource.h"
 #include "server/store/store_errors.h"
 
 namespace tissueform {
@@ -23,10 +24,13 @@ constexpr std::chrono::milliseconds kRest{150};
 }  // namespace
 
 DeformStreamReactor::DeformStreamReactor(CallScope scope, const ServiceLimits& limits,
-                                         SessionRegistry* registry, DeformStreams* streams,
-                                         SessionWatches* watches, DeadlineTimer* timer)
+                                         const Access& access, SessionRegistry* registry,
+                                         DeformStreams* streams, SessionWatches* watches,
+                                         DeadlineTimer* timer)
     : scope_(std::move(scope)),
+      principal_(scope_.principal().name),
       limits_(limits),
+      access_(access),
       registry_(registry),
       streams_(streams),
       watches_(watches),
@@ -179,6 +183,15 @@ void DeformStreamReactor::NotifyDraining(std::chrono::system_clock::time_point e
   Advance();
 }
 
+void DeformStreamReactor::AskAgain() {
+  MutexLock lock(mutex_);
+  if (!flow_.has_value()) return;  // is asked when it names its session
+  const absl::Status allowed =
+      access_.MaySession(scope_.principal(), stream_request_.session_id, Need::kDrag);
+  if (!allowed.ok()) End(allowed);
+  Advance();
+}
+
 absl::Status DeformStreamReactor::Take() {
   if (!flow_.has_value()) {
     return TakeConfiguration();
@@ -206,6 +219,8 @@ absl::Status DeformStreamReactor::TakeConfiguration() {
   if (!request_.has_configuration()) {
     return absl::InvalidArgumentError("the first message must be the configuration");
   }
+  TF_RETURN_IF_ERROR(
+      AllowedSession(access_, &scope_, request_.configuration().session(), Need::kDrag).status());
   TF_ASSIGN_OR_RETURN(stream_request_, ReadStreamRequest(request_.configuration(), limits_));
   flow_.emplace(stream_request_.max_unacked, &streams_->measures());
   StartOpening();

@@ -13,6 +13,7 @@
 #include "grpcpp/support/server_callback.h"
 
 #include "core/base/mutex.h"
+#include "server/access/access.h"
 #include "server/calls/call_scope.h"
 #include "server/rpc/deform_streams.h"
 #include "server/rpc/session_watches.h"
@@ -40,8 +41,9 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
                             private Dragger {
  public:
   // All pointers must outlive the stream.
-  DeformStreamReactor(CallScope scope, const ServiceLimits& limits, SessionRegistry* registry,
-                      DeformStreams* streams, SessionWatches* watches, DeadlineTimer* timer);
+  DeformStreamReactor(CallScope scope, const ServiceLimits& limits, const Access& access,
+                      SessionRegistry* registry, DeformStreams* streams, SessionWatches* watches,
+                      DeadlineTimer* timer);
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -50,6 +52,10 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
 
   // Tells the client that the server drains, and when it ends. Any thread.
   void NotifyDraining(std::chrono::system_clock::time_point end);
+  // Ends the stream where its caller may not drag the session any more. Any thread.
+  void AskAgain();
+  // The name of who drags, however the token is renewed.
+  const std::string& principal() const { return principal_; }
 
  private:
   using Configuration = std::shared_ptr<const StreamConfiguration>;
@@ -114,7 +120,9 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   CallScope scope_;  // ended by who calls Finish
 
   // Constant.
+  const std::string principal_;
   const ServiceLimits limits_;
+  const Access& access_;
   SessionRegistry* const registry_;
   DeformStreams* const streams_;
   SessionWatches* const watches_;

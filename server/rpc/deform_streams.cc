@@ -34,6 +34,18 @@ void DeformStreams::NotifyDraining(std::chrono::system_clock::time_point end) {
   }
 }
 
+void DeformStreams::AskAgain() {
+  MutexLock lock(mutex_);
+  for (DeformStreamReactor* stream : streams_) stream->AskAgain();
+}
+
+std::map<std::string, int64_t> DeformStreams::CountByPrincipal() const {
+  std::map<std::string, int64_t> counts;
+  MutexLock lock(mutex_);
+  for (const DeformStreamReactor* stream : streams_) ++counts[stream->principal()];
+  return counts;
+}
+
 int DeformStreams::size() const {
   MutexLock lock(mutex_);
   return static_cast<int>(streams_.size());

@@ -4,7 +4,10 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
+#include <map>
 #include <set>
+#include <string>
 
 #include "absl/status/status.h"
 
@@ -28,6 +31,9 @@ class DeformStreams {
   void Remove(DeformStreamReactor* stream);
 
   void NotifyDraining(std::chrono::system_clock::time_point end);
+  // Each whether it may still drag.
+  void AskAgain();
+  std::map<std::string, int64_t> CountByPrincipal() const;
   int size() const;
 
   // Of all streams there were.

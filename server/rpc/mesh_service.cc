@@ -12,9 +12,11 @@
 #include "core/base/status_macros.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "server/calls/message_stream.h"
+#include "server/rpc/allowed_resource.h"
 #include "server/rpc/mesh_surface.h"
 #include "server/rpc/mesh_upload_stream.h"
 #include "server/rpc/resource_conversion.h"
+#include "server/session/session_refusals.h"
 
 namespace tissueform {
 namespace {
@@ -29,8 +31,8 @@ struct SurfaceToSend {
 
 // Blocks on the disk, and computes.
 absl::StatusOr<std::shared_ptr<SurfaceToSend>> MakeSurface(const v1::GetSurfaceRequest& request,
+                                                           const std::string& sha256,
                                                            MeshCatalog* catalog) {
-  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request.name()));
   TF_ASSIGN_OR_RETURN(const std::shared_ptr<const StoredMesh> mesh, catalog->Load(sha256));
   TF_ASSIGN_OR_RETURN(const std::vector<const CellArray*> arrays,
                       FindSurfaceArrays(*mesh, request.cell_arrays()));
@@ -55,16 +57,16 @@ grpc::ServerReadReactor<v1::UploadMeshRequest>* MeshService::UploadMesh(
     grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) {
   auto* call =
       new MeshUploadStream(CallScope(context, "MeshService.UploadMesh", CallKind::kNewWork, gate_),
-                           limits_, catalog_, uploads_, pool_, timer_, response);
+                           limits_, changes_, catalog_, uploads_, pool_, timer_, response);
   call->Start();
   return call;
 }
 
 grpc::ServerUnaryReactor* MeshService::Run(grpc::CallbackServerContext* context,
                                            std::string_view method,
-                                           std::function<absl::Status()> work) {
-  return RunUpkeep(context, method, gate_, [&](const CallScope& /*scope*/, const EndCall& end) {
-    pool_->Post(Lane::kStore, [end, work = std::move(work)] { end(work()); });
+                                           std::function<absl::Status(CallScope* scope)> work) {
+  return RunUpkeep(context, method, gate_, [&](CallScope& scope, const EndCall& end) {
+    pool_->Post(Lane::kStore, [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
     return absl::OkStatus();
   });
 }
@@ -72,14 +74,16 @@ grpc::ServerUnaryReactor* MeshService::Run(grpc::CallbackServerContext* context,
 grpc::ServerUnaryReactor* MeshService::QueryUpload(grpc::CallbackServerContext* context,
                                                    const v1::QueryUploadRequest* request,
                                                    v1::QueryUploadResponse* response) {
-  return Run(context, "MeshService.QueryUpload",
-             [=, this] { return FindUpload(*request, response); });
+  return Run(context, "MeshService.QueryUpload", [=, this](CallScope* scope) {
+    return FindUpload(scope->principal(), *request, response);
+  });
 }
 
 grpc::ServerUnaryReactor* MeshService::GetMesh(grpc::CallbackServerContext* context,
                                                const v1::GetMeshRequest* request,
                                                v1::Mesh* response) {
-  return Run(context, "MeshService.GetMesh", [=, this] { return FindMesh(*request, response); });
+  return Run(context, "MeshService.GetMesh",
+             [=, this](CallScope* scope) { return FindMesh(scope, *request, response); });
 }
 
 grpc::ServerWriteReactor<v1::GetSurfaceResponse>* MeshService::GetSurface(
@@ -91,8 +95,14 @@ grpc::ServerWriteReactor<v1::GetSurfaceResponse>* MeshService::GetSurface(
     call->End(call->scope().admission());
     return call;
   }
-  pool_->Post(Lane::kStore, [call, request, catalog = catalog_] {
-    absl::StatusOr<std::shared_ptr<SurfaceToSend>> made = MakeSurface(*request, catalog);
+  const absl::StatusOr<std::string> sha256 =
+      AllowedMesh(changes_->access(), &call->scope(), request->name(), Need::kLook);
+  if (!sha256.ok()) {
+    call->End(sha256.status());
+    return call;
+  }
+  pool_->Post(Lane::kStore, [call, request, sha256 = *sha256, catalog = catalog_] {
+    absl::StatusOr<std::shared_ptr<SurfaceToSend>> made = MakeSurface(*request, sha256, catalog);
     if (!made.ok()) {
       call->End(made.status());
       return;
@@ -107,44 +117,66 @@ grpc::ServerWriteReactor<v1::GetSurfaceResponse>* MeshService::GetSurface(
 grpc::ServerUnaryReactor* MeshService::ListMeshes(grpc::CallbackServerContext* context,
                                                   const v1::ListMeshesRequest* request,
                                                   v1::ListMeshesResponse* response) {
-  return Run(context, "MeshService.ListMeshes", [=, this] { return List(*request, response); });
+  return Run(context, "MeshService.ListMeshes",
+             [=, this](CallScope* scope) { return List(scope->principal(), *request, response); });
 }
 
 grpc::ServerUnaryReactor* MeshService::DeleteMesh(grpc::CallbackServerContext* context,
                                                   const v1::DeleteMeshRequest* request,
                                                   google::protobuf::Empty* /*response*/) {
-  return Run(context, "MeshService.DeleteMesh", [=, this] { return RemoveMesh(*request); });
+  return Run(context, "MeshService.DeleteMesh",
+             [=, this](CallScope* scope) { return RemoveMesh(scope, *request); });
 }
 
-absl::Status MeshService::FindUpload(const v1::QueryUploadRequest& request,
+absl::Status MeshService::FindUpload(const Principal& caller, const v1::QueryUploadRequest& request,
                                      v1::QueryUploadResponse* response) {
   TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request.name()));
-  TF_ASSIGN_OR_RETURN(const UploadProgress progress, uploads_->Query(sha256));
+  TF_ASSIGN_OR_RETURN(const UploadProgress progress, uploads_->Query(sha256, caller.name));
   response->set_committed_bytes(progress.committed_bytes);
   response->set_total_bytes(progress.total_bytes);
   return absl::OkStatus();
 }
 
-absl::Status MeshService::FindMesh(const v1::GetMeshRequest& request, v1::Mesh* response) {
-  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request.name()));
+absl::Status MeshService::FindMesh(CallScope* scope, const v1::GetMeshRequest& request,
+                                   v1::Mesh* response) {
+  TF_ASSIGN_OR_RETURN(const std::string sha256,
+                      AllowedMesh(changes_->access(), scope, request.name(), Need::kLook));
   TF_ASSIGN_OR_RETURN(const MeshView mesh, catalog_->Look(sha256));
   *response = ToProto(mesh);
   return absl::OkStatus();
 }
 
-absl::Status MeshService::List(const v1::ListMeshesRequest& request,
+absl::Status MeshService::List(const Principal& caller, const v1::ListMeshesRequest& request,
                                v1::ListMeshesResponse* response) {
   TF_ASSIGN_OR_RETURN(const PageRequest page,
                       ReadPageRequest(request.page_size(), request.page_token()));
-  TF_ASSIGN_OR_RETURN(const MeshViewPage views, catalog_->List(page.after, page.size));
-  for (const MeshView& view : views.views) *response->add_meshes() = ToProto(view);
-  response->set_next_page_token(views.next);
+  std::string last;
+  std::string after = page.after;
+  do {
+    TF_ASSIGN_OR_RETURN(const MeshViewPage views, catalog_->List(after, page.size));
+    for (const MeshView& view : views.views) {
+      if (!changes_->access().MayMesh(caller, view.record.sha256, Need::kLook).ok()) continue;
+      if (response->meshes_size() == page.size) {
+        response->set_next_page_token(last);
+        return absl::OkStatus();
+      }
+      *response->add_meshes() = ToProto(view);
+      last = view.record.sha256;
+    }
+    after = views.next;
+  } while (!after.empty());
   return absl::OkStatus();
 }
 
-absl::Status MeshService::RemoveMesh(const v1::DeleteMeshRequest& request) {
-  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request.name()));
-  return registry_->RemoveMesh(sha256);
+// Others who have sent the same bytes keep the mesh, and nobody hears of them.
+absl::Status MeshService::RemoveMesh(CallScope* scope, const v1::DeleteMeshRequest& request) {
+  const Access& access = changes_->access();
+  TF_ASSIGN_OR_RETURN(const std::string sha256,
+                      AllowedMesh(access, scope, request.name(), Need::kOwn));
+  const Principal& caller = scope->principal();
+  if (!access.OthersHoldMesh(caller, sha256)) return registry_->RemoveMesh(sha256);
+  const int sessions = access.CountSessionsOf(caller, sha256);
+  return sessions > 0 ? MeshInUse(sessions) : changes_->ForsakeMesh(caller, sha256);
 }
 
 }  // namespace tissueform

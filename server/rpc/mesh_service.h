@@ -6,6 +6,7 @@
 #include <functional>
 #include <string_view>
 
+#include "server/access/access_changes.h"
 #include "server/calls/call_scope.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
@@ -20,11 +21,12 @@ namespace tissueform {
 // tissueform.v1.MeshService over a catalog. Stateless; all arguments must outlive it.
 class MeshService final : public v1::MeshService::CallbackService {
  public:
-  MeshService(ServiceGate* gate, const ServiceLimits& limits, MeshCatalog* catalog,
-              MeshUploads* uploads, SessionRegistry* registry, WorkerPool* pool,
-              DeadlineTimer* timer)
+  MeshService(ServiceGate* gate, const ServiceLimits& limits, AccessChanges* changes,
+              MeshCatalog* catalog, MeshUploads* uploads, SessionRegistry* registry,
+              WorkerPool* pool, DeadlineTimer* timer)
       : gate_(gate),
         limits_(limits),
+        changes_(changes),
         catalog_(catalog),
         uploads_(uploads),
         registry_(registry),
@@ -50,15 +52,18 @@ class MeshService final : public v1::MeshService::CallbackService {
  private:
   // Finishes a call with what `work` says, which may block on the disk.
   grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::string_view method,
-                                std::function<absl::Status()> work);
+                                std::function<absl::Status(CallScope* scope)> work);
 
-  absl::Status FindUpload(const v1::QueryUploadRequest& request, v1::QueryUploadResponse* response);
-  absl::Status FindMesh(const v1::GetMeshRequest& request, v1::Mesh* response);
-  absl::Status List(const v1::ListMeshesRequest& request, v1::ListMeshesResponse* response);
-  absl::Status RemoveMesh(const v1::DeleteMeshRequest& request);
+  absl::Status FindUpload(const Principal& caller, const v1::QueryUploadRequest& request,
+                          v1::QueryUploadResponse* response);
+  absl::Status FindMesh(CallScope* scope, const v1::GetMeshRequest& request, v1::Mesh* response);
+  absl::Status List(const Principal& caller, const v1::ListMeshesRequest& request,
+                    v1::ListMeshesResponse* response);
+  absl::Status RemoveMesh(CallScope* scope, const v1::DeleteMeshRequest& request);
 
   ServiceGate* const gate_;
   const ServiceLimits limits_;
+  AccessChanges* const changes_;
   MeshCatalog* const catalog_;
   MeshUploads* const uploads_;
   SessionRegistry* const registry_;

@@ -9,6 +9,7 @@
 
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
+#include "proto/conversion/mesh_conversion.h"
 #include "server/rpc/resource_conversion.h"
 
 namespace tissueform {
@@ -44,7 +45,13 @@ absl::StatusOr<MeshUploadStream::After> MeshUploadStream::TakeHeader(
     return absl::InvalidArgumentError("the first message must be the header");
   }
   UploadAnnouncement announcement = ToAnnouncement(request.header());
-  if (const auto known = catalog_->Look(announcement.sha256); known.ok()) {
+  const Principal& caller = scope().principal();
+  announcement.owner = caller.name;
+  // Whoever may not use the mesh does not hear that it is here: the bytes say who has it.
+  const bool may_use = changes_->access().MayMesh(caller, announcement.sha256, Need::kLook).ok();
+  scope().SetResource(MeshName(announcement.sha256));
+  sha256_ = announcement.sha256;
+  if (const auto known = catalog_->Look(announcement.sha256); may_use && known.ok()) {
     *response_->mutable_mesh() = ToProto(*known);
     response_->set_already_existed(true);
     response_->set_committed_bytes(announcement.total_bytes);
@@ -59,7 +66,7 @@ absl::Status MeshUploadStream::Check() {
   TF_ASSIGN_OR_RETURN(const auto stored, upload_->Finish());
   *response_->mutable_mesh() = ToProto(MeshView{RecordOf(*stored), stored});
   response_->set_committed_bytes(upload_->received_bytes());
-  return absl::OkStatus();
+  return changes_->GrantMesh(scope().principal(), sha256_);
 }
 
 }  // namespace tissueform

@@ -4,10 +4,12 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "server/access/access_changes.h"
 #include "server/calls/call_scope.h"
 #include "server/calls/upload_stream.h"
 #include "server/session/deadline_timer.h"
@@ -23,10 +25,11 @@ namespace tissueform {
 class MeshUploadStream final : public UploadStream<v1::UploadMeshRequest> {
  public:
   // `response` belongs to gRPC and lives as long as the call.
-  MeshUploadStream(CallScope scope, const ServiceLimits& limits, MeshCatalog* catalog,
-                   MeshUploads* uploads, WorkerPool* pool, DeadlineTimer* timer,
-                   v1::UploadMeshResponse* response)
+  MeshUploadStream(CallScope scope, const ServiceLimits& limits, AccessChanges* changes,
+                   MeshCatalog* catalog, MeshUploads* uploads, WorkerPool* pool,
+                   DeadlineTimer* timer, v1::UploadMeshResponse* response)
       : UploadStream(std::move(scope), limits.upload_silence, Lane::kBatch, pool, timer),
+        changes_(changes),
         catalog_(catalog),
         uploads_(uploads),
         response_(response) {}
@@ -42,11 +45,13 @@ class MeshUploadStream final : public UploadStream<v1::UploadMeshRequest> {
   absl::StatusOr<After> TakeHeader(const v1::UploadMeshRequest& request);
 
   // Constant.
+  AccessChanges* const changes_;
   MeshCatalog* const catalog_;
   MeshUploads* const uploads_;
   v1::UploadMeshResponse* const response_;
 
   // The job's alone.
+  std::string sha256_;                  // that the header tells
   std::unique_ptr<MeshUpload> upload_;  // null before the header
 };
 

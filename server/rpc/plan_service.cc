@@ -20,7 +20,7 @@
 #include "proto/conversion/fit_conversion.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "proto/conversion/model_conversion.h"
-#include "proto/conversion/session_conversion.h"
+#include "server/rpc/allowed_resource.h"
 
 namespace tissueform {
 namespace {
@@ -62,10 +62,11 @@ class FitCall : public grpc::ServerUnaryReactor {
           v1::FitResponse* response)
       : scope_(std::move(scope)), registry_(registry), request_(*request), response_(*response) {}
 
-  void Start() {
-    EndUnlessOk([this]() -> absl::Status {
+  void Start(const Access& access) {
+    EndUnlessOk([this, &access]() -> absl::Status {
       TF_RETURN_IF_ERROR(scope_.admission());
-      TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(request_.session()));
+      TF_ASSIGN_OR_RETURN(const std::string id,
+                          AllowedSession(access, &scope_, request_.session(), Need::kDrag));
       TF_ASSIGN_OR_RETURN(wanted_, ToFitRequest(request_));
       registry_->Open(id, cancelled_, [this](absl::StatusOr<std::shared_ptr<Session>> session) {
         if (!session.ok()) {
@@ -171,7 +172,7 @@ grpc::ServerUnaryReactor* PlanService::Fit(grpc::CallbackServerContext* context,
                                            v1::FitResponse* response) {
   auto* call = new FitCall(CallScope(context, "PlanService.Fit", CallKind::kNewWork, gate_),
                            registry_, request, response);
-  call->Start();
+  call->Start(access_);
   return call;
 }
 

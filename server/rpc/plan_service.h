@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include "server/access/access.h"
 #include "server/calls/call_scope.h"
 #include "server/session/session_registry.h"
 #include "tissueform/v1/plan_service.grpc.pb.h"
@@ -12,13 +13,15 @@ namespace tissueform {
 // tissueform.v1.PlanService over the registry. Stateless; all pointers must outlive it.
 class PlanService final : public v1::PlanService::CallbackService {
  public:
-  PlanService(ServiceGate* gate, SessionRegistry* registry) : gate_(gate), registry_(registry) {}
+  PlanService(ServiceGate* gate, const Access* access, SessionRegistry* registry)
+      : gate_(gate), access_(*access), registry_(registry) {}
 
   grpc::ServerUnaryReactor* Fit(grpc::CallbackServerContext* context, const v1::FitRequest* request,
                                 v1::FitResponse* response) override;
 
  private:
   ServiceGate* const gate_;
+  const Access& access_;
   SessionRegistry* const registry_;
 };
 

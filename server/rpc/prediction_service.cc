@@ -16,6 +16,7 @@
 #include "proto/conversion/prediction_conversion.h"
 #include "proto/conversion/session_conversion.h"
 #include "server/calls/message_stream.h"
+#include "server/rpc/allowed_resource.h"
 #include "server/rpc/compare_predictions.h"
 #include "server/rpc/prediction_record.h"
 #include "server/rpc/resource_conversion.h"
@@ -31,9 +32,11 @@ constexpr size_t kPageBytes = size_t{2} << 20;
 // One CreatePrediction call. Deletes itself when gRPC is done with it.
 class CreatePredictionCall : public grpc::ServerUnaryReactor {
  public:
-  CreatePredictionCall(CallScope scope, SessionRegistry* registry, PredictionStore* store,
-                       const v1::CreatePredictionRequest* request, v1::Prediction* response)
+  CreatePredictionCall(CallScope scope, const Access* access, SessionRegistry* registry,
+                       PredictionStore* store, const v1::CreatePredictionRequest* request,
+                       v1::Prediction* response)
       : scope_(std::move(scope)),
+        access_(*access),
         registry_(registry),
         store_(store),
         request_(*request),
@@ -92,6 +95,12 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
   }
 
   void Solve() {
+    const absl::Status allowed =
+        AllowedSession(access_, &scope_, request_.session(), Need::kDrag).status();
+    if (!allowed.ok()) {
+      End(allowed);
+      return;
+    }
     FindSingleAnswer(registry_, {request_.session(), request_.poses(), request_.model()},
                      cancelled_, {}, [this](const absl::StatusOr<SingleAnswer>& answer) {
                        if (!answer.ok()) {
@@ -117,6 +126,7 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
   void End(const absl::Status& outcome) { Finish(scope_.End(outcome)); }
 
   CallScope scope_;
+  const Access& access_;
   SessionRegistry* const registry_;
   PredictionStore* const store_;
   const v1::CreatePredictionRequest& request_;
@@ -128,9 +138,8 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
 };
 
 // The positions from the request's offset on. Blocks on the disk.
-absl::StatusOr<std::string> ReadFrom(const v1::ReadPositionsRequest& request,
+absl::StatusOr<std::string> ReadFrom(const v1::ReadPositionsRequest& request, const std::string& id,
                                      PredictionStore* store) {
-  TF_ASSIGN_OR_RETURN(const std::string id, ParsePredictionName(request.name()));
   TF_ASSIGN_OR_RETURN(std::string positions, store->Positions(id));
   const auto size = static_cast<int64_t>(positions.size());
   if (request.read_offset() < 0 || request.read_offset() > size) {
@@ -146,7 +155,7 @@ grpc::ServerUnaryReactor* PredictionService::CreatePrediction(
     grpc::CallbackServerContext* context, const v1::CreatePredictionRequest* request,
     v1::Prediction* response) {
   auto* call = new CreatePredictionCall(
-      CallScope(context, "PredictionService.CreatePrediction", CallKind::kNewWork, gate_),
+      CallScope(context, "PredictionService.CreatePrediction", CallKind::kNewWork, gate_), access_,
       registry_, store_, request, response);
   call->Start(limits_);
   return call;
@@ -157,8 +166,16 @@ grpc::ServerWriteReactor<v1::ReadPositionsResponse>* PredictionService::ReadPosi
   auto* call = new MessageStream<v1::ReadPositionsResponse>(
       CallScope(context, "PredictionService.ReadPositions", CallKind::kUpkeep, gate_),
       CancelOf(context), timer_, limits_.upload_silence);
-  registry_->pool().Post(Lane::kStore, [call, request, store = store_] {
-    absl::StatusOr<std::string> positions = ReadFrom(*request, store);
+  absl::StatusOr<std::string> id = call->scope().admission();
+  if (call->scope().admission().ok()) {
+    id = AllowedPrediction(*access_, &call->scope(), request->name(), Need::kLook);
+  }
+  if (!id.ok()) {
+    call->End(id.status());
+    return call;
+  }
+  registry_->pool().Post(Lane::kStore, [call, request, id = *std::move(id), store = store_] {
+    absl::StatusOr<std::string> positions = ReadFrom(*request, id, store);
     if (!positions.ok()) {
       call->End(positions.status());
       return;
@@ -176,16 +193,15 @@ grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* PredictionService::Com
     grpc::CallbackServerContext* context, const v1::ComparePredictionsRequest* request) {
   return StartComparison(
       CallScope(context, "PredictionService.ComparePredictions", CallKind::kNewWork, gate_),
-      context, timer_, limits_.upload_silence, registry_, catalog_, store_, request);
+      context, timer_, limits_.upload_silence, access_, registry_, catalog_, store_, request);
 }
 
 grpc::ServerUnaryReactor* PredictionService::Run(
     grpc::CallbackServerContext* context, std::string_view method,
-    std::function<absl::Status(const Principal& caller)> work) {
-  return RunUpkeep(context, method, gate_, [&, this](const CallScope& scope, const EndCall& end) {
-    registry_->pool().Post(Lane::kStore, [end, caller = scope.principal(), work = std::move(work)] {
-      end(work(caller));
-    });
+    std::function<absl::Status(CallScope* scope)> work) {
+  return RunUpkeep(context, method, gate_, [&, this](CallScope& scope, const EndCall& end) {
+    registry_->pool().Post(Lane::kStore,
+                           [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
     return absl::OkStatus();
   });
 }
@@ -194,26 +210,27 @@ grpc::ServerUnaryReactor* PredictionService::GetPrediction(grpc::CallbackServerC
                                                            const v1::GetPredictionRequest* request,
                                                            v1::Prediction* response) {
   return Run(context, "PredictionService.GetPrediction",
-             [=, this](const Principal& /*caller*/) { return Find(*request, response); });
+             [=, this](CallScope* scope) { return Find(scope, *request, response); });
 }
 
 grpc::ServerUnaryReactor* PredictionService::ListPredictions(
     grpc::CallbackServerContext* context, const v1::ListPredictionsRequest* request,
     v1::ListPredictionsResponse* response) {
   return Run(context, "PredictionService.ListPredictions",
-             [=, this](const Principal& caller) { return List(*request, caller, response); });
+             [=, this](CallScope* scope) { return List(*request, scope->principal(), response); });
 }
 
 grpc::ServerUnaryReactor* PredictionService::DeletePrediction(
     grpc::CallbackServerContext* context, const v1::DeletePredictionRequest* request,
     google::protobuf::Empty* /*response*/) {
   return Run(context, "PredictionService.DeletePrediction",
-             [=, this](const Principal& /*caller*/) { return Remove(*request); });
+             [=, this](CallScope* scope) { return Remove(scope, *request); });
 }
 
-absl::Status PredictionService::Find(const v1::GetPredictionRequest& request,
+absl::Status PredictionService::Find(CallScope* scope, const v1::GetPredictionRequest& request,
                                      v1::Prediction* response) {
-  TF_ASSIGN_OR_RETURN(const std::string id, ParsePredictionName(request.name()));
+  TF_ASSIGN_OR_RETURN(const std::string id,
+                      AllowedPrediction(*access_, scope, request.name(), Need::kLook));
   TF_ASSIGN_OR_RETURN(const PredictionRecord record, store_->Get(id));
   TF_ASSIGN_OR_RETURN(KeptPrediction kept, FromRecord(record));
   *response = std::move(kept.prediction);
@@ -225,8 +242,10 @@ absl::Status PredictionService::List(const v1::ListPredictionsRequest& request,
                                      v1::ListPredictionsResponse* response) {
   TF_ASSIGN_OR_RETURN(const PageRequest page,
                       ReadPageRequest(request.page_size(), request.page_token()));
-  PredictionStore::ListRequest wanted{
-      .owner = caller.name, .after = page.after, .limit = page.size};
+  PredictionStore::ListRequest wanted{.owner = caller.name,
+                                      .also = access_->SharedPredictions(caller),
+                                      .after = page.after,
+                                      .limit = page.size};
   if (!request.session().empty()) {
     TF_ASSIGN_OR_RETURN(wanted.session, ParseSessionName(request.session()));
   }
@@ -251,8 +270,10 @@ absl::Status PredictionService::List(const v1::ListPredictionsRequest& request,
   return absl::OkStatus();
 }
 
-absl::Status PredictionService::Remove(const v1::DeletePredictionRequest& request) {
-  TF_ASSIGN_OR_RETURN(const std::string id, ParsePredictionName(request.name()));
+absl::Status PredictionService::Remove(CallScope* scope,
+                                       const v1::DeletePredictionRequest& request) {
+  TF_ASSIGN_OR_RETURN(const std::string id,
+                      AllowedPrediction(*access_, scope, request.name(), Need::kOwn));
   return store_->Delete(id);
 }
 

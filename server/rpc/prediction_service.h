@@ -8,6 +8,7 @@
 
 #include "absl/status/status.h"
 
+#include "server/access/access.h"
 #include "server/calls/call_scope.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
@@ -21,10 +22,12 @@ namespace tissueform {
 // tissueform.v1.PredictionService over a store. Stateless; all pointers must outlive it.
 class PredictionService final : public v1::PredictionService::CallbackService {
  public:
-  PredictionService(ServiceGate* gate, const ServiceLimits& limits, MeshCatalog* catalog,
-                    SessionRegistry* registry, PredictionStore* store, DeadlineTimer* timer)
+  PredictionService(ServiceGate* gate, const ServiceLimits& limits, const Access* access,
+                    MeshCatalog* catalog, SessionRegistry* registry, PredictionStore* store,
+                    DeadlineTimer* timer)
       : gate_(gate),
         limits_(limits),
+        access_(access),
         catalog_(catalog),
         registry_(registry),
         store_(store),
@@ -50,15 +53,17 @@ class PredictionService final : public v1::PredictionService::CallbackService {
  private:
   // Finishes a call with what `work` says, which may block on the disk.
   grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::string_view method,
-                                std::function<absl::Status(const Principal& caller)> work);
+                                std::function<absl::Status(CallScope* scope)> work);
 
-  absl::Status Find(const v1::GetPredictionRequest& request, v1::Prediction* response);
+  absl::Status Find(CallScope* scope, const v1::GetPredictionRequest& request,
+                    v1::Prediction* response);
   absl::Status List(const v1::ListPredictionsRequest& request, const Principal& caller,
                     v1::ListPredictionsResponse* response);
-  absl::Status Remove(const v1::DeletePredictionRequest& request);
+  absl::Status Remove(CallScope* scope, const v1::DeletePredictionRequest& request);
 
   ServiceGate* const gate_;
   const ServiceLimits limits_;
+  const Access* const access_;
   MeshCatalog* const catalog_;
   SessionRegistry* const registry_;
   PredictionStore* const store_;

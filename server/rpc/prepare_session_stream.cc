@@ -34,10 +34,12 @@ v1::PreparationStage ToProto(SessionStage stage) {
 }  // namespace
 
 PrepareSessionStream::PrepareSessionStream(CallScope scope, const ServiceLimits& limits,
-                                           MeshCatalog* catalog, SessionRegistry* registry,
+                                           const Access& access, MeshCatalog* catalog,
+                                           SessionRegistry* registry,
                                            const v1::PrepareSessionRequest& request,
                                            const Clock* clock)
     : scope_(std::move(scope)),
+      admission_(SessionPreparation::Authorise(access, request, &scope_)),
       clock_(clock),
       start_(clock->Now()),
       preparation_(std::make_shared<SessionPreparation>(
@@ -51,7 +53,7 @@ PrepareSessionStream::PrepareSessionStream(CallScope scope, const ServiceLimits&
 
 void PrepareSessionStream::OnSendInitialMetadataDone(bool ok) {
   if (ok) {
-    preparation_->Start(scope_.admission(), scope_.principal());
+    preparation_->Start(admission_, scope_.principal());
   } else {
     preparation_->Cancel();
   }
@@ -84,7 +86,10 @@ void PrepareSessionStream::Tell(const SessionProgress& progress) {
 void PrepareSessionStream::TakeResult(absl::StatusOr<v1::Session> result) {
   MutexLock lock(mutex_);
   outcome_ = result.status();
-  if (result.ok()) session_ = *std::move(result);
+  if (result.ok()) {
+    scope_.SetResource(result->name());
+    session_ = *std::move(result);
+  }
   Advance();
 }
 

@@ -27,9 +27,9 @@ namespace tissueform {
 class PrepareSessionStream : public grpc::ServerWriteReactor<v1::PrepareSessionResponse> {
  public:
   // `clock` and the pointers of the preparation must outlive the call.
-  PrepareSessionStream(CallScope scope, const ServiceLimits& limits, MeshCatalog* catalog,
-                       SessionRegistry* registry, const v1::PrepareSessionRequest& request,
-                       const Clock* clock);
+  PrepareSessionStream(CallScope scope, const ServiceLimits& limits, const Access& access,
+                       MeshCatalog* catalog, SessionRegistry* registry,
+                       const v1::PrepareSessionRequest& request, const Clock* clock);
 
   void OnSendInitialMetadataDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -43,6 +43,7 @@ class PrepareSessionStream : public grpc::ServerWriteReactor<v1::PrepareSessionR
   void Advance() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   CallScope scope_;  // ended by who calls Finish
+  const absl::Status admission_;
   const Clock* const clock_;
   const Clock::TimePoint start_;
   const std::shared_ptr<SessionPreparation> preparation_;

@@ -82,6 +82,7 @@ absl::StatusOr<SessionRecord> ToSessionRecord(const v1::CreateSessionRequest& re
   SessionRecord record;
   record.id = std::move(checked.session_id);
   record.owner = owner.name;
+  record.project = request.project();
   record.mesh_sha256 = mesh.sha256;
   record.request_id = std::move(checked.request_id);
   record.request_fingerprint = RequestFingerprint(request);

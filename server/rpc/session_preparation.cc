@@ -10,6 +10,7 @@
 #include "core/base/status_macros.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "proto/conversion/session_conversion.h"
+#include "server/rpc/allowed_resource.h"
 #include "server/rpc/resource_conversion.h"
 
 namespace tissueform {
@@ -23,6 +24,26 @@ SessionPreparation::SessionPreparation(const ServiceLimits& limits, MeshCatalog*
       request_(std::move(request)),
       tell_(std::move(tell)),
       done_(std::move(done)) {}
+
+absl::Status SessionPreparation::Authorise(const Access& access,
+                                           const v1::PrepareSessionRequest& request,
+                                           CallScope* scope) {
+  TF_RETURN_IF_ERROR(scope->admission());
+  switch (request.what_case()) {
+    case v1::PrepareSessionRequest::kCreate: {
+      TF_ASSIGN_OR_RETURN(const std::string mesh, ParseMeshName(request.create().mesh()));
+      TF_RETURN_IF_ERROR(access.MayMesh(scope->principal(), mesh, Need::kLook));
+      return Access::MayPutInto(scope->principal(), request.create().project());
+    }
+    case v1::PrepareSessionRequest::kUpdate:
+      return AllowedSession(access, scope, request.update().name(), Need::kOwn).status();
+    case v1::PrepareSessionRequest::kOpen:
+      return AllowedSession(access, scope, request.open(), Need::kDrag).status();
+    case v1::PrepareSessionRequest::WHAT_NOT_SET:
+      break;
+  }
+  return absl::OkStatus();  // refused by who begins
+}
 
 void SessionPreparation::Start(const absl::Status& admission, const Principal& caller) {
   if (*cancelled_) return;

@@ -11,7 +11,9 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/mutex.h"
+#include "server/access/access.h"
 #include "server/auth/identity.h"
+#include "server/calls/call_scope.h"
 #include "server/rpc/stream_answers.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
@@ -36,7 +38,13 @@ class SessionPreparation : public std::enable_shared_from_this<SessionPreparatio
   SessionPreparation(const ServiceLimits& limits, MeshCatalog* catalog, SessionRegistry* registry,
                      v1::PrepareSessionRequest request, TellSession tell, Done done);
 
-  // Once. `admission` is why the call is not served, or OK; `caller` whose session it will be.
+  // Whether the call may do what it asks for; its admission first. Errors: InvalidArgument (the
+  // names), those of Access.
+  static absl::Status Authorise(const Access& access, const v1::PrepareSessionRequest& request,
+                                CallScope* scope);
+
+  // Once. `admission` is why the call is not served (see Authorise), or OK; `caller` whose session
+  // it will be.
   //
   // Errors: InvalidArgument (the request), those of MeshCatalog::Load, SessionRegistry::Create,
   // Update, Open and Look, and of PrepareAnswers; Cancelled.

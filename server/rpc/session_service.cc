@@ -8,6 +8,7 @@
 
 #include "core/base/status_macros.h"
 #include "proto/conversion/session_conversion.h"
+#include "server/rpc/allowed_resource.h"
 #include "server/rpc/prepare_session_stream.h"
 #include "server/rpc/resource_conversion.h"
 #include "server/rpc/session_preparation.h"
@@ -18,19 +19,23 @@ namespace {
 // One CreateSession or UpdateSession call. Deletes itself when gRPC is done with it.
 class PreparationCall : public grpc::ServerUnaryReactor {
  public:
-  PreparationCall(CallScope scope, const ServiceLimits& limits, MeshCatalog* catalog,
-                  SessionRegistry* registry, v1::PrepareSessionRequest request,
-                  v1::Session* response)
+  PreparationCall(CallScope scope, const ServiceLimits& limits, const Access& access,
+                  MeshCatalog* catalog, SessionRegistry* registry,
+                  v1::PrepareSessionRequest request, v1::Session* response)
       : scope_(std::move(scope)),
+        admission_(SessionPreparation::Authorise(access, request, &scope_)),
         preparation_(std::make_shared<SessionPreparation>(
             limits, catalog, registry, std::move(request), /*tell=*/nullptr,
             [this, response](absl::StatusOr<v1::Session> session) {
               const absl::Status outcome = session.status();
-              if (session.ok()) *response = *std::move(session);
+              if (session.ok()) {
+                scope_.SetResource(session->name());
+                *response = *std::move(session);
+              }
               Finish(scope_.End(outcome));
             })) {}
 
-  void Start() { preparation_->Start(scope_.admission(), scope_.principal()); }
+  void Start() { preparation_->Start(admission_, scope_.principal()); }
 
   void OnCancel() override { preparation_->Cancel(); }
 
@@ -41,6 +46,7 @@ class PreparationCall : public grpc::ServerUnaryReactor {
 
  private:
   CallScope scope_;
+  const absl::Status admission_;
   const std::shared_ptr<SessionPreparation> preparation_;
 };
 
@@ -53,7 +59,7 @@ grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerCont
   *preparation.mutable_create() = *request;
   auto* call = new PreparationCall(
       CallScope(context, "SessionService.CreateSession", CallKind::kNewWork, gate_), limits_,
-      catalog_, registry_, std::move(preparation), response);
+      access_, catalog_, registry_, std::move(preparation), response);
   call->Start();
   return call;
 }
@@ -61,16 +67,17 @@ grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerCont
 grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext* context,
                                                      const v1::GetSessionRequest* request,
                                                      v1::Session* response) {
-  return RunUpkeep(context, "SessionService.GetSession", gate_,
-                   [=, this](const CallScope& /*scope*/, const EndCall& end) -> absl::Status {
-                     TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(request->name()));
-                     registry_->Look(
-                         id, [end, response](const absl::StatusOr<SessionRegistry::View>& view) {
-                           if (view.ok()) *response = ToProto(*view);
-                           end(view.status());
-                         });
-                     return absl::OkStatus();
-                   });
+  return RunUpkeep(
+      context, "SessionService.GetSession", gate_,
+      [=, this](CallScope& scope, const EndCall& end) -> absl::Status {
+        TF_ASSIGN_OR_RETURN(const std::string id,
+                            AllowedSession(access_, &scope, request->name(), Need::kLook));
+        registry_->Look(id, [end, response](const absl::StatusOr<SessionRegistry::View>& view) {
+          if (view.ok()) *response = ToProto(*view);
+          end(view.status());
+        });
+        return absl::OkStatus();
+      });
 }
 
 grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerContext* context,
@@ -78,10 +85,13 @@ grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerConte
                                                        v1::ListSessionsResponse* response) {
   return RunUpkeep(
       context, "SessionService.ListSessions", gate_,
-      [=, this](const CallScope& scope, const EndCall& end) -> absl::Status {
+      [=, this](CallScope& scope, const EndCall& end) -> absl::Status {
         TF_ASSIGN_OR_RETURN(const PageRequest page,
                             ReadPageRequest(request->page_size(), request->page_token()));
-        registry_->List({.owner = scope.principal().name, .after = page.after, .limit = page.size},
+        registry_->List({.owner = scope.principal().name,
+                         .also = access_.SharedSessions(scope.principal()),
+                         .after = page.after,
+                         .limit = page.size},
                         [end, response](const absl::StatusOr<SessionRegistry::ViewPage>& views) {
                           if (views.ok()) {
                             for (const SessionRegistry::View& view : views->views) {
@@ -102,7 +112,7 @@ grpc::ServerUnaryReactor* SessionService::UpdateSession(grpc::CallbackServerCont
   *preparation.mutable_update() = *request;
   auto* call = new PreparationCall(
       CallScope(context, "SessionService.UpdateSession", CallKind::kNewWork, gate_), limits_,
-      catalog_, registry_, std::move(preparation), response);
+      access_, catalog_, registry_, std::move(preparation), response);
   call->Start();
   return call;
 }
@@ -111,15 +121,17 @@ grpc::ServerWriteReactor<v1::PrepareSessionResponse>* SessionService::PrepareSes
     grpc::CallbackServerContext* context, const v1::PrepareSessionRequest* request) {
   return new PrepareSessionStream(
       CallScope(context, "SessionService.PrepareSession", CallKind::kNewWork, gate_), limits_,
-      catalog_, registry_, *request, clock_);
+      access_, catalog_, registry_, *request, clock_);
 }
 
 grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerContext* context,
                                                         const v1::DeleteSessionRequest* request,
                                                         google::protobuf::Empty* /*response*/) {
   return RunUpkeep(context, "SessionService.DeleteSession", gate_,
-                   [=, this](const CallScope& /*scope*/, const EndCall& end) -> absl::Status {
-                     TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(request->name()));
+                   [=, this](CallScope& scope, const EndCall& end) -> absl::Status {
+                     TF_ASSIGN_OR_RETURN(
+                         const std::string id,
+                         AllowedSession(access_, &scope, request->name(), Need::kOwn));
                      registry_->Delete(id, end);
                      return absl::OkStatus();
                    });

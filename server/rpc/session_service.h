@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 
+#include "server/access/access.h"
 #include "server/calls/call_scope.h"
 #include "server/session/clock.h"
 #include "server/session/limits.h"
@@ -19,9 +20,15 @@ namespace tissueform {
 // tissueform.v1.SessionService over a registry. Stateless; all pointers must outlive it.
 class SessionService final : public v1::SessionService::CallbackService {
  public:
-  SessionService(ServiceGate* gate, const ServiceLimits& limits, MeshCatalog* catalog,
-                 SessionRegistry* registry, const Clock* clock = Clock::System())
-      : gate_(gate), limits_(limits), catalog_(catalog), registry_(registry), clock_(clock) {}
+  SessionService(ServiceGate* gate, const ServiceLimits& limits, const Access* access,
+                 MeshCatalog* catalog, SessionRegistry* registry,
+                 const Clock* clock = Clock::System())
+      : gate_(gate),
+        limits_(limits),
+        access_(*access),
+        catalog_(catalog),
+        registry_(registry),
+        clock_(clock) {}
 
   grpc::ServerUnaryReactor* CreateSession(grpc::CallbackServerContext* context,
                                           const v1::CreateSessionRequest* request,
@@ -44,6 +51,7 @@ class SessionService final : public v1::SessionService::CallbackService {
  private:
   ServiceGate* const gate_;
   const ServiceLimits limits_;
+  const Access& access_;
   MeshCatalog* const catalog_;
   SessionRegistry* const registry_;
   const Clock* const clock_;

@@ -54,7 +54,8 @@ std::shared_ptr<WatchChannel> SessionWatches::FindChannel(const std::string& ses
 
 absl::StatusOr<SessionWatches::Joined> SessionWatches::Add(const std::string& watch,
                                                            const std::string& session_id,
-                                                           CreditedWatcher* watcher) {
+                                                           CreditedWatcher* watcher,
+                                                           const std::string& principal) {
   MutexLock lock(mutex_);
   if (watches_.size() >= static_cast<size_t>(limits_.max_watches)) {
     return TooManyWatches(limits_.max_watches, "the server", "--max-watches");
@@ -64,7 +65,7 @@ absl::StatusOr<SessionWatches::Joined> SessionWatches::Add(const std::string& wa
     return TooManyWatches(limits_.max_watches_per_session, "the session",
                           "--max-watches-per-session");
   }
-  watches_[watch] = {watcher, joined.channel};
+  watches_[watch] = {watcher, joined.channel, principal};
   joined.has_frame = joined.channel->Add(watcher);
   return joined;
 }
@@ -81,7 +82,10 @@ absl::Status SessionWatches::Acknowledge(const std::string& watch, uint64_t numb
                                          const Authenticated& by) {
   MutexLock lock(mutex_);
   const auto found = watches_.find(watch);
-  if (found != watches_.end()) return found->second.watcher->Acknowledge(number, by);
+  const std::string& principal = by.principal == nullptr ? std::string() : by.principal->name;
+  if (found != watches_.end() && found->second.principal == principal) {
+    return found->second.watcher->Acknowledge(number, by);
+  }
   return WithReason(absl::NotFoundError(absl::StrCat("no watch \"watches/", watch,
                                                      "\": it has ended; begin another one")),
                     ErrorReason::kWatchNotFound);
@@ -122,6 +126,18 @@ void SessionWatches::NotifyDraining(std::chrono::system_clock::time_point end) {
                                           "watch again in a minute"),
                    ErrorReason::kServerDraining));
   }
+}
+
+void SessionWatches::AskAgain() {
+  MutexLock lock(mutex_);
+  for (const auto& [name, watch] : watches_) watch.watcher->AskAgain();
+}
+
+std::map<std::string, int64_t> SessionWatches::CountByPrincipal() const {
+  std::map<std::string, int64_t> counts;
+  MutexLock lock(mutex_);
+  for (const auto& [name, watch] : watches_) ++counts[watch.principal];
+  return counts;
 }
 
 int SessionWatches::size() const {

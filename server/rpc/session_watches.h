@@ -30,6 +30,8 @@ class CreditedWatcher : public Watcher {
   // `by` whom it is acknowledged: its token may be newer than the watch's. Errors: InvalidArgument
   // (a frame that was not sent).
   virtual absl::Status Acknowledge(uint64_t number, const Authenticated& by) = 0;
+  // Ends where it may not watch any more.
+  virtual void AskAgain() = 0;
 
  protected:
   ~CreditedWatcher() = default;
@@ -51,14 +53,14 @@ class SessionWatches {
     std::shared_ptr<WatchChannel> channel;
     bool has_frame = false;  // WatchChannel::Add
   };
-  // `watcher` follows the session under the id `watch`, which nobody else has. Errors:
-  // ResourceExhausted.
+  // `watcher` follows the session for `principal` under the id `watch`, which nobody else has.
+  // Errors: ResourceExhausted.
   absl::StatusOr<Joined> Add(const std::string& watch, const std::string& session_id,
-                             CreditedWatcher* watcher);
+                             CreditedWatcher* watcher, const std::string& principal = "");
   // Nothing where it was not added.
   void Remove(const std::string& watch);
 
-  // Errors: NotFound, those of CreditedWatcher::Acknowledge.
+  // Errors: NotFound (also where the watch is another's), those of CreditedWatcher::Acknowledge.
   absl::Status Acknowledge(const std::string& watch, uint64_t number, const Authenticated& by = {});
 
   // As the registry's observer.
@@ -66,12 +68,17 @@ class SessionWatches {
   // From now on watches end with the drags.
   void NotifyDraining(std::chrono::system_clock::time_point end);
 
+  // Each whether it may still watch.
+  void AskAgain();
+
+  std::map<std::string, int64_t> CountByPrincipal() const;
   int size() const;
 
  private:
   struct Watch {
     CreditedWatcher* watcher = nullptr;
     std::shared_ptr<WatchChannel> channel;
+    std::string principal;
   };
 
   std::shared_ptr<WatchChannel> FindChannel(const std::string& session_id)

@@ -14,6 +14,7 @@
 #include "proto/conversion/geometry_conversion.h"
 #include "proto/conversion/session_conversion.h"
 #include "server/auth/identity.h"
+#include "server/rpc/allowed_resource.h"
 
 namespace tissueform {
 namespace {
@@ -49,14 +50,17 @@ absl::StatusOr<std::string> ParseWatchName(const std::string& name) {
 }
 
 WatchStreamReactor::WatchStreamReactor(CallScope scope, const grpc::ByteBuffer& request,
-                                       const ServiceLimits& limits, SessionRegistry* registry,
-                                       SessionWatches* watches, DeadlineTimer* timer)
+                                       const ServiceLimits& limits, const Access& access,
+                                       SessionRegistry* registry, SessionWatches* watches,
+                                       DeadlineTimer* timer)
     : scope_(std::move(scope)),
       limits_(limits),
+      access_(access),
       registry_(registry),
       watches_(watches),
       timer_(timer),
-      id_(RandomId()) {
+      id_(RandomId()),
+      principal_(scope_.principal().name) {
   const absl::Status admission =
       scope_.admission().ok() ? ReadRequest(request) : scope_.admission();
   MutexLock lock(mutex_);
@@ -77,7 +81,8 @@ absl::Status WatchStreamReactor::ReadRequest(const grpc::ByteBuffer& bytes) {
   if (!grpc::SerializationTraits<v1::WatchRequest>::Deserialize(&copy, &request).ok()) {
     return absl::InvalidArgumentError("the request is no WatchRequest");
   }
-  TF_ASSIGN_OR_RETURN(session_id_, ParseSessionName(request.session()));
+  TF_ASSIGN_OR_RETURN(session_id_,
+                      AllowedSession(access_, &scope_, request.session(), Need::kLook));
   if (!request.has_max_unacked()) return absl::OkStatus();
   max_unacked_ = request.max_unacked();
   if (max_unacked_ >= 1 && max_unacked_ <= limits_.max_unacked) return absl::OkStatus();
@@ -107,9 +112,12 @@ void WatchStreamReactor::TakeSession(absl::StatusOr<std::shared_ptr<Session>> se
 }
 
 void WatchStreamReactor::Join(const std::shared_ptr<Session>& session) {
-  absl::StatusOr<SessionWatches::Joined> joined = watches_->Add(id_, session_id_, this);
-  if (!joined.ok() || joined->has_frame) {
-    FinishOpening(joined.status());
+  absl::StatusOr<SessionWatches::Joined> joined = watches_->Add(id_, session_id_, this, principal_);
+  // Once more: who was told between the two that less may be watched did not find this watch.
+  absl::Status allowed = joined.status();
+  if (allowed.ok()) allowed = access_.MaySession(scope_.principal(), session_id_, Need::kLook);
+  if (!allowed.ok() || joined->has_frame) {
+    FinishOpening(allowed);
     return;
   }
   channel_ = std::move(joined->channel);
@@ -229,6 +237,13 @@ absl::Status WatchStreamReactor::Acknowledge(uint64_t number, const Authenticate
   while (!unacked_.empty() && unacked_.front() <= number) unacked_.pop_front();
   Advance();
   return absl::OkStatus();
+}
+
+void WatchStreamReactor::AskAgain() {
+  MutexLock lock(mutex_);
+  const absl::Status allowed = access_.MaySession(scope_.principal(), session_id_, Need::kLook);
+  if (!allowed.ok()) End(allowed);
+  Advance();
 }
 
 void WatchStreamReactor::End(const absl::Status& outcome) {

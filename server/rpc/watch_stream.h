@@ -17,6 +17,7 @@
 
 #include "core/base/mutex.h"
 #include "core/constraints/handle_pose.h"
+#include "server/access/access.h"
 #include "server/calls/call_scope.h"
 #include "server/rpc/session_watches.h"
 #include "server/session/deadline_timer.h"
@@ -37,7 +38,8 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
  public:
   // `request` is a WatchRequest; all other pointers must outlive the stream.
   WatchStreamReactor(CallScope scope, const grpc::ByteBuffer& request, const ServiceLimits& limits,
-                     SessionRegistry* registry, SessionWatches* watches, DeadlineTimer* timer);
+                     const Access& access, SessionRegistry* registry, SessionWatches* watches,
+                     DeadlineTimer* timer);
 
   void OnSendInitialMetadataDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -48,6 +50,7 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   void Tell(const v1::DeformNotice& notice) override;
   void EndWatch(const absl::Status& outcome) override;
   absl::Status Acknowledge(uint64_t number, const Authenticated& by) override;
+  void AskAgain() override;
 
  private:
   // Its caller's token may have ended.
@@ -72,10 +75,12 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
 
   // Constant after the constructor.
   const ServiceLimits limits_;
+  const Access& access_;
   SessionRegistry* const registry_;
   SessionWatches* const watches_;
   DeadlineTimer* const timer_;
   const std::string id_;
+  const std::string principal_;
   std::string session_id_;
   int max_unacked_ = 2;
   const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);

@@ -196,10 +196,10 @@ int Housekeeping::RemoveMeshes(int64_t before_s, const std::set<std::string>& of
 }
 
 int Housekeeping::RemoveCases(int64_t before_s, const std::set<std::string>& of_predictions) {
-  const absl::StatusOr<int> removed =
+  const absl::StatusOr<std::vector<CaseKey>> removed =
       stores_->cases().RemoveUnused(before_s, of_predictions, kMostOfARound);
   WarnUnlessOk(removed.status(), "cases that nobody used stay");
-  return removed.value_or(0);
+  return removed.ok() ? static_cast<int>(removed->size()) : 0;
 }
 
 }  // namespace tissueform

@@ -10,6 +10,7 @@
 #include "core/base/status_macros.h"
 #include "core/mesh/tet_topology.h"
 #include "server/session/mesh_checks.h"
+#include "server/session/session_refusals.h"
 
 namespace tissueform {
 namespace {
@@ -30,11 +31,6 @@ absl::StatusOr<std::shared_ptr<const StoredMesh>> MakeStored(MemoryReservation r
   return std::make_shared<const StoredMesh>(StoredMesh{std::move(reservation), sha256,
                                                        std::move(mesh), std::move(cell_arrays),
                                                        std::move(facets), std::move(skin)});
-}
-
-absl::Status NoSuchMesh() {
-  return WithReason(absl::NotFoundError("the server does not have this mesh; upload it"),
-                    ErrorReason::kMeshNotFound);
 }
 
 }  // namespace
@@ -197,31 +193,44 @@ absl::Status MeshCatalog::Remove(const std::string& sha256) {
 
 absl::Status MeshCatalog::FinishRemoval(const std::string& sha256) {
   // From the store first: what fails there is still known.
-  absl::Status status = store_ == nullptr ? NoSuchMesh() : store_->Delete(sha256);
+  const absl::Status status = store_ == nullptr ? NoSuchMesh() : store_->Delete(sha256);
   std::shared_ptr<const StoredMesh> removed;  // destroyed after the lock is released
-  MutexLock lock(mutex_);
-  removing_.erase(sha256);
-  moved_.NotifyAll();
-  if (!status.ok() && !absl::IsNotFound(status)) return status;
-  const auto found = meshes_.find(sha256);
-  if (found == meshes_.end()) return status.ok() ? status : NoSuchMesh();
-  removed = std::move(found->second.mesh);
-  meshes_.erase(found);
-  return absl::OkStatus();
+  if (status.ok() || absl::IsNotFound(status)) {
+    MutexLock lock(mutex_);
+    if (const auto found = meshes_.find(sha256); found != meshes_.end()) {
+      removed = std::move(found->second.mesh);
+      meshes_.erase(found);
+    }
+  }
+  const bool is_gone = status.ok() || removed != nullptr;
+  // Before it may arrive again.
+  if (is_gone) on_removed_(sha256);
+  {
+    MutexLock lock(mutex_);
+    removing_.erase(sha256);
+    moved_.NotifyAll();
+  }
+  if (is_gone) return absl::OkStatus();
+  return absl::IsNotFound(status) ? NoSuchMesh() : status;
 }
 
 int MeshCatalog::RemoveIdle(Clock::Duration idle) {
   std::vector<std::shared_ptr<const StoredMesh>> removed;  // destroyed after the lock is released
-  MutexLock lock(mutex_);
-  const Clock::TimePoint cutoff = clock_->Now() - idle;
-  for (auto entry = meshes_.begin(); entry != meshes_.end();) {
-    // New users come through this map alone: with one reference nobody can gain another now.
-    if (entry->second.mesh.use_count() == 1 && entry->second.last_used <= cutoff) {
-      removed.push_back(std::move(entry->second.mesh));
-      entry = meshes_.erase(entry);
-    } else {
-      ++entry;
+  {
+    MutexLock lock(mutex_);
+    const Clock::TimePoint cutoff = clock_->Now() - idle;
+    for (auto entry = meshes_.begin(); entry != meshes_.end();) {
+      // New users come through this map alone: with one reference nobody can gain another now.
+      if (entry->second.mesh.use_count() == 1 && entry->second.last_used <= cutoff) {
+        removed.push_back(std::move(entry->second.mesh));
+        entry = meshes_.erase(entry);
+      } else {
+        ++entry;
+      }
     }
+  }
+  if (store_ == nullptr) {
+    for (const auto& mesh : removed) on_removed_(mesh->sha256);
   }
   return static_cast<int>(removed.size());
 }

@@ -8,6 +8,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -61,6 +62,12 @@ class MeshCatalog {
   // `clock` the catalog.
   MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget, MeshStore* store = nullptr,
               const Clock* clock = Clock::System(), UnixClock unix_clock = SystemUnixSeconds);
+
+  // Told of every mesh that is not there any more, from any thread, without a lock held. It may not
+  // block. Call it before anything else.
+  void set_on_removed(std::function<void(const std::string& sha256)> on_removed) {
+    on_removed_ = std::move(on_removed);
+  }
 
   // Where meshes take their memory from, and what is made of them should, too.
   MemoryBudget* budget() const { return budget_; }
@@ -135,6 +142,7 @@ class MeshCatalog {
   MeshStore* const store_;
   const Clock* const clock_;
   const UnixClock unix_clock_;
+  std::function<void(const std::string&)> on_removed_ = [](const std::string& /*sha256*/) {};
 
   mutable Mutex mutex_;
   std::map<std::string, Entry, std::less<>> meshes_ ABSL_GUARDED_BY(mutex_);

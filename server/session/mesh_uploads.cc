@@ -10,6 +10,7 @@
 
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
+#include "server/store/store_errors.h"
 
 namespace tissueform {
 namespace {
@@ -30,17 +31,17 @@ MeshUpload::MeshUpload(MeshUploads* uploads, UploadAnnouncement announced)
 
 MeshUpload::~MeshUpload() {
   UploadStore& store = *uploads_->store_;
-  const absl::StatusOr<int64_t> committed = store.Committed(announced_.sha256);
+  const absl::StatusOr<int64_t> committed = store.Committed(PartName(announced_));
   // Many of them would fill all places with nothing.
-  if (committed.ok() && *committed == 0) store.Drop(announced_.sha256).IgnoreError();
+  if (committed.ok() && *committed == 0) store.Drop(PartName(announced_)).IgnoreError();
   if (!committed.ok() && !absl::IsNotFound(committed.status())) {
     spdlog::warn("an upload begins anew when it goes on: {}", committed.status().ToString());
   }
-  uploads_->Release(announced_.sha256);
+  uploads_->Release(PartName(announced_));
 }
 
 absl::Status MeshUpload::BeginAnew() {
-  TF_RETURN_IF_ERROR(uploads_->store_->Drop(announced_.sha256));
+  TF_RETURN_IF_ERROR(uploads_->store_->Drop(PartName(announced_)));
   TF_ASSIGN_OR_RETURN(received_bytes_, uploads_->store_->Begin(announced_));
   return absl::OkStatus();
 }
@@ -62,7 +63,7 @@ absl::Status MeshUpload::Write(int64_t offset, absl::string_view data, bool last
   }
   if (anew) TF_RETURN_IF_ERROR(BeginAnew());
   first_ = false;
-  if (size > 0) TF_RETURN_IF_ERROR(uploads_->store_->Append(announced_.sha256, offset, data));
+  if (size > 0) TF_RETURN_IF_ERROR(uploads_->store_->Append(PartName(announced_), offset, data));
   received_bytes_ += size;
   if (last && received_bytes_ != total_bytes) {
     return absl::InvalidArgumentError(absl::StrCat("finish_write after ", received_bytes_, " of ",
@@ -73,11 +74,11 @@ absl::Status MeshUpload::Write(int64_t offset, absl::string_view data, bool last
 
 absl::StatusOr<std::shared_ptr<const StoredMesh>> MeshUpload::Finish() {
   UploadStore& store = *uploads_->store_;
-  auto stored = uploads_->catalog_->Admit(announced_,
-                                          [&store, this] { return store.Read(announced_.sha256); });
+  auto stored = uploads_->catalog_->Admit(
+      announced_, [&store, this] { return store.Read(PartName(announced_)); });
   const absl::Status& status = stored.status();
   if (status.ok() || absl::IsDataLoss(status) || absl::IsInvalidArgument(status)) {
-    if (const absl::Status dropped = store.Drop(announced_.sha256); !dropped.ok()) {
+    if (const absl::Status dropped = store.Drop(PartName(announced_)); !dropped.ok()) {
       spdlog::warn("the part of an upload stays for a day: {}", dropped.ToString());
     }
   }
@@ -86,21 +87,26 @@ absl::StatusOr<std::shared_ptr<const StoredMesh>> MeshUpload::Finish() {
 
 absl::StatusOr<std::unique_ptr<MeshUpload>> MeshUploads::Open(UploadAnnouncement announced) {
   TF_RETURN_IF_ERROR(catalog_->Check(announced));
-  TF_RETURN_IF_ERROR(Claim(announced.sha256));
+  TF_RETURN_IF_ERROR(Claim(PartName(announced)));
   std::unique_ptr<MeshUpload> upload(new MeshUpload(this, std::move(announced)));
   TF_ASSIGN_OR_RETURN(upload->received_bytes_, store_->Begin(upload->announced_));
   return upload;
 }
 
-absl::StatusOr<UploadProgress> MeshUploads::Query(const std::string& sha256) {
-  TF_ASSIGN_OR_RETURN(const int64_t committed_bytes, store_->Committed(sha256));
-  TF_ASSIGN_OR_RETURN(const UploadAnnouncement announced, store_->Announced(sha256));
-  return UploadProgress{committed_bytes, announced.total_bytes};
+absl::StatusOr<UploadProgress> MeshUploads::Query(const std::string& sha256,
+                                                  const std::string& owner) {
+  const std::string part =
+      PartName({.shape = {}, .total_bytes = 0, .sha256 = sha256, .owner = owner});
+  const absl::StatusOr<UploadAnnouncement> announced = store_->Announced(part);
+  if (absl::IsNotFound(announced.status())) return NoUpload(sha256);
+  TF_RETURN_IF_ERROR(announced.status());
+  TF_ASSIGN_OR_RETURN(const int64_t committed_bytes, store_->Committed(part));
+  return UploadProgress{committed_bytes, announced->total_bytes};
 }
 
-absl::Status MeshUploads::Claim(const std::string& sha256) {
+absl::Status MeshUploads::Claim(const std::string& part_name) {
   MutexLock lock(mutex_);
-  if (!claimed_.insert(sha256).second) {
+  if (!claimed_.insert(part_name).second) {
     return WithReason(
         absl::AbortedError("another client is sending this mesh; wait until it is done, or goes"),
         ErrorReason::kUploadUnderWay);
@@ -108,9 +114,9 @@ absl::Status MeshUploads::Claim(const std::string& sha256) {
   return absl::OkStatus();
 }
 
-void MeshUploads::Release(const std::string& sha256) {
+void MeshUploads::Release(const std::string& part_name) {
   MutexLock lock(mutex_);
-  claimed_.erase(sha256);
+  claimed_.erase(part_name);
 }
 
 }  // namespace tissueform

@@ -66,7 +66,8 @@ class MeshUpload {
 };
 
 // Meshes on their way to the catalog: on the disk (UploadStore), without memory of their size until
-// they are whole. One upload of a mesh at a time: a second one is refused, and no bytes mix.
+// they are whole. One upload of a mesh by one owner at a time: a second one is refused, and no
+// bytes mix.
 //
 // Thread-safe.
 class MeshUploads {
@@ -82,15 +83,15 @@ class MeshUploads {
   // this mesh.
   absl::StatusOr<std::unique_ptr<MeshUpload>> Open(UploadAnnouncement announced);
 
-  // How much is on the disk and will be there after a crash. Blocks on the disk. Errors: NotFound,
-  // those of UploadStore::Committed.
-  absl::StatusOr<UploadProgress> Query(const std::string& sha256);
+  // How much of what this owner sends is on the disk and will be there after a crash. Blocks on the
+  // disk. Errors: NotFound, those of UploadStore::Committed.
+  absl::StatusOr<UploadProgress> Query(const std::string& sha256, const std::string& owner = "");
 
  private:
   friend class MeshUpload;
 
-  absl::Status Claim(const std::string& sha256);
-  void Release(const std::string& sha256);
+  absl::Status Claim(const std::string& part_name);
+  void Release(const std::string& part_name);
 
   // Constant.
   const ServiceLimits limits_;
@@ -98,7 +99,7 @@ class MeshUploads {
   UploadStore* const store_;
 
   Mutex mutex_;
-  std::set<std::string> claimed_ ABSL_GUARDED_BY(mutex_);  // digests of open uploads
+  std::set<std::string> claimed_ ABSL_GUARDED_BY(mutex_);  // parts of open uploads
 };
 
 }  // namespace tissueform

@@ -85,9 +85,11 @@ void SessionMakings::MakeRoom() {
 
 SessionMakings::Admission SessionMakings::AdmitCreate(const SessionRecord& record,
                                                       const SessionWaiter& waiter) {
-  const RequestKey key{record.request_id, record.request_fingerprint};
+  const RequestKey key = RequestKeyOf(record);
   Admission admission;
-  if (!key.request_id.empty() && JoinEarlierRequest(key, waiter, &admission)) return admission;
+  if (!key.request_id.empty() && JoinEarlierRequest(key, waiter, &admission)) {
+    return admission;
+  }
   if (sessions_->table.Find(record.id) != nullptr ||
       sessions_->table.FindMaking(record.id) != nullptr) {
     admission.refusal = TakenId(record.id);
@@ -132,7 +134,7 @@ bool SessionMakings::JoinEarlierRequest(const RequestKey& key, const SessionWait
       known == nullptr ? sessions_->table.FindMakingOfRequest(key.request_id) : nullptr;
   if (known == nullptr && making == nullptr) return false;
   if ((known != nullptr ? known->key : making->key).fingerprint != key.fingerprint) {
-    admission->refusal = OtherRequest(key.request_id);
+    admission->refusal = OtherRequest(key.request_id.substr(key.request_id.find('\n') + 1));
   } else if (known != nullptr) {
     SessionWaiter claimant = waiter;
     claimant.claims = true;

@@ -45,6 +45,11 @@ absl::Status MeshInUse(int sessions) {
                     ErrorReason::kMeshInUse, {{"sessions", absl::StrCat(sessions)}});
 }
 
+absl::Status NoSuchMesh() {
+  return WithReason(absl::NotFoundError("the server does not have this mesh; upload it"),
+                    ErrorReason::kMeshNotFound);
+}
+
 absl::Status NoMeshAnyMore() {
   return WithReason(absl::NotFoundError("the mesh was deleted meanwhile; upload it"),
                     ErrorReason::kMeshNotFound);

@@ -16,6 +16,7 @@ absl::Status OtherRequest(const std::string& request_id);  // InvalidArgument: i
 absl::Status TakenId(const std::string& id);               // AlreadyExists
 absl::Status EndingId(const std::string& id);              // Unavailable: it is being deleted
 absl::Status MeshInUse(int sessions);                      // FailedPrecondition
+absl::Status NoSuchMesh();                                 // NotFound
 absl::Status NoMeshAnyMore();                              // NotFound: it was deleted meanwhile
 // ResourceExhausted: what the server does with so many ("keeps"), and what helps.
 absl::Status TooManySessions(int limit, absl::string_view what, absl::string_view remedy);

@@ -51,7 +51,7 @@ absl::Status SessionRegistry::LearnKnown() {
     MutexLock lock(sessions_.mutex);
     for (SessionRecord& record : page.records) {
       KnownSession known;
-      known.key = {std::move(record.request_id), std::move(record.request_fingerprint)};
+      known.key = RequestKeyOf(record);
       known.mesh_sha256 = std::move(record.mesh_sha256);
       known.last_used = clock_->Now();
       sessions_.table.Add(record.id, std::move(known));
@@ -177,6 +177,11 @@ SessionRegistry::Use SessionRegistry::UsedSince(Clock::TimePoint since) const {
 bool SessionRegistry::Knows(const std::string& id) const {
   MutexLock lock(sessions_.mutex);
   return sessions_.table.Find(id) != nullptr;
+}
+
+std::vector<std::shared_ptr<Session>> SessionRegistry::Loaded() const {
+  MutexLock lock(sessions_.mutex);
+  return sessions_.table.Loaded();
 }
 
 int SessionRegistry::size() const {

@@ -159,6 +159,7 @@ class SessionRegistry {
   void Stop() { maker_.Stop(); }
 
   // In memory.
+  std::vector<std::shared_ptr<Session>> Loaded() const;
   int size() const;
   // In memory or not.
   int CountKnown() const;

@@ -149,6 +149,14 @@ int SessionTable::CountMadeFrom(const std::string& mesh_sha256) const {
   return static_cast<int>(known + new_ones + ending);
 }
 
+std::vector<std::shared_ptr<Session>> SessionTable::Loaded() const {
+  std::vector<std::shared_ptr<Session>> loaded;
+  for (const auto& [id, known] : known_) {
+    if (known.session != nullptr) loaded.push_back(known.session);
+  }
+  return loaded;
+}
+
 size_t SessionTable::num_loaded_in_table() const {
   return static_cast<size_t>(std::count_if(known_.begin(), known_.end(), [](const auto& entry) {
     return entry.second.session != nullptr;

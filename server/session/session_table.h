@@ -18,6 +18,7 @@
 #include "server/session/clock.h"
 #include "server/session/session.h"
 #include "server/session/session_progress.h"
+#include "server/store/session_record.h"
 
 namespace tissueform {
 
@@ -27,6 +28,13 @@ struct RequestKey {
   std::string request_id;  // empty: none
   std::string fingerprint;
 };
+// Whose request ids are apart from everybody else's.
+inline RequestKey RequestKeyOf(const SessionRecord& record) {
+  if (record.request_id.empty() || record.owner.empty()) {
+    return {record.request_id, record.request_fingerprint};
+  }
+  return {record.owner + "\n" + record.request_id, record.request_fingerprint};
+}
 
 // Somebody who waits for a session.
 struct SessionWaiter {
@@ -127,6 +135,7 @@ class SessionTable {
   size_t num_loaded() const { return num_loaded_in_table() + makings_.size(); }
   size_t num_known() const { return known_.size(); }
   size_t num_loaded_in_table() const;
+  std::vector<std::shared_ptr<Session>> Loaded() const;
 
  private:
   bool IsInUse(const std::string& id, const KnownSession& known, Clock::TimePoint since) const;

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -19,14 +20,25 @@
 
 namespace tissueform {
 
+// What a case is found by: everybody who has sent a file has a case of it.
+struct CaseKey {
+  std::string sha256 = {};
+  std::string owner = {};
+
+  friend auto operator<=>(const CaseKey&, const CaseKey&) = default;
+};
+
 // What is known of a case without reading it.
 struct CaseRecord {
   std::string sha256 = {};  // of the file
   std::string owner = {};
+  std::string project = {};  // empty: none
   std::string title = {};
   int64_t total_bytes = 0;
   int64_t created_s = 0;    // unix seconds
   int64_t last_used_s = 0;  // never goes back
+
+  CaseKey key() const { return {.sha256 = sha256, .owner = owner}; }
 };
 
 // InvalidArgument for a record that no store keeps: no SHA-256, or a size that is not positive.
@@ -95,8 +107,8 @@ class CaseReader {
   Sha256 digest_;
 };
 
-// Where cases are kept: files that nobody here looks into, named by their SHA-256. They never
-// change.
+// Where cases are kept: files that nobody here looks into, named by their SHA-256, one case for
+// each of their owners. They never change.
 //
 // Calls block; durable when answered; thread-safe: as MeshStore. Writers and readers must not
 // outlive their store.
@@ -104,11 +116,12 @@ class CaseStore {
  public:
   struct ListRequest {
     std::optional<std::string> owner = {};  // of this one only; unset: of all
+    std::set<CaseKey> also = {};            // of others, where an owner is set
     std::string after = {};                 // names greater than this
     int limit = 100;                        // at least 1
   };
   struct Page {
-    std::vector<CaseRecord> records;  // by sha256, rising
+    std::vector<CaseRecord> records;  // by key, rising
     std::string next;                 // give it as `after`; empty: that was all
   };
 
@@ -119,25 +132,27 @@ class CaseStore {
   virtual absl::StatusOr<std::unique_ptr<CaseWriter>> Begin(CaseRecord record, int most) = 0;
 
   // Errors: NotFound.
-  virtual absl::StatusOr<CaseRecord> Find(const std::string& sha256) = 0;
+  virtual absl::StatusOr<CaseRecord> Find(const CaseKey& key) = 0;
 
   // Opens a case, which is a use of it. Errors: NotFound, DataLoss (set aside), or what the disk
   // says.
-  virtual absl::StatusOr<std::unique_ptr<CaseReader>> Open(const std::string& sha256,
-                                                           int64_t now_s) = 0;
+  virtual absl::StatusOr<std::unique_ptr<CaseReader>> Open(const CaseKey& key, int64_t now_s) = 0;
 
-  // Errors: InvalidArgument (limit).
+  // One case a name, where no name is both the owner's and in `also`, or there twice; else those of
+  // one name may be parted by the end of a page. Errors: InvalidArgument (limit).
   virtual absl::StatusOr<Page> List(const ListRequest& request) = 0;
 
   // Errors: NotFound.
-  virtual absl::Status Delete(const std::string& sha256) = 0;
+  virtual absl::Status Delete(const CaseKey& key) = 0;
 
   // last_used_s rises to it. Those that are not there are passed over.
-  virtual absl::Status Touch(const std::string& sha256, int64_t now_s) = 0;
+  virtual absl::Status Touch(const CaseKey& key, int64_t now_s) = 0;
 
-  // Deletes those that nobody has used since then, but `spared`; at most `most`. Returns how many.
-  virtual absl::StatusOr<int> RemoveUnused(int64_t before_s, const std::set<std::string>& spared,
-                                           int most) = 0;
+  // Deletes those that nobody has used since then, but the names in `spared`; at most `most`.
+  // Returns them.
+  virtual absl::StatusOr<std::vector<CaseKey>> RemoveUnused(int64_t before_s,
+                                                            const std::set<std::string>& spared,
+                                                            int most) = 0;
 };
 
 }  // namespace tissueform

@@ -220,13 +220,15 @@ absl::StatusOr<PredictionStore::Page> DurablePredictionStore::List(const ListReq
   return Ask<Page>(thread_, [&](Database& database) {
     Database::Query query =
         database.Prepare(TF_SELECT_PREDICTIONS
-                         "WHERE id > ? AND (? OR owner = ?) AND (? OR session = ?) AND (? OR "
-                         "case_sha256 = ?) ORDER BY id");
+                         "WHERE id > ? AND (? OR owner = ? OR id IN (SELECT value FROM "
+                         "json_each(?))) AND (? OR session = ?) AND (? OR case_sha256 = ?) ORDER "
+                         "BY id");
+    const std::string also = NamesInJson(request.also);
     const std::string owner = request.owner.value_or("");
     const std::string session = request.session.value_or("");
     const std::string case_sha256 = request.case_sha256.value_or("");
     query.Bind(request.after);
-    query.Bind(int64_t{!request.owner.has_value()}).Bind(owner);
+    query.Bind(int64_t{!request.owner.has_value()}).Bind(owner).Bind(also);
     query.Bind(int64_t{!request.session.has_value()}).Bind(session);
     query.Bind(int64_t{!request.case_sha256.has_value()}).Bind(case_sha256);
     return ReadPage<Page>(&query, request.limit, ReadPredictionRecord,

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
@@ -17,17 +19,19 @@
 namespace tissueform {
 namespace {
 
-absl::StatusOr<CaseRecord> FindCase(Database& database, const std::string& sha256) {
-  Database::Query query = database.Prepare(TF_SELECT_CASES "WHERE sha256 = ?");
-  TF_ASSIGN_OR_RETURN(const bool found, query.Bind(sha256).Step());
-  if (!found) return NoCase(sha256);
+absl::StatusOr<CaseRecord> FindCase(Database& database, const CaseKey& key) {
+  Database::Query query = database.Prepare(TF_SELECT_CASES "WHERE sha256 = ? AND owner = ?");
+  TF_ASSIGN_OR_RETURN(const bool found, query.Bind(key.sha256).Bind(key.owner).Step());
+  if (!found) return NoCase(key.sha256);
   return ReadCaseRow(query);
 }
 
-absl::Status TouchCase(Database& database, const std::string& sha256, int64_t now_s) {
-  return database.Prepare("UPDATE cases SET last_used_s = max(last_used_s, ?) WHERE sha256 = ?")
+absl::Status TouchCase(Database& database, const CaseKey& key, int64_t now_s) {
+  return database
+      .Prepare("UPDATE cases SET last_used_s = max(last_used_s, ?) WHERE sha256 = ? AND owner = ?")
       .Bind(now_s)
-      .Bind(sha256)
+      .Bind(key.sha256)
+      .Bind(key.owner)
       .Run();
 }
 
@@ -37,17 +41,20 @@ absl::Status CheckRoom(Database& database, int most) {
   return query.Integer(0) < most ? absl::OkStatus() : TooManyCases(most);
 }
 
-absl::Status DeleteCaseRow(Database& database, const std::string& sha256) {
+absl::Status DeleteCaseRow(Database& database, const CaseKey& key) {
   const int64_t before = database.total_changes();
-  TF_RETURN_IF_ERROR(database.Prepare("DELETE FROM cases WHERE sha256 = ?").Bind(sha256).Run());
-  return database.total_changes() > before ? absl::OkStatus() : NoCase(sha256);
+  TF_RETURN_IF_ERROR(database.Prepare("DELETE FROM cases WHERE sha256 = ? AND owner = ?")
+                         .Bind(key.sha256)
+                         .Bind(key.owner)
+                         .Run());
+  return database.total_changes() > before ? absl::OkStatus() : NoCase(key.sha256);
 }
 
 // The row as it is then: of one that was there only last_used_s rises.
 absl::StatusOr<CaseRecord> KeepCaseRow(Database& database, const CaseRecord& record, int most) {
-  if (FindCase(database, record.sha256).ok()) {
-    TF_RETURN_IF_ERROR(TouchCase(database, record.sha256, record.last_used_s));
-    return FindCase(database, record.sha256);
+  if (FindCase(database, record.key()).ok()) {
+    TF_RETURN_IF_ERROR(TouchCase(database, record.key(), record.last_used_s));
+    return FindCase(database, record.key());
   }
   TF_RETURN_IF_ERROR(CheckRoom(database, most));
   const std::string bytes = Seal(SerializeCaseRecord(record));
@@ -61,6 +68,15 @@ absl::StatusOr<CaseRecord> KeepCaseRow(Database& database, const CaseRecord& rec
                          .Bind(record.last_used_s)
                          .Run());
   return record;
+}
+
+// As SQL puts a key into words.
+std::string KeysOf(const std::set<CaseKey>& keys) {
+  std::set<std::string> words;
+  for (const CaseKey& key : keys) {
+    words.insert(key.sha256 + absl::AsciiStrToUpper(absl::BytesToHexString(key.owner)));
+  }
+  return NamesInJson(words);
 }
 
 class DurableCaseWriter final : public CaseWriter {
@@ -127,21 +143,22 @@ absl::StatusOr<std::unique_ptr<CaseWriter>> DurableCaseStore::Begin(CaseRecord r
                                              std::move(file));
 }
 
-absl::StatusOr<CaseRecord> DurableCaseStore::Find(const std::string& sha256) {
-  return Ask<CaseRecord>(thread_, [&](Database& database) { return FindCase(database, sha256); });
+absl::StatusOr<CaseRecord> DurableCaseStore::Find(const CaseKey& key) {
+  return Ask<CaseRecord>(thread_, [&](Database& database) { return FindCase(database, key); });
 }
 
-absl::StatusOr<std::unique_ptr<CaseReader>> DurableCaseStore::Open(const std::string& sha256,
+absl::StatusOr<std::unique_ptr<CaseReader>> DurableCaseStore::Open(const CaseKey& key,
                                                                    int64_t now_s) {
+  const std::string& sha256 = key.sha256;
   absl::Status damage = Damaged(absl::StrCat("case ", sha256), "its file is gone");
   for (int attempt = 0; attempt < kReadAttempts; ++attempt) {
-    TF_ASSIGN_OR_RETURN(const CaseRecord record, Find(sha256));
+    TF_ASSIGN_OR_RETURN(const CaseRecord record, Find(key));
     absl::StatusOr<OpenFile> file = blobs_->OpenBlob(sha256);
     if (absl::IsNotFound(file.status())) continue;
     TF_RETURN_IF_ERROR(file.status());
     const absl::Status size = CheckBlobSize(*blobs_, sha256, record.total_bytes);
     if (absl::IsDataLoss(size)) return SetBlobAside(thread_, blobs_, sha256, size);
-    TF_RETURN_IF_ERROR(Touch(sha256, now_s));
+    TF_RETURN_IF_ERROR(Touch(key, now_s));
     return std::make_unique<DurableCaseReader>(record, thread_, blobs_, *std::move(file));
   }
   return SetBlobAside(thread_, blobs_, sha256, damage);
@@ -151,55 +168,59 @@ absl::StatusOr<CaseStore::Page> DurableCaseStore::List(const ListRequest& reques
   if (request.limit < 1) return BadLimit(request.limit);
   return Ask<Page>(thread_, [&](Database& database) {
     Database::Query query =
-        database.Prepare(TF_SELECT_CASES "WHERE sha256 > ? AND (? OR owner = ?) ORDER BY sha256");
+        database.Prepare(TF_SELECT_CASES
+                         "WHERE sha256 > ? AND (? OR owner = ? OR sha256 || hex(owner) IN (SELECT "
+                         "value FROM json_each(?))) ORDER BY sha256, owner");
     const std::string owner = request.owner.value_or("");
-    query.Bind(request.after).Bind(int64_t{!request.owner.has_value()}).Bind(owner);
+    const std::string also = KeysOf(request.also);
+    query.Bind(request.after).Bind(int64_t{!request.owner.has_value()}).Bind(owner).Bind(also);
     return ReadPage<Page>(&query, request.limit, ReadCaseRow,
                           [](const CaseRecord& record) { return record.sha256; });
   });
 }
 
-absl::Status DurableCaseStore::Delete(const std::string& sha256) {
+absl::Status DurableCaseStore::Delete(const CaseKey& key) {
   return thread_->Run(
-      {.work = [&](Database& database) { return DeleteCaseRow(database, sha256); },
-       .after = [&](Database& database) { return RemoveUnclaimed(database, *blobs_, sha256); },
+      {.work = [&](Database& database) { return DeleteCaseRow(database, key); },
+       .after = [&](Database& database) { return RemoveUnclaimed(database, *blobs_, key.sha256); },
        .erases = true});
 }
 
-absl::Status DurableCaseStore::Touch(const std::string& sha256, int64_t now_s) {
+absl::Status DurableCaseStore::Touch(const CaseKey& key, int64_t now_s) {
   return thread_->Run(
-      {.work = [&](Database& database) { return TouchCase(database, sha256, now_s); }});
+      {.work = [&](Database& database) { return TouchCase(database, key, now_s); }});
 }
 
-absl::StatusOr<int> DurableCaseStore::RemoveUnused(int64_t before_s,
-                                                   const std::set<std::string>& spared, int most) {
-  std::vector<std::string> removed;
+absl::StatusOr<std::vector<CaseKey>> DurableCaseStore::RemoveUnused(
+    int64_t before_s, const std::set<std::string>& spared, int most) {
+  std::vector<CaseKey> removed;
   const auto remove_rows = [&](Database& database) -> absl::Status {
     removed.clear();
     {
       Database::Query query = database.Prepare(
-          "SELECT sha256 FROM cases WHERE last_used_s < ? ORDER BY last_used_s, sha256");
+          "SELECT sha256, owner FROM cases WHERE last_used_s < ? ORDER BY last_used_s, sha256, "
+          "owner");
       query.Bind(before_s);
       while (removed.size() < static_cast<size_t>(most)) {
         TF_ASSIGN_OR_RETURN(const bool row, query.Step());
         if (!row) break;
-        std::string sha256(query.Text(0));
-        if (!spared.contains(sha256)) removed.push_back(std::move(sha256));
+        CaseKey key{.sha256 = std::string(query.Text(0)), .owner = std::string(query.Text(1))};
+        if (!spared.contains(key.sha256)) removed.push_back(std::move(key));
       }
     }
-    for (const std::string& sha256 : removed) {
-      TF_RETURN_IF_ERROR(DeleteCaseRow(database, sha256));
+    for (const CaseKey& key : removed) {
+      TF_RETURN_IF_ERROR(DeleteCaseRow(database, key));
     }
     return absl::OkStatus();
   };
   const auto remove_files = [&](Database& database) -> absl::Status {
-    for (const std::string& sha256 : removed) {
-      TF_RETURN_IF_ERROR(RemoveUnclaimed(database, *blobs_, sha256));
+    for (const CaseKey& key : removed) {
+      TF_RETURN_IF_ERROR(RemoveUnclaimed(database, *blobs_, key.sha256));
     }
     return absl::OkStatus();
   };
   TF_RETURN_IF_ERROR(thread_->Run({.work = remove_rows, .after = remove_files, .erases = true}));
-  return static_cast<int>(removed.size());
+  return removed;
 }
 
 }  // namespace tissueform

@@ -7,6 +7,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -24,14 +25,14 @@ class DurableCaseStore final : public CaseStore {
   DurableCaseStore(CommitThread* thread, BlobStore* blobs) : thread_(thread), blobs_(blobs) {}
 
   absl::StatusOr<std::unique_ptr<CaseWriter>> Begin(CaseRecord record, int most) override;
-  absl::StatusOr<CaseRecord> Find(const std::string& sha256) override;
-  absl::StatusOr<std::unique_ptr<CaseReader>> Open(const std::string& sha256,
-                                                   int64_t now_s) override;
+  absl::StatusOr<CaseRecord> Find(const CaseKey& key) override;
+  absl::StatusOr<std::unique_ptr<CaseReader>> Open(const CaseKey& key, int64_t now_s) override;
   absl::StatusOr<Page> List(const ListRequest& request) override;
-  absl::Status Delete(const std::string& sha256) override;
-  absl::Status Touch(const std::string& sha256, int64_t now_s) override;
-  absl::StatusOr<int> RemoveUnused(int64_t before_s, const std::set<std::string>& spared,
-                                   int most) override;
+  absl::Status Delete(const CaseKey& key) override;
+  absl::Status Touch(const CaseKey& key, int64_t now_s) override;
+  absl::StatusOr<std::vector<CaseKey>> RemoveUnused(int64_t before_s,
+                                                    const std::set<std::string>& spared,
+                                                    int most) override;
 
  private:
   CommitThread* const thread_;

@@ -218,11 +218,15 @@ void DurableSessionStore::List(const ListRequest& request, PageCallback done) {
   Submit<Page>(
       [request](Database& database) {
         Database::Query query =
-            database.Prepare(TF_SELECT_SESSIONS "WHERE id > ? AND (? OR owner = ?) ORDER BY id");
+            database.Prepare(TF_SELECT_SESSIONS
+                             "WHERE id > ? AND (? OR owner = ? OR id IN (SELECT value FROM "
+                             "json_each(?))) ORDER BY id");
         query.Bind(request.after);
         query.Bind(int64_t{!request.owner.has_value()});
         const std::string owner = request.owner.value_or("");
         query.Bind(owner);
+        const std::string also = NamesInJson(request.also);
+        query.Bind(also);
         return ReadPage(&query, request.limit);
       },
       std::move(done));

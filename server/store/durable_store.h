@@ -56,6 +56,7 @@ class DurableStore final : public Stores {
   CaseStore& cases() override;
   const DurationHistogram* latency() const override;
   std::string folder() const override;
+  CommitThread* commit_thread() override;
 
   const std::vector<DamagedItem>& damaged() const;
 

@@ -75,14 +75,14 @@ void InMemoryCaseStore::Release(int64_t bytes) {
 absl::StatusOr<CaseRecord> InMemoryCaseStore::Keep(const CaseRecord& record,
                                                    const absl::Cord& bytes, int most, bool* taken) {
   MutexLock lock(mutex_);
-  const auto found = cases_.find(record.sha256);
+  const auto found = cases_.find(record.key());
   if (found != cases_.end()) {
     int64_t& last_used_s = found->second.record.last_used_s;
     last_used_s = std::max(last_used_s, record.last_used_s);
     return found->second.record;
   }
   if (cases_.size() >= static_cast<size_t>(most)) return TooManyCases(most);
-  cases_.emplace(record.sha256, Case{record, bytes});
+  cases_.emplace(record.key(), Case{record, bytes});
   *taken = true;
   return record;
 }
@@ -94,19 +94,19 @@ absl::StatusOr<std::unique_ptr<CaseWriter>> InMemoryCaseStore::Begin(CaseRecord 
   return std::make_unique<Writer>(std::move(record), most, this);
 }
 
-absl::StatusOr<CaseRecord> InMemoryCaseStore::Find(const std::string& sha256) {
+absl::StatusOr<CaseRecord> InMemoryCaseStore::Find(const CaseKey& key) {
   MutexLock lock(mutex_);
-  const auto found = cases_.find(sha256);
-  if (found == cases_.end()) return NoCase(sha256);
+  const auto found = cases_.find(key);
+  if (found == cases_.end()) return NoCase(key.sha256);
   return found->second.record;
 }
 
-absl::StatusOr<std::unique_ptr<CaseReader>> InMemoryCaseStore::Open(const std::string& sha256,
+absl::StatusOr<std::unique_ptr<CaseReader>> InMemoryCaseStore::Open(const CaseKey& key,
                                                                     int64_t now_s) {
-  TF_RETURN_IF_ERROR(Touch(sha256, now_s));
+  TF_RETURN_IF_ERROR(Touch(key, now_s));
   MutexLock lock(mutex_);
-  const auto found = cases_.find(sha256);
-  if (found == cases_.end()) return NoCase(sha256);
+  const auto found = cases_.find(key);
+  if (found == cases_.end()) return NoCase(key.sha256);
   return std::make_unique<Reader>(found->second);
 }
 
@@ -114,9 +114,12 @@ absl::StatusOr<CaseStore::Page> InMemoryCaseStore::List(const ListRequest& reque
   if (request.limit < 1) return BadLimit(request.limit);
   Page page;
   MutexLock lock(mutex_);
-  for (auto next = cases_.upper_bound(request.after); next != cases_.end(); ++next) {
+  for (auto next = cases_.lower_bound({.sha256 = request.after}); next != cases_.end(); ++next) {
     const CaseRecord& record = next->second.record;
-    if (request.owner.has_value() && record.owner != *request.owner) continue;
+    if (record.sha256 == request.after) continue;
+    const bool wanted = !request.owner.has_value() || record.owner == *request.owner ||
+                        request.also.contains(next->first);
+    if (!wanted) continue;
     if (page.records.size() == static_cast<size_t>(request.limit)) {
       page.next = page.records.back().sha256;
       break;
@@ -126,41 +129,43 @@ absl::StatusOr<CaseStore::Page> InMemoryCaseStore::List(const ListRequest& reque
   return page;
 }
 
-absl::Status InMemoryCaseStore::Delete(const std::string& sha256) {
+absl::Status InMemoryCaseStore::Delete(const CaseKey& key) {
   MutexLock lock(mutex_);
-  const auto found = cases_.find(sha256);
-  if (found == cases_.end()) return NoCase(sha256);
+  const auto found = cases_.find(key);
+  if (found == cases_.end()) return NoCase(key.sha256);
   bytes_ -= found->second.record.total_bytes;
   cases_.erase(found);
   return absl::OkStatus();
 }
 
-absl::Status InMemoryCaseStore::Touch(const std::string& sha256, int64_t now_s) {
+absl::Status InMemoryCaseStore::Touch(const CaseKey& key, int64_t now_s) {
   MutexLock lock(mutex_);
-  if (const auto found = cases_.find(sha256); found != cases_.end()) {
+  if (const auto found = cases_.find(key); found != cases_.end()) {
     int64_t& last_used_s = found->second.record.last_used_s;
     last_used_s = std::max(last_used_s, now_s);
   }
   return absl::OkStatus();
 }
 
-absl::StatusOr<int> InMemoryCaseStore::RemoveUnused(int64_t before_s,
-                                                    const std::set<std::string>& spared, int most) {
+absl::StatusOr<std::vector<CaseKey>> InMemoryCaseStore::RemoveUnused(
+    int64_t before_s, const std::set<std::string>& spared, int most) {
   MutexLock lock(mutex_);
-  std::vector<std::pair<int64_t, std::string>> unused;
-  for (const auto& [sha256, kept] : cases_) {
-    if (kept.record.last_used_s < before_s && !spared.contains(sha256)) {
-      unused.emplace_back(kept.record.last_used_s, sha256);
+  std::vector<std::pair<int64_t, CaseKey>> unused;
+  for (const auto& [key, kept] : cases_) {
+    if (kept.record.last_used_s < before_s && !spared.contains(key.sha256)) {
+      unused.emplace_back(kept.record.last_used_s, key);
     }
   }
   std::sort(unused.begin(), unused.end());
   if (unused.size() > static_cast<size_t>(most)) unused.resize(static_cast<size_t>(most));
-  for (const auto& [last_used_s, sha256] : unused) {
-    const auto found = cases_.find(sha256);
+  std::vector<CaseKey> removed;
+  for (auto& [last_used_s, key] : unused) {
+    const auto found = cases_.find(key);
     bytes_ -= found->second.record.total_bytes;
     cases_.erase(found);
+    removed.push_back(std::move(key));
   }
-  return static_cast<int>(unused.size());
+  return removed;
 }
 
 }  // namespace tissueform

@@ -8,6 +8,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -30,14 +31,14 @@ class InMemoryCaseStore final : public CaseStore {
   explicit InMemoryCaseStore(int64_t most_bytes = kMostBytes) : most_bytes_(most_bytes) {}
 
   absl::StatusOr<std::unique_ptr<CaseWriter>> Begin(CaseRecord record, int most) override;
-  absl::StatusOr<CaseRecord> Find(const std::string& sha256) override;
-  absl::StatusOr<std::unique_ptr<CaseReader>> Open(const std::string& sha256,
-                                                   int64_t now_s) override;
+  absl::StatusOr<CaseRecord> Find(const CaseKey& key) override;
+  absl::StatusOr<std::unique_ptr<CaseReader>> Open(const CaseKey& key, int64_t now_s) override;
   absl::StatusOr<Page> List(const ListRequest& request) override;
-  absl::Status Delete(const std::string& sha256) override;
-  absl::Status Touch(const std::string& sha256, int64_t now_s) override;
-  absl::StatusOr<int> RemoveUnused(int64_t before_s, const std::set<std::string>& spared,
-                                   int most) override;
+  absl::Status Delete(const CaseKey& key) override;
+  absl::Status Touch(const CaseKey& key, int64_t now_s) override;
+  absl::StatusOr<std::vector<CaseKey>> RemoveUnused(int64_t before_s,
+                                                    const std::set<std::string>& spared,
+                                                    int most) override;
 
  private:
   class Writer;
@@ -56,7 +57,7 @@ class InMemoryCaseStore final : public CaseStore {
   const int64_t most_bytes_;
   Mutex mutex_;
   int64_t bytes_ ABSL_GUARDED_BY(mutex_) = 0;
-  std::map<std::string, Case> cases_ ABSL_GUARDED_BY(mutex_);
+  std::map<CaseKey, Case> cases_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace tissueform

@@ -96,7 +96,9 @@ void InMemorySessionStore::List(const ListRequest& request, PageCallback done) {
   {
     MutexLock lock(mutex_);
     for (auto next = records_.upper_bound(request.after); next != records_.end(); ++next) {
-      if (request.owner.has_value() && next->second.owner != *request.owner) continue;
+      const bool wanted = !request.owner.has_value() || next->second.owner == *request.owner ||
+                          request.also.contains(next->first);
+      if (!wanted) continue;
       if (page.records.size() == static_cast<size_t>(request.limit)) {
         page.next = page.records.back().id;
         break;

@@ -152,7 +152,9 @@ absl::StatusOr<PredictionStore::Page> InMemoryPredictionStore::List(const ListRe
   MutexLock lock(mutex_);
   for (auto next = predictions_.upper_bound(request.after); next != predictions_.end(); ++next) {
     const PredictionRecord& record = next->second.record;
-    if (request.owner.has_value() && record.owner != *request.owner) continue;
+    const bool visible = !request.owner.has_value() || record.owner == *request.owner ||
+                         request.also.contains(record.id);
+    if (!visible) continue;
     if (request.session.has_value() && record.session != *request.session) continue;
     if (request.case_sha256.has_value() && record.case_sha256 != *request.case_sha256) continue;
     if (page.records.size() == static_cast<size_t>(request.limit)) {

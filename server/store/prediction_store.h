@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,7 @@ class PredictionStore {
  public:
   struct ListRequest {
     std::optional<std::string> owner = {};        // of this one only; unset: of all
+    std::set<std::string> also = {};              // ids of others, where an owner is set
     std::optional<std::string> session = {};      // of this one only; unset: of all
     std::optional<std::string> case_sha256 = {};  // of this one only; unset: of all
     std::string after = {};                       // ids greater than this

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,7 @@ class SessionStore {
 
   struct ListRequest {
     std::optional<std::string> owner = {};  // of this one only; unset: of all
+    std::set<std::string> also = {};        // ids of others, where an owner is set
     std::string after = {};                 // ids greater than this
     int limit = 100;                        // at least 1
   };

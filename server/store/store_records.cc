@@ -76,13 +76,15 @@ std::string SerializeAnnouncement(const UploadAnnouncement& announcement) {
   proto.set_sha256(announcement.sha256);
   SetShape(announcement.shape, proto.mutable_shape());
   proto.set_total_bytes(announcement.total_bytes);
+  proto.set_owner(announcement.owner);
   return proto.SerializeAsString();
 }
 
 absl::StatusOr<UploadAnnouncement> ParseAnnouncement(absl::string_view bytes) {
   store::v1::UploadAnnouncement proto;
   if (!Parse(bytes, &proto)) return Damaged("an upload's announcement", "its bytes are none");
-  UploadAnnouncement announcement{ToShape(proto.shape()), proto.total_bytes(), proto.sha256()};
+  UploadAnnouncement announcement{ToShape(proto.shape()), proto.total_bytes(), proto.sha256(),
+                                  proto.owner()};
   if (const absl::Status status = CheckAnnouncement(announcement); !status.ok()) {
     return Damaged("an upload's announcement", status.message());
   }
@@ -131,6 +133,7 @@ std::string SerializeCaseRecord(const CaseRecord& record) {
   proto.set_title(record.title);
   proto.set_total_bytes(record.total_bytes);
   proto.set_created_s(record.created_s);
+  proto.set_project(record.project);
   return proto.SerializeAsString();
 }
 
@@ -139,6 +142,7 @@ absl::StatusOr<CaseRecord> ParseCaseRecord(absl::string_view bytes) {
   if (!Parse(bytes, &proto)) return Damaged("a case's record", "its bytes are none");
   CaseRecord record{.sha256 = proto.sha256(),
                     .owner = proto.owner(),
+                    .project = proto.project(),
                     .title = proto.title(),
                     .total_bytes = proto.total_bytes(),
                     .created_s = proto.created_s()};

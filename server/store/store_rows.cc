@@ -5,6 +5,9 @@
 
 #include <utility>
 
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+
 #include "core/base/status_macros.h"
 #include "server/store/store_errors.h"
 
@@ -69,6 +72,11 @@ absl::StatusOr<CaseRecord> ReadCaseRow(const Database::Query& row) {
   }
   record.last_used_s = row.Integer(4);
   return record;
+}
+
+std::string NamesInJson(const std::set<std::string>& names) {
+  if (names.empty()) return "[]";
+  return absl::StrCat("[\"", absl::StrJoin(names, "\",\""), "\"]");
 }
 
 absl::StatusOr<bool> IsClaimed(Database& database, const std::string& sha256) {

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <set>
 #include <string>
 
 #include "absl/status/status.h"
@@ -31,6 +32,9 @@ absl::StatusOr<SessionRecord> ReadSession(const Database::Query& row);
 absl::StatusOr<MeshRecord> ReadMesh(const Database::Query& row);
 absl::StatusOr<PredictionRow> ReadPrediction(const Database::Query& row);
 absl::StatusOr<CaseRecord> ReadCaseRow(const Database::Query& row);
+
+// A list of names for json_each. REQUIRES: they are letters, digits and "-".
+std::string NamesInJson(const std::set<std::string>& names);
 
 // Removes the blob when no row claims it.
 absl::Status RemoveUnclaimed(Database& database, BlobStore& blobs, const std::string& sha256);

@@ -40,6 +40,20 @@ constexpr char kVersion3[] =
     "CREATE TABLE cases (key INTEGER PRIMARY KEY, sha256 TEXT NOT NULL UNIQUE, "
     "owner TEXT NOT NULL, record BLOB NOT NULL, last_used_s INTEGER NOT NULL) STRICT;";
 
+// Everybody who has sent a file has a case of it.
+constexpr char kVersion4[] =
+    "CREATE TABLE owned_cases (key INTEGER PRIMARY KEY, sha256 TEXT NOT NULL, owner TEXT NOT NULL, "
+    "record BLOB NOT NULL, last_used_s INTEGER NOT NULL, UNIQUE (sha256, owner)) STRICT;"
+    "INSERT INTO owned_cases SELECT key, sha256, owner, record, last_used_s FROM cases;"
+    "DROP TABLE cases;"
+    "ALTER TABLE owned_cases RENAME TO cases;"
+    "CREATE TABLE shares (key INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, "
+    "record BLOB NOT NULL) STRICT;"
+    "CREATE TABLE follow_links (key INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, "
+    "record BLOB NOT NULL) STRICT;"
+    "CREATE TABLE mesh_rights (key INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, "
+    "record BLOB NOT NULL) STRICT;";
+
 absl::StatusOr<int64_t> Pragma(Database& database, const char* sql) {
   Database::Query query = database.Prepare(sql);
   TF_ASSIGN_OR_RETURN(const bool row, query.Step());
@@ -55,6 +69,7 @@ absl::Status Change(Database& database, int64_t version, int64_t now_s) {
                      ";", "UPDATE meshes SET last_used_s = ", now_s)));
   }
   if (version < 3) TF_RETURN_IF_ERROR(database.Execute(kVersion3));
+  if (version < 4) TF_RETURN_IF_ERROR(database.Execute(kVersion4));
   TF_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA application_id=", kApplicationId,
                                                    ";PRAGMA user_version=", kSchemaVersion)));
   TF_FAULT_POINT("schema.changed");
@@ -68,7 +83,7 @@ struct Table {
   int columns;
 };
 
-constexpr std::array<Table, 5> kTables = {{
+constexpr std::array<Table, 8> kTables = {{
     {"SELECT key, id, owner, record FROM sessions ORDER BY key",
      "SELECT key, id, owner, record FROM sessions ORDER BY key DESC",
      "INSERT OR IGNORE INTO sessions (key, id, owner, record) VALUES (?, ?, ?, ?)", 4},
@@ -94,6 +109,15 @@ constexpr std::array<Table, 5> kTables = {{
      "SELECT key, sha256, owner, record, last_used_s FROM cases ORDER BY key DESC",
      "INSERT OR IGNORE INTO cases (key, sha256, owner, record, last_used_s) VALUES (?, ?, ?, ?, ?)",
      5},
+    {"SELECT key, name, record FROM shares ORDER BY key",
+     "SELECT key, name, record FROM shares ORDER BY key DESC",
+     "INSERT OR IGNORE INTO shares (key, name, record) VALUES (?, ?, ?)", 3},
+    {"SELECT key, name, record FROM follow_links ORDER BY key",
+     "SELECT key, name, record FROM follow_links ORDER BY key DESC",
+     "INSERT OR IGNORE INTO follow_links (key, name, record) VALUES (?, ?, ?)", 3},
+    {"SELECT key, name, record FROM mesh_rights ORDER BY key",
+     "SELECT key, name, record FROM mesh_rights ORDER BY key DESC",
+     "INSERT OR IGNORE INTO mesh_rights (key, name, record) VALUES (?, ?, ?)", 3},
 }};
 
 // True at the end of the table, false at a page that cannot be read.

@@ -22,9 +22,12 @@ namespace tissueform {
 //   predictions     id, owner, session, case_sha256, record; the positions are the blob
 //                   positions_sha256
 //   cases           sha256, owner, record, last_used_s; the file is the blob sha256
+//   shares, follow_links, mesh_rights
+//                   name, record: who may do what (server/access_store)
 //
-// Version 1 had neither times nor predictions, version 2 no cases.
-inline constexpr int64_t kSchemaVersion = 3;
+// Version 1 had neither times nor predictions, version 2 no cases, version 3 one owner a case, and
+// nobody had a right.
+inline constexpr int64_t kSchemaVersion = 4;
 
 // The version of a database of ours; 0 for an empty one. Nothing is changed.
 //

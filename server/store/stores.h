@@ -14,6 +14,8 @@
 
 namespace tissueform {
 
+class CommitThread;
+
 // All that a server keeps: OpenInMemoryStores (in_memory_stores.h) or DurableStore::Open.
 //
 // Its end waits for the calls that were made; none may be made any longer.
@@ -31,6 +33,9 @@ class Stores {
   virtual const DurationHistogram* latency() const { return nullptr; }
   // Where it is kept; empty: in memory.
   virtual std::string folder() const { return {}; }
+  // Of the database in which other rooms keep rows of theirs, too; null: nothing outlives the
+  // process.
+  virtual CommitThread* commit_thread() { return nullptr; }
 };
 
 }  // namespace tissueform

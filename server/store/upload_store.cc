@@ -22,6 +22,7 @@
 
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
+#include "core/mesh_payload/sha256.h"
 #include "server/store/durable_file.h"
 #include "server/store/fault_points.h"
 #include "server/store/store_errors.h"
@@ -63,6 +64,11 @@ bool SameAnnouncement(const UploadAnnouncement& a, const UploadAnnouncement& b) 
 }
 
 }  // namespace
+
+std::string PartName(const UploadAnnouncement& announcement) {
+  if (announcement.owner.empty()) return announcement.sha256;
+  return Sha256Hex({"part ", announcement.sha256, " ", announcement.owner});
+}
 
 // A part and its two files. The mutex is held while they are written.
 struct UploadStore::Part {
@@ -168,7 +174,8 @@ absl::Status UploadStore::TakeUpPart(const std::string& base) {
   TF_ASSIGN_OR_RETURN(const absl::string_view sealed,
                       Unseal(absl::string_view(head).substr(kMarkBytes)));
   TF_ASSIGN_OR_RETURN(UploadAnnouncement announcement, ParseAnnouncement(sealed));
-  if (std::filesystem::path(base).filename() != announcement.sha256) {
+  const std::string name = PartName(announcement);
+  if (std::filesystem::path(base).filename() != name) {
     return Damaged(path, "it is of another mesh");
   }
   absl::StatusOr<OpenFile> data = OpenFile::Open(absl::StrCat(base, kPartSuffix), O_RDWR);
@@ -180,22 +187,21 @@ absl::Status UploadStore::TakeUpPart(const std::string& base) {
   if (data_bytes != size) TF_RETURN_IF_ERROR(data->Truncate(size));
   MutexLock lock(mutex_);
   bytes_ += size;
-  const std::string sha256 = announcement.sha256;
-  parts_[sha256] =
+  parts_[name] =
       std::make_shared<Part>(std::move(announcement), *std::move(data), std::move(mark), size);
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::shared_ptr<UploadStore::Part>> UploadStore::Find(const std::string& sha256) {
+absl::StatusOr<std::shared_ptr<UploadStore::Part>> UploadStore::Find(const std::string& part_name) {
   MutexLock lock(mutex_);
-  const auto found = parts_.find(sha256);
-  if (found == parts_.end()) return NoUpload(sha256);
+  const auto found = parts_.find(part_name);
+  if (found == parts_.end()) return NoUpload(part_name);
   return found->second;
 }
 
 absl::StatusOr<std::shared_ptr<UploadStore::Part>> UploadStore::Make(
     const UploadAnnouncement& announcement) {
-  const std::string base = absl::StrCat(folder_, "/", announcement.sha256);
+  const std::string base = absl::StrCat(folder_, "/", PartName(announcement));
   TF_ASSIGN_OR_RETURN(OpenFile data,
                       OpenFile::Open(absl::StrCat(base, kPartSuffix), O_RDWR | O_CREAT | O_TRUNC));
   TF_FAULT_POINT("upload.part_made");
@@ -215,9 +221,10 @@ absl::StatusOr<std::shared_ptr<UploadStore::Part>> UploadStore::Make(
 absl::StatusOr<int64_t> UploadStore::Begin(const UploadAnnouncement& announcement) {
   TF_RETURN_IF_ERROR(CheckAnnouncement(announcement));
   MutexLock begin_lock(begin_mutex_);
-  if (const auto known = Find(announcement.sha256); known.ok()) {
+  const std::string name = PartName(announcement);
+  if (const auto known = Find(name); known.ok()) {
     if (SameAnnouncement((*known)->announcement, announcement)) {
-      const absl::StatusOr<int64_t> committed = Committed(announcement.sha256);
+      const absl::StatusOr<int64_t> committed = Committed(name);
       if (!absl::IsDataLoss(committed.status())) return committed;
     }
     TF_RETURN_IF_ERROR(Remove(*known));
@@ -233,7 +240,7 @@ absl::StatusOr<int64_t> UploadStore::Begin(const UploadAnnouncement& announcemen
   }
   TF_ASSIGN_OR_RETURN(std::shared_ptr<Part> part, Make(announcement));
   MutexLock lock(mutex_);
-  parts_[announcement.sha256] = std::move(part);
+  parts_[name] = std::move(part);
   return 0;
 }
 
@@ -248,9 +255,10 @@ absl::Status UploadStore::ReserveBytes(int64_t bytes) {
   return absl::OkStatus();
 }
 
-absl::Status UploadStore::Append(const std::string& sha256, int64_t offset,
+absl::Status UploadStore::Append(const std::string& part_name, int64_t offset,
                                  absl::string_view bytes) {
-  TF_ASSIGN_OR_RETURN(const std::shared_ptr<Part> part, Find(sha256));
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<Part> part, Find(part_name));
+  const std::string& sha256 = part->announcement.sha256;
   const auto count = static_cast<int64_t>(bytes.size());
   MutexLock lock(part->mutex);
   if (part->dropped) return NoUpload(sha256);
@@ -279,21 +287,22 @@ absl::Status UploadStore::Append(const std::string& sha256, int64_t offset,
   return due && durable_ ? part->Sync(folder_) : absl::OkStatus();
 }
 
-absl::StatusOr<int64_t> UploadStore::Committed(const std::string& sha256) {
-  TF_ASSIGN_OR_RETURN(const std::shared_ptr<Part> part, Find(sha256));
+absl::StatusOr<int64_t> UploadStore::Committed(const std::string& part_name) {
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<Part> part, Find(part_name));
   MutexLock lock(part->mutex);
-  if (part->dropped) return NoUpload(sha256);
+  if (part->dropped) return NoUpload(part->announcement.sha256);
   if (durable_) TF_RETURN_IF_ERROR(part->Sync(folder_));
   return part->size;
 }
 
-absl::StatusOr<UploadAnnouncement> UploadStore::Announced(const std::string& sha256) {
-  TF_ASSIGN_OR_RETURN(const std::shared_ptr<Part> part, Find(sha256));
+absl::StatusOr<UploadAnnouncement> UploadStore::Announced(const std::string& part_name) {
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<Part> part, Find(part_name));
   return part->announcement;
 }
 
-absl::StatusOr<MeshPayload> UploadStore::Read(const std::string& sha256) {
-  TF_ASSIGN_OR_RETURN(const std::shared_ptr<Part> part, Find(sha256));
+absl::StatusOr<MeshPayload> UploadStore::Read(const std::string& part_name) {
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<Part> part, Find(part_name));
+  const std::string& sha256 = part->announcement.sha256;
   const int64_t total_bytes = part->announcement.total_bytes;
   MutexLock lock(part->mutex);
   if (part->dropped) return NoUpload(sha256);
@@ -313,30 +322,30 @@ absl::StatusOr<MeshPayload> UploadStore::Read(const std::string& sha256) {
   return payload;
 }
 
-absl::StatusOr<MeshPayload> UploadStore::Take(const std::string& sha256) {
-  TF_ASSIGN_OR_RETURN(MeshPayload payload, Read(sha256));
-  TF_RETURN_IF_ERROR(Drop(sha256));
+absl::StatusOr<MeshPayload> UploadStore::Take(const std::string& part_name) {
+  TF_ASSIGN_OR_RETURN(MeshPayload payload, Read(part_name));
+  TF_RETURN_IF_ERROR(Drop(part_name));
   return payload;
 }
 
-absl::Status UploadStore::Drop(const std::string& sha256) {
-  TF_ASSIGN_OR_RETURN(const std::shared_ptr<Part> part, Find(sha256));
+absl::Status UploadStore::Drop(const std::string& part_name) {
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<Part> part, Find(part_name));
   return Remove(part);
 }
 
 // The announcement first: a part without one is removed at the next start.
 absl::Status UploadStore::Remove(const std::shared_ptr<Part>& part) {
-  const std::string& sha256 = part->announcement.sha256;
+  const std::string name = PartName(part->announcement);
   MutexLock part_lock(part->mutex);
-  if (part->dropped) return NoUpload(sha256);
-  const std::string base = absl::StrCat(folder_, "/", sha256);
+  if (part->dropped) return NoUpload(part->announcement.sha256);
+  const std::string base = absl::StrCat(folder_, "/", name);
   TF_RETURN_IF_ERROR(RemoveFile(absl::StrCat(base, kAnnouncedSuffix)));
   TF_FAULT_POINT("upload.announcement_removed");
   part->dropped = true;
   {
     MutexLock lock(mutex_);
     bytes_ -= part->size;
-    parts_.erase(sha256);
+    parts_.erase(name);
   }
   TF_RETURN_IF_ERROR(RemoveFile(absl::StrCat(base, kPartSuffix)));
   return durable_ ? SyncFolder(folder_) : absl::OkStatus();
@@ -346,9 +355,9 @@ std::vector<std::shared_ptr<UploadStore::Part>> UploadStore::OlderThan(int64_t b
   std::vector<std::pair<int64_t, std::shared_ptr<Part>>> old;
   {
     MutexLock lock(mutex_);
-    for (const auto& [sha256, part] : parts_) {
+    for (const auto& [name, part] : parts_) {
       struct stat status {};
-      const std::string path = absl::StrCat(folder_, "/", sha256, kPartSuffix);
+      const std::string path = absl::StrCat(folder_, "/", name, kPartSuffix);
       if (stat(path.c_str(), &status) == 0 && status.st_mtime < before_s) {
         old.emplace_back(status.st_mtime, part);
       }

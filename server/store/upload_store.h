@@ -24,7 +24,12 @@ struct UploadAnnouncement {
   MeshPayloadShape shape;
   int64_t total_bytes = 0;
   std::string sha256;
+  std::string owner = {};  // who sends it
 };
+
+// What its part is called: the mesh's SHA-256, or of somebody with a name a digest of both. So
+// nobody goes on with what another has sent, or hears of it.
+std::string PartName(const UploadAnnouncement& announcement);
 
 struct UploadLimits {
   int64_t max_bytes = int64_t{8} << 30;  // received of all parts together
@@ -37,9 +42,9 @@ struct UploadLimits {
   std::chrono::milliseconds sync_every{2'000};
 };
 
-// Meshes that have not arrived in full: one file each (SHA256.part) with what was announced beside
-// it (SHA256.announced), so that an upload goes on after a restart, and no memory is needed before
-// it is whole.
+// Meshes that have not arrived in full: one file each (PartName.part) with what was announced
+// beside it (PartName.announced), so that an upload goes on after a restart, and no memory is
+// needed before it is whole.
 //
 // What is said to be committed (Begin, Committed) is on the disk: these sync first. Between them a
 // part is synced every kSyncEveryBytes and UploadLimits::sync_every. After a restart a part ends
@@ -73,23 +78,23 @@ class UploadStore {
   // Adds bytes. Errors: NotFound; InvalidArgument (`offset` is not where the part ends, the message
   // says where that is; past the announced end); ResourceExhausted (over the limit of all parts;
   // the disk is full). After an error the part is as it was.
-  absl::Status Append(const std::string& sha256, int64_t offset, absl::string_view bytes);
+  absl::Status Append(const std::string& part_name, int64_t offset, absl::string_view bytes);
 
   // How many bytes are there, after they were synced. Errors: NotFound, or what the disk says;
   // DataLoss from then on, until it is begun anew.
-  absl::StatusOr<int64_t> Committed(const std::string& sha256);
+  absl::StatusOr<int64_t> Committed(const std::string& part_name);
 
   // What was announced. Errors: NotFound.
-  absl::StatusOr<UploadAnnouncement> Announced(const std::string& sha256);
+  absl::StatusOr<UploadAnnouncement> Announced(const std::string& part_name);
 
   // The whole payload, in memory of its size; the part stays. The digest is not checked.
   // Errors: NotFound, FailedPrecondition (it is not whole), or what the disk says.
-  absl::StatusOr<MeshPayload> Read(const std::string& sha256);
+  absl::StatusOr<MeshPayload> Read(const std::string& part_name);
   // Read, then Drop.
-  absl::StatusOr<MeshPayload> Take(const std::string& sha256);
+  absl::StatusOr<MeshPayload> Take(const std::string& part_name);
 
   // Forgets a part. Errors: NotFound, or what the disk says.
-  absl::Status Drop(const std::string& sha256);
+  absl::Status Drop(const std::string& part_name);
 
   // Forgets the parts that have not changed since then (unix seconds); returns how many.
   absl::StatusOr<int> RemoveOlderThan(int64_t before_s);
@@ -101,7 +106,7 @@ class UploadStore {
 
   absl::Status TakeUp();
   absl::Status TakeUpPart(const std::string& base);
-  absl::StatusOr<std::shared_ptr<Part>> Find(const std::string& sha256);
+  absl::StatusOr<std::shared_ptr<Part>> Find(const std::string& part_name);
   absl::StatusOr<std::shared_ptr<Part>> Make(const UploadAnnouncement& announcement);
   absl::Status Remove(const std::shared_ptr<Part>& part);
   // Those that have not changed since then (unix seconds), the oldest first. Looks at the disk.

@@ -15,6 +15,7 @@
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/rpc_rig.h"
 #include "tests/testing/fake_calls.h"
+#include "tests/testing/no_logins.h"
 
 namespace tissueform::fuzz {
 namespace {
@@ -35,7 +36,8 @@ struct CaseRig {
   InMemoryCaseStore store{128 << 10};
   WorkerPool workers{2};
   DeadlineTimer timer;
-  CaseService service{&gate, limits, &store, &workers, &timer};
+  testing::NoLogins no_logins;
+  CaseService service{&gate, limits, &no_logins.access, &store, &workers, &timer};
   WorkerPool reactions{2};
 };
 
@@ -73,7 +75,7 @@ void CheckKept(CaseRig* rig) {
   const absl::StatusOr<CaseStore::Page> page = rig->store.List({});
   if (!page.ok() || page->records.size() > 3) std::abort();
   for (const CaseRecord& record : page->records) {
-    const auto reader = rig->store.Open(record.sha256, 0);
+    const auto reader = rig->store.Open(record.key(), 0);
     if (!reader.ok()) continue;  // deleted just now
     const auto bytes = (*reader)->Read(0, record.total_bytes);
     if (!bytes.ok() || Sha256Hex({*bytes}) != record.sha256) std::abort();

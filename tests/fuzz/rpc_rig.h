@@ -17,6 +17,7 @@
 #include "server/store/in_memory_session_store.h"
 #include "tests/testing/fake_calls.h"
 #include "tests/testing/fake_clock.h"
+#include "tests/testing/no_logins.h"
 #include "tissueform/v1/deform_service.pb.h"
 
 namespace tissueform::fuzz {
@@ -36,7 +37,8 @@ struct RpcRig {
   DeformStreams streams{limits.max_streams};
   SessionWatches watches{limits, &workers};
   DeadlineTimer timer;
-  DeformService service{&gate, limits, &registry, &streams, &watches, &timer};
+  testing::NoLogins no_logins;
+  DeformService service{&gate, limits, &no_logins.access, &registry, &streams, &watches, &timer};
   WorkerPool reactions{2};
 };
 

@@ -19,6 +19,7 @@
 #include "server/rpc/case_service.h"
 #include "server/store/in_memory_case_store.h"
 #include "tests/testing/fake_calls.h"
+#include "tests/testing/no_logins.h"
 #include "tests/testing/status_matchers.h"
 
 // Without sockets: reactions come from threads that ThreadSanitizer sees through.
@@ -88,7 +89,7 @@ class CaseUploadStreamTest : public ::testing::Test {
     upload->call.Send(Chunk(0, bytes_.size(), true));
     EXPECT_TRUE(upload->EndsWith(code));
   }
-  bool Kept() { return store_.Find(sha256_).ok(); }
+  bool Kept() { return store_.Find({sha256_}).ok(); }
 
   const std::string bytes_ = Sample(10'000);
   const std::string sha256_ = Sha256Hex({bytes_});
@@ -97,7 +98,8 @@ class CaseUploadStreamTest : public ::testing::Test {
   InMemoryCaseStore store_;
   std::unique_ptr<WorkerPool> workers_ = std::make_unique<WorkerPool>(kStoreWorkers);
   DeadlineTimer timer_;
-  CaseService service_{&gate_, limits_, &store_, workers_.get(), &timer_};
+  NoLogins no_logins_;
+  CaseService service_{&gate_, limits_, &no_logins_.access, &store_, workers_.get(), &timer_};
   std::unique_ptr<WorkerPool> reactions_ = std::make_unique<WorkerPool>(4);
 };
 
@@ -113,7 +115,7 @@ TEST_F(CaseUploadStreamTest, ChunksMakeACase) {
   EXPECT_EQ(made.title(), "head");
   EXPECT_EQ(made.total_bytes(), 10'000);
   EXPECT_GT(made.create_time().seconds(), 0);
-  EXPECT_EQ(*(*store_.Open(sha256_, 0))->Read(0, 10'000), bytes_);
+  EXPECT_EQ(*(*store_.Open({sha256_}, 0))->Read(0, 10'000), bytes_);
 }
 
 TEST_F(CaseUploadStreamTest, AKnownCaseIsAnsweredWithoutItsChunks) {
@@ -215,25 +217,25 @@ TEST_F(CaseUploadStreamTest, MoreThanTheLimitOfCasesAreRefusedUntilOneGoes) {
     EXPECT_TRUE(upload.EndsWith(code));
     if (code == Code::OK) continue;
     EXPECT_THAT(upload.message, HasSubstr("max_cases"));
-    ASSERT_THAT(store_.Delete(sha256_), IsOk());
-    ASSERT_THAT(store_.Delete(Sha256Hex({absl::StrCat(other, 0)})), IsOk());
+    ASSERT_THAT(store_.Delete({sha256_}), IsOk());
+    ASSERT_THAT(store_.Delete({Sha256Hex({absl::StrCat(other, 0)})}), IsOk());
   }
 }
 
 TEST_F(CaseUploadStreamTest, NoMoreThanTheLimitAreReceivedAtATimeAndPlacesAreGivenBack) {
   ServiceLimits none = limits_;
   none.max_case_uploads = 0;
-  CaseService full(&gate_, none, &store_, workers_.get(), &timer_);
+  CaseService full(&gate_, none, &no_logins_.access, &store_, workers_.get(), &timer_);
   CaseCall refused(reactions_.get(), &full);
   refused.call.Send(HeaderOf(bytes_));
   EXPECT_TRUE(refused.EndsWith(Code::RESOURCE_EXHAUSTED));
   EXPECT_THAT(refused.message, HasSubstr("max_case_uploads"));
   ServiceLimits one = limits_;
   one.max_case_uploads = 1;
-  CaseService service(&gate_, one, &store_, workers_.get(), &timer_);
+  CaseService service(&gate_, one, &no_logins_.access, &store_, workers_.get(), &timer_);
   for (const bool whole : {false, true, true}) {
     if (Kept()) {
-      ASSERT_THAT(store_.Delete(sha256_), IsOk());
+      ASSERT_THAT(store_.Delete({sha256_}), IsOk());
     }
     CaseCall upload(reactions_.get(), &service);
     upload.call.Send(HeaderOf(bytes_));
@@ -251,13 +253,13 @@ TEST_F(CaseUploadStreamTest, OfManyCallsAtOnceNoBytesMix) {
     }
   }
   for (const auto& upload : uploads) EXPECT_TRUE(upload->EndsWith(Code::OK));
-  EXPECT_EQ(*(*store_.Open(sha256_, 0))->Read(0, 10'000), bytes_);
+  EXPECT_EQ(*(*store_.Open({sha256_}, 0))->Read(0, 10'000), bytes_);
 }
 
 TEST_F(CaseUploadStreamTest, ASilentOneEnds) {
   ServiceLimits impatient = limits_;
   impatient.upload_silence = std::chrono::milliseconds(20);
-  CaseService service(&gate_, impatient, &store_, workers_.get(), &timer_);
+  CaseService service(&gate_, impatient, &no_logins_.access, &store_, workers_.get(), &timer_);
   CaseCall silent(reactions_.get(), &service);
   EXPECT_TRUE(silent.EndsWith(Code::DEADLINE_EXCEEDED));
   CaseCall begun(reactions_.get(), &service);
@@ -289,7 +291,7 @@ class ReadCaseTest : public CaseUploadStreamTest {
 
   // What a part gives; its end in `status_`.
   std::string Read(int64_t offset, int64_t limit, const std::string& name = "") {
-    CaseService service(&gate_, limits_, &store_, workers_.get(), &timer_);
+    CaseService service(&gate_, limits_, &no_logins_.access, &store_, workers_.get(), &timer_);
     v1::ReadCaseRequest request;
     request.set_name(name.empty() ? "cases/" + sha256_ : name);
     request.set_read_offset(offset);

@@ -162,7 +162,8 @@ TEST_F(MeshUploadStreamTest, OfManyCallsAtOnceNoBytesMix) {
 TEST_F(MeshUploadStreamTest, ASilentOneEndsHoldsNoMemoryAndKeepsWhatCame) {
   ServiceLimits impatient = limits_;
   impatient.upload_silence = std::chrono::milliseconds(20);
-  MeshService service(&gate_, impatient, &catalog_, &uploads_, &registry_, workers_.get(), &timer_);
+  MeshService service(&gate_, impatient, &no_logins_.changes, &catalog_, &uploads_, &registry_,
+                      workers_.get(), &timer_);
   UploadCall silent(reactions_.get(), &service);
   EXPECT_TRUE(silent.EndsWith(Code::DEADLINE_EXCEEDED));
   for (const int64_t end : {0, 1000}) {
@@ -188,7 +189,8 @@ TEST_F(MeshUploadStreamTest, AStalledOneHoldsNoMemory) {
 TEST_F(MeshUploadStreamTest, AClientDoesNotPayForASlowDisk) {
   ServiceLimits impatient = limits_;
   impatient.upload_silence = std::chrono::milliseconds(200);
-  MeshService service(&gate_, impatient, &catalog_, &uploads_, &registry_, workers_.get(), &timer_);
+  MeshService service(&gate_, impatient, &no_logins_.changes, &catalog_, &uploads_, &registry_,
+                      workers_.get(), &timer_);
   std::promise<void> may_go_on;
   const std::shared_future<void> go_on = may_go_on.get_future().share();
   for (int worker = 0; worker < kWorkers; ++worker) {

@@ -21,6 +21,7 @@
 #include "tests/testing/fake_calls.h"
 #include "tests/testing/fake_clock.h"
 #include "tests/testing/meshes.h"
+#include "tests/testing/no_logins.h"
 #include "tests/testing/session_samples.h"
 
 namespace tissueform::testing {
@@ -119,10 +120,13 @@ class ReactorsTest : public ::testing::Test {
   DeformStreams streams_{limits_.max_streams};
   SessionWatches watches_{limits_, workers_.get()};
   DeadlineTimer timer_;
-  MeshService mesh_service_{&gate_,     limits_,        &catalog_, &uploads_,
-                            &registry_, workers_.get(), &timer_};
-  SessionService session_service_{&gate_, limits_, &catalog_, &registry_, &clock_};
-  DeformService deform_service_{&gate_, limits_, &registry_, &streams_, &watches_, &timer_};
+  NoLogins no_logins_;
+  MeshService mesh_service_{&gate_,    limits_,    &no_logins_.changes, &catalog_,
+                            &uploads_, &registry_, workers_.get(),      &timer_};
+  SessionService session_service_{&gate_,    limits_,    &no_logins_.access,
+                                  &catalog_, &registry_, &clock_};
+  DeformService deform_service_{&gate_,    limits_, &no_logins_.access, &registry_, &streams_,
+                                &watches_, &timer_};
   std::unique_ptr<WorkerPool> reactions_ = std::make_unique<WorkerPool>(4);
 };
 

@@ -268,15 +268,15 @@ TEST_F(HousekeepingTest, CasesThatNobodyOpenedGoUnlessAPredictionNamesThem) {
   const std::string opened = KeepCase('b');
   const std::string predicted = KeepCase('c');
   Pass(20 * kDay);
-  ASSERT_THAT(stores_->cases().Open(opened, unix_s_).status(), IsOk());
+  ASSERT_THAT(stores_->cases().Open({opened}, unix_s_).status(), IsOk());
   Predict("p", "gone", bar_->sha256, predicted);
   Pass(10 * kDay);
   EXPECT_EQ(housekeeping_->RunOnce().cases, 0) << "not a second early";
   Pass(1);
   EXPECT_EQ(housekeeping_->RunOnce().cases, 1);
-  EXPECT_THAT(stores_->cases().Find(unused), StatusIs(absl::StatusCode::kNotFound));
-  EXPECT_THAT(stores_->cases().Find(opened), IsOk());
-  EXPECT_THAT(stores_->cases().Find(predicted), IsOk());
+  EXPECT_THAT(stores_->cases().Find({unused}), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_THAT(stores_->cases().Find({opened}), IsOk());
+  EXPECT_THAT(stores_->cases().Find({predicted}), IsOk());
   Pass(21 * kDay);
   EXPECT_EQ(housekeeping_->RunOnce().cases, 2) << "the prediction has gone with its age";
 }

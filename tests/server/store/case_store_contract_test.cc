@@ -60,7 +60,7 @@ TEST_P(CaseStoreContractTest, ACaseIsFoundAndReadAsItWas) {
   const CaseRecord record = CaseRecordOf(bytes);
   ASSERT_OK_AND_ASSIGN(const CaseRecord kept, KeepCase(*store_, record, bytes));
   EXPECT_EQ(kept.sha256, record.sha256);
-  ASSERT_OK_AND_ASSIGN(const CaseRecord found, store_->Find(record.sha256));
+  ASSERT_OK_AND_ASSIGN(const CaseRecord found, store_->Find(SampleCaseKey(record.sha256)));
   EXPECT_EQ(found.sha256, record.sha256);
   EXPECT_EQ(found.owner, record.owner);
   EXPECT_EQ(found.title, record.title);
@@ -73,7 +73,7 @@ TEST_P(CaseStoreContractTest, ACaseIsFoundAndReadAsItWas) {
 TEST_P(CaseStoreContractTest, AnyPartOfItIsRead) {
   const std::string name = Keep(1);
   const std::string bytes = SampleCase(1);
-  ASSERT_OK_AND_ASSIGN(const auto reader, store_->Open(name, 0));
+  ASSERT_OK_AND_ASSIGN(const auto reader, store_->Open(SampleCaseKey(name), 0));
   EXPECT_EQ(reader->total_bytes(), static_cast<int64_t>(bytes.size()));
   EXPECT_EQ(*reader->Read(4000, 17), bytes.substr(4000, 17));
   EXPECT_EQ(*reader->Read(10, 100), bytes.substr(10, 100));
@@ -84,10 +84,11 @@ TEST_P(CaseStoreContractTest, AnyPartOfItIsRead) {
 TEST_P(CaseStoreContractTest, WhatIsNotThereIsNotFound) {
   const std::string name(64, 'a');
   for (const std::string& missing : {name, std::string("../../etc/passwd")}) {
-    EXPECT_THAT(store_->Find(missing), StatusIs(Code::kNotFound, HasSubstr(missing)));
-    EXPECT_THAT(store_->Open(missing, 0).status(), StatusIs(Code::kNotFound));
-    EXPECT_THAT(store_->Delete(missing), StatusIs(Code::kNotFound));
-    EXPECT_THAT(store_->Touch(missing, 5), IsOk());
+    EXPECT_THAT(store_->Find(SampleCaseKey(missing)),
+                StatusIs(Code::kNotFound, HasSubstr(missing)));
+    EXPECT_THAT(store_->Open(SampleCaseKey(missing), 0).status(), StatusIs(Code::kNotFound));
+    EXPECT_THAT(store_->Delete(SampleCaseKey(missing)), StatusIs(Code::kNotFound));
+    EXPECT_THAT(store_->Touch(SampleCaseKey(missing), 5), IsOk());
   }
 }
 
@@ -140,8 +141,8 @@ TEST_P(CaseStoreContractTest, TheSameCaseAgainIsKeptOnceAsItWasFirst) {
   ASSERT_OK_AND_ASSIGN(kept, KeepCase(*store_, record, bytes));
   EXPECT_EQ(kept.last_used_s, 2000) << "never goes back";
   EXPECT_THAT(Names(), ElementsAre(record.sha256));
-  EXPECT_THAT(store_->Delete(record.sha256), IsOk());
-  EXPECT_THAT(store_->Open(record.sha256, 0).status(), StatusIs(Code::kNotFound));
+  EXPECT_THAT(store_->Delete(SampleCaseKey(record.sha256)), IsOk());
+  EXPECT_THAT(store_->Open(SampleCaseKey(record.sha256), 0).status(), StatusIs(Code::kNotFound));
 }
 
 TEST_P(CaseStoreContractTest, ThereAreNoMoreThanMayBe) {
@@ -157,14 +158,14 @@ TEST_P(CaseStoreContractTest, ThereAreNoMoreThanMayBe) {
   EXPECT_THAT(store_->Begin(CaseRecordOf(second), 1).status(),
               StatusIs(Code::kResourceExhausted, HasSubstr("max_cases")));
   EXPECT_THAT(Names(), ElementsAre(CaseRecordOf(first).sha256));
-  ASSERT_THAT(store_->Delete(CaseRecordOf(first).sha256), IsOk());
+  ASSERT_THAT(store_->Delete(SampleCaseKey(CaseRecordOf(first).sha256)), IsOk());
   EXPECT_THAT(KeepCase(*store_, CaseRecordOf(second), second, 1), IsOk());
 }
 
 TEST_P(CaseStoreContractTest, AReaderReadsOnWhenItsCaseIsDeleted) {
   const std::string name = Keep(1);
-  ASSERT_OK_AND_ASSIGN(const auto reader, store_->Open(name, 0));
-  ASSERT_THAT(store_->Delete(name), IsOk());
+  ASSERT_OK_AND_ASSIGN(const auto reader, store_->Open(SampleCaseKey(name), 0));
+  ASSERT_THAT(store_->Delete(SampleCaseKey(name)), IsOk());
   EXPECT_THAT(reader->Read(0, 5000), Holds(SampleCase(1)));
 }
 
@@ -190,17 +191,51 @@ TEST_P(CaseStoreContractTest, ListsThoseOfAnOwnerByNamePageAfterPage) {
   EXPECT_THAT(store_->List({.limit = 0}), StatusIs(Code::kInvalidArgument));
 }
 
+TEST_P(CaseStoreContractTest, EveryOwnerHasACaseOfTheSameFile) {
+  const std::string name = Keep(1, 1000, "planner");
+  ASSERT_EQ(Keep(1, 1001, "another"), name);
+  ASSERT_OK_AND_ASSIGN(const CaseRecord mine, store_->Find({name, "planner"}));
+  ASSERT_OK_AND_ASSIGN(const CaseRecord theirs, store_->Find({name, "another"}));
+  EXPECT_EQ(mine.owner, "planner");
+  EXPECT_EQ(theirs.owner, "another");
+  EXPECT_EQ(mine.last_used_s, 1000);
+  ASSERT_THAT(store_->Delete({name, "planner"}), IsOk());
+  EXPECT_THAT(store_->Find({name, "planner"}), StatusIs(Code::kNotFound));
+  EXPECT_THAT(store_->Open({name, "another"}, 1002), IsOk()) << "its file stays";
+  ASSERT_THAT(store_->Delete({name, "another"}), IsOk());
+  EXPECT_THAT(store_->Open({name, "another"}, 1002).status(), StatusIs(Code::kNotFound));
+}
+
+TEST_P(CaseStoreContractTest, APageMayHoldNamedCasesOfOthers) {
+  const std::string mine = Keep(1, 1000, "planner");
+  const std::string shared = Keep(2, 1000, "o\"ther");
+  const std::string hidden = Keep(3, 1000, "o\"ther");
+  std::vector<std::string> names = {mine, shared};
+  std::sort(names.begin(), names.end());
+  std::vector<std::string> found;
+  CaseStore::ListRequest request{
+      .owner = "planner", .also = {{shared, "o\"ther"}}, .after = "", .limit = 1};
+  do {
+    ASSERT_OK_AND_ASSIGN(const CaseStore::Page page, store_->List(request));
+    for (const CaseRecord& record : page.records) found.push_back(record.sha256);
+    request.after = page.next;
+  } while (!request.after.empty());
+  EXPECT_EQ(found, names);
+}
+
 TEST_P(CaseStoreContractTest, ThoseThatNobodyUsedGoOldestFirstButNotSparedOnes) {
   const std::string a = Keep(1, 1000);
   const std::string b = Keep(2, 900);
   const std::string c = Keep(3, 800);
   const std::string d = Keep(4, 700);
-  EXPECT_THAT(store_->RemoveUnused(1000, {d}, 1), Holds(1));
-  EXPECT_THAT(store_->Find(c), StatusIs(Code::kNotFound)) << "the oldest that is not spared";
-  ASSERT_THAT(store_->Open(b, 1500).status(), IsOk());
-  EXPECT_THAT(store_->RemoveUnused(1001, {}, 10), Holds(2));
+  EXPECT_THAT(store_->RemoveUnused(1000, {d}, 1), Holds(std::vector<CaseKey>{SampleCaseKey(c)}));
+  EXPECT_THAT(store_->Find(SampleCaseKey(c)), StatusIs(Code::kNotFound))
+      << "the oldest that is not spared";
+  ASSERT_THAT(store_->Open(SampleCaseKey(b), 1500).status(), IsOk());
+  EXPECT_THAT(store_->RemoveUnused(1001, {}, 10),
+              Holds(std::vector<CaseKey>{SampleCaseKey(d), SampleCaseKey(a)}));
   EXPECT_THAT(Names(), ElementsAre(b)) << "opening is a use";
-  EXPECT_THAT(store_->Find(a), StatusIs(Code::kNotFound));
+  EXPECT_THAT(store_->Find(SampleCaseKey(a)), StatusIs(Code::kNotFound));
 }
 
 TEST_P(CaseStoreContractTest, KeepingAndDeletingOneCaseAtOnceLeavesItWholeOrGone) {
@@ -214,7 +249,7 @@ TEST_P(CaseStoreContractTest, KeepingAndDeletingOneCaseAtOnceLeavesItWholeOrGone
         if (i % 2 == 0) {
           EXPECT_THAT(KeepCase(*store_, record, bytes), IsOk());
         } else {
-          const absl::Status status = store_->Delete(record.sha256);
+          const absl::Status status = store_->Delete(SampleCaseKey(record.sha256));
           EXPECT_TRUE(status.ok() || absl::IsNotFound(status)) << status;
         }
         const absl::StatusOr<std::string> read = ReadWholeCase(*store_, record.sha256);
@@ -242,7 +277,7 @@ TEST(InMemoryCaseStoreTest, HoldsSoManyBytesThoseOnTheirWayIncluded) {
   }
   ASSERT_THAT(KeepCase(store, CaseRecordOf(c), c), IsOk());
   EXPECT_THAT(KeepCase(store, CaseRecordOf(b), b), StatusIs(Code::kResourceExhausted));
-  ASSERT_THAT(store.Delete(CaseRecordOf(a).sha256), IsOk());
+  ASSERT_THAT(store.Delete(SampleCaseKey(CaseRecordOf(a).sha256)), IsOk());
   EXPECT_THAT(KeepCase(store, CaseRecordOf(b), b), IsOk());
 }
 

@@ -83,7 +83,7 @@ TEST_F(DurableCaseStoreTest, CasesAreThereAfterARestart) {
   EXPECT_THAT(Damaged(), IsEmpty());
   ExpectCase(1);
   ExpectCase(2);
-  ASSERT_OK_AND_ASSIGN(const CaseRecord record, store_->cases().Find(name));
+  ASSERT_OK_AND_ASSIGN(const CaseRecord record, store_->cases().Find(SampleCaseKey(name)));
   EXPECT_EQ(record.title, CaseRecordOf(SampleCase(1)).title);
   EXPECT_EQ(record.created_s, 1234);
 }
@@ -96,7 +96,7 @@ TEST_F(DurableCaseStoreTest, WhatWasDeletedIsNowhereInItsFiles) {
   Keep(2);
   EXPECT_TRUE(Found(record.title));
   EXPECT_TRUE(Found(bytes.substr(0, 100)));
-  ASSERT_THAT(store_->cases().Delete(record.sha256), IsOk());
+  ASSERT_THAT(store_->cases().Delete(SampleCaseKey(record.sha256)), IsOk());
   EXPECT_FALSE(Found(record.title));
   EXPECT_FALSE(Found(record.sha256));
   EXPECT_FALSE(Found(bytes.substr(0, 100)));
@@ -162,7 +162,7 @@ TEST_F(DurableCaseStoreTest, OneThatIsDamagedWhileItServesIsFoundWhenItIsRead) {
   std::filesystem::resize_file(Blob(cut), 17);
   for (const std::string& name : {flipped, gone, cut}) {
     EXPECT_THAT(ReadWholeCase(store_->cases(), name), StatusIs(Code::kDataLoss));
-    EXPECT_THAT(store_->cases().Find(name), StatusIs(Code::kNotFound));
+    EXPECT_THAT(store_->cases().Find(SampleCaseKey(name)), StatusIs(Code::kNotFound));
   }
   EXPECT_TRUE(std::filesystem::exists(path_ + "/damaged/" + flipped));
   ExpectCase(4);
@@ -170,11 +170,11 @@ TEST_F(DurableCaseStoreTest, OneThatIsDamagedWhileItServesIsFoundWhenItIsRead) {
 
 TEST_F(DurableCaseStoreTest, OneThatIsCutWhileItIsReadIsNotTakenForWhole) {
   const std::string name = Keep(1);
-  ASSERT_OK_AND_ASSIGN(const auto reader, store_->cases().Open(name, 0));
+  ASSERT_OK_AND_ASSIGN(const auto reader, store_->cases().Open(SampleCaseKey(name), 0));
   ASSERT_THAT(reader->Read(0, 1000), IsOk());
   std::filesystem::resize_file(Blob(name), 1500);
   EXPECT_THAT(reader->Read(1000, 1000), StatusIs(Code::kDataLoss));
-  EXPECT_THAT(store_->cases().Find(name), StatusIs(Code::kNotFound));
+  EXPECT_THAT(store_->cases().Find(SampleCaseKey(name)), StatusIs(Code::kNotFound));
 }
 
 TEST_F(DurableCaseStoreTest, ADatabaseWithDamagedPagesKeepsItsReadableCases) {

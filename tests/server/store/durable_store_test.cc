@@ -351,7 +351,7 @@ TEST_F(DurableStoreTest, AStoreOfANewerServerOrAnotherProgramIsRefused) {
   Fill(1);
   Sql("PRAGMA user_version=99");
   EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("newer server")));
-  Sql("PRAGMA user_version=3; PRAGMA application_id=7");
+  Sql("PRAGMA user_version=4; PRAGMA application_id=7");
   EXPECT_THAT(Open(),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("not one of tissueform")));
   Sql("PRAGMA application_id=" + absl::StrCat(0x54697346));
@@ -407,6 +407,29 @@ TEST_F(DurableStoreTest, AFolderFromBeforeThereWereCasesKeepsAllThatItHadAndTake
   EXPECT_THAT(model.cases, SizeIs(1));
   ASSERT_THAT(Open(), IsOk());
   EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
+}
+
+TEST_F(DurableStoreTest, AFolderFromBeforeThereWereRightsKeepsAllAndTakesACaseOfEveryOwner) {
+  constexpr int kStepsOfVersion3 = 17;
+  std::filesystem::copy(testing::SourcePath("tests/data/store/version3"), path_,
+                        std::filesystem::copy_options::recursive);
+  std::filesystem::permissions(path_, std::filesystem::perms::owner_all);
+  StoreModel model;
+  for (int number = 0; number < kStepsOfVersion3; ++number) {
+    ApplyStep(number, /*bursts=*/true, &model);
+  }
+  model.uploads.clear();  // not copied
+  ASSERT_THAT(model.cases, SizeIs(1));
+  ASSERT_THAT(Open(), IsOk());
+  EXPECT_THAT(store_->damaged(), IsEmpty());
+  EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
+  const std::string bytes = SampleCase(*model.cases.begin());
+  CaseRecord others = CaseRecordOf(bytes);
+  others.owner = "another";
+  ASSERT_THAT(KeepCase(store_->cases(), others, bytes), IsOk());
+  ASSERT_THAT(Open(), IsOk());
+  EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
+  EXPECT_THAT(store_->cases().Find(others.key()), IsOk());
 }
 
 TEST_F(DurableStoreTest, ASecondServerIsRefused) {

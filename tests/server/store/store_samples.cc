@@ -93,6 +93,8 @@ std::string SamplePositions(int number, int64_t vertex_count) {
 
 std::string SampleCase(int number, size_t size) { return SampleBytes(number, size); }
 
+CaseKey SampleCaseKey(const std::string& sha256) { return {.sha256 = sha256, .owner = "planner"}; }
+
 CaseRecord CaseRecordOf(const std::string& bytes) {
   return {.sha256 = Sha256Hex({bytes}),
           .owner = "planner",
@@ -115,7 +117,8 @@ absl::StatusOr<CaseRecord> KeepCase(CaseStore& store, const CaseRecord& record,
 absl::StatusOr<std::string> ReadWholeCase(CaseStore& store, const std::string& sha256,
                                           int64_t now_s) {
   constexpr int64_t kPieceBytes = 999;
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<CaseReader> reader, store.Open(sha256, now_s));
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<CaseReader> reader,
+                      store.Open(SampleCaseKey(sha256), now_s));
   std::string bytes;
   while (static_cast<int64_t>(bytes.size()) < reader->total_bytes()) {
     TF_ASSIGN_OR_RETURN(const std::string piece,

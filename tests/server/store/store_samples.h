@@ -36,6 +36,8 @@ std::string SamplePositions(int number, int64_t vertex_count = 40);
 
 // The file of a case, and what is said of it.
 std::string SampleCase(int number, size_t size = 5000);
+// Of a case of its owner.
+CaseKey SampleCaseKey(const std::string& sha256);
 CaseRecord CaseRecordOf(const std::string& bytes);
 // Sends it in two pieces.
 absl::StatusOr<CaseRecord> KeepCase(CaseStore& store, const CaseRecord& record,

@@ -346,7 +346,7 @@ absl::Status RunStep(int number, bool bursts, Stores& stores) {
     case kKeepCase:
       return Keep(KeptCase(round), stores);
     case kDeleteCase:
-      return stores.cases().Delete(NameOfCase(ErasedCase(round)));
+      return stores.cases().Delete(SampleCaseKey(NameOfCase(ErasedCase(round))));
   }
   return absl::OkStatus();
 }

@@ -1,0 +1,264 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/access/access.h"
+
+#include <algorithm>
+#include <array>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
+
+#include "core/base/status_macros.h"
+#include "server/access/access_names.h"
+#include "server/session/session_refusals.h"
+#include "server/store/store_errors.h"
+
+namespace tissueform {
+namespace {
+
+// What the page of who follows calls: its session, what it shows and its case.
+constexpr std::array<std::string_view, 9> kOpenToLinks = {
+    "AccessService.WhoAmI",      "CaseService.GetCase",
+    "CaseService.ReadCase",      "DeformService.AcknowledgeWatch",
+    "DeformService.Watch",       "MeshService.GetMesh",
+    "MeshService.GetSurface",    "ServerInfoService.GetServerInfo",
+    "SessionService.GetSession",
+};
+
+bool IsLink(const Principal& caller) { return !caller.only_session.empty(); }
+
+absl::Status LinkHasEnded() {
+  return absl::UnauthenticatedError(
+      "the follow link has expired or was taken back; ask who sent it for another one");
+}
+
+}  // namespace
+
+absl::Status Access::MayCall(const Principal& caller, std::string_view method) {
+  if (IsLink(caller) && std::ranges::find(kOpenToLinks, method) == kOpenToLinks.end()) {
+    return absl::PermissionDeniedError(
+        "a follow link may follow its session and nothing else; log in for this");
+  }
+  if (method == "CaseService.UploadCase" && !caller.anonymous() &&
+      !caller.roles.contains("publisher")) {
+    return absl::PermissionDeniedError(
+        "the token has not the role publisher, which cases are uploaded by; ask who runs the "
+        "server for it");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Access::MayPutInto(const Principal& caller, const std::string& project) {
+  if (project.empty()) return absl::OkStatus();
+  TF_RETURN_IF_ERROR(CheckAccessName(project, "project"));
+  if (caller.anonymous() || caller.projects.contains(project)) return absl::OkStatus();
+  return absl::PermissionDeniedError(
+      "the token does not name this project; leave it out, or ask for a token that names it");
+}
+
+absl::Status Access::Judge(Level level, Need need, const absl::Status& not_found) {
+  if (level == Level::kNothing) return not_found;
+  if (need == Need::kDrag && level < Level::kDrag) {
+    return absl::PermissionDeniedError(
+        "it is shared with you to look at; ask its owner for the role planner");
+  }
+  if (need == Need::kOwn && level < Level::kOwn) {
+    return absl::PermissionDeniedError("it is another's, who shares it with you; ask its owner");
+  }
+  return absl::OkStatus();
+}
+
+Access::Level Access::LevelOfShare(const std::string& owner, const std::string& resource,
+                                   const std::string& project, const std::string& principal) const {
+  std::optional<ShareRole> role = table_.RoleOf(owner, resource, principal);
+  if (!project.empty()) {
+    role = std::max(role, table_.RoleOf(owner, ProjectResource(project), principal));
+  }
+  if (!role.has_value()) return Level::kNothing;
+  return *role == ShareRole::kPlanner ? Level::kDrag : Level::kLook;
+}
+
+Access::Level Access::SessionLevel(const Principal& caller, const std::string& id) const {
+  const ResourceIndex::Session* session = index_.FindSession(id);
+  if (session == nullptr) return caller.anonymous() ? Level::kOwn : Level::kNothing;
+  const std::string resource = SessionResource(id);
+  if (IsLink(caller)) {
+    return caller.only_session == resource && HasGoodLink(id) ? Level::kLook : Level::kNothing;
+  }
+  if (session->owner == caller.name) return Level::kOwn;
+  return LevelOfShare(session->owner, resource, session->project, caller.name);
+}
+
+Access::Level Access::PredictionLevel(const Principal& caller, const std::string& id) const {
+  const ResourceIndex::Prediction* prediction = index_.FindPrediction(id);
+  if (prediction == nullptr) return caller.anonymous() ? Level::kOwn : Level::kNothing;
+  if (IsLink(caller)) return Level::kNothing;
+  if (prediction->owner == caller.name) return Level::kOwn;
+  if (table_.RoleOf(prediction->owner, PredictionResource(id), caller.name).has_value()) {
+    return Level::kLook;
+  }
+  // Only of one owner: an id of a session may have become another's meanwhile.
+  const ResourceIndex::Session* session = index_.FindSession(prediction->session);
+  if (session == nullptr || session->owner != prediction->owner) return Level::kNothing;
+  return std::min(Level::kLook, SessionLevel(caller, prediction->session));
+}
+
+Access::Level Access::CaseLevel(const Principal& caller, const CaseKey& key) const {
+  if (key.owner == caller.name) return Level::kOwn;
+  const ResourceIndex::Case* found = index_.FindCase(key);
+  if (found == nullptr) return Level::kNothing;
+  return std::min(Level::kLook,
+                  LevelOfShare(key.owner, CaseResource(key.sha256), found->project, caller.name));
+}
+
+Access::Level Access::MeshLevel(const Principal& caller, const std::string& sha256) const {
+  const std::set<std::string>& holders = table_.HoldersOf(sha256);
+  const bool unclaimed = caller.anonymous() && holders.empty();
+  if (!IsLink(caller) && (unclaimed || holders.contains(caller.name))) return Level::kOwn;
+  for (const std::string& id : index_.SessionsOf(sha256)) {
+    if (SessionLevel(caller, id) >= Level::kLook) return Level::kLook;
+  }
+  for (const std::string& id : index_.PredictionsOf(sha256)) {
+    if (PredictionLevel(caller, id) >= Level::kLook) return Level::kLook;
+  }
+  return Level::kNothing;
+}
+
+absl::Status Access::MaySession(const Principal& caller, const std::string& id, Need need) const {
+  MutexLock lock(mutex_);
+  if (caller.only_session == SessionResource(id) && !HasGoodLink(id)) return LinkHasEnded();
+  return Judge(SessionLevel(caller, id), need, NoSuchSession(id));
+}
+
+absl::Status Access::MayPrediction(const Principal& caller, const std::string& id,
+                                   Need need) const {
+  MutexLock lock(mutex_);
+  return Judge(PredictionLevel(caller, id), need, NoPrediction(id));
+}
+
+absl::StatusOr<CaseKey> Access::MayCase(const Principal& caller, const std::string& sha256,
+                                        Need need) const {
+  MutexLock lock(mutex_);
+  return IsLink(caller) ? CaseOfLink(caller, sha256) : FindCase(caller, sha256, need);
+}
+
+absl::StatusOr<CaseKey> Access::FindCase(const Principal& caller, const std::string& sha256,
+                                         Need need) const {
+  CaseKey own{.sha256 = sha256, .owner = caller.name};
+  if (caller.anonymous() || index_.FindCase(own) != nullptr) return own;
+  const auto& cases = index_.cases();
+  for (auto next = cases.lower_bound({.sha256 = sha256});
+       next != cases.end() && next->first.sha256 == sha256; ++next) {
+    const Level level = CaseLevel(caller, next->first);
+    if (level == Level::kNothing) continue;
+    TF_RETURN_IF_ERROR(Judge(level, need, NoCase(sha256)));
+    return next->first;
+  }
+  return NoCase(sha256);
+}
+
+absl::StatusOr<CaseKey> Access::CaseOfLink(const Principal& link, const std::string& sha256) const {
+  const std::string session(absl::StripPrefix(link.only_session, kSessionsPrefix));
+  if (!HasGoodLink(session)) return LinkHasEnded();
+  for (const FollowLinkRow& row : table_.LinksOf(session)) {
+    if (row.case_sha256 == sha256 && IsGood(row)) {
+      return FindCase(Principal{.name = row.maker}, sha256, Need::kLook);
+    }
+  }
+  return NoCase(sha256);
+}
+
+absl::Status Access::MayMesh(const Principal& caller, const std::string& sha256, Need need) const {
+  MutexLock lock(mutex_);
+  return Judge(MeshLevel(caller, sha256), need, NoSuchMesh());
+}
+
+bool Access::OthersHoldMesh(const Principal& caller, const std::string& sha256) const {
+  MutexLock lock(mutex_);
+  const std::set<std::string>& holders = table_.HoldersOf(sha256);
+  if (holders.size() > (holders.contains(caller.name) ? 1U : 0U)) return true;
+  for (const std::string& id : index_.SessionsOf(sha256)) {
+    if (index_.FindSession(id)->owner != caller.name) return true;
+  }
+  return false;
+}
+
+int Access::CountSessionsOf(const Principal& caller, const std::string& mesh) const {
+  MutexLock lock(mutex_);
+  int count = 0;
+  for (const std::string& id : index_.SessionsOf(mesh)) {
+    count += index_.FindSession(id)->owner == caller.name ? 1 : 0;
+  }
+  return count;
+}
+
+std::set<std::string> Access::SharedSessions(const Principal& caller) const {
+  std::set<std::string> shared;
+  MutexLock lock(mutex_);
+  if (!table_.HasAny(caller.name)) return shared;
+  for (const auto& [id, session] : index_.sessions()) {
+    const Level level = SessionLevel(caller, id);
+    if (level != Level::kNothing && level != Level::kOwn) shared.insert(id);
+  }
+  return shared;
+}
+
+std::set<std::string> Access::SharedPredictions(const Principal& caller) const {
+  std::set<std::string> shared;
+  MutexLock lock(mutex_);
+  if (!table_.HasAny(caller.name)) return shared;
+  for (const auto& [id, prediction] : index_.predictions()) {
+    if (PredictionLevel(caller, id) == Level::kLook) shared.insert(id);
+  }
+  return shared;
+}
+
+std::set<CaseKey> Access::SharedCases(const Principal& caller) const {
+  std::set<CaseKey> shared;
+  MutexLock lock(mutex_);
+  if (!table_.HasAny(caller.name)) return shared;
+  for (const auto& [key, of_case] : index_.cases()) {
+    const absl::StatusOr<CaseKey> found = FindCase(caller, key.sha256, Need::kLook);
+    if (found.ok() && found->owner != caller.name) shared.insert(*found);
+  }
+  return shared;
+}
+
+bool Access::IsGood(const FollowLinkRow& link) const {
+  return link.expires_s > clock_() && index_.FindSession(link.session) != nullptr &&
+         SessionLevel(Principal{.name = link.maker}, link.session) >= Level::kDrag;
+}
+
+bool Access::HasGoodLink(const std::string& session) const {
+  for (const FollowLinkRow& link : table_.LinksOf(session)) {
+    if (IsGood(link)) return true;
+  }
+  return false;
+}
+
+absl::StatusOr<FollowLinkRow> Access::FindLink(const std::string& digest) const {
+  MutexLock lock(mutex_);
+  const FollowLinkRow* link = table_.FindLink(digest);
+  if (link == nullptr || !IsGood(*link)) return LinkHasEnded();
+  return *link;
+}
+
+std::map<std::string, Access::Holdings> Access::HoldingsByOwner() const {
+  std::map<std::string, Holdings> holdings;
+  MutexLock lock(mutex_);
+  for (const auto& [id, session] : index_.sessions()) ++holdings[session.owner].sessions;
+  for (const auto& [id, prediction] : index_.predictions()) {
+    holdings[prediction.owner].bytes += prediction.bytes;
+  }
+  for (const auto& [key, of_case] : index_.cases()) holdings[key.owner].bytes += of_case.bytes;
+  return holdings;
+}
+
+std::string Access::OwnerOf(const std::string& session) const {
+  MutexLock lock(mutex_);
+  const ResourceIndex::Session* found = index_.FindSession(session);
+  return found == nullptr ? "" : found->owner;
+}
+
+}  // namespace tissueform

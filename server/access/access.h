@@ -1,0 +1,115 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/base/mutex.h"
+#include "server/access/resource_index.h"
+#include "server/access/share_table.h"
+#include "server/auth/identity.h"
+#include "server/store/session_store.h"
+
+namespace tissueform {
+
+// What somebody wants of a resource; each includes the ones before.
+enum class Need {
+  kLook,  // read it, watch it
+  kDrag,  // have it answer poses, and keep the answers
+  kOwn,   // change it, delete it, share it
+};
+
+// Who may do what: the one place that decides it (docs/security.md, "Who may what").
+//
+// It answers from memory, by one look-up with principal and name, and never blocks. What a
+// principal may not look at answers NotFound, as what is not there, to the letter;
+// PermissionDenied is for what may be looked at only. What nobody with a name owns is open to those
+// without a name, and to them alone.
+//
+// Thread-safe. Its lock is held over nothing else.
+class Access {
+ public:
+  explicit Access(UnixClock clock = SystemUnixSeconds) : clock_(std::move(clock)) {}
+
+  // Whether the principal may call a method ("CaseService.UploadCase") at all: publishers publish,
+  // and a follow link follows. Errors: PermissionDenied.
+  static absl::Status MayCall(const Principal& caller, std::string_view method);
+  // Whether new resources may go into the project; empty: none. Errors: InvalidArgument,
+  // PermissionDenied.
+  static absl::Status MayPutInto(const Principal& caller, const std::string& project);
+
+  // Errors: NotFound, PermissionDenied; Unauthenticated for a follow link that has ended.
+  absl::Status MaySession(const Principal& caller, const std::string& id, Need need) const;
+  absl::Status MayPrediction(const Principal& caller, const std::string& id, Need need) const;
+  // Whose case the caller's name of it means: its own, else the first that is shared with it.
+  absl::StatusOr<CaseKey> MayCase(const Principal& caller, const std::string& sha256,
+                                  Need need) const;
+  // A mesh is looked at, and sessions are made of it, by who has sent its bytes and who may look at
+  // a session or a prediction that holds it; who has sent its bytes owns it. Errors: NotFound,
+  // PermissionDenied.
+  absl::Status MayMesh(const Principal& caller, const std::string& sha256, Need need) const;
+  // Whether somebody else has sent its bytes, or has a session of it.
+  bool OthersHoldMesh(const Principal& caller, const std::string& sha256) const;
+  // How many sessions of the caller are made from it.
+  int CountSessionsOf(const Principal& caller, const std::string& mesh) const;
+
+  // What of others' a list shows to the caller.
+  std::set<std::string> SharedSessions(const Principal& caller) const;
+  std::set<std::string> SharedPredictions(const Principal& caller) const;
+  std::set<CaseKey> SharedCases(
+      const Principal& caller) const;  // one a name, and none of one's own
+
+  // A link that is good: neither expired nor taken back, and its maker may still drag the session.
+  // Errors: Unauthenticated.
+  absl::StatusOr<FollowLinkRow> FindLink(const std::string& digest) const;
+
+  // What is kept, by owner.
+  struct Holdings {
+    int64_t sessions = 0;
+    int64_t bytes = 0;  // of predictions and cases
+  };
+  std::map<std::string, Holdings> HoldingsByOwner() const;
+  // Empty where nobody with a name has it.
+  std::string OwnerOf(const std::string& session) const;
+
+ private:
+  friend class AccessChanges;
+
+  enum class Level { kNothing, kLook, kDrag, kOwn };
+
+  static absl::Status Judge(Level level, Need need, const absl::Status& not_found);
+  // All with the lock.
+  Level LevelOfShare(const std::string& owner, const std::string& resource,
+                     const std::string& project, const std::string& principal) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Level SessionLevel(const Principal& caller, const std::string& id) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Level PredictionLevel(const Principal& caller, const std::string& id) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Level CaseLevel(const Principal& caller, const CaseKey& key) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Level MeshLevel(const Principal& caller, const std::string& sha256) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::StatusOr<CaseKey> FindCase(const Principal& caller, const std::string& sha256,
+                                   Need need) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::StatusOr<CaseKey> CaseOfLink(const Principal& link, const std::string& sha256) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool IsGood(const FollowLinkRow& link) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool HasGoodLink(const std::string& session) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  const UnixClock clock_;
+
+  mutable Mutex mutex_;
+  ResourceIndex index_ ABSL_GUARDED_BY(mutex_);
+  ShareTable table_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace tissueform

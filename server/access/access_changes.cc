@@ -1,0 +1,250 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/access/access_changes.h"
+
+#include <future>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
+#include "spdlog/spdlog.h"
+
+#include "core/base/status_macros.h"
+#include "server/access/access_names.h"
+#include "server/session/session_refusals.h"
+#include "server/store/store_errors.h"
+
+namespace tissueform {
+namespace {
+
+void WarnUnlessErased(const absl::Status& status) {
+  // In memory it is away; after a restart it belongs to a resource that is not there.
+  if (!status.ok()) spdlog::warn("rights of what was removed stay on the disk");
+}
+
+absl::Status TooMany(absl::string_view what, int limit, absl::string_view option) {
+  return absl::ResourceExhaustedError(absl::StrCat(
+      "it has ", limit, " ", what, ", as many as it may; take some back or raise ", option));
+}
+
+}  // namespace
+
+absl::Status AccessChanges::Learn() {
+  TF_ASSIGN_OR_RETURN(const AccessRows rows, store_->Load());
+  MutexLock lock(access_.mutex_);
+  access_.table_.Add(rows);
+  return absl::OkStatus();
+}
+
+absl::Status AccessChanges::MayOwn(const Principal& caller, const std::string& resource) const {
+  absl::string_view name = resource;
+  const ResourceIndex& index = access_.index_;
+  if (absl::ConsumePrefix(&name, kProjectsPrefix)) return CheckAccessName(name, "project");
+  TF_RETURN_IF_ERROR(CheckAccessName(resource, "resource"));
+  if (absl::ConsumePrefix(&name, kSessionsPrefix)) {
+    const std::string id(name);
+    if (index.FindSession(id) == nullptr) return NoSuchSession(id);
+    return Access::Judge(access_.SessionLevel(caller, id), Need::kOwn, NoSuchSession(id));
+  }
+  if (absl::ConsumePrefix(&name, kPredictionsPrefix)) {
+    const std::string id(name);
+    if (index.FindPrediction(id) == nullptr) return NoPrediction(id);
+    return Access::Judge(access_.PredictionLevel(caller, id), Need::kOwn, NoPrediction(id));
+  }
+  if (absl::ConsumePrefix(&name, kCasesPrefix)) {
+    const std::string sha256(name);
+    TF_ASSIGN_OR_RETURN(const CaseKey key, access_.FindCase(caller, sha256, Need::kOwn));
+    return index.FindCase(key) == nullptr ? NoCase(sha256) : absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(
+      "not the name of a resource that can be shared; name a session, a prediction, a case or a "
+      "project, \"sessions/{id}\"");
+}
+
+absl::Status AccessChanges::CheckShare(const Principal& caller, const ShareRow& share) const {
+  TF_RETURN_IF_ERROR(CheckAccessName(share.principal, "principal"));
+  MutexLock lock(access_.mutex_);
+  TF_RETURN_IF_ERROR(MayOwn(caller, share.resource));
+  const ShareTable& table = access_.table_;
+  const bool is_new = !table.RoleOf(caller.name, share.resource, share.principal).has_value();
+  const size_t most = static_cast<size_t>(options_.max_shares_per_resource);
+  if (is_new && table.SharesOf(caller.name, share.resource).size() >= most) {
+    return TooMany("shares", options_.max_shares_per_resource, "--max-shares-per-resource");
+  }
+  return absl::OkStatus();
+}
+
+void AccessChanges::Share(const Principal& caller, ShareRow share, const Done& done) {
+  if (const absl::Status status = CheckShare(caller, share); !status.ok()) {
+    done(status);
+    return;
+  }
+  share.owner = caller.name;
+  const bool lessens = share.role == ShareRole::kViewer;
+  Put({.shares = {std::move(share)}}, [this, done, lessens](const absl::Status& status) {
+    if (status.ok() && lessens) on_revoked_();
+    done(status);
+  });
+}
+
+void AccessChanges::Unshare(const Principal& caller, const std::string& resource,
+                            const std::string& with, const Done& done) {
+  absl::Status status;
+  {
+    MutexLock lock(access_.mutex_);
+    status = MayOwn(caller, resource);
+    if (status.ok() && !access_.table_.RoleOf(caller.name, resource, with).has_value()) {
+      status = absl::NotFoundError("no such share; ListShares tells which there are");
+    }
+  }
+  if (!status.ok()) {
+    done(status);
+    return;
+  }
+  Erase({.shares = {{.resource = resource, .owner = caller.name, .principal = with}}}, done);
+  on_revoked_();
+}
+
+absl::StatusOr<std::vector<ShareRow>> AccessChanges::SharesOf(const Principal& caller,
+                                                              const std::string& resource) const {
+  MutexLock lock(access_.mutex_);
+  TF_RETURN_IF_ERROR(MayOwn(caller, resource));
+  return access_.table_.SharesOf(caller.name, resource);
+}
+
+absl::Status AccessChanges::CheckLink(const Principal& caller, const FollowLinkRow& link) const {
+  MutexLock lock(access_.mutex_);
+  if (access_.index_.FindSession(link.session) == nullptr) return NoSuchSession(link.session);
+  TF_RETURN_IF_ERROR(Access::Judge(access_.SessionLevel(caller, link.session), Need::kDrag,
+                                   NoSuchSession(link.session)));
+  if (!link.case_sha256.empty()) {
+    TF_ASSIGN_OR_RETURN(const CaseKey key, access_.FindCase(caller, link.case_sha256, Need::kLook));
+    if (access_.index_.FindCase(key) == nullptr) return NoCase(key.sha256);
+  }
+  if (access_.table_.LinksOf(link.session).size() >=
+      static_cast<size_t>(options_.max_links_per_session)) {
+    return TooMany("follow links", options_.max_links_per_session, "--max-links-per-session");
+  }
+  return absl::OkStatus();
+}
+
+void AccessChanges::AddLink(const Principal& caller, FollowLinkRow link, const Done& done) {
+  AccessRows ended;
+  {
+    MutexLock lock(access_.mutex_);
+    ended.links = access_.table_.LinksUntil(access_.clock_());
+  }
+  if (!ended.links.empty()) Erase(std::move(ended), WarnUnlessErased);
+  if (const absl::Status status = CheckLink(caller, link); !status.ok()) {
+    done(status);
+    return;
+  }
+  link.maker = caller.name;
+  Put({.links = {std::move(link)}}, done);
+}
+
+void AccessChanges::RemoveLinks(const Principal& caller, const std::string& session,
+                                const Done& done) {
+  if (const absl::Status status = access_.MaySession(caller, session, Need::kDrag); !status.ok()) {
+    done(status);
+    return;
+  }
+  AccessRows rows;
+  {
+    MutexLock lock(access_.mutex_);
+    if (access_.index_.FindSession(session) != nullptr) {
+      rows.links = access_.table_.LinksOf(session);
+    }
+  }
+  Erase(std::move(rows), done);
+  on_revoked_();
+}
+
+absl::Status AccessChanges::GrantMesh(const Principal& caller, const std::string& sha256) {
+  // What nobody with a name has is open to those without one as it is.
+  if (access_.MayMesh(caller, sha256, Need::kOwn).ok()) return absl::OkStatus();
+  std::promise<absl::Status> kept;
+  Put({.mesh_rights = {{.principal = caller.name, .sha256 = sha256}}},
+      [&kept](const absl::Status& status) { kept.set_value(status); });
+  return kept.get_future().get();
+}
+
+absl::Status AccessChanges::ForsakeMesh(const Principal& caller, const std::string& sha256) {
+  std::promise<absl::Status> erased;
+  Erase({.mesh_rights = {{.principal = caller.name, .sha256 = sha256}}},
+        [&erased](const absl::Status& status) { erased.set_value(status); });
+  return erased.get_future().get();
+}
+
+void AccessChanges::SessionRemoved(const std::string& id) {
+  AccessRows rows;
+  {
+    MutexLock lock(access_.mutex_);
+    const ResourceIndex::Session* session = access_.index_.FindSession(id);
+    if (session == nullptr) return;
+    rows.shares = access_.table_.SharesOf(session->owner, SessionResource(id));
+    rows.links = access_.table_.LinksOf(id);
+    access_.index_.RemoveSession(id);
+  }
+  Erase(std::move(rows), WarnUnlessErased);
+}
+
+void AccessChanges::PredictionRemoved(const std::string& id) {
+  AccessRows rows;
+  {
+    MutexLock lock(access_.mutex_);
+    const ResourceIndex::Prediction* prediction = access_.index_.FindPrediction(id);
+    if (prediction == nullptr) return;
+    rows.shares = access_.table_.SharesOf(prediction->owner, PredictionResource(id));
+    access_.index_.RemovePrediction(id);
+  }
+  Erase(std::move(rows), WarnUnlessErased);
+}
+
+void AccessChanges::CaseRemoved(const CaseKey& key) {
+  AccessRows rows;
+  {
+    MutexLock lock(access_.mutex_);
+    rows.shares = access_.table_.SharesOf(key.owner, CaseResource(key.sha256));
+    access_.index_.RemoveCase(key);
+  }
+  Erase(std::move(rows), WarnUnlessErased);
+}
+
+void AccessChanges::MeshRemoved(const std::string& sha256) {
+  AccessRows rows;
+  {
+    MutexLock lock(access_.mutex_);
+    for (const std::string& holder : access_.table_.HoldersOf(sha256)) {
+      rows.mesh_rights.push_back({.principal = holder, .sha256 = sha256});
+    }
+  }
+  Erase(std::move(rows), WarnUnlessErased);
+}
+
+void AccessChanges::Erase(AccessRows rows, const Done& done) {
+  if (rows.shares.empty() && rows.links.empty() && rows.mesh_rights.empty()) {
+    done(absl::OkStatus());
+    return;
+  }
+  {
+    MutexLock lock(access_.mutex_);
+    access_.table_.Remove(rows);
+  }
+  store_->Change(std::move(rows), {}, done);
+}
+
+void AccessChanges::Put(AccessRows rows, const Done& done) {
+  AccessRows kept = rows;
+  store_->Change({}, std::move(rows),
+                 [this, kept = std::move(kept), done](const absl::Status& status) {
+                   if (status.ok()) {
+                     MutexLock lock(access_.mutex_);
+                     access_.table_.Add(kept);
+                   }
+                   done(status);
+                 });
+}
+
+}  // namespace tissueform

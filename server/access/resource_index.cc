@@ -1,0 +1,85 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/access/resource_index.h"
+
+namespace tissueform {
+namespace {
+
+constexpr int64_t kVertexBytes = 12;
+
+template <typename Map, typename Key>
+const typename Map::mapped_type* FindIn(const Map& map, const Key& key) {
+  const auto found = map.find(key);
+  return found == map.end() ? nullptr : &found->second;
+}
+
+}  // namespace
+
+void ResourceIndex::Add(const SessionRecord& record) {
+  RemoveSession(record.id);
+  sessions_[record.id] = {
+      .owner = record.owner, .project = record.project, .mesh = record.mesh_sha256};
+  sessions_of_mesh_[record.mesh_sha256].insert(record.id);
+}
+
+void ResourceIndex::Add(const PredictionRecord& record) {
+  RemovePrediction(record.id);
+  predictions_[record.id] = {
+      .owner = record.owner,
+      .session = record.session,
+      .mesh = record.mesh_sha256,
+      .bytes = kVertexBytes * record.vertex_count + static_cast<int64_t>(record.metadata.size())};
+  predictions_of_mesh_[record.mesh_sha256].insert(record.id);
+}
+
+void ResourceIndex::Add(const CaseRecord& record) {
+  cases_[record.key()] = {.project = record.project, .bytes = record.total_bytes};
+}
+
+void ResourceIndex::RemoveSession(const std::string& id) {
+  const auto found = sessions_.find(id);
+  if (found == sessions_.end()) return;
+  Forget(&sessions_of_mesh_, found->second.mesh, id);
+  sessions_.erase(found);
+}
+
+void ResourceIndex::RemovePrediction(const std::string& id) {
+  const auto found = predictions_.find(id);
+  if (found == predictions_.end()) return;
+  Forget(&predictions_of_mesh_, found->second.mesh, id);
+  predictions_.erase(found);
+}
+
+void ResourceIndex::RemoveCase(const CaseKey& key) { cases_.erase(key); }
+
+const ResourceIndex::Session* ResourceIndex::FindSession(const std::string& id) const {
+  return FindIn(sessions_, id);
+}
+const ResourceIndex::Prediction* ResourceIndex::FindPrediction(const std::string& id) const {
+  return FindIn(predictions_, id);
+}
+const ResourceIndex::Case* ResourceIndex::FindCase(const CaseKey& key) const {
+  return FindIn(cases_, key);
+}
+
+const std::set<std::string>& ResourceIndex::SessionsOf(const std::string& mesh) const {
+  return Of(sessions_of_mesh_, mesh);
+}
+const std::set<std::string>& ResourceIndex::PredictionsOf(const std::string& mesh) const {
+  return Of(predictions_of_mesh_, mesh);
+}
+
+void ResourceIndex::Forget(NamesOfMesh* names, const std::string& mesh, const std::string& id) {
+  const auto found = names->find(mesh);
+  found->second.erase(id);
+  if (found->second.empty()) names->erase(found);
+}
+
+const std::set<std::string>& ResourceIndex::Of(const NamesOfMesh& names, const std::string& mesh) {
+  static const auto* none = new std::set<std::string>();
+  const std::set<std::string>* found = FindIn(names, mesh);
+  return found == nullptr ? *none : *found;
+}
+
+}  // namespace tissueform

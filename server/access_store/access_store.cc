@@ -1,0 +1,16 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/access_store/access_store.h"
+
+#include "server/access_store/durable_access_store.h"
+#include "server/access_store/in_memory_access_store.h"
+
+namespace tissueform {
+
+std::unique_ptr<AccessStore> OpenAccessStore(Stores* stores) {
+  if (stores->commit_thread() == nullptr) return std::make_unique<InMemoryAccessStore>();
+  return std::make_unique<DurableAccessStore>(stores->commit_thread());
+}
+
+}  // namespace tissueform

@@ -1,0 +1,46 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/rpc/allowed_resource.h"
+
+#include "core/base/status_macros.h"
+#include "proto/conversion/case_conversion.h"
+#include "proto/conversion/mesh_conversion.h"
+#include "proto/conversion/prediction_conversion.h"
+#include "proto/conversion/session_conversion.h"
+
+namespace tissueform {
+
+absl::StatusOr<std::string> AllowedSession(const Access& access, CallScope* scope,
+                                           const std::string& name, Need need) {
+  TF_ASSIGN_OR_RETURN(std::string id, ParseSessionName(name));
+  TF_RETURN_IF_ERROR(access.MaySession(scope->principal(), id, need));
+  scope->SetResource(name);
+  return id;
+}
+
+absl::StatusOr<std::string> AllowedPrediction(const Access& access, CallScope* scope,
+                                              const std::string& name, Need need) {
+  TF_ASSIGN_OR_RETURN(std::string id, ParsePredictionName(name));
+  TF_RETURN_IF_ERROR(access.MayPrediction(scope->principal(), id, need));
+  scope->SetResource(name);
+  return id;
+}
+
+absl::StatusOr<std::string> AllowedMesh(const Access& access, CallScope* scope,
+                                        const std::string& name, Need need) {
+  TF_ASSIGN_OR_RETURN(std::string sha256, ParseMeshName(name));
+  TF_RETURN_IF_ERROR(access.MayMesh(scope->principal(), sha256, need));
+  scope->SetResource(name);
+  return sha256;
+}
+
+absl::StatusOr<CaseKey> AllowedCase(const Access& access, CallScope* scope, const std::string& name,
+                                    Need need) {
+  TF_ASSIGN_OR_RETURN(const std::string sha256, ParseCaseName(name));
+  TF_ASSIGN_OR_RETURN(CaseKey key, access.MayCase(scope->principal(), sha256, need));
+  scope->SetResource(name);
+  return key;
+}
+
+}  // namespace tissueform

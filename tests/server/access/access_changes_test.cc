@@ -1,0 +1,166 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/access/access_changes.h"
+
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "server/access_store/in_memory_access_store.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform::testing {
+namespace {
+
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using Code = absl::StatusCode;
+
+const std::string kMesh(64, 'e');
+
+class AccessChangesTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    changes_.set_on_revoked([this] { ++revoked_; });
+    AddSession("s", "ann");
+  }
+
+  void AddSession(const std::string& id, const std::string& owner) {
+    SessionRecord session;
+    session.id = id;
+    session.owner = owner;
+    session.mesh_sha256 = kMesh;
+    changes_.Added(session);
+  }
+
+  AccessChanges::Done Into(absl::Status* outcome) {
+    return [outcome](const absl::Status& status) { *outcome = status; };
+  }
+  absl::Status Share(const Principal& caller, const std::string& resource, const std::string& with,
+                     ShareRole role = ShareRole::kViewer) {
+    absl::Status outcome;
+    changes_.Share(caller, {.resource = resource, .principal = with, .role = role}, Into(&outcome));
+    return outcome;
+  }
+  absl::Status Unshare(const Principal& caller, const std::string& resource,
+                       const std::string& with) {
+    absl::Status outcome;
+    changes_.Unshare(caller, resource, with, Into(&outcome));
+    return outcome;
+  }
+  absl::Status Link(const Principal& caller, const std::string& digest) {
+    absl::Status outcome;
+    changes_.AddLink(caller, {.digest = digest, .session = "s", .expires_s = now_s_ + 10},
+                     Into(&outcome));
+    return outcome;
+  }
+
+  const Principal ann_{.name = "ann"};
+  const Principal bob_{.name = "bob"};
+  int64_t now_s_ = 1000;
+  int revoked_ = 0;
+  InMemoryAccessStore store_;
+  Access access_{[this] { return now_s_; }};
+  AccessChanges changes_{
+      {.max_shares_per_resource = 2, .max_links_per_session = 2}, &store_, &access_};
+};
+
+TEST_F(AccessChangesTest, OnlyTheOwnerShares) {
+  EXPECT_THAT(Share(bob_, "sessions/s", "bob"), StatusIs(Code::kNotFound));
+  ASSERT_THAT(Share(ann_, "sessions/s", "bob", ShareRole::kPlanner), IsOk());
+  EXPECT_THAT(Share(bob_, "sessions/s", "cid"), StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(changes_.SharesOf(bob_, "sessions/s").status(), StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(Unshare(bob_, "sessions/s", "bob"), StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(*changes_.SharesOf(ann_, "sessions/s"), SizeIs(1));
+}
+
+TEST_F(AccessChangesTest, WhatIsNoNameIsRefused) {
+  for (const char* resource :
+       {"", "sessions", "session/s", "meshes/x", "projects/", "sessions/\n"}) {
+    EXPECT_THAT(Share(ann_, resource, "bob"), StatusIs(Code::kInvalidArgument)) << resource;
+  }
+  EXPECT_THAT(Share(ann_, "sessions/s", ""), StatusIs(Code::kInvalidArgument));
+  EXPECT_THAT(Share(ann_, "sessions/s", "b\tob"), StatusIs(Code::kInvalidArgument));
+  EXPECT_THAT(Share(ann_, "sessions/s", std::string(129, 'b')), StatusIs(Code::kInvalidArgument));
+  EXPECT_THAT(Share(ann_, "sessions/none", "bob"), StatusIs(Code::kNotFound));
+}
+
+TEST_F(AccessChangesTest, AShareThatIsTakenBackIsAwayAtOnceAndStreamsAreAsked) {
+  ASSERT_THAT(Share(ann_, "sessions/s", "bob", ShareRole::kPlanner), IsOk());
+  EXPECT_EQ(revoked_, 0);
+  ASSERT_THAT(Unshare(ann_, "sessions/s", "bob"), IsOk());
+  EXPECT_EQ(revoked_, 1);
+  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(store_.Load()->shares, IsEmpty());
+  EXPECT_THAT(Unshare(ann_, "sessions/s", "bob"), StatusIs(Code::kNotFound));
+}
+
+TEST_F(AccessChangesTest, SharesAndLinksOfOneResourceAreBounded) {
+  ASSERT_THAT(Share(ann_, "sessions/s", "a"), IsOk());
+  ASSERT_THAT(Share(ann_, "sessions/s", "b"), IsOk());
+  EXPECT_THAT(Share(ann_, "sessions/s", "c"), StatusIs(Code::kResourceExhausted));
+  EXPECT_THAT(Share(ann_, "sessions/s", "b", ShareRole::kPlanner), IsOk()) << "no new one";
+  ASSERT_THAT(Link(ann_, "1"), IsOk());
+  ASSERT_THAT(Link(ann_, "2"), IsOk());
+  EXPECT_THAT(Link(ann_, "3"), StatusIs(Code::kResourceExhausted));
+  now_s_ += 10;
+  EXPECT_THAT(Link(ann_, "3"), IsOk()) << "those that have ended make room";
+  EXPECT_THAT(store_.Load()->links, SizeIs(1));
+}
+
+TEST_F(AccessChangesTest, ASessionTakesItsSharesAndLinksWithIt) {
+  ASSERT_THAT(Share(ann_, "sessions/s", "bob"), IsOk());
+  ASSERT_THAT(Link(ann_, "1"), IsOk());
+  changes_.SessionRemoved("s");
+  AddSession("s", "ann");
+  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.FindLink("1").status(), StatusIs(Code::kUnauthenticated));
+  EXPECT_THAT(store_.Load()->shares, IsEmpty());
+  EXPECT_THAT(store_.Load()->links, IsEmpty());
+}
+
+TEST_F(AccessChangesTest, LinksAreTakenBackByWhoMayDrag) {
+  ASSERT_THAT(Link(bob_, "1"), StatusIs(Code::kNotFound));
+  ASSERT_THAT(Share(ann_, "sessions/s", "bob"), IsOk());
+  ASSERT_THAT(Link(bob_, "1"), StatusIs(Code::kPermissionDenied));
+  ASSERT_THAT(Link(ann_, "1"), IsOk());
+  absl::Status outcome;
+  changes_.RemoveLinks(bob_, "s", Into(&outcome));
+  EXPECT_THAT(outcome, StatusIs(Code::kPermissionDenied));
+  changes_.RemoveLinks(ann_, "s", Into(&outcome));
+  EXPECT_THAT(outcome, IsOk());
+  EXPECT_THAT(access_.FindLink("1").status(), StatusIs(Code::kUnauthenticated));
+}
+
+TEST_F(AccessChangesTest, WhatWasLearntCountsAfterARestart) {
+  ASSERT_THAT(Share(ann_, "sessions/s", "bob"), IsOk());
+  Access access([this] { return now_s_; });
+  AccessChanges changes({}, &store_, &access);
+  ASSERT_THAT(changes.Learn(), IsOk());
+  SessionRecord session;
+  session.id = "s";
+  session.owner = "ann";
+  changes.Added(session);
+  EXPECT_THAT(access.MaySession(bob_, "s", Need::kLook), IsOk());
+}
+
+TEST_F(AccessChangesTest, AMeshIsOfWhoHasSentItUntilItGoes) {
+  const std::string mesh(64, 'b');
+  ASSERT_THAT(changes_.GrantMesh(bob_, mesh), IsOk());
+  EXPECT_THAT(access_.MayMesh(bob_, mesh, Need::kOwn), IsOk());
+  EXPECT_THAT(access_.MayMesh(ann_, mesh, Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_FALSE(access_.OthersHoldMesh(bob_, mesh));
+  ASSERT_THAT(changes_.GrantMesh(ann_, mesh), IsOk());
+  EXPECT_TRUE(access_.OthersHoldMesh(bob_, mesh));
+  ASSERT_THAT(changes_.ForsakeMesh(ann_, mesh), IsOk());
+  EXPECT_FALSE(access_.OthersHoldMesh(bob_, mesh));
+  changes_.MeshRemoved(mesh);
+  EXPECT_THAT(access_.MayMesh(bob_, mesh, Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(store_.Load()->mesh_rights, IsEmpty());
+}
+
+}  // namespace
+}  // namespace tissueform::testing

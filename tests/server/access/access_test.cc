@@ -1,0 +1,207 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/access/access.h"
+
+#include <string>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "server/access/access_changes.h"
+#include "server/access_store/in_memory_access_store.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform::testing {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using Code = absl::StatusCode;
+
+const std::string kMesh(64, 'e');
+const std::string kCase(64, 'c');
+
+// Ann has a session, a prediction of it and a case, all in one project but the prediction; nobody
+// else has anything.
+class AccessTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    SessionRecord session;
+    session.id = "s";
+    session.owner = ann_.name;
+    session.project = "p";
+    session.mesh_sha256 = kMesh;
+    changes_.Added(session);
+    PredictionRecord prediction;
+    prediction.id = "q";
+    prediction.owner = ann_.name;
+    prediction.session = "s";
+    prediction.mesh_sha256 = kMesh;
+    changes_.Added(prediction);
+    changes_.Added(CaseRecord{.sha256 = kCase, .owner = ann_.name, .project = "p"});
+  }
+
+  absl::Status Share(const std::string& resource, const std::string& with,
+                     ShareRole role = ShareRole::kViewer) {
+    absl::Status outcome;
+    changes_.Share(ann_, {.resource = resource, .principal = with, .role = role},
+                   [&outcome](const absl::Status& status) { outcome = status; });
+    return outcome;
+  }
+
+  const Principal ann_{.name = "ann"};
+  const Principal bob_{.name = "bob"};
+  const Principal nobody_;
+  int64_t now_s_ = 1000;
+  InMemoryAccessStore store_;
+  Access access_{[this] { return now_s_; }};
+  AccessChanges changes_{{}, &store_, &access_};
+};
+
+TEST_F(AccessTest, OnesOwnIsOnesOwn) {
+  EXPECT_THAT(access_.MaySession(ann_, "s", Need::kOwn), IsOk());
+  EXPECT_THAT(access_.MayPrediction(ann_, "q", Need::kOwn), IsOk());
+  EXPECT_THAT(access_.MayCase(ann_, kCase, Need::kOwn), IsOk());
+  EXPECT_THAT(access_.MayMesh(ann_, kMesh, Need::kLook), IsOk());
+}
+
+TEST_F(AccessTest, AnothersAnswersAsWhatIsNotThere) {
+  const std::string none(64, 'f');
+  const auto same_but_for_the_name = [](const absl::Status& foreign, const absl::Status& missing,
+                                        const std::string& name, const std::string& other) {
+    std::string message(foreign.message());
+    for (size_t at = 0; (at = message.find(name, at)) != std::string::npos; at += other.size()) {
+      message.replace(at, name.size(), other);
+    }
+    return foreign.code() == Code::kNotFound && missing.code() == Code::kNotFound &&
+           message == missing.message();
+  };
+  for (const Need need : {Need::kLook, Need::kDrag, Need::kOwn}) {
+    EXPECT_EQ(access_.MaySession(bob_, "s", need).code(), Code::kNotFound);
+    EXPECT_EQ(access_.MayPrediction(bob_, "q", need).code(), Code::kNotFound);
+    EXPECT_TRUE(same_but_for_the_name(access_.MayCase(bob_, kCase, need).status(),
+                                      access_.MayCase(bob_, none, need).status(), kCase, none));
+    EXPECT_TRUE(same_but_for_the_name(access_.MayMesh(bob_, kMesh, need),
+                                      access_.MayMesh(bob_, none, need), kMesh, none));
+  }
+}
+
+TEST_F(AccessTest, WhatSomebodyHasIsNothingForThoseWithoutAName) {
+  EXPECT_THAT(access_.MaySession(nobody_, "s", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.MayPrediction(nobody_, "q", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_EQ(access_.MayCase(nobody_, kCase, Need::kLook)->owner, "");
+}
+
+TEST_F(AccessTest, WithoutLoginsWhatNobodyHasIsEverybodys) {
+  SessionRecord session;
+  session.id = "t";
+  session.mesh_sha256 = std::string(64, 'a');
+  changes_.Added(session);
+  EXPECT_THAT(access_.MaySession(nobody_, "t", Need::kOwn), IsOk());
+  EXPECT_THAT(access_.MaySession(bob_, "t", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.MayMesh(nobody_, session.mesh_sha256, Need::kOwn), IsOk());
+  EXPECT_THAT(access_.MayMesh(bob_, session.mesh_sha256, Need::kLook), StatusIs(Code::kNotFound));
+}
+
+TEST_F(AccessTest, AViewerLooksAndAPlannerDrags) {
+  ASSERT_THAT(Share("sessions/s", "bob", ShareRole::kViewer), IsOk());
+  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kLook), IsOk());
+  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kDrag), StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(access_.MayPrediction(bob_, "q", Need::kLook), IsOk());
+  EXPECT_THAT(access_.MayPrediction(bob_, "q", Need::kOwn), StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(access_.MayMesh(bob_, kMesh, Need::kLook), IsOk());
+  EXPECT_THAT(access_.MayCase(bob_, kCase, Need::kLook), StatusIs(Code::kNotFound));
+  ASSERT_THAT(Share("sessions/s", "bob", ShareRole::kPlanner), IsOk());
+  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kDrag), IsOk());
+  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kOwn), StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(access_.SharedSessions(bob_), ElementsAre("s"));
+  EXPECT_THAT(access_.SharedPredictions(bob_), ElementsAre("q"));
+  EXPECT_THAT(access_.SharedSessions(ann_), IsEmpty()) << "they are her own";
+}
+
+TEST_F(AccessTest, AShareOfAProjectIsOneOfAllThatItsOwnerHasInIt) {
+  ASSERT_THAT(Share("projects/p", "bob", ShareRole::kPlanner), IsOk());
+  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kDrag), IsOk());
+  ASSERT_OK_AND_ASSIGN(const CaseKey found, access_.MayCase(bob_, kCase, Need::kLook));
+  EXPECT_EQ(found.owner, "ann");
+  EXPECT_THAT(access_.SharedCases(bob_), ElementsAre(CaseKey{kCase, "ann"}));
+  SessionRecord others;
+  others.id = "o";
+  others.owner = "cid";
+  others.project = "p";
+  changes_.Added(others);
+  EXPECT_THAT(access_.MaySession(bob_, "o", Need::kLook), StatusIs(Code::kNotFound))
+      << "another's project of this name";
+}
+
+TEST_F(AccessTest, ACaseOfOnesOwnComesBeforeOneThatIsShared) {
+  ASSERT_THAT(Share("cases/" + kCase, "bob"), IsOk());
+  EXPECT_EQ(access_.MayCase(bob_, kCase, Need::kLook)->owner, "ann");
+  EXPECT_THAT(access_.MayCase(bob_, kCase, Need::kOwn), StatusIs(Code::kPermissionDenied));
+  changes_.Added(CaseRecord{.sha256 = kCase, .owner = "bob"});
+  EXPECT_EQ(access_.MayCase(bob_, kCase, Need::kOwn)->owner, "bob");
+  EXPECT_THAT(access_.SharedCases(bob_), IsEmpty()) << "one a name";
+}
+
+TEST_F(AccessTest, AnIdThatAnotherTakesAgainOpensNoPredictionOfItsFirstOwner) {
+  changes_.SessionRemoved("s");
+  SessionRecord session;
+  session.id = "s";
+  session.owner = "bob";
+  changes_.Added(session);
+  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kOwn), IsOk());
+  EXPECT_THAT(access_.MayPrediction(bob_, "q", Need::kLook), StatusIs(Code::kNotFound));
+}
+
+TEST_F(AccessTest, ALinkFollowsItsSessionReadsItsCaseAndNothingElse) {
+  const Principal link{.name = "link:s", .only_session = "sessions/s"};
+  EXPECT_THAT(access_.MaySession(link, "s", Need::kLook), StatusIs(Code::kUnauthenticated))
+      << "nobody has made one";
+  changes_.AddLink(ann_,
+                   {.digest = "d", .session = "s", .case_sha256 = kCase, .expires_s = now_s_ + 1},
+                   [](const absl::Status& status) { EXPECT_THAT(status, IsOk()); });
+  EXPECT_THAT(access_.MaySession(link, "s", Need::kLook), IsOk());
+  EXPECT_THAT(access_.MaySession(link, "s", Need::kDrag), StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(access_.MaySession(link, "t", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.MayPrediction(link, "q", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.MayMesh(link, kMesh, Need::kLook), IsOk());
+  EXPECT_EQ(access_.MayCase(link, kCase, Need::kLook)->owner, "ann");
+  EXPECT_THAT(access_.MayCase(link, kMesh, Need::kLook), StatusIs(Code::kNotFound));
+  now_s_ += 1;
+  EXPECT_THAT(access_.MaySession(link, "s", Need::kLook), StatusIs(Code::kUnauthenticated));
+  EXPECT_THAT(access_.FindLink("d").status(), StatusIs(Code::kUnauthenticated));
+}
+
+TEST_F(AccessTest, ALinkEndsWhenItsMakerMayDragNoMore) {
+  ASSERT_THAT(Share("sessions/s", "bob", ShareRole::kPlanner), IsOk());
+  changes_.AddLink(bob_, {.digest = "d", .session = "s", .expires_s = now_s_ + 100},
+                   [](const absl::Status& status) { EXPECT_THAT(status, IsOk()); });
+  EXPECT_THAT(access_.FindLink("d"), IsOk());
+  ASSERT_THAT(Share("sessions/s", "bob", ShareRole::kViewer), IsOk());
+  EXPECT_THAT(access_.FindLink("d").status(), StatusIs(Code::kUnauthenticated));
+}
+
+TEST_F(AccessTest, ALinkCallsWhatAFollowerNeedsAndAPublisherUploadsCases) {
+  const Principal link{.name = "link:s", .only_session = "sessions/s"};
+  EXPECT_THAT(Access::MayCall(link, "DeformService.Watch"), IsOk());
+  EXPECT_THAT(Access::MayCall(link, "CaseService.ReadCase"), IsOk());
+  EXPECT_THAT(Access::MayCall(link, "DeformService.Deform"), StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(Access::MayCall(link, "MeshService.UploadMesh"), StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(Access::MayCall(ann_, "CaseService.UploadCase"), StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(Access::MayCall(nobody_, "CaseService.UploadCase"), IsOk());
+  EXPECT_THAT(Access::MayCall({.name = "ann", .roles = {"publisher"}}, "CaseService.UploadCase"),
+              IsOk());
+}
+
+TEST_F(AccessTest, OnlyAProjectOfTheTokenTakesNewResources) {
+  EXPECT_THAT(Access::MayPutInto(ann_, ""), IsOk());
+  EXPECT_THAT(Access::MayPutInto(ann_, "p"), StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(Access::MayPutInto({.name = "ann", .projects = {"p"}}, "p"), IsOk());
+  EXPECT_THAT(Access::MayPutInto(nobody_, "p"), IsOk());
+  EXPECT_THAT(Access::MayPutInto(nobody_, "p\n"), StatusIs(Code::kInvalidArgument));
+  EXPECT_THAT(Access::MayPutInto(nobody_, std::string(129, 'p')), StatusIs(Code::kInvalidArgument));
+}
+
+}  // namespace
+}  // namespace tissueform::testing

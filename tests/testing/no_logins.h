@@ -1,0 +1,18 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "server/access/access_changes.h"
+#include "server/access_store/in_memory_access_store.h"
+
+namespace tissueform::testing {
+
+// Who may what on a server where nobody logs in: everybody everything.
+struct NoLogins {
+  InMemoryAccessStore store;
+  Access access;
+  AccessChanges changes{{}, &store, &access};
+};
+
+}  // namespace tissueform::testing
