@@ -13,6 +13,7 @@
 #include "absl/types/span.h"
 #include "grpcpp/channel.h"
 
+#include "client/cpp/access_calls.h"
 #include "client/cpp/case_calls.h"
 #include "client/cpp/deform_stream.h"
 #include "client/cpp/mesh_upload.h"
@@ -105,6 +106,9 @@ class TissueformClient {
   // What planners open.
   CaseCalls& cases() { return cases_; }
 
+  // Who may do what.
+  AccessCalls& access() { return access_; }
+
  private:
   TissueformClient(const std::shared_ptr<grpc::Channel>& channel, const Options& options);
 
@@ -117,6 +121,7 @@ class TissueformClient {
   const std::unique_ptr<v1::ServerInfoService::Stub> server_info_;
   PredictionCalls predictions_;
   CaseCalls cases_;
+  AccessCalls access_;
 };
 
 }  // namespace tissueform
