@@ -3,6 +3,9 @@
 //
 // The companion of `tissueform` that speaks with servers.
 
+#include "client/cli/access/follow_link_command.h"
+#include "client/cli/access/share_command.h"
+#include "client/cli/access/whoami_command.h"
 #include "client/cli/cases/case_command.h"
 #include "client/cli/cases/planner_process.h"
 #include "client/cli/load/load_command.h"
@@ -15,6 +18,7 @@
 #include "client/cli/online/session_command.h"
 #include "client/cli/online/watch_command.h"
 #include "client/cli/shared/command_line.h"
+#include "client/cli/shared/companion.h"
 
 int main(int argc, char** argv) {
   return tissueform::RunCommandLine(argc, argv, [](CLI::App& app, tissueform::CommandWork* work) {
@@ -26,6 +30,9 @@ int main(int argc, char** argv) {
     tissueform::AddWatchCommand(app, work);
     tissueform::AddPredictionCommand(app, work);
     tissueform::AddCaseCommand(app, work);
+    tissueform::AddFollowLinkCommands(*app.get_subcommand(tissueform::kSessionCommand.name), work);
+    tissueform::AddShareCommand(app, work);
+    tissueform::AddWhoamiCommand(app, work);
     tissueform::AddServerInfoCommand(app, work);
     tissueform::AddDemoCommand(app, tissueform::OpenPlannerOfPlan, work);
   });

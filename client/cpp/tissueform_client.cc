@@ -70,7 +70,8 @@ TissueformClient::TissueformClient(const std::shared_ptr<grpc::Channel>& channel
       deform_(v1::DeformService::NewStub(channel)),
       server_info_(v1::ServerInfoService::NewStub(channel)),
       predictions_(channel, options.call_deadline),
-      cases_(channel, options.call_deadline) {}
+      cases_(channel, options.call_deadline),
+      access_(channel, options.call_deadline) {}
 
 void TissueformClient::SetDeadline(grpc::ClientContext* context) const {
   context->set_deadline(std::chrono::system_clock::now() + options_.call_deadline);

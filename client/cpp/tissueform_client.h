@@ -13,6 +13,7 @@
 #include "absl/types/span.h"
 #include "grpcpp/channel.h"
 
+#include "client/cpp/access_calls.h"
 #include "client/cpp/case_calls.h"
 #include "client/cpp/connection_options.h"
 #include "client/cpp/deform_stream.h"
@@ -110,6 +111,9 @@ class TissueformClient {
   // What planners open.
   CaseCalls& cases() { return cases_; }
 
+  // Who may do what.
+  AccessCalls& access() { return access_; }
+
  private:
   TissueformClient(const std::shared_ptr<grpc::Channel>& channel, std::shared_ptr<TokenFile> token,
                    const Options& options);
@@ -124,6 +128,7 @@ class TissueformClient {
   const std::unique_ptr<v1::ServerInfoService::Stub> server_info_;
   PredictionCalls predictions_;
   CaseCalls cases_;
+  AccessCalls access_;
 };
 
 }  // namespace tissueform

@@ -162,9 +162,9 @@ absl::StatusOr<CaseKey> Access::CaseOfLink(const Principal& link, const std::str
   const std::string session(absl::StripPrefix(link.only_session, kSessionsPrefix));
   if (!HasGoodLink(session)) return LinkHasEnded();
   for (const FollowLinkRow& row : table_.LinksOf(session)) {
-    if (row.case_sha256 == sha256 && IsGood(row)) {
-      return FindCase(Principal{.name = row.maker}, sha256, Need::kLook);
-    }
+    if (row.case_sha256 != sha256 || !IsGood(row)) continue;
+    absl::StatusOr<CaseKey> found = FindCase(Principal{.name = row.maker}, sha256, Need::kLook);
+    if (found.ok()) return found;
   }
   return NoCase(sha256);
 }

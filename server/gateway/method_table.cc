@@ -10,6 +10,7 @@
 #include "google/protobuf/message.h"
 #include "google/protobuf/wire_format_lite.h"
 
+#include "tissueform/v1/access_service.pb.h"
 #include "tissueform/v1/case_service.pb.h"
 #include "tissueform/v1/deform_service.pb.h"
 #include "tissueform/v1/mesh_service.pb.h"
@@ -37,6 +38,7 @@ constexpr std::array<absl::string_view, 4> kDownloads = {
 
 // Descriptors of files that nobody names are left out by the linker.
 void LinkServices() {
+  google::protobuf::LinkMessageReflection<v1::WhoAmIRequest>();
   google::protobuf::LinkMessageReflection<v1::GetCaseRequest>();
   google::protobuf::LinkMessageReflection<v1::DeformRequest>();
   google::protobuf::LinkMessageReflection<v1::GetMeshRequest>();

@@ -172,8 +172,11 @@ absl::Status MeshService::List(const Principal& caller, const v1::ListMeshesRequ
 absl::Status MeshService::RemoveMesh(CallScope* scope, const v1::DeleteMeshRequest& request) {
   const Access& access = changes_->access();
   TF_ASSIGN_OR_RETURN(const std::string sha256,
-                      AllowedMesh(access, scope, request.name(), Need::kOwn));
+                      AllowedMesh(access, scope, request.name(), Need::kLook));
   const Principal& caller = scope->principal();
+  // A prediction may hold the name of one that has gone.
+  TF_RETURN_IF_ERROR(catalog_->Look(sha256).status());
+  TF_RETURN_IF_ERROR(access.MayMesh(caller, sha256, Need::kOwn));
   if (!access.OthersHoldMesh(caller, sha256)) return registry_->RemoveMesh(sha256);
   const int sessions = access.CountSessionsOf(caller, sha256);
   return sessions > 0 ? MeshInUse(sessions) : changes_->ForsakeMesh(caller, sha256);

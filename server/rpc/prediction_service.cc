@@ -166,10 +166,12 @@ grpc::ServerWriteReactor<v1::ReadPositionsResponse>* PredictionService::ReadPosi
   auto* call = new MessageStream<v1::ReadPositionsResponse>(
       CallScope(context, "PredictionService.ReadPositions", CallKind::kUpkeep, gate_),
       CancelOf(context), timer_, limits_.upload_silence);
-  absl::StatusOr<std::string> id = call->scope().admission();
-  if (call->scope().admission().ok()) {
-    id = AllowedPrediction(*access_, &call->scope(), request->name(), Need::kLook);
+  if (!call->scope().admission().ok()) {
+    call->End(call->scope().admission());
+    return call;
   }
+  absl::StatusOr<std::string> id =
+      AllowedPrediction(*access_, &call->scope(), request->name(), Need::kLook);
   if (!id.ok()) {
     call->End(id.status());
     return call;

@@ -89,8 +89,8 @@ ServerOptions ServiceTest::TestOptions() {
   return options;
 }
 
-void ServiceTest::StartServer(const ServerOptions& options) {
-  server_ = ValueOrDie(TissueformServer::Start(options));
+void ServiceTest::StartServer(const ServerOptions& options, Authenticator* authenticator) {
+  server_ = ValueOrDie(TissueformServer::Start(options, authenticator));
 }
 
 TissueformServer& ServiceTest::server() {

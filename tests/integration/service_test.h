@@ -55,7 +55,8 @@ class ServiceTest : public ::testing::Test {
   static ServerOptions TestOptions();
 
   // In place of a server with TestOptions().
-  void StartServer(const ServerOptions& options);
+  void StartServer(const ServerOptions& options, Authenticator* authenticator = nullptr);
+  void StopServer() { server_.reset(); }
   TissueformServer& server();
   std::string address();
 

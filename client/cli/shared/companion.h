@@ -30,7 +30,7 @@ inline constexpr CompanionCommand kDragCommand = {
     "drag", "drag on a server, to and fro; goes on when the server is started again",
     "tissueform-online"};
 inline constexpr CompanionCommand kSessionCommand = {
-    "session", "list, show and delete the sessions of a server", "tissueform-online"};
+    "session", "list, show, update, link and delete the sessions of a server", "tissueform-online"};
 // Of `mesh`.
 inline constexpr CompanionCommand kMeshUploadCommand = {
     "upload", "give a mesh of tets to a server, which tells its name", "tissueform-online"};
@@ -45,6 +45,10 @@ inline constexpr CompanionCommand kPredictionCommand = {
     "tissueform-online"};
 inline constexpr CompanionCommand kCaseCommand = {"case", "cases: what the browser planner opens",
                                                   "tissueform-online"};
+inline constexpr CompanionCommand kShareCommand = {
+    "share", "let others look at one's own on a server, or drag it", "tissueform-online"};
+inline constexpr CompanionCommand kWhoamiCommand = {"whoami", "tell whom a server takes one for",
+                                                    "tissueform-online"};
 inline constexpr CompanionCommand kServerInfoCommand = {
     "server-info", "tell what a server is: version, models, limits", "tissueform-online"};
 inline constexpr CompanionCommand kExperimentsCommand = {

@@ -1,6 +1,8 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include <cstdlib>
+#include <filesystem>
 #include <future>
 #include <memory>
 #include <string>
@@ -14,7 +16,6 @@
 #include "server/store/database.h"
 #include "server/store/durable_store.h"
 #include "server/store/in_memory_stores.h"
-#include "tests/server/store/stores_case.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform::testing {
@@ -47,17 +48,25 @@ struct AccessStoreCase {
 // What every AccessStore does.
 class AccessStoreContractTest : public ::testing::TestWithParam<AccessStoreCase> {
  protected:
-  void SetUp() override { Open(); }
+  void SetUp() override {
+    ASSERT_NE(mkdtemp(folder_.data()), nullptr);
+    Open();
+  }
+  void TearDown() override {
+    store_.reset();
+    stores_.reset();
+    std::filesystem::remove_all(folder_);
+  }
 
   void Open() {
     store_.reset();
     stores_.reset();
-    stores_ = GetParam().durable ? *DurableStore::Open(*DataFolder::Open(folder_ / "data"))
+    stores_ = GetParam().durable ? *DurableStore::Open(*DataFolder::Open(folder_ + "/data"))
                                  : *OpenInMemoryStores();
     store_ = OpenAccessStore(stores_.get());
   }
 
-  ScratchFolder folder_;
+  std::string folder_ = ::testing::TempDir() + "access-XXXXXX";
   std::unique_ptr<Stores> stores_;
   std::unique_ptr<AccessStore> store_;
 };
@@ -117,7 +126,7 @@ TEST_P(AccessStoreContractTest, ADurableStoreHasItAfterARestartAndADamagedRowGiv
   store_.reset();
   stores_.reset();
   {
-    ASSERT_OK_AND_ASSIGN(const auto database, Database::Open(folder_ / "data/tissueform.db"));
+    ASSERT_OK_AND_ASSIGN(const auto database, Database::Open(folder_ + "/data/tissueform.db"));
     ASSERT_THAT(database->Execute("UPDATE shares SET record = CAST(replace(CAST(record AS TEXT), "
                                   "'bob', 'cid') AS BLOB)"),
                 IsOk());

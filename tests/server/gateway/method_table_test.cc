@@ -19,6 +19,7 @@ namespace {
 
 TEST(MethodTable, CallsThatEndByThemselvesGoOverGrpcWeb) {
   EXPECT_EQ(KindOf("/tissueform.v1.MeshService/GetMesh"), MethodKind::kUnary);
+  EXPECT_EQ(KindOf("/tissueform.v1.AccessService/WhoAmI"), MethodKind::kUnary);
   EXPECT_EQ(KindOf("/grpc.health.v1.Health/Check"), MethodKind::kUnary);
   for (const char* method :
        {"MeshService/GetSurface", "CaseService/ReadCase", "PredictionService/ReadPositions",

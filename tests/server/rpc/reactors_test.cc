@@ -253,7 +253,8 @@ TEST_F(ReactorsTest, OfTenThousandStreamsAsManyAreServedAsThereArePlaces) {
   const std::string session = MakeSession();
   ServiceLimits patient = limits_;
   patient.configuration_deadline = std::chrono::minutes(10);
-  DeformService service(&gate_, patient, &registry_, &streams_, &watches_, &timer_);
+  DeformService service(&gate_, patient, &no_logins_.access, &registry_, &streams_, &watches_,
+                        &timer_);
   const auto places = static_cast<size_t>(limits_.max_streams);
   std::vector<std::unique_ptr<FakeStream>> streams;
   for (int i = 0; i < 10'000; ++i) {
@@ -282,7 +283,8 @@ TEST_F(ReactorsTest, OfTenThousandStreamsAsManyAreServedAsThereArePlaces) {
 TEST_F(ReactorsTest, AStreamWithoutConfigurationIsGivenUpAndLeavesItsPlace) {
   ServiceLimits impatient = limits_;
   impatient.configuration_deadline = std::chrono::milliseconds(20);
-  DeformService service(&gate_, impatient, &registry_, &streams_, &watches_, &timer_);
+  DeformService service(&gate_, impatient, &no_logins_.access, &registry_, &streams_, &watches_,
+                        &timer_);
   FakeStream silent(reactions_.get());
   silent.Bind(service.Deform(nullptr));
   const auto status = silent.WaitUntilDone();
@@ -295,7 +297,8 @@ TEST_F(ReactorsTest, AStreamWithoutConfigurationIsGivenUpAndLeavesItsPlace) {
 TEST_F(ReactorsTest, AConfiguredStreamMayRest) {
   ServiceLimits impatient = limits_;
   impatient.configuration_deadline = std::chrono::milliseconds(200);
-  DeformService service(&gate_, impatient, &registry_, &streams_, &watches_, &timer_);
+  DeformService service(&gate_, impatient, &no_logins_.access, &registry_, &streams_, &watches_,
+                        &timer_);
   FakeStream stream(reactions_.get());
   stream.Bind(service.Deform(nullptr));
   stream.Send(Configuration(MakeSession()));
