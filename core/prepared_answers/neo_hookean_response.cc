@@ -76,6 +76,7 @@ class NeoHookeanResponse : public VertexResponse {
         MakeNeoHookeanSeries(*preparation_, elastic_, free, options_.observer, cancellation));
     damping_ = std::move(series.damping);
     estimate_.emplace(series.linear, series.columns.middleCols(sizes_.linear, sizes_.pairs),
+                      series.columns.rightCols(sizes_.triples),
                       preparation_->mesh().BoundingBoxDiagonal());
     TF_RETURN_IF_ERROR(Calibrate(free, series.columns, cancellation));
     TF_RETURN_IF_ERROR(cancellation.Check());
@@ -147,13 +148,14 @@ class NeoHookeanResponse : public VertexResponse {
     Use use;
     use.factors.resize(sizes_.columns());
     use.factors.head(sizes_.linear + sizes_.pairs) << elastic_.Coefficients(poses), pairs;
-    std::optional<double> ratio;
     if (damping_) {
       const Eigen::VectorXd triples = TripleProducts(numbers);
-      ratio = damping_->Ratio(pairs, triples);
-      use.factors.tail(sizes_.triples) = triples / (1 + *ratio);
+      const double ratio = damping_->Ratio(pairs, triples);
+      use.factors.tail(sizes_.triples) = triples / (1 + ratio);
+      use.series_mm = estimate_->scale() * estimate_->UnscaledMm(triples, ratio);
+    } else {
+      use.series_mm = estimate_->scale() * estimate_->UnscaledMm(pairs);
     }
-    use.series_mm = estimate_->Mm(pairs, ratio);
     use.error_mm =
         std::max(use.series_mm + rounding_mm_ + cut_per_mm_ * estimate_->FirstOrderMm(numbers),
                  chosen_.RoundingBoundMm(poses));
