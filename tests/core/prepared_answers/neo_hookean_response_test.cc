@@ -73,17 +73,20 @@ class NeoHookeanResponseTest : public ::testing::TestWithParam<int> {
   RandomNumbers random_{11};
 };
 
-// What is left out is of third order: half the pose, an eighth of the error. The linear answer's
-// falls to a quarter only.
-TEST_P(NeoHookeanResponseTest, ErrorIsOfThirdOrderInThePose) {
-  Prepared prepared(GetParam());
+// What is left out is of third order: half the pose, an eighth of the error; with one handle, whose
+// third order is there, of fourth: a sixteenth. The linear answer's falls to a quarter only.
+TEST_P(NeoHookeanResponseTest, ErrorIsOfTheOrderAfterTheLast) {
+  const bool third_order = GetParam() == 1;
+  Prepared prepared(GetParam(), 1e-9);
   ASSERT_OK_AND_ASSIGN(const auto linear, CreateLinearElasticDeformer(prepared.preparation));
   for (int sample = 0; sample < 4; ++sample) {
-    const std::vector<HandlePose> poses = prepared.Poses(0.25, &random_);
+    const std::vector<HandlePose> poses = prepared.Poses(third_order ? 0.6 : 0.25, &random_);
     std::vector<HandlePose> half = poses;
     for (HandlePose& pose : half) pose = PartOfPose(pose, 0.5);
     const double error = prepared.ErrorMm(poses);
-    EXPECT_NEAR(error / prepared.ErrorMm(half), 8, 1.5) << sample;
+    printf("XX %g %g\n", error, error / prepared.ErrorMm(half));
+    EXPECT_NEAR(error / prepared.ErrorMm(half), third_order ? 16 : 8, third_order ? 3 : 1.5)
+        << sample;
     ASSERT_OK_AND_ASSIGN(const Deformation of_linear, linear->Deform(poses));
     const Positions converged = prepared.direct->Deform(poses)->positions;
     EXPECT_LT(error, 0.3 * (of_linear.positions - converged).rowwise().norm().maxCoeff());
@@ -138,6 +141,7 @@ TEST_P(NeoHookeanResponseTest, CompressionPutsOffByNoMoreThanIsSaid) {
   ASSERT_OK_AND_ASSIGN(const auto coarse,
                        CreateNeoHookeanResponse(fine.preparation, testing::AllVertices(fine.mesh),
                                                 {.tolerance_mm = 0.002, .max_estimate_mm = 100}));
+  printf("YY %d %d %d\n", coarse->num_terms(), fine.response->num_terms(), coarse->num_terms_before());
   EXPECT_LT(coarse->num_terms(), fine.response->num_terms());
   EXPECT_LT(coarse->bytes_held(), fine.response->bytes_held());
   FloatPositions answer;
@@ -166,7 +170,7 @@ TEST(NeoHookeanResponseCoverTest, CoversItsRangeAndNoScale) {
                        CreateNeoHookeanResponse(preparation, {1, 5, 100},
                                                 {.max_rotation_rad = 0.3, .max_estimate_mm = 50}));
   EXPECT_TRUE(response->error_is_estimate());
-  EXPECT_EQ(response->num_terms_before(), 12 + 21);
+  EXPECT_EQ(response->num_terms_before(), 12 + 21 + 56);
   EXPECT_LT(response->num_terms(), 12 + 21);
   EXPECT_LT(response->bytes_held(), NeoHookeanResponseBytes(*preparation, 3));
   std::vector<HandlePose> poses(1);
