@@ -194,23 +194,31 @@ class NeoHookeanResponse : public VertexResponse {
           options_.tolerance_mm * (1 + UseOf(tried[s]).series_mm / kEstimateThatDoublesMm);
     }
     columns_.emplace(rest, columns, uses);
-    MeasureCut(rest, columns, tried);
+    MeasureCut(rest, columns, tried, uses.tried);
   }
 
+  // `factors`: of the poses tried.
   void MeasureCut(const Positions& rest, const Eigen::MatrixXd& columns,
-                  const std::vector<std::vector<HandlePose>>& tried) {
+                  const std::vector<std::vector<HandlePose>>& tried,
+                  const Eigen::MatrixXd& factors) {
     // Of the rest positions and of the sum: single precision's half unit of each.
     constexpr double kRoundings = 2 * 5.97e-8;
+    // So many poses read the columns once.
+    constexpr Eigen::Index kAtOnce = 20;
     if (rest.rows() == 0) return;
     rounding_mm_ = kRoundings * rest.rowwise().norm().maxCoeff();
     double worst = 0;
     FloatPositions answer;
-    for (const std::vector<HandlePose>& poses : tried) {
-      const Use use = UseOf(poses);
-      columns_->Evaluate(use.factors, &answer);
+    Eigen::MatrixXd exact;
+    for (Eigen::Index s = 0; s < factors.cols(); ++s) {
+      if (s % kAtOnce == 0) {
+        exact = columns * factors.middleCols(s, std::min(kAtOnce, factors.cols() - s));
+      }
+      columns_->Evaluate(factors.col(s), &answer);
       const Positions off = answer.cast<double>() - rest -
-                            (columns * use.factors).reshaped<Eigen::RowMajor>(rest.rows(), 3);
-      const double moved = estimate_->FirstOrderMm(PoseNumbers(poses, centroids_));
+                            exact.col(s % kAtOnce).reshaped<Eigen::RowMajor>(rest.rows(), 3);
+      const double moved =
+          estimate_->FirstOrderMm(PoseNumbers(tried[static_cast<size_t>(s)], centroids_));
       if (moved > 0) worst = std::max(worst, off.rowwise().norm().maxCoeff() / moved);
     }
     cut_per_mm_ = kCutAllowance * worst;

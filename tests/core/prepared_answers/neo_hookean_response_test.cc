@@ -84,7 +84,6 @@ TEST_P(NeoHookeanResponseTest, ErrorIsOfTheOrderAfterTheLast) {
     std::vector<HandlePose> half = poses;
     for (HandlePose& pose : half) pose = PartOfPose(pose, 0.5);
     const double error = prepared.ErrorMm(poses);
-    printf("XX %g %g\n", error, error / prepared.ErrorMm(half));
     EXPECT_NEAR(error / prepared.ErrorMm(half), third_order ? 16 : 8, third_order ? 3 : 1.5)
         << sample;
     ASSERT_OK_AND_ASSIGN(const Deformation of_linear, linear->Deform(poses));
@@ -138,10 +137,12 @@ TEST_P(NeoHookeanResponseTest, EstimateIsSeldomExceeded) {
 // columns and digits lies from that of all is what the estimate has been raised by.
 TEST_P(NeoHookeanResponseTest, CompressionPutsOffByNoMoreThanIsSaid) {
   const Prepared fine(GetParam());
+  // Its 225 vertices use all triples.
+  const double tolerance_mm = GetParam() == 1 ? 0.02 : 0.002;
   ASSERT_OK_AND_ASSIGN(const auto coarse,
                        CreateNeoHookeanResponse(fine.preparation, testing::AllVertices(fine.mesh),
-                                                {.tolerance_mm = 0.002, .max_estimate_mm = 100}));
-  printf("YY %d %d %d\n", coarse->num_terms(), fine.response->num_terms(), coarse->num_terms_before());
+                                                {.tolerance_mm = tolerance_mm,
+                                                 .max_estimate_mm = 100}));
   EXPECT_LT(coarse->num_terms(), fine.response->num_terms());
   EXPECT_LT(coarse->bytes_held(), fine.response->bytes_held());
   FloatPositions answer;
