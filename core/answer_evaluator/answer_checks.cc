@@ -82,8 +82,7 @@ bool HasNothingElse(const PortableAnswers& answers, bool is_gradient, bool is_ne
                            answers.cluster_vertices.empty() && answers.first_gains.empty() &&
                            answers.second_gains.empty() && answers.probes.empty() &&
                            answers.second_lengths.empty() && answers.third_lengths.empty() &&
-                           answers.third_gains.empty() &&
-                           IsPacked(answers.cluster_map, 0, 0);
+                           answers.third_gains.empty() && IsPacked(answers.cluster_map, 0, 0);
   return (is_gradient || no_expansion) && (is_neo ? no_compression : no_clusters);
 }
 

@@ -76,7 +76,7 @@ double LengthOf(const std::vector<float>& rows, const std::vector<double>& produ
 
 // How long the third order is beside the second.
 double RatioOf(const PortableAnswers& answers, const std::vector<double>& pairs,
-              const std::vector<double>& triples) {
+               const std::vector<double>& triples) {
   const double second = LengthOf(answers.second_lengths, pairs);
   return second > 0 ? LengthOf(answers.third_lengths, triples) / second : 0;
 }

@@ -25,9 +25,9 @@ class AnswerBytesTest : public ::testing::TestWithParam<Evaluated> {
  protected:
   AnswerBytesTest() {
     const auto preparation = PrepareMesh(Bar({3, 6, 6}, 2.0, 0.2), GetParam().num_handles);
-    bytes_ = WriteAnswers(
-        (*CreateResponse(preparation, AllVertices(preparation->mesh()), {.model = GetParam().model}))
-            ->Describe());
+    bytes_ = WriteAnswers((*CreateResponse(preparation, AllVertices(preparation->mesh()),
+                                           {.model = GetParam().model}))
+                              ->Describe());
   }
 
   template <typename Value>

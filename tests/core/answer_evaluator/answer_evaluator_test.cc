@@ -126,8 +126,7 @@ TEST(AnswerSizeTest, AHeadWithThreeSegmentsTravelsInAFewMegabytes) {
 
 class EvaluatedModelTest : public ::testing::TestWithParam<Evaluated> {
  protected:
-  const Problem problem_ =
-      GetParam().num_handles == 2 ? BarWithTwoHandles() : BarWithOneHandle();
+  const Problem problem_ = GetParam().num_handles == 2 ? BarWithTwoHandles() : BarWithOneHandle();
   const std::unique_ptr<VertexResponse> response_ =
       *CreateResponse(problem_.preparation, problem_.vertices, {.model = GetParam().model});
 };
@@ -221,8 +220,7 @@ TEST_P(EvaluatedModelTest, NumbersThatAreNoneAreFound) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, EvaluatedModelTest,
-                         ::testing::ValuesIn(EvaluatedModels()),
+INSTANTIATE_TEST_SUITE_P(Models, EvaluatedModelTest, ::testing::ValuesIn(EvaluatedModels()),
                          [](const auto& test) { return test.param.name; });
 
 }  // namespace

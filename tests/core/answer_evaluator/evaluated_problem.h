@@ -34,11 +34,11 @@ struct Evaluated {
 };
 
 inline const std::vector<Evaluated>& EvaluatedModels() {
-  static const auto* const models = new std::vector<Evaluated>{
-      {"gradient_field", DeformationModel::kGradientField, 2},
-      {"linear_elastic", DeformationModel::kLinearElastic, 2},
-      {"neo_hookean", DeformationModel::kNeoHookean, 2},
-      {"neo_hookean_third_order", DeformationModel::kNeoHookean, 1}};
+  static const auto* const models =
+      new std::vector<Evaluated>{{"gradient_field", DeformationModel::kGradientField, 2},
+                                 {"linear_elastic", DeformationModel::kLinearElastic, 2},
+                                 {"neo_hookean", DeformationModel::kNeoHookean, 2},
+                                 {"neo_hookean_third_order", DeformationModel::kNeoHookean, 1}};
   return *models;
 }
 

@@ -56,9 +56,9 @@ class GoldenAnswersTest : public ::testing::TestWithParam<Evaluated> {
  protected:
   // Every other vertex of a jittered bar with two handles, or of a smaller one with one.
   GoldenAnswersTest()
-      : preparation_(PrepareMesh(GetParam().num_handles == 2 ? Bar({4, 6, 10}, 2.0, 0.2)
-                                                             : Bar({3, 4, 8}, 2.0, 0.2),
-                                 GetParam().num_handles)) {
+      : preparation_(PrepareMesh(
+            GetParam().num_handles == 2 ? Bar({4, 6, 10}, 2.0, 0.2) : Bar({3, 4, 8}, 2.0, 0.2),
+            GetParam().num_handles)) {
     std::vector<int32_t> vertices;
     for (int32_t v = 0; v < preparation_->mesh().num_vertices(); v += 2) vertices.push_back(v);
     response_ = *CreateResponse(preparation_, vertices,

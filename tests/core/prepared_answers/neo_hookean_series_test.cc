@@ -34,8 +34,8 @@ std::shared_ptr<MeshPreparation> JitteredBar() {
 }
 
 std::shared_ptr<MeshPreparation> Tongue() {
-  return testing::PrepareMesh(
-      testing::LoadTestMesh("meshes/tet_sofa_tongue/volumetricTongue.vtu"), 1);
+  return testing::PrepareMesh(testing::LoadTestMesh("meshes/tet_sofa_tongue/volumetricTongue.vtu"),
+                              1);
 }
 
 std::shared_ptr<MeshPreparation> Head() {
@@ -122,8 +122,7 @@ TEST_P(NeoHookeanSeriesTest, ConstrainedVerticesAreMovedByTheLinearColumnsAlone)
 INSTANTIATE_TEST_SUITE_P(Bodies, NeoHookeanSeriesTest,
                          ::testing::Values(Body{"OneTet", OneTet, 0.04},
                                            Body{"JitteredBar", JitteredBar, 0.02},
-                                           Body{"Tongue", Tongue, 0.02},
-                                           Body{"Head", Head, 0.005}),
+                                           Body{"Tongue", Tongue, 0.02}, Body{"Head", Head, 0.005}),
                          [](const auto& test) { return test.param.name; });
 
 TEST(NeoHookeanSeriesSizesTest, SeveralHandlesEndWithTheSecondOrder) {
