@@ -76,6 +76,7 @@ class NeoHookeanResponse : public VertexResponse {
         MakeNeoHookeanSeries(*preparation_, elastic_, free, options_.observer, cancellation));
     damping_ = std::move(series.damping);
     estimate_.emplace(series.linear, series.columns.middleCols(sizes_.linear, sizes_.pairs),
+                      series.columns.rightCols(sizes_.triples),
                       preparation_->mesh().BoundingBoxDiagonal());
     TF_RETURN_IF_ERROR(Calibrate(free, series.columns, cancellation));
     TF_RETURN_IF_ERROR(cancellation.Check());
@@ -147,13 +148,14 @@ class NeoHookeanResponse : public VertexResponse {
     Use use;
     use.factors.resize(sizes_.columns());
     use.factors.head(sizes_.linear + sizes_.pairs) << elastic_.Coefficients(poses), pairs;
-    std::optional<double> ratio;
     if (damping_) {
       const Eigen::VectorXd triples = TripleProducts(numbers);
-      ratio = damping_->Ratio(pairs, triples);
-      use.factors.tail(sizes_.triples) = triples / (1 + *ratio);
+      const double ratio = damping_->Ratio(pairs, triples);
+      use.factors.tail(sizes_.triples) = triples / (1 + ratio);
+      use.series_mm = estimate_->scale() * estimate_->UnscaledMm(triples, ratio);
+    } else {
+      use.series_mm = estimate_->scale() * estimate_->UnscaledMm(pairs);
     }
-    use.series_mm = estimate_->Mm(pairs, ratio);
     use.error_mm =
         std::max(use.series_mm + rounding_mm_ + cut_per_mm_ * estimate_->FirstOrderMm(numbers),
                  chosen_.RoundingBoundMm(poses));
@@ -192,23 +194,31 @@ class NeoHookeanResponse : public VertexResponse {
           options_.tolerance_mm * (1 + UseOf(tried[s]).series_mm / kEstimateThatDoublesMm);
     }
     columns_.emplace(rest, columns, uses);
-    MeasureCut(rest, columns, tried);
+    MeasureCut(rest, columns, tried, uses.tried);
   }
 
+  // `factors`: of the poses tried.
   void MeasureCut(const Positions& rest, const Eigen::MatrixXd& columns,
-                  const std::vector<std::vector<HandlePose>>& tried) {
+                  const std::vector<std::vector<HandlePose>>& tried,
+                  const Eigen::MatrixXd& factors) {
     // Of the rest positions and of the sum: single precision's half unit of each.
     constexpr double kRoundings = 2 * 5.97e-8;
+    // So many poses read the columns once.
+    constexpr Eigen::Index kAtOnce = 20;
     if (rest.rows() == 0) return;
     rounding_mm_ = kRoundings * rest.rowwise().norm().maxCoeff();
     double worst = 0;
     FloatPositions answer;
-    for (const std::vector<HandlePose>& poses : tried) {
-      const Use use = UseOf(poses);
-      columns_->Evaluate(use.factors, &answer);
+    Eigen::MatrixXd exact;
+    for (Eigen::Index s = 0; s < factors.cols(); ++s) {
+      if (s % kAtOnce == 0) {
+        exact = columns * factors.middleCols(s, std::min(kAtOnce, factors.cols() - s));
+      }
+      columns_->Evaluate(factors.col(s), &answer);
       const Positions off = answer.cast<double>() - rest -
-                            (columns * use.factors).reshaped<Eigen::RowMajor>(rest.rows(), 3);
-      const double moved = estimate_->FirstOrderMm(PoseNumbers(poses, centroids_));
+                            exact.col(s % kAtOnce).reshaped<Eigen::RowMajor>(rest.rows(), 3);
+      const double moved =
+          estimate_->FirstOrderMm(PoseNumbers(tried[static_cast<size_t>(s)], centroids_));
       if (moved > 0) worst = std::max(worst, off.rowwise().norm().maxCoeff() / moved);
     }
     cut_per_mm_ = kCutAllowance * worst;

@@ -53,8 +53,10 @@ std::vector<Eigen::Index> MostMoved(const Eigen::MatrixXd& columns) {
 }  // namespace
 
 SeriesEstimate::SeriesEstimate(const Eigen::MatrixXd& first, const Eigen::MatrixXd& second,
-                               double size_mm)
-    : size_mm_(size_mm), first_gains_(Gains(first)), second_gains_(Gains(second)) {
+                               const Eigen::MatrixXd& third, double size_mm)
+    : size_mm_(size_mm), first_gains_(Gains(first)), third_gains_(Gains(third)) {
+  if (third.cols() > 0) return;
+  second_gains_ = Gains(second);
   const std::vector<Eigen::Index> vertices = MostMoved(second);
   probes_.resize(3 * static_cast<Eigen::Index>(vertices.size()), second.cols());
   for (size_t p = 0; p < vertices.size(); ++p) {
@@ -63,13 +65,12 @@ SeriesEstimate::SeriesEstimate(const Eigen::MatrixXd& first, const Eigen::Matrix
   }
 }
 
-double SeriesEstimate::UnscaledMm(const Eigen::VectorXd& pairs, std::optional<double> ratio) const {
+double SeriesEstimate::UnscaledMm(const Eigen::VectorXd& pairs) const {
   if (probes_.rows() == 0) return 0;
   const Eigen::VectorXf moves = probes_ * pairs.cast<float>();
   const double together = LargestMove(moves.cast<double>()).second;
   const double single = second_gains_.cwiseProduct(pairs).norm();
-  const double third_order = std::pow(together * single, 0.75) / std::sqrt(size_mm_);
-  return ratio ? third_order * *ratio / (1 + *ratio) : third_order;
+  return std::pow(together * single, 0.75) / std::sqrt(size_mm_);
 }
 
 void SeriesEstimate::Describe(PortableAnswers* answers) const {
@@ -77,13 +78,15 @@ void SeriesEstimate::Describe(PortableAnswers* answers) const {
   answers->numbers.estimate_scale = scale_;
   answers->first_gains.assign(first_gains_.begin(), first_gains_.end());
   answers->second_gains.assign(second_gains_.begin(), second_gains_.end());
+  answers->third_gains.assign(third_gains_.begin(), third_gains_.end());
   const Eigen::MatrixXf rows = probes_.transpose();  // column by column: row-major
   answers->probes.assign(rows.data(), rows.data() + rows.size());
 }
 
 int64_t SeriesEstimate::bytes_held() const {
   return probes_.size() * static_cast<int64_t>(sizeof(float)) +
-         (first_gains_.size() + second_gains_.size()) * static_cast<int64_t>(sizeof(double));
+         (first_gains_.size() + second_gains_.size() + third_gains_.size()) *
+             static_cast<int64_t>(sizeof(double));
 }
 
 }  // namespace tissueform
