@@ -35,6 +35,8 @@ namespace {
 constexpr size_t kTransportQuotaBytes = size_t{512} << 20;
 // Chunks are 1 MiB at most; regions of a mesh of a million vertices fit too.
 constexpr int kMaxReceiveBytes = 4 << 20;
+// A token of 8 KiB, and what else a client says of itself; longer headers gRPC refuses.
+constexpr int kMaxMetadataBytes = 16 << 10;
 constexpr int kKeepaliveMilliseconds = 25'000;
 constexpr int kKeepaliveTimeoutMilliseconds = 10'000;
 constexpr int kMinClientPingMilliseconds = 10'000;
@@ -63,6 +65,7 @@ void SetTransportLimits(const ServerOptions& options, grpc::ServerBuilder* build
   builder->SetMaxReceiveMessageSize(kMaxReceiveBytes);
   builder->SetMaxSendMessageSize(-1);  // an answer is as large as its mesh
   builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, options.max_calls_per_connection);
+  builder->AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, kMaxMetadataBytes);
   // A client whose machine is gone is noticed, and its stream ends.
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMilliseconds);
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMilliseconds);

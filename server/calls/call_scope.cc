@@ -204,9 +204,10 @@ void CallScope::TellEnd(const absl::Status& outcome) {
 grpc::Status CallScope::End(const absl::Status& outcome) {
   const std::chrono::duration<double, std::milli> elapsed =
       std::chrono::steady_clock::now() - start_;
-  const auto level = outcome.ok() || outcome.code() == absl::StatusCode::kCancelled
-                         ? spdlog::level::debug
-                         : spdlog::level::info;
+  // Who knocks without being let in is counted, and logged, by the authenticator.
+  const bool quiet = outcome.ok() || outcome.code() == absl::StatusCode::kCancelled ||
+                     absl::IsUnauthenticated(admission_);
+  const auto level = quiet ? spdlog::level::debug : spdlog::level::info;
   spdlog::log(level, "{} {} {:.1f} ms, request {}", method_,
               absl::StatusCodeToString(outcome.code()), elapsed.count(), request_id_);
   TellEnd(outcome);
