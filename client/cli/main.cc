@@ -41,6 +41,7 @@ int main(int argc, char** argv) {
     tissueform::AddCompanionCommand(app, tissueform::kShareCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kWhoamiCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kServerInfoCommand, words, work);
+    tissueform::AddCompanionCommand(app, tissueform::kDoctorCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kDemoCommand, words, work);
   });
 }

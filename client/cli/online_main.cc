@@ -3,6 +3,7 @@
 //
 // The companion of `tissueform` that speaks with servers.
 
+#include "client/cli/access/doctor_command.h"
 #include "client/cli/access/follow_link_command.h"
 #include "client/cli/access/share_command.h"
 #include "client/cli/access/whoami_command.h"
@@ -34,6 +35,7 @@ int main(int argc, char** argv) {
     tissueform::AddShareCommand(app, work);
     tissueform::AddWhoamiCommand(app, work);
     tissueform::AddServerInfoCommand(app, work);
+    tissueform::AddDoctorCommand(app, work);
     tissueform::AddDemoCommand(app, tissueform::OpenPlannerOfPlan, work);
   });
 }
