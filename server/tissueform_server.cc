@@ -134,7 +134,7 @@ TissueformServer::TissueformServer(const ServerOptions& options,
                                    std::unique_ptr<Stores> stores)
     : options_(options),
       telemetry_(std::move(telemetry)),
-      gate_(nullptr, telemetry_->observer()),
+      gate_(nullptr, telemetry_.get()),
       budget_(options.memory_budget_bytes),
       stores_(std::move(stores)),
       catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),
@@ -185,6 +185,7 @@ absl::Status TissueformServer::ServeMetrics() {
   AddSessionMetrics(registry_, telemetry_->session_events(), &*metrics_);
   AddMemoryMetrics(budget_, catalog_, &*metrics_);
   AddStoreMetrics(*stores_, &*metrics_);
+  AddSecurityMetrics({}, &*metrics_);
   metrics_->AddGauge("tissueform_streams", "Drags open.", {},
                      [this] { return static_cast<double>(streams_.size()); });
   metrics_->AddGauge("tissueform_watches", "Watches open.", {},

@@ -59,6 +59,9 @@ class TissueformServer {
   // closes. Blocks until all calls have ended. One thread, once.
   void Drain();
 
+  // Files that it writes may have been moved away. Any thread.
+  void CheckFiles() { telemetry_->CheckFiles(); }
+
   const MemoryBudget& memory_budget() const { return budget_; }
   Stores& stores() { return *stores_; }
   const SessionRegistry& sessions() const { return registry_; }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "client/cli/access/audit_command.h"
 #include "client/cli/bench/bench_command.h"
 #include "client/cli/compare/compare_command.h"
 #include "client/cli/mesh/mesh_command.h"
@@ -37,6 +38,7 @@ int main(int argc, char** argv) {
     tissueform::AddCompanionCommand(app, tissueform::kPredictionCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kCaseCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kServerInfoCommand, words, work);
+    tissueform::AddAuditCommand(app, work);
     tissueform::AddCompanionCommand(app, tissueform::kDemoCommand, words, work);
   });
 }

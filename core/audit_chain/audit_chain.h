@@ -15,10 +15,10 @@
 //
 //   {"n":17,"event":"call",...,"mac":"<64 hexadecimal digits>"}
 //
-// n rises by one from line to line, over all files. mac is HMAC-SHA-256, by the log's key, of the mac
-// of the line before followed by this line up to, but without, `,"mac":`. So no line can be changed,
-// taken out, put in or moved without the key. The first line of a file repeats the last mac of the
-// file before (of the first file: 64 noughts), so that each can be verified by itself:
+// n rises by one from line to line, over all files. mac is HMAC-SHA-256, by the log's key, of the
+// mac of the line before followed by this line up to, but without, `,"mac":`. So no line can be
+// changed, taken out, put in or moved without the key. The first line of a file repeats the last
+// mac of the file before (of the first file: 64 noughts), so that each can be verified by itself:
 //
 //   {"n":40,"event":"begin","file":2,"key":"<AuditKey::Id>","previous":"<mac of line 39>",...}
 namespace tissueform {
@@ -41,8 +41,8 @@ struct AuditLine {
   absl::string_view body;  // what is sealed
   absl::string_view mac;
 };
-// Nothing when it has not the form of a line. Whether it is sealed is another question. `line` comes
-// without its line feed.
+// Nothing when it has not the form of a line. Whether it is sealed is another question. `line`
+// comes without its line feed.
 std::optional<AuditLine> ParseAuditLine(absl::string_view line);
 
 // Whether it follows the line that has this mac.

@@ -35,7 +35,8 @@ void Demand(bool ok) {
 absl::Status DiskError(const std::string& path, const char* what) {
   const std::string message =
       absl::StrCat("audit key ", path, ": ", what, " (", std::strerror(errno), ")");
-  if (errno == ENOENT) return absl::NotFoundError(message + "; `tissueform audit keygen` makes one");
+  if (errno == ENOENT)
+    return absl::NotFoundError(message + "; `tissueform audit keygen` makes one");
   if (errno == EEXIST) return absl::AlreadyExistsError(message + "; name another file");
   return absl::UnavailableError(message);
 }
@@ -62,9 +63,10 @@ absl::StatusOr<AuditKey> AuditKey::Read(const std::string& path) {
   bool is_hex = text.size() == 2 * kKeyBytes;
   for (const char c : text) is_hex = is_hex && absl::ascii_isxdigit(static_cast<unsigned char>(c));
   if (!is_hex) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "audit key ", path, ": is not 64 hexadecimal digits and a line feed; make it with "
-        "`tissueform audit keygen` or `openssl rand -hex 32`"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("audit key ", path,
+                     ": is not 64 hexadecimal digits and a line feed; make it with "
+                     "`tissueform audit keygen` or `openssl rand -hex 32`"));
   }
   return AuditKey(absl::HexStringToBytes(text));
 }

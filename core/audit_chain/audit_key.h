@@ -19,8 +19,8 @@ class AuditKey {
   // its owner alone may read. Errors: those of the disk; FailedPrecondition (others may read it);
   // InvalidArgument (holds something else). No message holds anything of it.
   static absl::StatusOr<AuditKey> Read(const std::string& path);
-  // Makes a new one and writes it to a new file with mode 0600, synced. Errors: AlreadyExists, those
-  // of the disk.
+  // Makes a new one and writes it to a new file with mode 0600, synced. Errors: AlreadyExists,
+  // those of the disk.
   static absl::Status WriteNew(const std::string& path);
 
   explicit AuditKey(std::string bytes);

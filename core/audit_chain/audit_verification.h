@@ -41,13 +41,14 @@ struct AuditReport {
   uint64_t first = 0;
   AuditPosition last;
   // What the server itself has noted in the chain.
-  int64_t mended = 0;  // beginnings of lines that a crash has left, set aside
-  int64_t lost = 0;    // notes of lines that could not be kept
+  int64_t mended = 0;                   // beginnings of lines that a crash has left, set aside
+  int64_t lost = 0;                     // notes of lines that could not be kept
   std::optional<AuditFinding> finding;  // empty: all is right
 };
 
 // Reads files of one log, in whatever order they are named, and compares them with checkpoints that
-// were kept elsewhere. Without those nobody can tell whether whole lines at the very end are missing.
+// were kept elsewhere. Without those nobody can tell whether whole lines at the very end are
+// missing.
 //
 // Errors: InvalidArgument (no file), or what the disk says. What is wrong with a log is no error.
 absl::StatusOr<AuditReport> VerifyAuditFiles(const std::vector<std::string>& paths,

@@ -8,8 +8,8 @@
 namespace tissueform {
 
 void DurationHistogram::Observe(std::chrono::steady_clock::duration duration) {
-  const int64_t ns = std::max<int64_t>(
-      0, std::chrono::duration_cast<std::chrono::nanoseconds>(duration).count());
+  const int64_t ns =
+      std::max<int64_t>(0, std::chrono::duration_cast<std::chrono::nanoseconds>(duration).count());
   const auto bucket =
       std::lower_bound(kBounds.begin(), kBounds.end(), static_cast<double>(ns) * 1e-9);
   counts_[bucket - kBounds.begin()].fetch_add(1, std::memory_order_relaxed);

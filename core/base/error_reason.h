@@ -47,6 +47,7 @@ enum class ErrorReason {
   kCaseNotFound,
   kTooManyCases,
   kCaseDamagedOnItsWay,
+  kAuditNotWritten,
   // Of a code, where nothing more was said.
   kInvalidRequest,
   kNotFound,

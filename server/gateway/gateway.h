@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -13,6 +14,7 @@
 #include "server/gateway/gateway_routes.h"
 #include "server/gateway/http_server.h"
 #include "server/gateway/server_pool.h"
+#include "server/monitoring/metrics_page.h"
 
 namespace tissueform {
 
@@ -22,12 +24,14 @@ class Gateway {
   // Listens when it returns; servers need not be there yet.
   //
   // Errors: Unavailable, naming the address, when it cannot be listened on; those of
-  // WebFiles::Load.
+  // WebFiles::Load and MetricsPage::Serve.
   static absl::StatusOr<std::unique_ptr<Gateway>> Start(const GatewayOptions& options);
 
   // "http://127.0.0.1:8080", also when the options said port 0.
   std::string Url() const;
   int port() const { return http_->port(); }
+  // On which Prometheus finds the page of metrics; 0: there is none.
+  int metrics_port() const { return metrics_.has_value() ? metrics_->port() : 0; }
   const GatewayCounters& counters() const { return counters_; }
   const ServerPool& pool() const { return pool_; }
 
@@ -38,6 +42,8 @@ class Gateway {
  private:
   Gateway(const GatewayOptions& options, WebFiles files);
 
+  absl::Status ServeMetrics();
+
   // Constant.
   const GatewayOptions options_;
 
@@ -46,6 +52,7 @@ class Gateway {
   ServerPool pool_;
   GatewayRoutes routes_;
   std::unique_ptr<HttpServer> http_;
+  std::optional<MetricsPage> metrics_;  // reads what the others count
 };
 
 }  // namespace tissueform

@@ -23,6 +23,8 @@ struct GatewayOptions {
   int threads = 2;
   GatewayLimits limits;
   std::string log_level = "info";
+  std::string log_format = "text";
+  int metrics_port = -1;  // of loopback; 0: any free one; -1: no metrics
 };
 
 // Adds one option a setting to `app`, with its default in the help; parsing writes into `options`,

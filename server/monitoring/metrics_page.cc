@@ -4,18 +4,19 @@
 #include "server/monitoring/metrics_page.h"
 
 #include <cmath>
+#include <dlfcn.h>
 #include <exception>
 #include <limits>
+#include <pthread.h>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+
 #include "prometheus/collectable.h"
 #include "prometheus/exposer.h"
 #include "prometheus/metric_family.h"
 #include "prometheus/text_serializer.h"
-#include <dlfcn.h>
-#include <pthread.h>
 
 // The library's web server, CivetWeb, gives its threads stacks of 100 KiB, of which the C library
 // takes the thread-local storage of all libraries: 90 KiB in a server with OpenBLAS and METIS. The
@@ -155,9 +156,9 @@ absl::Status MetricsPage::Serve(int port) {
     server->exposer().RegisterCollectable(families_);
     server_ = std::move(server);
   } catch (const std::exception& error) {
-    return absl::UnavailableError(absl::StrCat("metrics: port ", port,
-                                               " of 127.0.0.1 cannot be listened on (", error.what(),
-                                               "); name another --metrics-port, or 0"));
+    return absl::UnavailableError(
+        absl::StrCat("metrics: port ", port, " of 127.0.0.1 cannot be listened on (", error.what(),
+                     "); name another --metrics-port, or 0"));
   }
   return absl::OkStatus();
 }

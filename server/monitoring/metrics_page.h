@@ -17,8 +17,8 @@ namespace tissueform {
 // The page of metrics that a Prometheus server reads from a program. Everything on it is asked for
 // when it is read: whoever counts keeps plain numbers and knows nothing of the page.
 //
-// Names are families: several of one name have different values of the same labels. No label's value
-// comes from a client.
+// Names are families: several of one name have different values of the same labels. No label's
+// value comes from a client.
 class MetricsPage {
  public:
   using Labels = std::map<std::string, std::string>;
@@ -41,8 +41,8 @@ class MetricsPage {
   void AddHistogram(const std::string& name, const std::string& help, Labels labels,
                     const DurationHistogram* histogram);
 
-  // Serves it as http://127.0.0.1:PORT/metrics, to this machine alone, until it ends; port 0 takes a
-  // free one. Once. Errors: Unavailable, naming the port.
+  // Serves it as http://127.0.0.1:PORT/metrics, to this machine alone, until it ends; port 0 takes
+  // a free one. Once. Errors: Unavailable, naming the port.
   absl::Status Serve(int port);
   // 0 while it is not served.
   int port() const;

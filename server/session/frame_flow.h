@@ -33,7 +33,7 @@ struct FrameMeasures {
   std::atomic<int64_t> poses = 0;
   std::atomic<int64_t> coalesced_poses = 0;  // replaced by a newer one before they were answered
   std::atomic<int64_t> frames = 0;           // taken to be written
-  DurationHistogram latency;      // of each: since its pose came
+  DurationHistogram latency;                 // of each: since its pose came
   DurationHistogram picture_age;  // since the pose of a frame came, when the client has used it
 };
 

@@ -104,7 +104,8 @@ void Strand::Post(Lane lane, WorkerPool::Job job) {
     }
     queue->running = true;
   }
-  queue->pool->Post(lane, [queue] { RunOne(queue); }, now);
+  queue->pool->Post(
+      lane, [queue] { RunOne(queue); }, now);
 }
 
 void Strand::RunOne(const std::shared_ptr<Queue>& queue) {
@@ -127,7 +128,8 @@ void Strand::RunOne(const std::shared_ptr<Queue>& queue) {
     next = queue->jobs.front().lane;
     since = queue->jobs.front().since;
   }
-  queue->pool->Post(next, [queue] { RunOne(queue); }, since);
+  queue->pool->Post(
+      next, [queue] { RunOne(queue); }, since);
 }
 
 }  // namespace tissueform

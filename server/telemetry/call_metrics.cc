@@ -55,8 +55,7 @@ void CallMetrics::OnEnd(const ObservedCall& call, const absl::Status& outcome,
   }
 }
 
-void CallMetrics::AddCallsTo(const std::string& rpc, const OfRpc& of_rpc,
-                             MetricsPage* page) const {
+void CallMetrics::AddCallsTo(const std::string& rpc, const OfRpc& of_rpc, MetricsPage* page) const {
   for (size_t code = 0; code < kNumCodes; ++code) {
     const std::atomic<int64_t>& count = of_rpc.ended[code];
     // Of most codes there is never one: seventeen lines an rpc would be mostly noughts.
@@ -69,8 +68,8 @@ void CallMetrics::AddCallsTo(const std::string& rpc, const OfRpc& of_rpc,
   page->AddGauge("tissueform_calls_open", "Calls under way, by rpc.", {{"rpc", rpc}},
                  ReadOf(of_rpc.open));
   page->AddHistogram("tissueform_call_duration_seconds",
-                     "How long calls took, those of streams from opening to close.",
-                     {{"rpc", rpc}}, &of_rpc.durations);
+                     "How long calls took, those of streams from opening to close.", {{"rpc", rpc}},
+                     &of_rpc.durations);
 }
 
 void CallMetrics::AddTo(MetricsPage* page) const {

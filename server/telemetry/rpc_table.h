@@ -10,7 +10,7 @@ namespace tissueform {
 
 // An rpc of the protocol, by the name that CallScope has for it.
 struct Rpc {
-  std::string name;     // "MeshService.GetMesh"
+  std::string name;      // "MeshService.GetMesh"
   bool streams = false;  // on either side
 };
 

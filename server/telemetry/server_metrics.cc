@@ -105,14 +105,36 @@ void AddMemoryMetrics(const MemoryBudget& budget, const MeshCatalog& catalog, Me
   const char* const help = "Bytes of the memory budget that are reserved, by what for.";
   page->AddGauge("tissueform_memory_reserved_bytes", help, {{"kind", "meshes"}},
                  [&catalog] { return static_cast<double>(catalog.CountHeld().bytes); });
-  page->AddGauge("tissueform_memory_reserved_bytes", help, {{"kind", "sessions"}},
-                 [&budget, &catalog] {
-                   const int64_t meshes = catalog.CountHeld().bytes;
-                   return static_cast<double>(std::max<int64_t>(
-                       0, budget.reserved_bytes() - meshes));
-                 });
+  page->AddGauge(
+      "tissueform_memory_reserved_bytes", help, {{"kind", "sessions"}}, [&budget, &catalog] {
+        const int64_t meshes = catalog.CountHeld().bytes;
+        return static_cast<double>(std::max<int64_t>(0, budget.reserved_bytes() - meshes));
+      });
   page->AddGauge("tissueform_memory_budget_bytes", "The memory budget.", {},
                  [&budget] { return static_cast<double>(budget.limit_bytes()); });
+}
+
+void AddSecurityMetrics(const SecurityReadings& readings, MetricsPage* page) {
+  page->AddGauge("tissueform_insecure", "1 when the server was started with --insecure.", {},
+                 [insecure = readings.insecure] { return insecure ? 1.0 : 0.0; });
+  const auto add_time = [page](const std::string& name, const std::string& help,
+                               const MetricsPage::Labels& labels, const MetricsPage::Read& read) {
+    if (read != nullptr) page->AddGauge(name, help, labels, read);
+  };
+  const char* const expiry = "tissueform_certificate_expiry_timestamp_seconds";
+  add_time(expiry, "When a certificate ends, in Unix time.", {{"certificate", "server"}},
+           readings.certificate_expires);
+  add_time(expiry, "", {{"certificate", "client_ca"}}, readings.client_ca_expires);
+  add_time("tissueform_token_keys_read_timestamp_seconds",
+           "When keys of tokens were last read and good, in Unix time.", {},
+           readings.token_keys_read);
+  add_time("tissueform_token_keys_expiry_timestamp_seconds",
+           "When the first key of tokens may be used no longer, in Unix time.", {},
+           readings.token_keys_expire);
+  if (readings.token_key_alarms == nullptr) return;
+  page->AddCounter("tissueform_token_key_alarms_total",
+                   "Times that new keys of tokens were nonsense, and the old ones stayed.", {},
+                   readings.token_key_alarms);
 }
 
 void AddStoreMetrics(const Stores& stores, MetricsPage* page) {
@@ -127,8 +149,7 @@ void AddStoreMetrics(const Stores& stores, MetricsPage* page) {
                                                         {"uploads", "uploads"},
                                                         {"damaged", "damaged"}};
   for (const auto& [kind, name] : kKinds) {
-    page->AddGauge("tissueform_store_bytes", "Bytes in the data folder, by kind.",
-                   {{"kind", kind}},
+    page->AddGauge("tissueform_store_bytes", "Bytes in the data folder, by kind.", {{"kind", kind}},
                    [path = std::filesystem::path(folder) / name] { return BytesAt(path); });
   }
   page->AddGauge("tissueform_store_free_bytes", "Free bytes on the disk of the data folder.", {},

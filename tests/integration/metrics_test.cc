@@ -87,8 +87,8 @@ TEST_F(MetricsTest, PromtoolFindsNothingToSay) {
   const std::string page = Page();
   const std::string path = absl::StrCat(::testing::TempDir(), "metrics_page.txt");
   std::ofstream(path) << page.substr(page.find("\r\n\r\n") + 4);
-  EXPECT_EQ(std::system(absl::StrCat("promtool check metrics < ", path, " > ", path, ".out 2>&1")
-                            .c_str()),
+  EXPECT_EQ(std::system(
+                absl::StrCat("promtool check metrics < ", path, " > ", path, ".out 2>&1").c_str()),
             0);
   EXPECT_EQ(std::filesystem::file_size(path + ".out"), 0);
 }
@@ -96,8 +96,9 @@ TEST_F(MetricsTest, PromtoolFindsNothingToSay) {
 TEST_F(MetricsTest, NamesThatClientsChooseAreNotOnThePage) {
   const auto client = Connect();
   EXPECT_FALSE(client->GetSession(absl::StrCat("sessions/", kPlanted)).ok());
-  EXPECT_THAT(Page(), AllOf(Not(HasSubstr(kPlanted)),
-                            HasSubstr("tissueform_failures_total{reason=\"SESSION_NOT_FOUND\"} 1")));
+  EXPECT_THAT(Page(),
+              AllOf(Not(HasSubstr(kPlanted)),
+                    HasSubstr("tissueform_failures_total{reason=\"SESSION_NOT_FOUND\"} 1")));
 }
 
 TEST_F(MetricsTest, WithoutTheOptionThereIsNoPage) {

@@ -27,8 +27,7 @@ inline std::string HttpGet(int port, const std::string& path,
     const std::string request = "GET " + path + " HTTP/1.0\r\nHost: localhost\r\n\r\n";
     size_t sent = 0;
     while (sent < request.size()) {
-      const ssize_t count =
-          send(fd, request.data() + sent, request.size() - sent, MSG_NOSIGNAL);
+      const ssize_t count = send(fd, request.data() + sent, request.size() - sent, MSG_NOSIGNAL);
       if (count <= 0) break;
       sent += static_cast<size_t>(count);
     }

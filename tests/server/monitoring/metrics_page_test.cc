@@ -18,9 +18,9 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using ::testing::Not;
 using testing::HttpGet;
 using testing::IsOk;
+using ::testing::Not;
 using testing::StatusIs;
 
 TEST(MetricsPageTest, EverythingIsReadWhenItIsAskedFor) {
@@ -45,8 +45,7 @@ TEST(MetricsPageTest, AFamilyIsToldOnceWithAllItsLabels) {
 
 TEST(MetricsPageTest, WhatIsNotThereIsLeftOut) {
   MetricsPage page;
-  page.AddGauge("unknown", "Nothing.", {},
-                [] { return std::numeric_limits<double>::quiet_NaN(); });
+  page.AddGauge("unknown", "Nothing.", {}, [] { return std::numeric_limits<double>::quiet_NaN(); });
   EXPECT_EQ(page.Text(), "");
 }
 
@@ -69,9 +68,10 @@ TEST(MetricsPageTest, ServesTheTextAndNothingElse) {
   EXPECT_EQ(page.port(), 0);
   ASSERT_THAT(page.Serve(0), IsOk());
   const std::string answer = HttpGet(page.port(), "/metrics");
-  EXPECT_THAT(answer, AllOf(HasSubstr("200 OK"), HasSubstr("program_build_info{version=\"1.2.3\"} 1"),
-                            HasSubstr("process_open_fds "), HasSubstr("process_cpu_seconds_total "),
-                            HasSubstr("process_resident_memory_bytes ")));
+  EXPECT_THAT(answer,
+              AllOf(HasSubstr("200 OK"), HasSubstr("program_build_info{version=\"1.2.3\"} 1"),
+                    HasSubstr("process_open_fds "), HasSubstr("process_cpu_seconds_total "),
+                    HasSubstr("process_resident_memory_bytes ")));
   EXPECT_THAT(HttpGet(page.port(), "/"), HasSubstr("404"));
   EXPECT_THAT(HttpGet(page.port(), "/../../etc/passwd"), Not(HasSubstr("root:")));
 }

@@ -24,8 +24,8 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using ::testing::Not;
 using testing::IsOk;
+using ::testing::Not;
 
 class CallMetricsTest : public ::testing::Test {
  protected:
@@ -57,12 +57,13 @@ TEST_F(CallMetricsTest, CountsByRpcAndCode) {
   Call("MeshService.GetMesh", absl::OkStatus());
   Call("MeshService.GetMesh", absl::OkStatus());
   Call("MeshService.GetMesh", absl::NotFoundError("gone"));
-  EXPECT_THAT(page_.Text(),
-              AllOf(HasSubstr("tissueform_calls_total{code=\"OK\",rpc=\"MeshService.GetMesh\"} 2\n"),
-                    HasSubstr("{code=\"NOT_FOUND\",rpc=\"MeshService.GetMesh\"} 1\n"),
-                    HasSubstr("seconds_bucket{rpc=\"MeshService.GetMesh\",le=\"0.0025\"} 3\n"),
-                    HasSubstr("seconds_bucket{rpc=\"MeshService.GetMesh\",le=\"0.001\"} 0\n"),
-                    HasSubstr("tissueform_failures_total{reason=\"NOT_FOUND\"} 1\n")));
+  EXPECT_THAT(
+      page_.Text(),
+      AllOf(HasSubstr("tissueform_calls_total{code=\"OK\",rpc=\"MeshService.GetMesh\"} 2\n"),
+            HasSubstr("{code=\"NOT_FOUND\",rpc=\"MeshService.GetMesh\"} 1\n"),
+            HasSubstr("seconds_bucket{rpc=\"MeshService.GetMesh\",le=\"0.0025\"} 3\n"),
+            HasSubstr("seconds_bucket{rpc=\"MeshService.GetMesh\",le=\"0.001\"} 0\n"),
+            HasSubstr("tissueform_failures_total{reason=\"NOT_FOUND\"} 1\n")));
 }
 
 TEST_F(CallMetricsTest, ACallIsOpenUntilItEnds) {
@@ -99,8 +100,8 @@ TEST_F(CallMetricsTest, NothingThatAClientChoosesIsOnThePage) {
 
 TEST(RpcTableTest, HasEveryServiceOfTheProtocol) {
   std::set<std::string> in_files;
-  for (const auto& entry : std::filesystem::directory_iterator(
-           testing::SourcePath("proto/tissueform/v1"))) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator(testing::SourcePath("proto/tissueform/v1"))) {
     std::ifstream file(entry.path());
     const std::regex service("^service (\\w+) \\{");
     for (std::string line; std::getline(file, line);) {
