@@ -28,15 +28,14 @@ constexpr char kDescription[] =
 
 enum ExitCode : int { kExitDone = 0, kExitFailed = 1, kExitWrongUse = 2 };
 
-constexpr uint64_t kTerminationSignals = (uint64_t{1} << (SIGTERM - 1)) |
-                                         (uint64_t{1} << (SIGINT - 1)) |
-                                         (uint64_t{1} << (SIGHUP - 1));
+constexpr uint64_t kTerminationSignals =
+    (uint64_t{1} << (SIGTERM - 1)) | (uint64_t{1} << (SIGINT - 1)) | (uint64_t{1} << (SIGHUP - 1));
 
-// Blocks SIGTERM, SIGINT and SIGHUP for every thread that there will be. In main() it would be too late:
-// OpenBLAS starts threads when it is loaded, and a second signal, while the server drains, would
-// end the process by one of them. Handlers would not do either: METIS takes SIGTERM for a jump of
-// its own while it orders a matrix, and leaves a handler behind that lasts for one signal. The
-// system call itself, as nothing is initialised yet that the sanitizers' wrappers need.
+// Blocks SIGTERM, SIGINT and SIGHUP for every thread that there will be. In main() it would be too
+// late: OpenBLAS starts threads when it is loaded, and a second signal, while the server drains,
+// would end the process by one of them. Handlers would not do either: METIS takes SIGTERM for a
+// jump of its own while it orders a matrix, and leaves a handler behind that lasts for one signal.
+// The system call itself, as nothing is initialised yet that the sanitizers' wrappers need.
 __attribute__((no_sanitize("address", "thread", "undefined"))) void BlockTerminationSignals() {
   syscall(SYS_rt_sigprocmask, SIG_BLOCK, &kTerminationSignals, nullptr,
           sizeof(kTerminationSignals));

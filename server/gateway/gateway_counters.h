@@ -60,8 +60,8 @@ class GatewayCounters {
   std::array<std::atomic<int64_t>, static_cast<size_t>(GatewayEvent::kLast) + 1> counts_ = {};
 };
 
-// What it has done as tissueform_gateway_events_total, the rest as tissueform_gateway_refusals_total;
-// `counters` must outlive the page.
+// What it has done as tissueform_gateway_events_total, the rest as
+// tissueform_gateway_refusals_total; `counters` must outlive the page.
 void AddCounterMetrics(const GatewayCounters& counters, MetricsPage* page);
 
 }  // namespace tissueform

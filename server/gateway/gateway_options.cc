@@ -127,9 +127,10 @@ void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
                  "how lines of the log look: for people, or one JSON object each")
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
-  app.add_option("--metrics-port", options->metrics_port,
-                 "port of 127.0.0.1 on which Prometheus finds /metrics; 0 takes a free one (default: "
-                 "there is none)")
+  app.add_option(
+         "--metrics-port", options->metrics_port,
+         "port of 127.0.0.1 on which Prometheus finds /metrics; 0 takes a free one (default: "
+         "there is none)")
       ->check(CLI::Range(0, 65535));
 }
 

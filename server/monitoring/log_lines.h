@@ -21,8 +21,8 @@ struct CallOfLogLine {
   std::string_view traceparent;  // empty: none
 };
 
-// Lines that this thread logs while it lives are about this call. What it names must outlive it; they
-// do not nest.
+// Lines that this thread logs while it lives are about this call. What it names must outlive it;
+// they do not nest.
 class LogLinesOfCall {
  public:
   explicit LogLinesOfCall(const CallOfLogLine& call);
@@ -31,8 +31,8 @@ class LogLinesOfCall {
   LogLinesOfCall& operator=(const LogLinesOfCall&) = delete;
 };
 
-// One JSON object a line: time (UTC, RFC 3339), level, logger, message, and of a line that is about a
-// call request_id, method, code, duration_ms and traceparent. What is no UTF-8 is replaced.
+// One JSON object a line: time (UTC, RFC 3339), level, logger, message, and of a line that is about
+// a call request_id, method, code, duration_ms and traceparent. What is no UTF-8 is replaced.
 std::unique_ptr<spdlog::formatter> MakeJsonLines();
 
 // "text" leaves what spdlog does; "json" makes objects of all lines of the program from now on.

@@ -20,9 +20,9 @@
 namespace tissueform {
 
 // The files of an audit log (core/audit_chain/audit_chain.h): the newest one under the log's own
-// name, the others as PATH.000001, PATH.000002 or wherever somebody has moved them. A new one begins
-// when a line would make the newest one larger than `max_bytes`, on a new day (UTC), and when the
-// newest one is no longer where it was.
+// name, the others as PATH.000001, PATH.000002 or wherever somebody has moved them. A new one
+// begins when a line would make the newest one larger than `max_bytes`, on a new day (UTC), and
+// when the newest one is no longer where it was.
 //
 // One thread at a time.
 class AuditFile {
@@ -35,9 +35,9 @@ class AuditFile {
     std::function<absl::Time()> now = [] { return absl::Now(); };
   };
 
-  // Goes on where the log ended, with a line that says so; makes the first file, for its owner only,
-  // where there is none. What a crash has left of a line is moved to PATH.torn-N, and a line says so.
-  // A file that was sealed with another key is left, and the next one begins.
+  // Goes on where the log ended, with a line that says so; makes the first file, for its owner
+  // only, where there is none. What a crash has left of a line is moved to PATH.torn-N, and a line
+  // says so. A file that was sealed with another key is left, and the next one begins.
   //
   // Errors: FailedPrecondition (another process writes it), or what the disk says, naming the file.
   static absl::StatusOr<std::unique_ptr<AuditFile>> Open(AuditKey key, Options options);
@@ -73,7 +73,7 @@ class AuditFile {
   int fd_ = -1;
   int64_t size_ = 0;      // up to where it holds whole lines
   bool is_torn_ = false;  // it holds more
-  absl::CivilDay day_;  // on which the file began, or was opened
+  absl::CivilDay day_;    // on which the file began, or was opened
 };
 
 }  // namespace tissueform

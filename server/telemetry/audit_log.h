@@ -32,8 +32,8 @@ class AuditLog {
     AuditFile::Options file;
     // Is told where the log is, now and then and at the end of a run; null: nobody is.
     std::function<void(const std::string& text)> checkpoint = nullptr;
-    size_t most = 16'384;                  // lines that wait, and places that are reserved
-    uint64_t checkpoint_lines = 1000;      // between two
+    size_t most = 16'384;              // lines that wait, and places that are reserved
+    uint64_t checkpoint_lines = 1000;  // between two
     std::chrono::seconds checkpoint_interval{300};
     std::chrono::milliseconds retry{1000};  // after a write that has failed
   };

@@ -51,7 +51,8 @@ void AddOutcome(const absl::Status& outcome, std::chrono::steady_clock::duration
 
 // The inside of the object.
 std::string Inside(const Json& line) {
-  const std::string text = line.dump(-1, ' ', /*ensure_ascii=*/true, Json::error_handler_t::replace);
+  const std::string text =
+      line.dump(-1, ' ', /*ensure_ascii=*/true, Json::error_handler_t::replace);
   return text.substr(1, text.size() - 2);
 }
 
@@ -87,9 +88,7 @@ void AuditObserver::OnEnd(const ObservedCall& call, const absl::Status& outcome,
                           std::chrono::steady_clock::duration elapsed) {
   if (IsLeftOut(call.method)) return;
   if (!call.served && !MayTellRefused()) return;
-  const char* const event = !call.served             ? "refused"
-                            : IsStream(call.method) ? "close"
-                                                     : "call";
+  const char* const event = !call.served ? "refused" : IsStream(call.method) ? "close" : "call";
   Json line = CallEvent(event, now_(), call);
   AddOutcome(outcome, elapsed, &line);
   if (call.served) {

@@ -23,12 +23,12 @@ namespace tissueform {
 // when it opens and when it names what it is about. Nothing that a call brings or is answered goes
 // there.
 //
-// Left out are calls that touch no content: what the server is (GetServerInfo), who one is (WhoAmI),
-// and the acknowledgements of a watch. All others are refused while the log cannot be written, those
-// that only look too: a look that nobody records is what an audit is there against.
+// Left out are calls that touch no content: what the server is (GetServerInfo), who one is
+// (WhoAmI), and the acknowledgements of a watch. All others are refused while the log cannot be
+// written, those that only look too: a look that nobody records is what an audit is there against.
 //
-// Calls that were never let in (not known, draining, refused here) are told, too, but only so many a
-// second; of the rest the number.
+// Calls that were never let in (not known, draining, refused here) are told, too, but only so many
+// a second; of the rest the number.
 //
 // Thread-safe.
 class AuditObserver final : public CallObserver {
@@ -36,7 +36,8 @@ class AuditObserver final : public CallObserver {
   static constexpr int kRefusedLinesASecond = 20;
 
   // `log` must outlive it.
-  explicit AuditObserver(AuditLog* log, std::function<absl::Time()> now = [] { return absl::Now(); });
+  explicit AuditObserver(
+      AuditLog* log, std::function<absl::Time()> now = [] { return absl::Now(); });
   ~AuditObserver() override;
 
   // Errors: those of AuditLog::Reserve.

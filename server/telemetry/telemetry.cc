@@ -4,9 +4,8 @@
 #include "server/telemetry/telemetry.h"
 
 #include <string>
-#include <utility>
-
 #include <syslog.h>
+#include <utility>
 
 #include "core/audit_chain/audit_key.h"
 #include "core/base/status_macros.h"

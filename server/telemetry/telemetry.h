@@ -19,8 +19,8 @@
 
 namespace tissueform {
 
-// What a server tells of its calls: metrics always, an audit where the options ask for one. It is to
-// be told of every call. Thread-safe.
+// What a server tells of its calls: metrics always, an audit where the options ask for one. It is
+// to be told of every call. Thread-safe.
 class Telemetry final : public CallObserver {
  public:
   // Errors: those of AuditKey::Read and AuditLog::Open.
@@ -48,7 +48,7 @@ class Telemetry final : public CallObserver {
 
   CallMetrics call_metrics_;
   SessionEventCounts session_events_;
-  std::unique_ptr<AuditLog> audit_log_;         // null: there is none
+  std::unique_ptr<AuditLog> audit_log_;  // null: there is none
   std::optional<AuditObserver> audit_observer_;
 };
 

@@ -16,9 +16,10 @@ void AddTelemetryOptions(CLI::App& app, TelemetryOptions* options) {
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
   CLI::Option* audit_log =
-      app.add_option("--audit-log", options->audit_log,
-                     "file to which it is written who has called what, one JSON object a line; when "
-                     "it cannot be written, calls are refused")
+      app.add_option(
+             "--audit-log", options->audit_log,
+             "file to which it is written who has called what, one JSON object a line; when "
+             "it cannot be written, calls are refused")
           ->type_name("FILE");
   CLI::Option* audit_key =
       app.add_option("--audit-key", options->audit_key,

@@ -54,8 +54,8 @@ absl::Status Verify(const VerifyOptions& options) {
     return absl::DataLossError(absl::StrCat(finding.file, ":", finding.line, ": ",
                                             AuditFaultName(finding.fault), ": ", finding.what));
   }
-  std::cout << "ok: " << report.lines << " lines in " << report.files << " files, n="
-            << report.first << " to n=" << report.last.number << "\n";
+  std::cout << "ok: " << report.lines << " lines in " << report.files
+            << " files, n=" << report.first << " to n=" << report.last.number << "\n";
   if (report.mended > 0) {
     std::cout << "crashes: " << report.mended << " torn lines were set aside by the server\n";
   }
@@ -74,8 +74,9 @@ absl::Status Verify(const VerifyOptions& options) {
 
 void AddVerify(CLI::App& audit, CommandWork* work) {
   CLI::App* command = audit.add_subcommand(
-      "verify", "tell whether the files of an audit log are what the server wrote, or the first "
-                "line that is not, and how");
+      "verify",
+      "tell whether the files of an audit log are what the server wrote, or the first "
+      "line that is not, and how");
   auto options = std::make_shared<VerifyOptions>();
   command->add_option("FILE", options->files, "files of one log, in any order")->required();
   command->add_option("--key", options->key, "the key by which the server sealed them")

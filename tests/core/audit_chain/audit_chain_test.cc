@@ -5,12 +5,12 @@
 
 #include <cstdio>
 #include <string>
-#include <sys/stat.h>
 
 #include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
+#include <sys/stat.h>
 
 #include "tests/testing/audit_samples.h"
 #include "tests/testing/status_matchers.h"
@@ -20,8 +20,8 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using ::testing::Not;
 using testing::IsOk;
+using ::testing::Not;
 using testing::SampleKey;
 using testing::StatusIs;
 

@@ -3,6 +3,7 @@
 
 #include "core/audit_chain/audit_verification.h"
 
+#include <cstdio>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,8 +32,10 @@ class AuditVerificationTest : public ::testing::Test {
                      const std::vector<AuditCheckpoint>& checkpoints = {}) const {
     std::vector<std::string> paths;
     for (const std::string& file : files) {
-      paths.push_back(testing::WriteFile(
-          absl::StrCat(::testing::TempDir(), "audit_verification_", paths.size()), file));
+      const std::string path =
+          absl::StrCat(::testing::TempDir(), "audit_verification_", paths.size());
+      std::remove(path.c_str());  // one that takes another's place is synced, which takes long
+      paths.push_back(testing::WriteFile(path, file));
     }
     auto report = VerifyAuditFiles(paths, key, checkpoints);
     EXPECT_THAT(report, IsOk());
@@ -106,8 +109,7 @@ TEST_F(AuditVerificationTest, AnyCutIsFoundExceptBetweenLines) {
 
 TEST_F(AuditVerificationTest, ACutBetweenLinesIsFoundByACheckpoint) {
   AuditPosition last;
-  const std::vector<std::string> lines =
-      LinesOf(SampleLog({4}, SampleKey(), &last).front());
+  const std::vector<std::string> lines = LinesOf(SampleLog({4}, SampleKey(), &last).front());
   const std::vector<AuditCheckpoint> checkpoints = {{.number = last.number, .mac = last.mac}};
   EXPECT_EQ(Found(Verify({Joined(lines)}, SampleKey(), checkpoints)), "ok");
   const std::string cut = Joined({lines.begin(), lines.end() - 1});
@@ -127,8 +129,9 @@ TEST_F(AuditVerificationTest, WhoHasTheKeyAndWritesAnewIsFoundByACheckpoint) {
 
 TEST_F(AuditVerificationTest, SaysWhereAndHow) {
   using Lines = std::vector<std::string>;
-  EXPECT_EQ(After([](Lines& lines) { lines[2].replace(lines[2].find("sessions/2"), 10, "sessions/7"); }),
-            "changed 3");
+  EXPECT_EQ(
+      After([](Lines& lines) { lines[2].replace(lines[2].find("sessions/2"), 10, "sessions/7"); }),
+      "changed 3");
   EXPECT_EQ(After([](Lines& lines) { lines[2].replace(5, 1, "9"); }), "changed 3");
   EXPECT_EQ(After([](Lines& lines) { lines.erase(lines.begin() + 2); }), "removed 3");
   EXPECT_EQ(After([](Lines& lines) { lines.erase(lines.begin() + 1, lines.begin() + 4); }),
@@ -183,8 +186,9 @@ TEST_F(AuditVerificationTest, CheckpointsAreFoundInASystemLog) {
   SampleLog({2}, SampleKey(), &last);
   const std::string path = testing::WriteFile(
       absl::StrCat(::testing::TempDir(), "syslog"),
-      absl::StrCat("Nov 23 17:00:00 host sshd[1]: other\nNov 23 17:00:01 host tissueform-server[7]: ",
-                   CheckpointText(last), "\ntissueform-audit checkpoint n=x mac=y\n"));
+      absl::StrCat(
+          "Nov 23 17:00:00 host sshd[1]: other\nNov 23 17:00:01 host tissueform-server[7]: ",
+          CheckpointText(last), "\ntissueform-audit checkpoint n=x mac=y\n"));
   ASSERT_OK_AND_ASSIGN(const std::vector<AuditCheckpoint> checkpoints, ReadCheckpoints(path));
   ASSERT_EQ(checkpoints.size(), 1);
   EXPECT_EQ(checkpoints.front().number, 2);

@@ -75,7 +75,8 @@ class AuditObserverTest : public ::testing::Test {
     EXPECT_TRUE(log_->Flush());
     std::vector<nlohmann::json> lines;
     std::ifstream stream(path_);
-    for (std::string text; std::getline(stream, text);) lines.push_back(nlohmann::json::parse(text));
+    for (std::string text; std::getline(stream, text);)
+      lines.push_back(nlohmann::json::parse(text));
     return lines;
   }
 
@@ -99,7 +100,8 @@ TEST_F(AuditObserverTest, ACallIsOneLineWithWhoWhatFromWhereAndHowItEnded) {
   ASSERT_EQ(lines.size(), 2);
   nlohmann::json line = lines[1];
   line.erase("mac");
-  EXPECT_EQ(line, nlohmann::json::parse(R"({"n":2,"event":"call","time":"2023-11-14T22:13:20.000000Z",
+  EXPECT_EQ(line,
+            nlohmann::json::parse(R"({"n":2,"event":"call","time":"2023-11-14T22:13:20.000000Z",
       "principal":"planner@example.org","rpc":"SessionService.GetSession","resource":"sessions/one",
       "address":"192.0.2.1","request_id":"request-1","code":"NOT_FOUND","reason":"NOT_FOUND","duration_ms":3})"));
 }

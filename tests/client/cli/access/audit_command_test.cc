@@ -55,7 +55,8 @@ TEST_F(AuditCommandTest, AChangedLineIsNamed) {
   std::string doctored = files_[1];
   doctored.replace(doctored.find("sessions/2"), 10, "sessions/9");
   Write("audit.jsonl", doctored);
-  EXPECT_THAT(Verify(), FailsWith(1, HasSubstr("audit.jsonl:3: changed: line n=7 is not what was")));
+  EXPECT_THAT(Verify(),
+              FailsWith(1, HasSubstr("audit.jsonl:3: changed: line n=7 is not what was")));
 }
 
 TEST_F(AuditCommandTest, ARemovedLineIsNamed) {
