@@ -174,7 +174,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
                          : std::make_unique<LinkAuthenticator>(&access_, parts.authenticator)),
       gate_({.authenticator = authenticator_.get(),
              .may_call = &Access::MayCall,
-             .observer = telemetry_->observer(),
+             .observer = telemetry_.get(),
              .quotas = &quotas_,
              .gateway_name = options.tls.gateway_name}),
       budget_(options.memory_budget_bytes),
@@ -236,6 +236,7 @@ absl::Status TissueformServer::ServeMetrics() {
   AddSessionMetrics(registry_, telemetry_->session_events(), &*metrics_);
   AddMemoryMetrics(budget_, catalog_, &*metrics_);
   AddStoreMetrics(*stores_, &*metrics_);
+  AddSecurityMetrics({}, &*metrics_);
   metrics_->AddGauge("tissueform_streams", "Drags open.", {},
                      [this] { return static_cast<double>(streams_.size()); });
   metrics_->AddGauge("tissueform_watches", "Watches open.", {},

@@ -18,6 +18,7 @@
 #include "server/auth/identity.h"
 #include "server/calls/client_address.h"
 #include "server/calls/status_conversion.h"
+#include "server/monitoring/log_lines.h"
 
 namespace tissueform {
 namespace {
@@ -208,8 +209,14 @@ grpc::Status CallScope::End(const absl::Status& outcome) {
   const bool quiet = outcome.ok() || outcome.code() == absl::StatusCode::kCancelled ||
                      absl::IsUnauthenticated(admission_);
   const auto level = quiet ? spdlog::level::debug : spdlog::level::info;
-  spdlog::log(level, "{} {} {:.1f} ms, request {}", method_,
-              absl::StatusCodeToString(outcome.code()), elapsed.count(), request_id_);
+  const std::string code = absl::StatusCodeToString(outcome.code());
+  const CallOfLogLine call = {.request_id = request_id_,
+                              .method = method_,
+                              .code = code,
+                              .duration = elapsed,
+                              .traceparent = traceparent_};
+  const LogLinesOfCall lines(call);
+  spdlog::log(level, "{} {} {:.1f} ms, request {}", method_, code, elapsed.count(), request_id_);
   TellEnd(outcome);
   std::exchange(gate_, nullptr)->Leave();
   return ToGrpcStatus(outcome);
