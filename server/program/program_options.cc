@@ -111,6 +111,10 @@ std::string Line(const CLI::Option& option) {
                         "\n");
   if (values.empty()) {
     if (option.get_default_str().empty()) return absl::StrCat("# ", name, " is not set\n");
+    // Where it is given, others must or must not be: its default goes without saying.
+    if (!option.get_needs().empty() || !option.get_excludes().empty()) {
+      return absl::StrCat("# ", name, " = ", option.get_default_str(), "\n");
+    }
     values = {option.get_default_str()};
   }
   std::vector<std::string> quoted;

@@ -87,8 +87,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadKeys{"NoKeys", "no key", [] { return std::string(R"({"keys": []})"); }},
         BadKeys{"NoSet", "Key Set", [] { return std::string(R"({"key": 1})"); }},
         BadKeys{"HalfASet", "Key Set", [] { return EcKey().PublicJwks().dump().substr(0, 80); }},
-        BadKeys{"KeyIsNoObject", "no JSON object",
-                [] { return std::string(R"({"keys": [1]})"); }},
+        BadKeys{"KeyIsNoObject", "no JSON object", [] { return std::string(R"({"keys": [1]})"); }},
         BadKeys{"PemAndSomethingElse", "something else",
                 [] {
                   return EcKey().PublicPem() +

@@ -32,9 +32,9 @@ Authenticated Known(const std::string& name, int64_t issued) {
 }
 
 TEST(RevocationListTest, HoldsTokensByDigestAndIdAndAllThatAPrincipalHadBefore) {
-  ASSERT_OK_AND_ASSIGN(const auto list, RevocationList::Parse(absl::StrCat(
-                                            R"({"token_digests": [")", std::string(64, 'a'),
-                                            R"("]})")));
+  ASSERT_OK_AND_ASSIGN(const auto list,
+                       RevocationList::Parse(absl::StrCat(R"({"token_digests": [")",
+                                                          std::string(64, 'a'), R"("]})")));
   EXPECT_TRUE(list->Holds(Known("alice", 0)));
   ASSERT_OK_AND_ASSIGN(const auto ids, RevocationList::Parse(R"({"token_ids": ["id-1"]})"));
   EXPECT_TRUE(ids->Holds(Known("alice", 0)));
@@ -112,8 +112,8 @@ TEST(RevocationListTest, ATokenIsRevokedHoweverItsSignatureIsWritten) {
   ASSERT_TRUE(Soon([&] { return authenticator->standing().revocations > 0; }));
   EXPECT_TRUE(absl::IsUnauthenticated(authenticator->StillGood(known)));
   for (const std::string& header : {bearer, other}) {
-    EXPECT_TRUE(absl::IsUnauthenticated(
-        authenticator->Authenticate({.authorization = {header}}).status()));
+    EXPECT_TRUE(
+        absl::IsUnauthenticated(authenticator->Authenticate({.authorization = {header}}).status()));
   }
 }
 

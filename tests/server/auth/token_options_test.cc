@@ -35,22 +35,22 @@ TEST(TokenOptionsTest, AudiencesMayBeSeveral) {
 }
 
 TEST(TokenOptionsTest, WhatIsMissingIsNamed) {
-  EXPECT_THAT(CheckTokenOptions({}), StatusIs(absl::StatusCode::kInvalidArgument,
-                                              HasSubstr("--token-issuer")));
+  EXPECT_THAT(CheckTokenOptions({}),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("--token-issuer")));
   TokenOptions options{.issuer = "a"};
-  EXPECT_THAT(CheckTokenOptions(options), StatusIs(absl::StatusCode::kInvalidArgument,
-                                                   HasSubstr("--token-audience")));
+  EXPECT_THAT(CheckTokenOptions(options),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("--token-audience")));
   options.audiences = {"a"};
-  EXPECT_THAT(CheckTokenOptions(options), StatusIs(absl::StatusCode::kInvalidArgument,
-                                                   HasSubstr("--token-jwks-url")));
+  EXPECT_THAT(CheckTokenOptions(options),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("--token-jwks-url")));
   options.jwks_url = "http://login.example/keys";
-  EXPECT_THAT(CheckTokenOptions(options), StatusIs(absl::StatusCode::kInvalidArgument,
-                                                   HasSubstr("must be https")));
+  EXPECT_THAT(CheckTokenOptions(options),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("must be https")));
   options.jwks_url = "https://login.example/keys";
   EXPECT_THAT(CheckTokenOptions(options), IsOk());
   options.keys_file = "keys.pem";
-  EXPECT_THAT(CheckTokenOptions(options), StatusIs(absl::StatusCode::kInvalidArgument,
-                                                   HasSubstr("give one of")));
+  EXPECT_THAT(CheckTokenOptions(options),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("give one of")));
 }
 
 }  // namespace
