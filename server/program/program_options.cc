@@ -104,7 +104,7 @@ std::optional<std::string> Quoted(const std::string& value) {
 }
 
 std::string Line(const CLI::Option& option) {
-  const std::string name = option.get_single_name();
+  const std::string& name = option.get_single_name();
   std::vector<std::string> values = option.results();
   if (IsFlag(option))
     return absl::StrCat(name, " = ", option.count() > 0 && !IsNo(values.back()) ? "true" : "false",
