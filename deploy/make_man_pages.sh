@@ -32,6 +32,6 @@ for command in "${commands[@]}"; do
   # Defaults that are those of this machine stay out.
   help2man --no-info --version-string="$version" --name="${name%.}" "$programs/$command" |
     sed -e "s/^\.TH [^ ]* /.TH ${page^^} /" -e "s/^$command \\\\- /$page \\\\- /" \
-        -e 's/^\(.*\\-\(threads\|workers\|budget\\-mib\) .*\]\)=[0-9]*/\1/' >"$out/$page.1.new"
+        -e 's/^\(.*\\-\(threads\|workers\|budget\\-mib\)\(\\fR\)* .*\]\)=[0-9]*/\1/' >"$out/$page.1.new"
   mv "$out/$page.1.new" "$out/$page.1"
 done
