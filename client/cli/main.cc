@@ -39,6 +39,8 @@ int main(int argc, char** argv) {
     tissueform::AddCompanionCommand(app, tissueform::kPredictionCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kCaseCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kServerInfoCommand, words, work);
+    tissueform::AddCompanionCommand(app, tissueform::kLoginCommand, words, work);
+    tissueform::AddCompanionCommand(app, tissueform::kLogoutCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kDemoCommand, words, work);
   });
 }

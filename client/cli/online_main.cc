@@ -3,6 +3,7 @@
 //
 // The companion of `tissueform` that speaks with servers.
 
+#include "client/cli/access/login_command.h"
 #include "client/cli/cases/case_command.h"
 #include "client/cli/cases/planner_process.h"
 #include "client/cli/load/load_command.h"
@@ -27,6 +28,8 @@ int main(int argc, char** argv) {
     tissueform::AddPredictionCommand(app, work);
     tissueform::AddCaseCommand(app, work);
     tissueform::AddServerInfoCommand(app, work);
+    tissueform::AddLoginCommand(app, work);
+    tissueform::AddLogoutCommand(app, work);
     tissueform::AddDemoCommand(app, tissueform::OpenPlannerOfPlan, work);
   });
 }

@@ -47,6 +47,10 @@ inline constexpr CompanionCommand kCaseCommand = {"case", "cases: what the brows
                                                   "tissueform-online"};
 inline constexpr CompanionCommand kServerInfoCommand = {
     "server-info", "tell what a server is: version, models, limits", "tissueform-online"};
+inline constexpr CompanionCommand kLoginCommand = {
+    "login", "log in at an identity provider: the token that servers ask for", "tissueform-online"};
+inline constexpr CompanionCommand kLogoutCommand = {
+    "logout", "remove the token that `login` has left", "tissueform-online"};
 inline constexpr CompanionCommand kExperimentsCommand = {
     "experiments", "compute the paper's figures and table again, and the models' accuracy",
     "tissueform-experiments"};
