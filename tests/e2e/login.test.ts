@@ -1,9 +1,11 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+import { mkdtempSync, readFileSync, readdirSync, statSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
 import type { BrowserContext, Page } from "playwright-core";
-import { IdentityProvider, enterName } from "./identity_provider";
-import { Planner, type Hook, live, moved, openPage, seriousFindings, state, takeSegment, typeMove } from "./planner";
+import { AUDIENCE, IdentityProvider, enterName } from "./identity_provider";
+import { Planner, type Hook, live, moved, openPage, seriousFindings, startCommand, state, takeSegment, typeMove } from "./planner";
 
 let provider: IdentityProvider;
 let planner: Planner;
@@ -164,4 +166,34 @@ test("a login that ends keeps the work over the next one", async () => {
   await moved(page, 5, 9);
   expect((await state(page)).moves[1].forwardMm).toBeCloseTo(7, 9);
   expect(faults).toEqual([]);
+});
+
+test("the command logs in by a code that is entered in a browser", async () => {
+  const folder = mkdtempSync(join(planner.folder, "command-"));
+  const file = join(folder, "config/token");
+  const command = startCommand(["login", "--issuer", provider.issuer, "--client-id", "command", "--audience", AUDIENCE, "--token-file", file]);
+  const url = /or open (\S+)/.exec(await command.said("or open"))?.[1] ?? "";
+  const page = await (await planner.browse()).newPage();
+  await page.goto(url);
+  await page.locator("button[type=submit]").click();
+  await enterName(page, "ida");
+  await page.getByText("Continue on your device").waitFor();
+  expect(await command.ended()).toBe(0);
+  const token = readFileSync(file, "utf8").trim();
+  const claims = () => JSON.parse(Buffer.from(readFileSync(file, "utf8").split(".")[1], "base64url").toString());
+  expect(claims()).toMatchObject({ iss: provider.issuer, aud: AUDIENCE, sub: "ida" });
+  expect(statSync(file).mode & 0o777).toBe(0o600);
+  expect(await command.said("")).not.toContain(token);
+
+  const list = ["case", "list", "--server", planner.serverAddress, "--token-file"];
+  expect(await startCommand([...list, file]).ended()).toBe(0);
+  const forged = join(folder, "forged");
+  writeFileSync(forged, `${token}x`, { mode: 0o600 });
+  expect(await startCommand([...list, forged]).ended()).toBe(1);
+
+  expect(await startCommand(["login", "--renew", "--token-file", file]).ended()).toBe(0);
+  expect(readFileSync(file, "utf8").trim()).not.toBe(token);
+  expect(claims().sub).toBe("ida");
+  expect(await startCommand(["logout", "--token-file", file]).ended()).toBe(0);
+  expect(readdirSync(join(folder, "config"))).toEqual([]);
 });
