@@ -85,7 +85,7 @@ test("a drag outlives its tokens: it is told every new one, and the server takes
   const before = tokensTold.length;
   const first = tokensTold[before - 1];
   await takeSegment(page, "Lower jaw");
-  for (let mm = 1; mm <= 3; ++mm) {
+  for (let mm = 1; mm <= 2; ++mm) {
     await expect.poll(() => tokensTold[before - 1], { timeout: 20_000, interval: 50 }).toBeGreaterThanOrEqual(first + mm);
     await typeMove(page, "Forward", String(mm));
     await moved(page, 0.6 * mm, 1.4 * mm);
@@ -175,9 +175,9 @@ test("the command logs in by a code that is entered in a browser", async () => {
   const url = /or open (\S+)/.exec(await command.said("or open"))?.[1] ?? "";
   const page = await (await planner.browse()).newPage();
   await page.goto(url);
-  await page.locator("button[type=submit]").click();
+  await page.getByRole("button", { name: "Continue", exact: true }).click();
   await enterName(page, "ida");
-  await page.getByText("Continue on your device").waitFor();
+  await page.getByText("Sign-in Success").waitFor();
   expect(await command.ended()).toBe(0);
   const token = readFileSync(file, "utf8").trim();
   const claims = () => JSON.parse(Buffer.from(readFileSync(file, "utf8").split(".")[1], "base64url").toString());
@@ -188,7 +188,7 @@ test("the command logs in by a code that is entered in a browser", async () => {
   const list = ["case", "list", "--server", planner.serverAddress, "--token-file"];
   expect(await startCommand([...list, file]).ended()).toBe(0);
   const forged = join(folder, "forged");
-  writeFileSync(forged, `${token}x`, { mode: 0o600 });
+  writeFileSync(forged, token.replace(/.{8}$/, "AAAAAAAA"), { mode: 0o600 });
   expect(await startCommand([...list, forged]).ended()).toBe(1);
 
   expect(await startCommand(["login", "--renew", "--token-file", file]).ended()).toBe(0);
