@@ -97,7 +97,7 @@ test("the login", async () => {
     await moved(page, 6, 12);
     page.once("dialog", (dialog) => void dialog.dismiss());
     await page.getByRole("button", { name: "Copy follow link" }).click();
-    await page.getByText(/works until/).waitFor();
+    await page.getByText(/until \d/).waitFor();
     await picture(page, "signed-in");
   } finally {
     await house.stop();
