@@ -44,6 +44,8 @@ int main(int argc, char** argv) {
     tissueform::AddCompanionCommand(app, tissueform::kServerInfoCommand, words, work);
     tissueform::AddAuditCommand(app, work);
     tissueform::AddCompanionCommand(app, tissueform::kDoctorCommand, words, work);
+    tissueform::AddCompanionCommand(app, tissueform::kLoginCommand, words, work);
+    tissueform::AddCompanionCommand(app, tissueform::kLogoutCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kDemoCommand, words, work);
   });
 }

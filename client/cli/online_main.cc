@@ -5,6 +5,7 @@
 
 #include "client/cli/access/doctor_command.h"
 #include "client/cli/access/follow_link_command.h"
+#include "client/cli/access/login_command.h"
 #include "client/cli/access/share_command.h"
 #include "client/cli/access/whoami_command.h"
 #include "client/cli/cases/case_command.h"
@@ -36,6 +37,8 @@ int main(int argc, char** argv) {
     tissueform::AddWhoamiCommand(app, work);
     tissueform::AddServerInfoCommand(app, work);
     tissueform::AddDoctorCommand(app, work);
+    tissueform::AddLoginCommand(app, work);
+    tissueform::AddLogoutCommand(app, work);
     tissueform::AddDemoCommand(app, tissueform::OpenPlannerOfPlan, work);
   });
 }

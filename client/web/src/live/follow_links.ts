@@ -21,7 +21,7 @@ export function isLinkToken(text: string): boolean {
 /** A link that is asked for again is made anew when so little of its life is left. */
 const LEAST_LEFT_MS = 3_600_000;
 
-/** Links by which others follow this page's session. All reject with a CallError. */
+/** Links by which others follow this page's session and see its case. All reject with a CallError. */
 export class FollowLinks {
   private made: (FollowLink & { session: string }) | null = null;
 
@@ -29,6 +29,7 @@ export class FollowLinks {
   constructor(
     private readonly gateway: { access: Pick<Gateway["access"], "createFollowLink" | "deleteFollowLinks"> },
     readonly hasLogins: boolean,
+    private readonly caseName: string,
     private readonly session: () => string,
     private readonly url: (sessionOrToken: string) => string,
     private readonly now: () => number = () => Date.now(),
@@ -51,7 +52,7 @@ export class FollowLinks {
   }
 
   private async create(session: string): Promise<FollowLink & { session: string }> {
-    const request = this.gateway.access.createFollowLink({ session }, { headers: sessionMetadata(session) });
+    const request = this.gateway.access.createFollowLink({ session, case: this.caseName }, { headers: sessionMetadata(session) });
     const { token, expireTime } = await request.catch((thrown) => Promise.reject(toCallError(thrown)));
     return { session, url: this.url(token), endsAt: new Date(1000 * Number(expireTime?.seconds ?? 0n)) };
   }
