@@ -24,6 +24,8 @@
 namespace tissueform {
 namespace {
 
+constexpr int kMostNames = 100;
+
 // What is found of a log in one of its files.
 struct FileEnd {
   std::optional<AuditPosition> position;  // of its last line that has the form of one
@@ -109,12 +111,12 @@ absl::Status AuditFile::DiskError(const char* what) const {
 
 absl::StatusOr<std::unique_ptr<AuditFile>> AuditFile::Open(AuditKey key, Options options) {
   std::unique_ptr<AuditFile> file(new AuditFile(std::move(key), std::move(options)));
-  TF_RETURN_IF_ERROR(file->OpenAtPath());
+  TF_RETURN_IF_ERROR(file->OpenAtPath(/*begins=*/false));
   TF_RETURN_IF_ERROR(file->Resume());
   return file;
 }
 
-absl::Status AuditFile::OpenAtPath() {
+absl::Status AuditFile::OpenAtPath(bool begins) {
   const int fd = open(options_.path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW,
                       S_IRUSR | S_IWUSR);
   if (fd < 0) return DiskError("cannot be opened to write");
@@ -123,6 +125,12 @@ absl::Status AuditFile::OpenAtPath() {
     close(fd);
     return absl::FailedPreconditionError(
         absl::StrCat("audit log ", options_.path, ": is no regular file; name another one"));
+  }
+  if (begins && status.st_size > 0) {
+    close(fd);
+    return absl::FailedPreconditionError(
+        absl::StrCat("audit log ", options_.path,
+                     ": a file that is not the server's is in the way; move it elsewhere"));
   }
   if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
     close(fd);
@@ -184,19 +192,21 @@ bool AuditFile::IsFull(size_t bytes) const {
 }
 
 absl::Status AuditFile::BeginNext() {
-  if (IsAtPath()) {
-    const std::string name = absl::StrFormat("%s.%06d", options_.path, chain_.position().file);
-    // By link and not by rename, which would take the place of another file.
-    if (link(options_.path.c_str(), name.c_str()) != 0 || unlink(options_.path.c_str()) != 0) {
-      return DiskError("cannot be moved to the name with its number");
-    }
+  if (IsAtPath()) TF_RETURN_IF_ERROR(MoveAway());
+  return OpenAtPath(/*begins=*/true);
+}
+
+absl::Status AuditFile::MoveAway() const {
+  const std::string numbered = absl::StrFormat("%s.%06d", options_.path, chain_.position().file);
+  std::string name = numbered;
+  // By link and not by rename, which would take the place of another file: one of another log may
+  // have the name.
+  for (int i = 1; link(options_.path.c_str(), name.c_str()) != 0; ++i) {
+    if (errno != EEXIST || i == kMostNames) return DiskError("cannot be moved to make room");
+    name = absl::StrCat(numbered, "-", i);
   }
-  TF_RETURN_IF_ERROR(OpenAtPath());
-  struct stat status = {};
-  if (fstat(fd_, &status) == 0 && status.st_size == 0) return absl::OkStatus();
-  return absl::FailedPreconditionError(
-      absl::StrCat("audit log ", options_.path,
-                   ": a file that is not the server's is in the way; move it elsewhere"));
+  return unlink(options_.path.c_str()) == 0 ? absl::OkStatus()
+                                            : DiskError("cannot be moved to make room");
 }
 
 absl::Status AuditFile::Append(const std::vector<std::string>& lines) {

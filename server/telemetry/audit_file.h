@@ -54,13 +54,14 @@ class AuditFile {
  private:
   AuditFile(AuditKey key, Options options);
 
-  // The file at the path, or a new one, locked.
-  absl::Status OpenAtPath();
+  // The file at the path, or a new one, locked; one that `begins` must be empty.
+  absl::Status OpenAtPath(bool begins);
   absl::Status Resume();
   absl::Status SetAside(int64_t from, int64_t size);
   absl::Status Mend();
   // A new file in place of this one, which is given a name of its own unless it has been moved.
   absl::Status BeginNext();
+  absl::Status MoveAway() const;
   bool IsAtPath() const;
   bool IsAsItWas() const;  // at its path, and nobody has written to it or cut it
   bool IsFull(size_t bytes) const;

@@ -212,6 +212,7 @@ TEST_F(AuditObserverTest, CheckpointsTellWhereTheLogIsAndTheEndOfARun) {
 
 TEST_F(AuditObserverTest, ManyThreadsWriteOneChain) {
   std::vector<std::thread> threads;
+  threads.reserve(4);
   for (int i = 0; i < 4; ++i) {
     threads.emplace_back([this] {
       for (int j = 0; j < 200; ++j) EXPECT_THAT(Run("SessionService.GetSession"), IsOk());
