@@ -197,3 +197,28 @@ test("the command logs in by a code that is entered in a browser", async () => {
   expect(await startCommand(["logout", "--token-file", file]).ended()).toBe(0);
   expect(readdirSync(join(folder, "config"))).toEqual([]);
 });
+
+test("a follow link needs no login, shows its end, and is over when its maker ends it", async () => {
+  const { page, faults } = await plannerOf("hans");
+  await takeSegment(page, "Lower jaw");
+  await page.context().grantPermissions(["clipboard-read", "clipboard-write"], { origin: planner.url });
+  await page.getByRole("button", { name: "Copy follow link" }).click();
+  await page.getByText(/copied, until \d/).waitFor();
+  const url = await page.evaluate(() => navigator.clipboard.readText());
+  expect(url).toMatch(/#follow=tfl_[\w-]{43}&case=[0-9a-f]{64}$/);
+
+  const stranger = await planner.browse();
+  const { page: follower, faults: theirs } = await openPage(stranger, url);
+  await page.getByText("one follows").waitFor();
+  await typeMove(page, "Forward", "7");
+  await moved(follower, 5, 9);
+  await follower.getByText(/Link works until/).waitFor();
+  expect(await seriousFindings(follower)).toEqual([]);
+
+  await page.getByRole("button", { name: "End all links" }).click();
+  await page.getByText("all links have ended").waitFor();
+  await follower.getByText("The link has expired, or was ended.").waitFor();
+  const { page: late } = await openPage(stranger, url);
+  await late.getByRole("alert").getByText("The link has expired, or was ended.").waitFor();
+  expect([...faults, ...theirs]).toEqual([]);
+});

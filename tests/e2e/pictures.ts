@@ -95,7 +95,7 @@ test("the login", async () => {
     await takeSegment(page, "Lower jaw");
     await typeMove(page, "Forward", "8");
     await moved(page, 6, 12);
-    page.once("dialog", (dialog) => void dialog.dismiss());
+    await page.context().grantPermissions(["clipboard-read", "clipboard-write"], { origin: house.url });
     await page.getByRole("button", { name: "Copy follow link" }).click();
     await page.getByText(/until \d/).waitFor();
     await picture(page, "signed-in");
