@@ -51,8 +51,8 @@ TEST_F(AccuracyRunTest, TableHasARowForEachModelReferenceAndRegion) {
   AddAccuracyRows(bend_, results, &table);
   const std::string csv = table.Csv();
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 7 * 2 * 2);
-  EXPECT_THAT(csv,
-              StartsWith("case,nu,model,reference,region,mean_mm,p50_mm,p90_mm,p95_mm,p99_mm,max_mm"));
+  EXPECT_THAT(
+      csv, StartsWith("case,nu,model,reference,region,mean_mm,p50_mm,p90_mm,p95_mm,p99_mm,max_mm"));
   EXPECT_THAT(csv, HasSubstr("\nbar_bend,0.3,arap,calculix_neo_hookean,skin,"));
 }
 
