@@ -145,16 +145,10 @@ bool ClustersFit(const PortableAnswers& answers, const AnswerSizes& sizes) {
          IsPacked(answers.cluster_map, sizes.columns, sizes.factors);
 }
 
-// What the error is told by: the last order.
-bool SecondOrderFits(const PortableAnswers& answers, const AnswerSizes& sizes) {
-  return answers.second_lengths.empty() && answers.third_gains.empty() &&
-         answers.second_gains.size() == sizes.pairs &&
-         answers.probes.size() % (3 * sizes.pairs) == 0;
-}
-
+// All of it or nothing.
 bool ThirdOrderFits(const PortableAnswers& answers, const AnswerSizes& sizes) {
-  return answers.second_gains.empty() && answers.probes.empty() &&
-         answers.second_lengths.size() % sizes.pairs == 0 &&
+  if (sizes.triples == 0) return answers.second_lengths.empty() && answers.third_gains.empty();
+  return answers.second_lengths.size() % sizes.pairs == 0 &&
          answers.third_lengths.size() % sizes.triples == 0 &&
          answers.third_gains.size() == sizes.triples;
 }
@@ -162,7 +156,8 @@ bool ThirdOrderFits(const PortableAnswers& answers, const AnswerSizes& sizes) {
 bool SeriesFits(const PortableAnswers& answers, const AnswerSizes& sizes) {
   return answers.origins.size() == 3 && answers.centroids.size() == 3 * sizes.handles &&
          answers.first_gains.size() == 6 * sizes.handles && answers.numbers.size_mm > 0 &&
-         (sizes.triples > 0 ? ThirdOrderFits(answers, sizes) : SecondOrderFits(answers, sizes));
+         answers.second_gains.size() == sizes.pairs &&
+         answers.probes.size() % (3 * sizes.pairs) == 0 && ThirdOrderFits(answers, sizes);
 }
 
 }  // namespace

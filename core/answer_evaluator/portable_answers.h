@@ -84,8 +84,7 @@ struct PortableAnswers {
   std::vector<double> first_gains;
   std::vector<double> second_gains;
   std::vector<float> probes;  // three rows for each by #pairs
-  // With a third order, in place of second_gains and probes: any number of rows by #pairs, and by
-  // #triples.
+  // With a third order: any number of rows by #pairs, and by #triples; gains of the triples.
   std::vector<float> second_lengths;
   std::vector<float> third_lengths;
   std::vector<double> third_gains;

@@ -40,11 +40,11 @@ Matrix3d SecondOrderStress(const ElasticModuli& moduli, const Gradient& a, const
   return P;
 }
 
-constexpr auto kLanes = static_cast<Eigen::Index>(ThirdOrderBatch::kLanes);
+constexpr auto kTetsAtOnce = static_cast<Eigen::Index>(ThirdOrderBatch::kLanes);
 
 // A number of every field, or of every direction, in a lane.
 template <typename Vector>
-using OfLane = Eigen::Map<Vector, 0, Eigen::InnerStride<9 * kLanes>>;
+using OfLane = Eigen::Map<Vector, 0, Eigen::InnerStride<9 * kTetsAtOnce>>;
 
 // Writes a tet's gradients into a lane. `fields`: a column for every coordinate of a vertex.
 void FillLane(const PiecewiseLinearElements& elements, Eigen::Index tet,
@@ -60,7 +60,7 @@ void FillLane(const PiecewiseLinearElements& elements, Eigen::Index tet,
     for (int a = 0; a < 3; ++a) edges.col(a) = at(a + 1) - at(0);
     const Eigen::MatrixX3d gradients = edges.lazyProduct(hats.transpose());
     for (Eigen::Index j = 0; j < 3; ++j) {
-      const Eigen::Index to = (3 * i + j) * kLanes + lane;
+      const Eigen::Index to = (3 * i + j) * kTetsAtOnce + lane;
       OfLane<Eigen::VectorXd>(batch->first.data() + to, num_first) =
           gradients.col(j).head(num_first);
       OfLane<Eigen::VectorXd>(batch->second.data() + to, num_second) =
@@ -74,7 +74,8 @@ void AddLane(const PiecewiseLinearElements& elements, Eigen::Index tet, Eigen::I
              const ThirdOrderBatch& batch, Eigen::MatrixXd* forces) {
   Eigen::VectorXd pulls(forces->rows());
   for (Eigen::Index i = 0; i < 9; ++i) {
-    pulls = OfLane<const Eigen::VectorXd>(batch.loads.data() + i * kLanes + lane, forces->rows());
+    pulls =
+        OfLane<const Eigen::VectorXd>(batch.loads.data() + i * kTetsAtOnce + lane, forces->rows());
     forces->col(Eigen::Index{3} * elements.cells(tet, static_cast<int>(1 + i / 3)) + i % 3) +=
         pulls;
     forces->col(Eigen::Index{3} * elements.cells(tet, 0) + i % 3) -= pulls;
@@ -161,19 +162,19 @@ Eigen::MatrixXd ThirdOrderForces(const PiecewiseLinearElements& elements,
   fields << first.transpose(), second.transpose();
   Eigen::MatrixXd forces = Eigen::MatrixXd::Zero(NumFieldTriples(first.cols()), first.rows());
   ThirdOrderBatch batch(static_cast<size_t>(first.cols()));
-  for (Eigen::Index begin = 0; begin < elements.num_cells(); begin += kLanes) {
-    for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
+  for (Eigen::Index begin = 0; begin < elements.num_cells(); begin += kTetsAtOnce) {
+    for (Eigen::Index lane = 0; lane < kTetsAtOnce; ++lane) {
       // The last tet fills the lanes behind it, which are left out below.
       const Eigen::Index tet = std::min(begin + lane, elements.num_cells() - 1);
       const Eigen::Matrix3d hats = HatGradients<4>(elements, tet);
       FillLane(elements, tet, fields, hats, lane, &batch);
       const double weight = stiffness[tet] * elements.measures[tet];
       for (Eigen::Index i = 0; i < 9; ++i) {
-        batch.hats[static_cast<size_t>(i * kLanes + lane)] = weight * hats(i % 3, i / 3);
+        batch.hats[static_cast<size_t>(i * kTetsAtOnce + lane)] = weight * hats(i % 3, i / 3);
       }
     }
     EvaluateThirdOrder(unit.shear, unit.bulk, &batch);
-    const Eigen::Index end = std::min(begin + kLanes, elements.num_cells());
+    const Eigen::Index end = std::min(begin + kTetsAtOnce, elements.num_cells());
     for (Eigen::Index tet = begin; tet < end; ++tet) {
       AddLane(elements, tet, tet - begin, batch, &forces);
     }

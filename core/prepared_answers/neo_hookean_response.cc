@@ -10,7 +10,6 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "core/base/percentiles.h"
 #include "core/base/status_macros.h"
 #include "core/deformation/deformation_checks.h"
 #include "core/deformation/neo_hookean_deformer.h"
@@ -137,6 +136,7 @@ class NeoHookeanResponse : public VertexResponse {
  private:
   // What the columns are multiplied with, and what that leaves out.
   struct Use {
+    SeriesEstimate::Terms terms;
     Eigen::VectorXd factors;
     double series_mm = 0;  // estimated
     double error_mm = 0;   // with what was cut of the columns, and rounding
@@ -144,18 +144,16 @@ class NeoHookeanResponse : public VertexResponse {
 
   Use UseOf(absl::Span<const HandlePose> poses) const {
     const Eigen::VectorXd numbers = PoseNumbers(poses, centroids_);
-    const Eigen::VectorXd pairs = PairProducts(numbers);
     Use use;
+    use.terms.pairs = PairProducts(numbers);
     use.factors.resize(sizes_.columns());
-    use.factors.head(sizes_.linear + sizes_.pairs) << elastic_.Coefficients(poses), pairs;
+    use.factors.head(sizes_.linear + sizes_.pairs) << elastic_.Coefficients(poses), use.terms.pairs;
     if (damping_) {
-      const Eigen::VectorXd triples = TripleProducts(numbers);
-      const double ratio = damping_->Ratio(pairs, triples);
-      use.factors.tail(sizes_.triples) = triples / (1 + ratio);
-      use.series_mm = estimate_->scale() * estimate_->UnscaledMm(triples, ratio);
-    } else {
-      use.series_mm = estimate_->scale() * estimate_->UnscaledMm(pairs);
+      use.terms.triples = TripleProducts(numbers);
+      use.terms.ratio = damping_->Ratio(use.terms.pairs, use.terms.triples);
+      use.factors.tail(sizes_.triples) = use.terms.triples / (1 + use.terms.ratio);
     }
+    use.series_mm = estimate_->Mm(use.terms);
     use.error_mm =
         std::max(use.series_mm + rounding_mm_ + cut_per_mm_ * estimate_->FirstOrderMm(numbers),
                  chosen_.RoundingBoundMm(poses));
@@ -263,24 +261,21 @@ class NeoHookeanResponse : public VertexResponse {
     control.on_progress = [&cancellation](const Deformation& /*so_far*/) {
       return cancellation.Check().ok();
     };
-    std::vector<double> ratios;
+    std::vector<SeriesEstimate::Measured> measured;
     for (const std::vector<HandlePose>& poses : CalibrationPoses()) {
       TF_ASSIGN_OR_RETURN(const Deformation converged, deformer->Deform(poses, control));
       TF_RETURN_IF_ERROR(cancellation.Check());
       if (!converged.summary.converged) continue;  // nothing is learnt from it
-      const Use use = UseOf(poses);
+      Use use = UseOf(poses);
       const Positions displacements =
           (converged.positions - preparation_->mesh().positions())(free, Eigen::all);
       const double error =
           LargestMove(columns * use.factors - displacements.reshaped<Eigen::RowMajor>());
-      if (use.series_mm > 0) ratios.push_back(error / use.series_mm);
+      measured.push_back({std::move(use.terms), error});
     }
-    // Where nothing converged it is taken for as bad as on the worst body that was tried.
-    constexpr double kWorstScale = 50;
-    const double allowance =
-        kEstimateAllowance +
-        kAllowancePerHandle * static_cast<double>(NumHandles(*preparation_) - 1);
-    estimate_->set_scale(allowance * (ratios.empty() ? kWorstScale : Percentile(ratios, 50)));
+    estimate_->Calibrate(measured,
+                         kEstimateAllowance + kAllowancePerHandle *
+                                                  static_cast<double>(NumHandles(*preparation_) - 1));
     return absl::OkStatus();
   }
 

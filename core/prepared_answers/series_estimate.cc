@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/percentiles.h"
+
 namespace tissueform {
 namespace {
 
@@ -54,9 +56,10 @@ std::vector<Eigen::Index> MostMoved(const Eigen::MatrixXd& columns) {
 
 SeriesEstimate::SeriesEstimate(const Eigen::MatrixXd& first, const Eigen::MatrixXd& second,
                                const Eigen::MatrixXd& third, double size_mm)
-    : size_mm_(size_mm), first_gains_(Gains(first)), third_gains_(Gains(third)) {
-  if (third.cols() > 0) return;
-  second_gains_ = Gains(second);
+    : size_mm_(size_mm),
+      first_gains_(Gains(first)),
+      second_gains_(Gains(second)),
+      third_gains_(Gains(third)) {
   const std::vector<Eigen::Index> vertices = MostMoved(second);
   probes_.resize(3 * static_cast<Eigen::Index>(vertices.size()), second.cols());
   for (size_t p = 0; p < vertices.size(); ++p) {
@@ -65,7 +68,32 @@ SeriesEstimate::SeriesEstimate(const Eigen::MatrixXd& first, const Eigen::Matrix
   }
 }
 
-double SeriesEstimate::UnscaledMm(const Eigen::VectorXd& pairs) const {
+void SeriesEstimate::Calibrate(const std::vector<Measured>& measured, double allowance) {
+  constexpr double kWorstScale = 50;
+  std::vector<double> by_second;
+  std::vector<double> by_third;
+  for (const auto& [terms, error_mm] : measured) {
+    const double part = terms.triples.size() > 0 ? terms.ratio / (1 + terms.ratio) : 1;
+    const double second = part * BySecondOrder(terms.pairs);
+    const double third = part * ByThirdOrder(terms.triples);
+    if (second > 0) by_second.push_back(error_mm / second);
+    if (third > 0) by_third.push_back(error_mm / third);
+  }
+  const auto scale = [allowance](std::vector<double> ratios) {
+    return allowance * (ratios.empty() ? kWorstScale : Percentile(std::move(ratios), 50));
+  };
+  second_scale_ = scale(std::move(by_second));
+  third_scale_ = scale(std::move(by_third));
+}
+
+double SeriesEstimate::Mm(const Terms& terms) const {
+  const double second = second_scale_ * BySecondOrder(terms.pairs);
+  if (terms.triples.size() == 0) return second;
+  return std::max(second, third_scale_ * ByThirdOrder(terms.triples)) * terms.ratio /
+         (1 + terms.ratio);
+}
+
+double SeriesEstimate::BySecondOrder(const Eigen::VectorXd& pairs) const {
   if (probes_.rows() == 0) return 0;
   const Eigen::VectorXf moves = probes_ * pairs.cast<float>();
   const double together = LargestMove(moves.cast<double>()).second;
@@ -75,10 +103,11 @@ double SeriesEstimate::UnscaledMm(const Eigen::VectorXd& pairs) const {
 
 void SeriesEstimate::Describe(PortableAnswers* answers) const {
   answers->numbers.size_mm = size_mm_;
-  answers->numbers.estimate_scale = scale_;
+  answers->numbers.estimate_scale = second_scale_;
   answers->first_gains.assign(first_gains_.begin(), first_gains_.end());
   answers->second_gains.assign(second_gains_.begin(), second_gains_.end());
-  answers->third_gains.assign(third_gains_.begin(), third_gains_.end());
+  const Eigen::VectorXd third_gains = third_scale_ * third_gains_;
+  answers->third_gains.assign(third_gains.begin(), third_gains.end());
   const Eigen::MatrixXf rows = probes_.transpose();  // column by column: row-major
   answers->probes.assign(rows.data(), rows.data() + rows.size());
 }

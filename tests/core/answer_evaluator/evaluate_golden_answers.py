@@ -144,16 +144,16 @@ class Answers:
     def neo_hookean_factors(self, poses):
         n, products = self.pairs(poses)
         factors = [self.elastic_factors(poses), products[:, None]]
+        error = self.second_order_error(products)
         if len(self.section(44)) > 0:
-            triples, error = self.third_order(n, products)
-            factors.append(triples[:, None])
-        else:
-            error = self.second_order_error(products)
+            triples, q = self.third_order(n, products)
+            factors.append(triples[:, None] / (1 + q))
+            error = max(error, np.linalg.norm(self.section(45) * triples)) * q / (1 + q)
         error += self.rounding_mm + self.cut_per_mm * np.linalg.norm(self.section(40) * n)
         return np.concatenate(factors), error
 
     def third_order(self, n, pairs):
-        """The triples' factors and the error without what is cut."""
+        """The triples' products, and how long their order is beside the second."""
         triples = []
         for a in range(len(n)):
             for b in range(a, len(n)):
@@ -163,9 +163,7 @@ class Answers:
         triples = np.array(triples)
         second = np.linalg.norm(self.section(43).reshape(-1, len(pairs)).astype(np.float64) @ pairs)
         third = np.linalg.norm(self.section(44).reshape(-1, len(triples)).astype(np.float64) @ triples)
-        q = third / second if second > 0 else 0
-        single = np.linalg.norm(self.section(45) * triples)
-        return triples / (1 + q), self.estimate_scale * single * q / (1 + q)
+        return triples, third / second if second > 0 else 0
 
     def second_order_error(self, products):
         moves = self.section(42).reshape(-1, len(products)).astype(np.float64) @ products
