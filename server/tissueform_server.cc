@@ -133,6 +133,18 @@ absl::StatusOr<std::unique_ptr<Stores>> OpenStores(const ServerOptions& options)
   return store;
 }
 
+// `server` outlives the page.
+SecurityReadings ReadSecurity(const TissueformServer& server) {
+  SecurityReadings readings;
+  readings.insecure = server.is_exposed();
+  if (server.tls_files() != nullptr) {
+    readings.certificate_expires = [files = server.tls_files()] {
+      return static_cast<double>(std::chrono::system_clock::to_time_t(files->expiry()));
+    };
+  }
+  return readings;
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
@@ -236,7 +248,7 @@ absl::Status TissueformServer::ServeMetrics() {
   AddSessionMetrics(registry_, telemetry_->session_events(), &*metrics_);
   AddMemoryMetrics(budget_, catalog_, &*metrics_);
   AddStoreMetrics(*stores_, &*metrics_);
-  AddSecurityMetrics({}, &*metrics_);
+  AddSecurityMetrics(ReadSecurity(*this), &*metrics_);
   metrics_->AddGauge("tissueform_streams", "Drags open.", {},
                      [this] { return static_cast<double>(streams_.size()); });
   metrics_->AddGauge("tissueform_watches", "Watches open.", {},

@@ -73,7 +73,9 @@ std::vector<std::string> NamesOf(const X509* certificate) {
   std::vector<std::string> names;
   const GeneralNames alternatives(static_cast<GENERAL_NAMES*>(
       X509_get_ext_d2i(certificate, NID_subject_alt_name, nullptr, nullptr)));
-  for (int i = 0; i < sk_GENERAL_NAME_num(alternatives.get()); ++i) {
+  const int count = sk_GENERAL_NAME_num(alternatives.get());
+  names.reserve(static_cast<size_t>(std::max(count, 0)));
+  for (int i = 0; i < count; ++i) {
     names.push_back(NameText(sk_GENERAL_NAME_value(alternatives.get(), i)));
   }
   if (!names.empty()) return names;

@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "absl/strings/str_replace.h"
+#include "grpcpp/server_context.h"
 
 #include "server/transport/network_address.h"
 
