@@ -101,11 +101,11 @@ TEST_F(DoctorTest, AGoodServerWithTlsAndLogins) {
                    .tls_key = client.key,
                    .token_file = WriteToken(With(GoodClaims(), "exp", SecondsFromNow(3660)))}});
   EXPECT_FALSE(report.failed()) << report.Text();
-  EXPECT_THAT(report.Text(), AllOf(HasSubstr("TLSv1.3, certificate of localhost"),
-                                   HasSubstr("days left"), HasSubstr("of alice, from "),
-                                   HasSubstr("lasts 60 min"),
-                                   HasSubstr("the server knows you as alice"),
-                                   HasSubstr("clock"), HasSubstr("dragged and deleted")));
+  EXPECT_THAT(report.Text(),
+              AllOf(HasSubstr("TLSv1.3, certificate of localhost"), HasSubstr("days left"),
+                    HasSubstr("of alice, from "), HasSubstr("lasts 60 min"),
+                    HasSubstr("the server knows you as alice"), HasSubstr("clock"),
+                    HasSubstr("dragged and deleted")));
 }
 
 TEST_F(DoctorTest, NoSuchName) {
