@@ -133,18 +133,6 @@ absl::StatusOr<std::unique_ptr<Stores>> OpenStores(const ServerOptions& options)
   return store;
 }
 
-// `server` outlives the page.
-SecurityReadings ReadSecurity(const TissueformServer& server) {
-  SecurityReadings readings;
-  readings.insecure = server.is_exposed();
-  if (server.tls_files() != nullptr) {
-    readings.certificate_expires = [files = server.tls_files()] {
-      return static_cast<double>(std::chrono::system_clock::to_time_t(files->expiry()));
-    };
-  }
-  return readings;
-}
-
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
@@ -248,7 +236,7 @@ absl::Status TissueformServer::ServeMetrics() {
   AddSessionMetrics(registry_, telemetry_->session_events(), &*metrics_);
   AddMemoryMetrics(budget_, catalog_, &*metrics_);
   AddStoreMetrics(*stores_, &*metrics_);
-  AddSecurityMetrics(ReadSecurity(*this), &*metrics_);
+  AddSecurityMetrics(ReadSecurity(), &*metrics_);
   metrics_->AddGauge("tissueform_streams", "Drags open.", {},
                      [this] { return static_cast<double>(streams_.size()); });
   metrics_->AddGauge("tissueform_watches", "Watches open.", {},
@@ -258,6 +246,26 @@ absl::Status TissueformServer::ServeMetrics() {
   TF_RETURN_IF_ERROR(metrics_->Serve(options_.telemetry.metrics_port));
   spdlog::info("metrics on http://127.0.0.1:{}/metrics", metrics_->port());
   return absl::OkStatus();
+}
+
+SecurityReadings TissueformServer::ReadSecurity() const {
+  SecurityReadings readings = {.insecure = is_exposed()};
+  if (tls_files_ != nullptr && tls_files_->has_identity()) {
+    readings.certificate_expires = [this] {
+      return std::chrono::duration<double>(tls_files_->expiry().time_since_epoch()).count();
+    };
+    readings.certificate_alarm = [this] { return tls_files_->alarm() ? 1.0 : 0.0; };
+  }
+  if (tokens_ == nullptr) return readings;
+  readings.token_keys_alarm = [this] { return tokens_->standing().keys_alarm ? 1.0 : 0.0; };
+  readings.revocations_alarm = [this] { return tokens_->standing().revocations_alarm ? 1.0 : 0.0; };
+  readings.alarms = [this] { return static_cast<double>(tokens_->standing().alarms); };
+  for (const auto& [reason, count] : tokens_->failures().Counts()) {
+    readings.token_failures[reason] = [this, reason = reason] {
+      return static_cast<double>(tokens_->failures().Counts().at(reason));
+    };
+  }
+  return readings;
 }
 
 absl::Status TissueformServer::Listen() {

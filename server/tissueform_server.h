@@ -104,6 +104,7 @@ class TissueformServer {
   void Reclaim(int64_t bytes);
   // Nothing is told without --metrics-port.
   absl::Status ServeMetrics();
+  SecurityReadings ReadSecurity() const;
 
   // Constant.
   const ServerOptions options_;

@@ -117,24 +117,27 @@ void AddMemoryMetrics(const MemoryBudget& budget, const MeshCatalog& catalog, Me
 void AddSecurityMetrics(const SecurityReadings& readings, MetricsPage* page) {
   page->AddGauge("tissueform_insecure", "1 when the server was started with --insecure.", {},
                  [insecure = readings.insecure] { return insecure ? 1.0 : 0.0; });
-  const auto add_time = [page](const std::string& name, const std::string& help,
-                               const MetricsPage::Labels& labels, const MetricsPage::Read& read) {
+  const auto add = [page](const char* name, const char* help, const MetricsPage::Labels& labels,
+                          const MetricsPage::Read& read) {
     if (read != nullptr) page->AddGauge(name, help, labels, read);
   };
-  const char* const expiry = "tissueform_certificate_expiry_timestamp_seconds";
-  add_time(expiry, "When a certificate ends, in Unix time.", {{"certificate", "server"}},
-           readings.certificate_expires);
-  add_time(expiry, "", {{"certificate", "client_ca"}}, readings.client_ca_expires);
-  add_time("tissueform_token_keys_read_timestamp_seconds",
-           "When keys of tokens were last read and good, in Unix time.", {},
-           readings.token_keys_read);
-  add_time("tissueform_token_keys_expiry_timestamp_seconds",
-           "When the first key of tokens may be used no longer, in Unix time.", {},
-           readings.token_keys_expire);
-  if (readings.token_key_alarms == nullptr) return;
-  page->AddCounter("tissueform_token_key_alarms_total",
-                   "Times that new keys of tokens were nonsense, and the old ones stayed.", {},
-                   readings.token_key_alarms);
+  add("tissueform_certificate_expiry_timestamp_seconds",
+      "When the certificate in use ends, in Unix time.", {{"certificate", "server"}},
+      readings.certificate_expires);
+  const char* const alarm = "tissueform_credentials_alarm";
+  const char* const help = "1 while new credentials are no good, and those before stay in use.";
+  add(alarm, help, {{"kind", "certificate"}}, readings.certificate_alarm);
+  add(alarm, help, {{"kind", "token_keys"}}, readings.token_keys_alarm);
+  add(alarm, help, {{"kind", "revocations"}}, readings.revocations_alarm);
+  if (readings.alarms != nullptr) {
+    page->AddCounter("tissueform_token_key_alarms_total",
+                     "Times that new keys of tokens or revocations were no good.", {},
+                     readings.alarms);
+  }
+  for (const auto& [reason, read] : readings.token_failures) {
+    page->AddCounter("tissueform_token_failures_total", "Tokens that were refused, by why.",
+                     {{"reason", reason}}, read);
+  }
 }
 
 void AddStoreMetrics(const Stores& stores, MetricsPage* page) {

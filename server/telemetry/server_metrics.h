@@ -5,6 +5,8 @@
 
 #include <atomic>
 #include <cstdint>
+#include <map>
+#include <string>
 
 #include "server/monitoring/metrics_page.h"
 #include "server/session/frame_flow.h"
@@ -35,16 +37,17 @@ void AddMemoryMetrics(const MemoryBudget& budget, const MeshCatalog& catalog, Me
 // Of a store on a disk; of one in memory there is nothing to tell.
 void AddStoreMetrics(const Stores& stores, MetricsPage* page);
 
-// What the server's locks tell of themselves; a reading that is null is left out.
+// What TLS and logins tell of themselves; a reading that is null is left out.
 struct SecurityReadings {
-  bool insecure = false;  // started with --insecure
-  // Unix times.
-  MetricsPage::Read certificate_expires = nullptr;  // the server's own
-  MetricsPage::Read client_ca_expires = nullptr;    // the first of the clients' authorities
-  MetricsPage::Read token_keys_read = nullptr;      // when keys of tokens were last read and good
-  MetricsPage::Read token_keys_expire = nullptr;    // when the first of them may be used no longer
-  // Times that new keys were nonsense and the old ones stayed.
-  MetricsPage::Read token_key_alarms = nullptr;
+  bool insecure = false;                            // started with --insecure
+  MetricsPage::Read certificate_expires = nullptr;  // the server's own, in Unix time
+  // 1 while what stands in the files, or came from the provider, is no good, and what was before
+  // stays.
+  MetricsPage::Read certificate_alarm = nullptr;
+  MetricsPage::Read token_keys_alarm = nullptr;
+  MetricsPage::Read revocations_alarm = nullptr;
+  MetricsPage::Read alarms = nullptr;                            // of the last two, since the start
+  std::map<std::string, MetricsPage::Read> token_failures = {};  // by reason
 };
 void AddSecurityMetrics(const SecurityReadings& readings, MetricsPage* page);
 

@@ -25,8 +25,8 @@ import urllib.request
 PATIENCE_S = 60
 
 # On the page of a server with TLS and tokens only.
-WITH_TLS_AND_TOKENS = {"tissueform_certificate_expiry_timestamp_seconds", "tissueform_token_keys_read_timestamp_seconds",
-                       "tissueform_token_keys_expiry_timestamp_seconds", "tissueform_token_key_alarms_total"}
+WITH_TLS_AND_TOKENS = {"tissueform_certificate_expiry_timestamp_seconds", "tissueform_credentials_alarm",
+                       "tissueform_token_failures_total"}
 
 
 failures = []
