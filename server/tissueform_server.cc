@@ -117,6 +117,25 @@ NamedLimits LimitsOf(const ServerOptions& options) {
   return limits;
 }
 
+// `tokens` may be null.
+SecurityReadings ReadingsOf(const TokenOptions& options, const TokenAuthenticator* tokens) {
+  SecurityReadings readings;
+  if (tokens == nullptr) return readings;
+  readings.token_key_alarms = [tokens] { return static_cast<double>(tokens->standing().alarms); };
+  for (const auto& [failure, count] : tokens->failures().Counts()) {
+    readings.token_failures[failure] = [tokens, name = failure] {
+      return static_cast<double>(tokens->failures().Counts().at(name));
+    };
+  }
+  if (!options.jwks_url.empty()) {  // a file is read when it changes, which may be never
+    readings.token_keys_read = [tokens] {
+      return static_cast<double>(
+          std::chrono::system_clock::to_time_t(tokens->standing().keys_read));
+    };
+  }
+  return readings;
+}
+
 absl::StatusOr<std::unique_ptr<Stores>> OpenStores(const ServerOptions& options) {
   if (options.in_memory) return OpenInMemoryStores();
   std::string path = options.data_dir;
@@ -236,7 +255,7 @@ absl::Status TissueformServer::ServeMetrics() {
   AddSessionMetrics(registry_, telemetry_->session_events(), &*metrics_);
   AddMemoryMetrics(budget_, catalog_, &*metrics_);
   AddStoreMetrics(*stores_, &*metrics_);
-  AddSecurityMetrics({}, &*metrics_);
+  AddSecurityMetrics(ReadingsOf(options_.tokens, tokens_.get()), &*metrics_);
   metrics_->AddGauge("tissueform_streams", "Drags open.", {},
                      [this] { return static_cast<double>(streams_.size()); });
   metrics_->AddGauge("tissueform_watches", "Watches open.", {},

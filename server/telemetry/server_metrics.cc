@@ -131,6 +131,10 @@ void AddSecurityMetrics(const SecurityReadings& readings, MetricsPage* page) {
   add_time("tissueform_token_keys_expiry_timestamp_seconds",
            "When the first key of tokens may be used no longer, in Unix time.", {},
            readings.token_keys_expire);
+  for (const auto& [failure, read] : readings.token_failures) {
+    page->AddCounter("tissueform_token_failures_total", "Tokens that were refused, by why.",
+                     {{"failure", failure}}, read);
+  }
   if (readings.token_key_alarms == nullptr) return;
   page->AddCounter("tissueform_token_key_alarms_total",
                    "Times that new keys of tokens were nonsense, and the old ones stayed.", {},

@@ -5,6 +5,8 @@
 
 #include <atomic>
 #include <cstdint>
+#include <map>
+#include <string>
 
 #include "server/monitoring/metrics_page.h"
 #include "server/session/frame_flow.h"
@@ -45,6 +47,8 @@ struct SecurityReadings {
   MetricsPage::Read token_keys_expire = nullptr;    // when the first of them may be used no longer
   // Times that new keys were nonsense and the old ones stayed.
   MetricsPage::Read token_key_alarms = nullptr;
+  // How many tokens were refused, by why.
+  std::map<std::string, MetricsPage::Read> token_failures = {};
 };
 void AddSecurityMetrics(const SecurityReadings& readings, MetricsPage* page);
 

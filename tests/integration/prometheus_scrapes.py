@@ -26,7 +26,8 @@ PATIENCE_S = 60
 
 # On the page of a server with TLS and tokens only.
 WITH_TLS_AND_TOKENS = {"tissueform_certificate_expiry_timestamp_seconds", "tissueform_token_keys_read_timestamp_seconds",
-                       "tissueform_token_keys_expiry_timestamp_seconds", "tissueform_token_key_alarms_total"}
+                       "tissueform_token_keys_expiry_timestamp_seconds", "tissueform_token_key_alarms_total",
+                       "tissueform_token_failures_total"}
 
 
 failures = []
