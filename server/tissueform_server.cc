@@ -260,6 +260,12 @@ SecurityReadings TissueformServer::ReadSecurity() const {
   readings.token_keys_alarm = [this] { return tokens_->standing().keys_alarm ? 1.0 : 0.0; };
   readings.revocations_alarm = [this] { return tokens_->standing().revocations_alarm ? 1.0 : 0.0; };
   readings.alarms = [this] { return static_cast<double>(tokens_->standing().alarms); };
+  if (!options_.tokens.jwks_url.empty()) {  // a file is read when it changes, which may be never
+    readings.token_keys_read = [this] {
+      return static_cast<double>(
+          std::chrono::system_clock::to_time_t(tokens_->standing().keys_read));
+    };
+  }
   for (const auto& [reason, count] : tokens_->failures().Counts()) {
     readings.token_failures[reason] = [this, reason = reason] {
       return static_cast<double>(tokens_->failures().Counts().at(reason));

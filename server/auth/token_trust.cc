@@ -24,6 +24,7 @@ absl::Status TokenTrust::TakeKeys(const char* option, const absl::StatusOr<std::
   if (!keys.ok()) return Alarm(option, keys.status(), &TokenStanding::keys_alarm);
   MutexLock lock(mutex_);
   standing_.keys_alarm = false;
+  standing_.keys_read = std::chrono::system_clock::now();
   if ((*keys)->SameAs(*keys_)) return absl::OkStatus();
   keys_ = *std::move(keys);
   standing_.keys = keys_->size();

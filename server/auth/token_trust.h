@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -20,6 +21,7 @@ namespace tissueform {
 struct TokenStanding {
   int keys = 0;
   int64_t revocations = 0;
+  std::chrono::system_clock::time_point keys_read = {};  // when they came last and were good
   // What came last was nonsense, or nothing came: what was there before stays.
   bool keys_alarm = false;
   bool revocations_alarm = false;

@@ -124,6 +124,9 @@ void AddSecurityMetrics(const SecurityReadings& readings, MetricsPage* page) {
   add("tissueform_certificate_expiry_timestamp_seconds",
       "When the certificate in use ends, in Unix time.", {{"certificate", "server"}},
       readings.certificate_expires);
+  add("tissueform_token_keys_read_timestamp_seconds",
+      "When the provider's keys of tokens were last read and good, in Unix time.", {},
+      readings.token_keys_read);
   const char* const alarm = "tissueform_credentials_alarm";
   const char* const help = "1 while new credentials are no good, and those before stay in use.";
   add(alarm, help, {{"kind", "certificate"}}, readings.certificate_alarm);

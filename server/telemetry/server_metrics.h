@@ -45,6 +45,7 @@ struct SecurityReadings {
   // stays.
   MetricsPage::Read certificate_alarm = nullptr;
   MetricsPage::Read token_keys_alarm = nullptr;
+  MetricsPage::Read token_keys_read = nullptr;  // when the provider's were last good, in Unix time
   MetricsPage::Read revocations_alarm = nullptr;
   MetricsPage::Read alarms = nullptr;                            // of the last two, since the start
   std::map<std::string, MetricsPage::Read> token_failures = {};  // by reason

@@ -9,9 +9,11 @@ refuses; it reads those of `tissueform token`. grpcio brings them. Nothing of a 
 import json
 import pathlib
 import shutil
+import socket
 import subprocess
 import sys
 import time
+import urllib.request
 
 try:
     import grpc
@@ -99,13 +101,19 @@ def check_our_tokens(channel):
         assert ask(channel, bearer(token)) == ("OK", "")
 
 
+def free_port():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        return listener.getsockname()[1]
+
+
 def main():
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     keys = make_keys()
+    metrics_port = free_port()
     server = subprocess.Popen(
         [programs / "tissueform-server", "--in-memory", "--port", "0", "--log-level", "trace", "--token-issuer", ISSUER,
-         "--token-audience", AUDIENCE, "--token-keys", folder / "jwks.json"],
+         "--token-audience", AUDIENCE, "--token-keys", folder / "jwks.json", "--metrics-port", str(metrics_port)],
         stdout=subprocess.PIPE, stderr=(folder / "log.txt").open("w"), text=True)
     try:
         address = server.stdout.readline().split()[-1]
@@ -117,13 +125,16 @@ def main():
             assert ask(channel, bearer("a" * (1 << 20)))[0] == "RESOURCE_EXHAUSTED", "a megabyte"
         with grpc.insecure_channel(address) as channel:
             check_our_tokens(channel)
+        with urllib.request.urlopen(f"http://127.0.0.1:{metrics_port}/metrics", timeout=PATIENCE) as answer:
+            metrics = answer.read().decode()
     finally:
         server.terminate()
         server.wait(PATIENCE)
     log = (folder / "log.txt").read_text()
     assert "UNAUTHENTICATED" in log, "the log tells nothing"
+    assert 'tissueform_token_failures_total{reason="expired"} 2' in metrics, metrics
     for secret in [NAME, *(part for value in brought for part in value.removeprefix("Bearer ").split(".") if part)]:
-        assert secret not in log, f"the log has a secret of {len(secret)} characters"
+        assert secret not in log + metrics, f"the log or the metrics have a secret of {len(secret)} characters"
     print(f"{len(brought)} tokens, {len(log)} bytes of log without any of them")
 
 
