@@ -115,7 +115,7 @@ function linkButtons(links: FollowLinks): HTMLElement {
 /** With the day where that is not today. */
 export function timeText(time: Date): string {
   const isToday = time.toDateString() === new Date().toDateString();
-  return isToday ? time.toLocaleTimeString([], { timeStyle: "short" }) : time.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
+  return isToday ? time.toLocaleTimeString([], { timeStyle: "short" }) : time.toLocaleString([], { month: "short", day: "numeric", hour: "numeric", minute: "2-digit" });
 }
 
 async function copyText(text: string): Promise<boolean> {
