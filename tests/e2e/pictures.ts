@@ -97,7 +97,7 @@ test("the login", async () => {
     await moved(page, 6, 12);
     await page.context().grantPermissions(["clipboard-read", "clipboard-write"], { origin: house.url });
     await page.getByRole("button", { name: "Copy follow link" }).click();
-    await page.getByText(/until \d/).waitFor();
+    await page.getByText(/copied, until /).waitFor();
     await picture(page, "signed-in");
   } finally {
     await house.stop();

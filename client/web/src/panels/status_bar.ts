@@ -93,7 +93,7 @@ function describe(connection: Connection): string {
 function linkButtons(links: FollowLinks): HTMLElement {
   const told = el("span", { class: "quiet", attributes: { role: "status" } });
   const fail = (thrown: unknown) => (told.textContent = sentenceOf(thrown));
-  const end = button("End all links", () => {
+  const end = button("End links", () => {
     const run = async () => {
       await links.endAll();
       told.textContent = "all links have ended";
@@ -112,10 +112,12 @@ function linkButtons(links: FollowLinks): HTMLElement {
   return el("span", { class: "links" }, [copy, end, told]);
 }
 
-/** With the day where that is not today. */
+const DAY_MS = 24 * 3_600_000;
+
+/** With the day where that is not within the next 24 hours. */
 export function timeText(time: Date): string {
-  const isToday = time.toDateString() === new Date().toDateString();
-  return isToday ? time.toLocaleTimeString([], { timeStyle: "short" }) : time.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
+  const isSoon = time.getTime() - Date.now() < DAY_MS;
+  return isSoon ? time.toLocaleTimeString([], { timeStyle: "short" }) : time.toLocaleString([], { month: "short", day: "numeric", hour: "numeric", minute: "2-digit" });
 }
 
 async function copyText(text: string): Promise<boolean> {
