@@ -36,7 +36,7 @@ depends_on_libraries() {
   local work=$scratch/shlibs programs
   mkdir -p "$work/debian"
   printf 'Source: tissueform\nPackage: tissueform\nArchitecture: any\n' >"$work/debian/control"
-  mapfile -t programs < <(find "$1/usr/bin" "$1/usr/libexec" -type f -exec sh -c 'file -b "$1" | grep -q ^ELF' _ {} \; -print 2>/dev/null)
+  mapfile -t programs < <(find "$1/usr/bin" "$1/usr/libexec" -type f -exec sh -c 'head -c 4 "$1" | grep -q ELF' _ {} \; -print 2>/dev/null)
   (cd "$work" && dpkg-shlibdeps -O "${programs[@]/#/-e}" 2>"$work/warnings") | sed -n 's/^shlibs:Depends=//p'
 }
 

@@ -9,6 +9,7 @@ Each of them succeeds; the server speaks TLS to openssl; nobody else may read wh
 no printed configuration holds it.
 """
 
+import contextlib
 import os
 import pathlib
 import re
@@ -60,7 +61,7 @@ def look(folder, programs, port, metrics_port):
     check("token-keys = keys/jwks.json\n" in printed, "the configuration prints as it was given")
     metrics = urllib.request.urlopen(f"http://127.0.0.1:{metrics_port}/metrics", timeout=PATIENCE_S).read().decode()
     check("tissueform_" in metrics, "Prometheus finds metrics")
-    told = printed + metrics + "".join((folder / name).read_text() for name in ("server.log", "server.out", "audit.log"))
+    told = printed + metrics + "".join((folder / name).read_text() for name in ("server.log", "server.out", "audit.jsonl"))
     check(not [secret for secret in secrets(folder) if secret in told], "no secret is in logs, metrics, audit or configuration")
     for name in ("token", "audit.key", "keys/private.pem", "ca.key", "server.key", "data"):
         check((folder / name).stat().st_mode & 0o077 == 0, f"{name} is its owner's alone")
@@ -86,7 +87,8 @@ def main(programs):
             check(code == 0, "ten commands succeed")
             look(folder, programs, port, metrics_port)
         finally:
-            os.killpg(shell.pid, signal.SIGTERM)
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(shell.pid, signal.SIGTERM)
 
 
 if __name__ == "__main__":

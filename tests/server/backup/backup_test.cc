@@ -129,6 +129,7 @@ TEST_F(BackupTest, WhatIsDeletedBetweenRowsAndFilesIsInNeither) {
   std::map<std::string, int> numbers;
   for (int number = 5000; number < 5004; ++number) numbers[KeepCaseOf(number)] = number;
   std::vector<std::string> cases;
+  cases.reserve(numbers.size());
   for (const auto& [sha256, number] : numbers) cases.push_back(sha256);
   // By the third copy of the rows one file was copied for nothing, and two were never found.
   const std::vector<std::vector<int>> deleted_after = {{2}, {0, 3}, {}};
