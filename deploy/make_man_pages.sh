@@ -18,6 +18,7 @@ commands=(
   "tissueform mesh check" "tissueform mesh generate"
   "tissueform plan build" "tissueform plan check" "tissueform plan fit" "tissueform case pack"
   "tissueform deform" "tissueform run" "tissueform demo" "tissueform load" "tissueform server-info" "tissueform compare" "tissueform experiments" "tissueform bench"
+  "tissueform token" "tissueform token keygen" "tissueform token make" "tissueform token show"
   "tissueform-server" "tissueform-gateway"
 )
 

@@ -4,9 +4,12 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <signal.h>
 #include <unistd.h>
+#include <utility>
 
 #include "CLI/CLI.hpp"
 #include "spdlog/sinks/stdout_color_sinks.h"
@@ -14,6 +17,9 @@
 #include <sys/syscall.h>
 
 #include "core/base/freed_memory.h"
+#include "server/backup_commands.h"
+#include "server/program/program_options.h"
+#include "server/program/systemd_notices.h"
 #include "server/server_options.h"
 #include "server/tissueform_server.h"
 
@@ -25,7 +31,7 @@ constexpr char kDescription[] =
     "SIGTERM or SIGINT: refuses new work, lets open calls finish, exit code 0.\n"
     "Research software, not a medical device: not for diagnosis or treatment.";
 
-enum ExitCode : int { kExitDone = 0, kExitFailed = 1, kExitWrongUse = 2 };
+enum ExitCode : int { kExitDone = 0, kExitFailed = 1 };
 
 constexpr uint64_t kTerminationSignals =
     (uint64_t{1} << (SIGTERM - 1)) | (uint64_t{1} << (SIGINT - 1));
@@ -61,7 +67,11 @@ ExitCode Serve(const tissueform::ServerOptions& options) {
   }
   std::printf("listening on %s:%d\n", options.host.c_str(), (*server)->port());
   std::fflush(stdout);
+  const tissueform::SystemdWatchdog watchdog(
+      [&server](std::function<void()> answered) { (*server)->Ask(std::move(answered)); });
+  tissueform::TellSystemdReady();
   WaitForTerminationSignal();
+  tissueform::TellSystemdStopping();
   (*server)->Drain();
   spdlog::info("done");
   return kExitDone;
@@ -75,14 +85,9 @@ int main(int argc, char** argv) {
   CLI::App app(kDescription, "tissueform-server");
   tissueform::ServerOptions options = tissueform::ServerOptions::Defaults();
   tissueform::AddServerOptions(app, &options);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::CallForHelp& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "tissueform-server: %s; see --help\n", error.what());
-    return kExitWrongUse;
-  }
+  const tissueform::BackupCommands commands(app, &options);
+  if (const std::optional<int> end = tissueform::ParseProgramOptions(app, argc, argv)) return *end;
+  if (const std::optional<int> end = commands.Run()) return *end;
   spdlog::set_default_logger(spdlog::stderr_color_mt("tissueform"));
   spdlog::set_level(spdlog::level::from_str(options.log_level));
   return Serve(options);

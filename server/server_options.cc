@@ -9,6 +9,8 @@
 #include <thread>
 #include <unistd.h>
 
+#include "server/program/program_options.h"
+
 namespace tissueform {
 namespace {
 
@@ -100,6 +102,24 @@ void AddAccessLimits(CLI::App& app, AccessOptions* access) {
             });
 }
 
+void AddQuotas(CLI::App& app, Quotas* quotas) {
+  AddNumber(app, "--quota-calls-per-second", quotas->calls_per_second, 1, kMaxCount,
+            "of one principal, as all quotas: calls a second on average, twice as many at once",
+            Into(&quotas->calls_per_second));
+  AddNumber(app, "--quota-waiting-calls", quotas->waiting_calls, 1, kMaxCount,
+            "calls that are answered or wait for it at the same time",
+            Into(&quotas->waiting_calls));
+  AddNumber(app, "--quota-streams", quotas->streams, 1, kMaxCount,
+            "drags and watches open at the same time", Into(&quotas->streams));
+  AddNumber(app, "--quota-sessions", quotas->sessions, 1, kMaxCount, "sessions kept",
+            Into(&quotas->sessions));
+  AddNumber(app, "--quota-memory-mib", quotas->memory_bytes / kMebibyte, 0, kMaxMebibytes,
+            "memory of sessions and what they need; 0: half of --memory-budget-mib",
+            MebibytesInto(&quotas->memory_bytes));
+  AddNumber(app, "--quota-disk-mib", quotas->disk_bytes / kMebibyte, 1, kMaxMebibytes,
+            "meshes, cases and predictions kept", MebibytesInto(&quotas->disk_bytes));
+}
+
 }  // namespace
 
 ServerOptions ServerOptions::Defaults() {
@@ -111,14 +131,14 @@ ServerOptions ServerOptions::Defaults() {
 }
 
 void AddServerOptions(CLI::App& app, ServerOptions* options) {
-  app.set_config("--config", "", "file with any of these options, as `name = value` lines");
   app.add_option("--host", options->host,
-                 "address to listen on; anything but loopback is open to the network: there is no "
-                 "login yet")
+                 "address to listen on; anything but loopback needs encryption and logins, or "
+                 "--insecure")
       ->capture_default_str();
   app.add_option("--port", options->port, "port to listen on; 0 takes a free one")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
+  AddTlsOptions(app, &options->tls);
   app.add_option("--workers", options->workers,
                  "threads that compute, in each lane (default: one a core); sessions share them")
       ->check(CLI::Range(1, 1024))
@@ -132,7 +152,9 @@ void AddServerOptions(CLI::App& app, ServerOptions* options) {
          "this machine (default: $XDG_STATE_HOME/tissueform, or ~/.local/state/tissueform)")
       ->type_name("DIR")
       ->excludes(in_memory);
+  AddTokenOptions(app, &options->tokens);
   AddLimits(app, options);
+  AddQuotas(app, &options->quotas);
   AddAccessLimits(app, &options->access);
   AddNumber(app, "--drain-seconds", options->drain_deadline.count(), 0, 3600,
             "after SIGTERM or SIGINT, how long open calls may go on",
@@ -141,6 +163,8 @@ void AddServerOptions(CLI::App& app, ServerOptions* options) {
                  "what is logged on stderr, without names or paths")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
+  AddTelemetryOptions(app, &options->telemetry);
+  AddConfiguration(app, "TISSUEFORM_SERVER_");  // last: it looks at all options
 }
 
 }  // namespace tissueform

@@ -10,7 +10,11 @@
 #include "CLI/CLI.hpp"
 
 #include "server/access/access_options.h"
+#include "server/auth/token_options.h"
 #include "server/session/limits.h"
+#include "server/session/quotas.h"
+#include "server/telemetry/telemetry_options.h"
+#include "server/transport/tls_options.h"
 
 namespace tissueform {
 
@@ -18,9 +22,11 @@ namespace tissueform {
 struct ServerOptions {
   std::string host = "127.0.0.1";
   int port = 50051;  // 0: any free one
+  TlsOptions tls = {};
   int64_t memory_budget_bytes = 0;
   int workers = 1;
   ServiceLimits limits;
+  Quotas quotas = {};
   int max_calls_per_connection = 128;
   int max_connections = 1024;
   int max_connections_per_address = 512;
@@ -30,6 +36,8 @@ struct ServerOptions {
   bool in_memory = true;
   std::string data_dir;  // empty: DefaultDataFolder
   std::string log_level = "info";
+  TokenOptions tokens = {};
+  TelemetryOptions telemetry = {};
   AccessOptions access = {};
 
   // Half of the machine's memory, one worker a core.
@@ -37,8 +45,7 @@ struct ServerOptions {
 };
 
 // Adds one option a setting to `app`, with its default in the help; parsing writes into `options`,
-// which must outlive it. A config file in TOML or INI form with the same names may be given by
-// --config.
+// which must outlive it. They may stand in a file and in the environment too (AddConfiguration).
 void AddServerOptions(CLI::App& app, ServerOptions* options);
 
 }  // namespace tissueform

@@ -12,17 +12,21 @@
 #include "grpcpp/ext/proto_server_reflection_plugin.h"
 #include "grpcpp/health_check_service_interface.h"
 #include "grpcpp/resource_quota.h"
-#include "grpcpp/security/server_credentials.h"
 #include "grpcpp/server_builder.h"
 #include "spdlog/spdlog.h"
 
+#include "core/base/software_version.h"
 #include "core/base/status_macros.h"
 #include "core/linear_solvers/blas_threads.h"
 #include "server/access/access_watch_stores.h"
 #include "server/library_logs.h"
+#include "server/monitoring/process_metrics.h"
 #include "server/store/data_folder.h"
 #include "server/store/durable_store.h"
 #include "server/store/in_memory_stores.h"
+#include "server/telemetry/server_metrics.h"
+#include "server/transport/network_address.h"
+#include "server/transport/tls_credentials.h"
 
 namespace tissueform {
 namespace {
@@ -79,13 +83,24 @@ ConnectionListener::Options ListenerOptions(const ServerOptions& options) {
           .most_of_address = options.max_connections_per_address};
 }
 
+int64_t MemoryQuota(const ServerOptions& options) {
+  return options.quotas.memory_bytes > 0 ? options.quotas.memory_bytes
+                                         : options.memory_budget_bytes / 2;
+}
+
 // Every option by its place: one that is added does not compile here until it was decided whether
 // it is a limit.
 NamedLimits LimitsOf(const ServerOptions& options) {
-  const auto& [host, port, memory_budget_bytes, workers, service, max_calls_per_connection,
-               max_connections, max_connections_per_address, drain_deadline, in_memory, data_dir,
-               log_level, access] = options;
+  const auto& [host, port, tls, memory_budget_bytes, workers, service, quotas,
+               max_calls_per_connection, max_connections, max_connections_per_address,
+               drain_deadline, in_memory, data_dir, log_level, tokens, telemetry, access] = options;
   NamedLimits limits = ToNamedLimits(service);
+  limits["quota_calls_per_second"] = quotas.calls_per_second;
+  limits["quota_waiting_calls"] = quotas.waiting_calls;
+  limits["quota_streams"] = quotas.streams;
+  limits["quota_sessions"] = quotas.sessions;
+  limits["quota_memory_bytes"] = MemoryQuota(options);
+  limits["quota_disk_bytes"] = quotas.disk_bytes;
   limits["max_shares_per_resource"] = access.max_shares_per_resource;
   limits["max_links_per_session"] = access.max_links_per_session;
   limits["max_link_hours"] = access.max_link_lifetime.count();
@@ -119,28 +134,44 @@ absl::StatusOr<std::unique_ptr<Stores>> OpenStores(const ServerOptions& options)
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
     const ServerOptions& options, Authenticator* authenticator) {
-  TF_ASSIGN_OR_RETURN(std::unique_ptr<Stores> stores, OpenStores(options));
-  std::unique_ptr<TissueformServer> server(
-      new TissueformServer(options, std::move(stores), authenticator));
+  TF_RETURN_IF_ERROR(CheckExposure(options.host, options.tls, options.tokens.configured()));
+  Parts parts;
+  TF_ASSIGN_OR_RETURN(parts.telemetry, Telemetry::Start(options.telemetry));
+  TF_ASSIGN_OR_RETURN(parts.tls_files, LoadServerFiles(options.tls));
+  if (options.tokens.configured()) {
+    TF_ASSIGN_OR_RETURN(parts.tokens, TokenAuthenticator::Start(options.tokens));
+  }
+  parts.authenticator = authenticator != nullptr ? authenticator : parts.tokens.get();
+  TF_ASSIGN_OR_RETURN(parts.stores, OpenStores(options));
+  std::unique_ptr<TissueformServer> server(new TissueformServer(options, std::move(parts)));
+  if (server->is_exposed()) {
+    spdlog::warn("INSECURE: {}, and strangers may reach it (--insecure)",
+                 options.tls.enabled() ? "nobody is asked to log in" : "calls are not encrypted");
+  }
   TF_RETURN_IF_ERROR(server->access_changes_.Learn());
   TF_RETURN_IF_ERROR(TellWhatIsKept(server->stores_.get(), &server->access_changes_));
   TF_RETURN_IF_ERROR(server->registry_.LearnKnown());
   server->housekeeping_.Start();
+  TF_RETURN_IF_ERROR(server->ServeMetrics());
   TF_RETURN_IF_ERROR(server->Listen());
   return server;
 }
 
-TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores,
-                                   Authenticator* authenticator)
+TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
     : options_(options),
-      access_store_(OpenAccessStore(stores.get())),
+      telemetry_(std::move(parts.telemetry)),
+      tls_files_(std::move(parts.tls_files)),
+      tokens_(std::move(parts.tokens)),
+      quotas_(options.quotas),
+      access_store_(OpenAccessStore(parts.stores.get())),
       access_changes_(options.access, access_store_.get(), &access_),
-      authenticator_(authenticator == nullptr
+      authenticator_(parts.authenticator == nullptr
                          ? nullptr
-                         : std::make_unique<LinkAuthenticator>(&access_, authenticator)),
-      gate_(authenticator_.get(), /*observer=*/nullptr, &Access::MayCall),
+                         : std::make_unique<LinkAuthenticator>(&access_, parts.authenticator)),
+      gate_(authenticator_.get(), telemetry_->observer(), &quotas_, options.tls.gateway_name,
+            &Access::MayCall),
       budget_(options.memory_budget_bytes),
-      stores_(WatchStores(std::move(stores), &access_changes_)),
+      stores_(WatchStores(std::move(parts.stores), &access_changes_)),
       catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),
       uploads_(options.limits, &catalog_, &stores_->uploads()),
       pool_(std::make_unique<WorkerPool>(options.workers)),
@@ -161,6 +192,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr
       server_info_service_(&gate_, LimitsOf(options)) {
   SetBlasThreads(1);  // the pool's workers share the cores already
   registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
+    telemetry_->session_events().Count(event);
     watches_.OnSessionEvent(id, event);
   });
   catalog_.set_on_removed(
@@ -169,10 +201,12 @@ TissueformServer::TissueformServer(const ServerOptions& options, std::unique_ptr
     streams_.AskAgain();
     watches_.AskAgain();
   });
+  budget_.set_account_limit(MemoryQuota(options), [](const std::string& /*owner*/, int64_t) {});
   budget_.set_reclaimer([this](int64_t bytes) { Reclaim(bytes); });
 }
 
 TissueformServer::~TissueformServer() {
+  metrics_.reset();
   if (server_ != nullptr) {
     listener_->Stop();
     server_->Shutdown(std::chrono::system_clock::now());
@@ -185,6 +219,27 @@ TissueformServer::~TissueformServer() {
   stores_.reset();  // its last answers may still use the registry
 }
 
+absl::Status TissueformServer::ServeMetrics() {
+  if (options_.telemetry.metrics_port < 0) return absl::OkStatus();
+  metrics_.emplace();
+  AddProcessMetrics("tissueform", SoftwareVersion(), &*metrics_);
+  telemetry_->AddTo(&*metrics_);
+  AddFrameMetrics(streams_.measures(), &*metrics_);
+  AddLaneMetrics(*pool_, &*metrics_);
+  AddSessionMetrics(registry_, telemetry_->session_events(), &*metrics_);
+  AddMemoryMetrics(budget_, catalog_, &*metrics_);
+  AddStoreMetrics(*stores_, &*metrics_);
+  metrics_->AddGauge("tissueform_streams", "Drags open.", {},
+                     [this] { return static_cast<double>(streams_.size()); });
+  metrics_->AddGauge("tissueform_watches", "Watches open.", {},
+                     [this] { return static_cast<double>(watches_.size()); });
+  metrics_->AddGauge("tissueform_draining", "1 while the server drains.", {},
+                     [this] { return gate_.draining() ? 1.0 : 0.0; });
+  TF_RETURN_IF_ERROR(metrics_->Serve(options_.telemetry.metrics_port));
+  spdlog::info("metrics on http://127.0.0.1:{}/metrics", metrics_->port());
+  return absl::OkStatus();
+}
+
 absl::Status TissueformServer::Listen() {
   PrepareProcessOnce();
   TF_ASSIGN_OR_RETURN(listener_, ConnectionListener::Listen(ListenerOptions(options_)));
@@ -192,7 +247,7 @@ absl::Status TissueformServer::Listen() {
   SetTransportLimits(options_, &builder);
   acceptor_ = builder.experimental().AddExternalConnectionAcceptor(
       grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
-      grpc::InsecureServerCredentials());
+      MakeServerCredentials(options_.tls, tls_files_.get()));
   builder.RegisterService(&mesh_service_);
   builder.RegisterService(&session_service_);
   builder.RegisterService(&deform_service_);
@@ -210,6 +265,10 @@ absl::Status TissueformServer::Listen() {
     acceptor_->HandleNewConnection(&connection);
   });
   return absl::OkStatus();
+}
+
+bool TissueformServer::is_exposed() const {
+  return !IsLoopback(options_.host) && !(options_.tls.enabled() && tokens_ != nullptr);
 }
 
 void TissueformServer::Reclaim(int64_t bytes) {
@@ -230,6 +289,13 @@ void TissueformServer::Reclaim(int64_t bytes) {
     meshes = catalog_.RemoveIdle(options_.limits.session_idle_ttl);
   }
   if (meshes > 0) spdlog::info("{} meshes that nobody uses have left memory", meshes);
+}
+
+void TissueformServer::Ask(std::function<void()> answered) {
+  // Not the others: a factorisation, or a disk, may take long and is no reason to start again.
+  pool_->Post(Lane::kFrames, [this, answered = std::move(answered)]() mutable {
+    pool_->Post(Lane::kSolves, std::move(answered));
+  });
 }
 
 void TissueformServer::Drain() {

@@ -3,7 +3,9 @@
 
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -15,6 +17,7 @@
 #include "server/access/link_authenticator.h"
 #include "server/access_store/access_store.h"
 #include "server/auth/authenticator.h"
+#include "server/auth/token_authenticator.h"
 #include "server/calls/call_scope.h"
 #include "server/rpc/access_service.h"
 #include "server/rpc/case_service.h"
@@ -35,7 +38,9 @@
 #include "server/session/session_registry.h"
 #include "server/session/worker_pool.h"
 #include "server/store/stores.h"
+#include "server/telemetry/telemetry.h"
 #include "server/transport/connection_listener.h"
+#include "server/transport/rotated_files.h"
 
 namespace tissueform {
 
@@ -44,8 +49,8 @@ class TissueformServer {
  public:
   // Listens when it returns. Several servers may live in one process.
   //
-  // Errors: Unavailable, naming the address, when it cannot be listened on; those of
-  // DataFolder::Open and DurableStore::Open.
+  // Errors: Unavailable, naming the address, when it cannot be listened on; those of CheckExposure,
+  // LoadServerFiles, TokenAuthenticator::Start, DataFolder::Open and DurableStore::Open.
   //
   // `authenticator`, which must outlive the server, says who calls; null: what the options say.
   static absl::StatusOr<std::unique_ptr<TissueformServer>> Start(
@@ -57,30 +62,56 @@ class TissueformServer {
   // The port that is listened on, also when the options said 0.
   int port() const { return listener_->port(); }
 
+  // On which Prometheus finds the page of metrics; 0: there is none.
+  int metrics_port() const { return metrics_.has_value() ? metrics_->port() : 0; }
+
   // Ends in good order: health turns to NOT_SERVING, streams are told (with the time of the drain
   // deadline), new work is refused with
   // UNAVAILABLE; open calls may go on until the drain deadline and are then cancelled; the listener
   // closes. Blocks until all calls have ended. One thread, once.
   void Drain();
 
+  // Calls `answered` later, when the lanes that planners wait for have each done a job.
+  void Ask(std::function<void()> answered);
+
   const MemoryBudget& memory_budget() const { return budget_; }
   Stores& stores() { return *stores_; }
   const SessionRegistry& sessions() const { return registry_; }
   const DeformStreams& streams() const { return streams_; }
   const SessionWatches& watches() const { return watches_; }
+  // Null without TLS.
+  const RotatedFiles* tls_files() const { return tls_files_.get(); }
+  // Strangers may reach it, and it is not protected from them: --insecure.
+  bool is_exposed() const;
+  // Null: nobody logs in.
+  const TokenAuthenticator* tokens() const { return tokens_.get(); }
 
  private:
-  TissueformServer(const ServerOptions& options, std::unique_ptr<Stores> stores,
-                   Authenticator* authenticator);
+  // What is made before the server itself.
+  struct Parts {
+    std::unique_ptr<Telemetry> telemetry;
+    std::unique_ptr<RotatedFiles> tls_files;     // null without TLS
+    std::unique_ptr<TokenAuthenticator> tokens;  // null: nobody logs in
+    Authenticator* authenticator = nullptr;      // null: nobody logs in
+    std::unique_ptr<Stores> stores;
+  };
+
+  TissueformServer(const ServerOptions& options, Parts parts);
 
   absl::Status Listen();
   void Reclaim(int64_t bytes);
+  // Nothing is told without --metrics-port.
+  absl::Status ServeMetrics();
 
   // Constant.
   const ServerOptions options_;
 
   // Self-synchronised; each may use those before it. Destroyed from the last to the first: calls
   // end, then jobs, then what they used.
+  const std::unique_ptr<Telemetry> telemetry_;
+  const std::unique_ptr<RotatedFiles> tls_files_;  // null without TLS
+  const std::unique_ptr<TokenAuthenticator> tokens_;
+  CallQuotas quotas_;
   std::unique_ptr<AccessStore> access_store_;  // its rows are those of the stores
   Access access_;
   AccessChanges access_changes_;
@@ -109,6 +140,7 @@ class TissueformServer {
   std::unique_ptr<ConnectionListener> listener_;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
   std::unique_ptr<grpc::Server> server_;
+  std::optional<MetricsPage> metrics_;  // reads what the others count
 };
 
 }  // namespace tissueform

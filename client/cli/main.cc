@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "client/cli/access/token_command.h"
 #include "client/cli/bench/bench_command.h"
 #include "client/cli/compare/compare_command.h"
 #include "client/cli/mesh/mesh_command.h"
@@ -30,6 +31,7 @@ int main(int argc, char** argv) {
     tissueform::AddCompareCommand(app, work);
     tissueform::AddCompanionCommand(app, tissueform::kExperimentsCommand, words, work);
     tissueform::AddBenchCommand(app, work);
+    tissueform::AddTokenCommand(app, work);
     tissueform::AddCompanionCommand(app, tissueform::kLoadCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kDragCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kSessionCommand, words, work);

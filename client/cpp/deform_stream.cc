@@ -3,6 +3,7 @@
 
 #include "client/cpp/deform_stream.h"
 
+#include <string>
 #include <utility>
 
 #include "client/cpp/client_call.h"
@@ -28,9 +29,11 @@ v1::DeformConfiguration DeformStream::ConfigurationOf(const Options& options) {
 }
 
 absl::Status DeformStream::Start(v1::DeformService::Stub* stub, const std::string& session,
-                                 const Options& options) {
+                                 const Options& options, const std::shared_ptr<TokenFile>& token) {
   on_notice_ = options.on_notice;
   AddSessionHeader(session, &context_);
+  // Before the call is made: it may be made with a newer one, which is then sent twice.
+  std::string used = token == nullptr ? "" : token->Current();
   call_ = stub->Deform(&context_);
   v1::DeformRequest request;
   *request.mutable_configuration() = ConfigurationOf(options);
@@ -44,6 +47,13 @@ absl::Status DeformStream::Start(v1::DeformService::Stub* stub, const std::strin
         "the stream did not begin with `started`; the server speaks another version");
   }
   started_ = std::move(*response.mutable_started());
+  if (token != nullptr) {
+    renewal_ = std::make_unique<TokenRenewal>(token, std::move(used), [this](const auto& renewed) {
+      v1::DeformRequest renewal;
+      renewal.set_token(renewed);
+      Send(renewal).IgnoreError();  // how a stream ends is seen where frames are received
+    });
+  }
   return absl::OkStatus();
 }
 
@@ -102,6 +112,7 @@ absl::Status DeformStream::Finish() {
   while (call_->Read(&dropped)) {
     if (dropped.has_notice()) Tell(dropped.notice());
   }
+  renewal_.reset();
   finished_ = true;
   return FromGrpcStatus(call_->Finish());
 }

@@ -15,6 +15,7 @@
 #include "grpcpp/client_context.h"
 #include "grpcpp/support/sync_stream.h"
 
+#include "client/cpp/token_file.h"
 #include "core/base/mutex.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "tissueform/v1/deform_service.grpc.pb.h"
@@ -77,9 +78,10 @@ class DeformStream {
 
   DeformStream() = default;
 
-  // Sends the configuration and waits for the answer.
+  // Sends the configuration and waits for the answer. `token`: where the calls of the client have
+  // theirs from; null: they have none. A new one is sent while the stream lasts.
   absl::Status Start(v1::DeformService::Stub* stub, const std::string& session,
-                     const Options& options);
+                     const Options& options, const std::shared_ptr<TokenFile>& token);
   absl::Status Send(const v1::DeformRequest& request) ABSL_LOCKS_EXCLUDED(send_mutex_);
 
   // Self-synchronised.
@@ -96,6 +98,7 @@ class DeformStream {
   Mutex send_mutex_;
   bool sending_closed_ ABSL_GUARDED_BY(send_mutex_) = false;
   bool finished_ = false;
+  std::unique_ptr<TokenRenewal> renewal_;  // null without a token; ends before all others
 };
 
 }  // namespace tissueform

@@ -3,11 +3,12 @@
 
 #include "client/cpp/tissueform_client.h"
 
+#include <utility>
+
 #include "absl/strings/str_cat.h"
-#include "grpcpp/create_channel.h"
-#include "grpcpp/security/credentials.h"
 
 #include "client/cpp/client_call.h"
+#include "client/cpp/server_channel.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/mesh_conversion.h"
 
@@ -22,7 +23,7 @@ constexpr int kKeepaliveMilliseconds = 30'000;
 constexpr int kReconnectMilliseconds = 100;
 constexpr int kMaxReconnectMilliseconds = 2'000;
 
-std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address, bool own_connection) {
+grpc::ChannelArguments ArgumentsOf(bool own_connection) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMilliseconds);
@@ -34,7 +35,7 @@ std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address, bool own_
   // After a failure it looks the name up again before it tries, and that 30 s apart.
   arguments.SetInt(GRPC_ARG_DNS_MIN_TIME_BETWEEN_RESOLUTIONS_MS, kReconnectMilliseconds);
   if (own_connection) arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  return arguments;
 }
 
 }  // namespace
@@ -45,19 +46,25 @@ absl::StatusOr<std::unique_ptr<TissueformClient>> TissueformClient::Connect(
     return absl::InvalidArgumentError(
         absl::StrCat("\"", address, "\" has no port; give the server as HOST:PORT"));
   }
-  const std::shared_ptr<grpc::Channel> channel = MakeChannel(address, options.own_connection);
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<TokenFile> token, OpenTokenOf(options.connection));
+  TF_ASSIGN_OR_RETURN(
+      const std::shared_ptr<grpc::Channel> channel,
+      MakeServerChannel(address, options.connection, token, ArgumentsOf(options.own_connection)));
   if (!channel->WaitForConnected(std::chrono::system_clock::now() + options.connect_deadline)) {
     return absl::UnavailableError(absl::StrCat(
         "no tissueform-server answers at ", address, " within ",
         std::chrono::duration<double>(options.connect_deadline).count(),
-        " s; start one (tissueform-server --port PORT) or check address and firewall"));
+        " s; start one (tissueform-server --port PORT) or check address and firewall: `tissueform "
+        "doctor ",
+        address, "` tells what is wrong"));
   }
-  return std::unique_ptr<TissueformClient>(new TissueformClient(channel, options));
+  return std::unique_ptr<TissueformClient>(new TissueformClient(channel, token, options));
 }
 
 TissueformClient::TissueformClient(const std::shared_ptr<grpc::Channel>& channel,
-                                   const Options& options)
+                                   std::shared_ptr<TokenFile> token, const Options& options)
     : options_(options),
+      token_(std::move(token)),
       meshes_(v1::MeshService::NewStub(channel)),
       sessions_(v1::SessionService::NewStub(channel)),
       deform_(v1::DeformService::NewStub(channel)),
@@ -229,7 +236,7 @@ absl::StatusOr<v1::DeformOnceResponse> TissueformClient::DeformOnce(
 absl::StatusOr<std::unique_ptr<DeformStream>> TissueformClient::OpenStream(
     const std::string& session, const DeformStream::Options& options) {
   std::unique_ptr<DeformStream> stream(new DeformStream());
-  TF_RETURN_IF_ERROR(stream->Start(deform_.get(), session, options));
+  TF_RETURN_IF_ERROR(stream->Start(deform_.get(), session, options, token_));
   return stream;
 }
 

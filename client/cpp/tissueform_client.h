@@ -15,10 +15,12 @@
 
 #include "client/cpp/access_calls.h"
 #include "client/cpp/case_calls.h"
+#include "client/cpp/connection_options.h"
 #include "client/cpp/deform_stream.h"
 #include "client/cpp/mesh_upload.h"
 #include "client/cpp/prediction_calls.h"
 #include "client/cpp/prepare_session.h"
+#include "client/cpp/token_file.h"
 #include "client/cpp/watch_stream.h"
 #include "core/mesh/tet_mesh.h"
 #include "core/mesh_payload/mesh_payload.h"
@@ -45,11 +47,14 @@ class TissueformClient {
     // A TCP connection of its own. Otherwise clients of one process and address share one, over
     // which their frames follow each other.
     bool own_connection = false;
+    // Encryption, and who one is.
+    ConnectionOptions connection = {};
   };
 
   // `address` is HOST:PORT. Connects directly: proxies of the environment are not used.
   //
-  // Errors: InvalidArgument (no port), Unavailable when nobody answers within the deadline.
+  // Errors: InvalidArgument (no port), Unavailable when nobody answers within the deadline; those
+  // of MakeServerChannel and OpenTokenOf.
   static absl::StatusOr<std::unique_ptr<TissueformClient>> Connect(const std::string& address,
                                                                    const Options& options);
 
@@ -110,11 +115,13 @@ class TissueformClient {
   AccessCalls& access() { return access_; }
 
  private:
-  TissueformClient(const std::shared_ptr<grpc::Channel>& channel, const Options& options);
+  TissueformClient(const std::shared_ptr<grpc::Channel>& channel, std::shared_ptr<TokenFile> token,
+                   const Options& options);
 
   void SetDeadline(grpc::ClientContext* context) const;
 
   const Options options_;
+  const std::shared_ptr<TokenFile> token_;  // null: none
   const std::unique_ptr<v1::MeshService::Stub> meshes_;
   const std::unique_ptr<v1::SessionService::Stub> sessions_;
   const std::unique_ptr<v1::DeformService::Stub> deform_;

@@ -84,6 +84,9 @@ struct PortableAnswers {
   std::vector<double> first_gains;
   std::vector<double> second_gains;
   std::vector<float> probes;  // three rows for each by #pairs
+  // Of a third order, empty without one: any number of rows by #pairs, and by #triples.
+  std::vector<float> second_lengths;
+  std::vector<float> third_lengths;
 };
 
 // Calls visit(number, what) for all that travels, in the order of the bytes. The numbers are those
@@ -115,6 +118,8 @@ void VisitSections(Answers& answers, const Visitor& visit) {
   visit(40, answers.first_gains);
   visit(41, answers.second_gains);
   visit(42, answers.probes);
+  visit(43, answers.second_lengths);
+  visit(44, answers.third_lengths);
 }
 
 }  // namespace tissueform

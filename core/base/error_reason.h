@@ -47,6 +47,7 @@ enum class ErrorReason {
   kCaseNotFound,
   kTooManyCases,
   kCaseDamagedOnItsWay,
+  kQuotaExceeded,
   // Of a code, where nothing more was said.
   kInvalidRequest,
   kNotFound,

@@ -3,11 +3,13 @@
 
 #include "core/elasticity/neo_hookean_expansion.h"
 
+#include <algorithm>
 #include <vector>
 
 #include <Eigen/LU>
 
 #include "core/elasticity/material.h"
+#include "core/elasticity/third_order_batch.h"
 
 namespace tissueform {
 namespace {
@@ -38,7 +40,72 @@ Matrix3d SecondOrderStress(const ElasticModuli& moduli, const Gradient& a, const
   return P;
 }
 
+constexpr auto kLanes = static_cast<Eigen::Index>(ThirdOrderBatch::kLanes);
+
+// Writes a tet's gradients into a lane. `fields`: a run of memory for every coordinate of a vertex.
+void FillLane(const PiecewiseLinearElements& elements, Eigen::Index tet,
+              const Eigen::MatrixXd& fields, const Eigen::Matrix3d& hats, Eigen::Index lane,
+              ThirdOrderBatch* batch) {
+  const auto num_first = static_cast<Eigen::Index>(batch->num_fields);
+  for (Eigen::Index f = 0; f < fields.rows(); ++f) {
+    const auto at = [&](int corner) -> Eigen::Vector3d {
+      return fields.row(f).segment<3>(Eigen::Index{3} * elements.cells(tet, corner));
+    };
+    const Eigen::Vector3d base = at(0);
+    Matrix3d edges;
+    edges << at(1) - base, at(2) - base, at(3) - base;
+    const Matrix3d gradient = edges * hats.transpose();
+    double* const to = f < num_first ? batch->first.data() + 9 * kLanes * f
+                                     : batch->second.data() + 9 * kLanes * (f - num_first);
+    for (Eigen::Index i = 0; i < 9; ++i) to[i * kLanes + lane] = gradient(i / 3, i % 3);
+  }
+}
+
+// Adds what a lane's tet pulls at its corners. `forces`: a column for every coordinate.
+void AddLane(const PiecewiseLinearElements& elements, Eigen::Index tet, Eigen::Index lane,
+             const ThirdOrderBatch& batch, Eigen::MatrixXd* forces) {
+  using Strided = Eigen::Map<const Eigen::VectorXd, 0, Eigen::InnerStride<9 * kLanes>>;
+  for (Eigen::Index i = 0; i < 9; ++i) {
+    const Strided pulls(batch.loads.data() + i * kLanes + lane, forces->rows());
+    forces->col(Eigen::Index{3} * elements.cells(tet, static_cast<int>(1 + i / 3)) + i % 3) +=
+        pulls;
+    forces->col(Eigen::Index{3} * elements.cells(tet, 0) + i % 3) -= pulls;
+  }
+}
+
+// A cubic's values at the directions e_a + e_b + e_c from its columns: row d holds m n_a n_b n_c.
+Eigen::MatrixXd CubicsAtDirections(Eigen::Index count) {
+  std::vector<std::vector<Eigen::Index>> triples;
+  for (Eigen::Index a = 0; a < count; ++a) {
+    for (Eigen::Index b = a; b < count; ++b) {
+      for (Eigen::Index c = b; c < count; ++c) triples.push_back({a, b, c});
+    }
+  }
+  const auto size = static_cast<Eigen::Index>(triples.size());
+  Eigen::MatrixXd values(size, size);
+  for (Eigen::Index d = 0; d < size; ++d) {
+    Eigen::VectorXd n = Eigen::VectorXd::Zero(count);
+    for (const Eigen::Index number : triples[static_cast<size_t>(d)]) n[number] += 1;
+    values.row(d) = TripleProducts(n).transpose();
+  }
+  return values;
+}
+
 }  // namespace
+
+Eigen::VectorXd TripleProducts(const Eigen::VectorXd& numbers) {
+  Eigen::VectorXd products(NumFieldTriples(numbers.size()));
+  Eigen::Index triple = 0;
+  for (Eigen::Index a = 0; a < numbers.size(); ++a) {
+    for (Eigen::Index b = a; b < numbers.size(); ++b) {
+      for (Eigen::Index c = b; c < numbers.size(); ++c) {
+        const double orders = a == c ? 1 : a == b || b == c ? 3 : 6;
+        products[triple++] = orders * numbers[a] * numbers[b] * numbers[c];
+      }
+    }
+  }
+  return products;
+}
 
 Eigen::MatrixXd SecondOrderForces(const PiecewiseLinearElements& elements,
                                   const Eigen::VectorXd& stiffness, double poisson_ratio,
@@ -76,6 +143,35 @@ Eigen::MatrixXd SecondOrderForces(const PiecewiseLinearElements& elements,
     }
   }
   return forces.transpose();
+}
+
+Eigen::MatrixXd ThirdOrderForces(const PiecewiseLinearElements& elements,
+                                 const Eigen::VectorXd& stiffness, double poisson_ratio,
+                                 const Eigen::MatrixXd& first, const Eigen::MatrixXd& second) {
+  const ElasticModuli unit = ModuliOf(1.0, poisson_ratio);
+  Eigen::MatrixXd fields(first.cols() + second.cols(), first.rows());
+  fields << first.transpose(), second.transpose();
+  Eigen::MatrixXd forces = Eigen::MatrixXd::Zero(NumFieldTriples(first.cols()), first.rows());
+  ThirdOrderBatch batch(static_cast<size_t>(first.cols()));
+  for (Eigen::Index begin = 0; begin < elements.num_cells(); begin += kLanes) {
+    for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
+      // The last tet fills the lanes behind it, which are left out below.
+      const Eigen::Index tet = std::min(begin + lane, elements.num_cells() - 1);
+      const Eigen::Matrix3d hats = HatGradients<4>(elements, tet);
+      FillLane(elements, tet, fields, hats, lane, &batch);
+      const double weight = stiffness[tet] * elements.measures[tet];
+      for (Eigen::Index i = 0; i < 9; ++i) {
+        batch.hats[static_cast<size_t>(i * kLanes + lane)] = weight * hats(i % 3, i / 3);
+      }
+    }
+    EvaluateThirdOrder(unit.shear, unit.bulk, &batch);
+    const Eigen::Index end = std::min(begin + kLanes, elements.num_cells());
+    for (Eigen::Index tet = begin; tet < end; ++tet) {
+      AddLane(elements, tet, tet - begin, batch, &forces);
+    }
+  }
+  // A row for every triple, all at once.
+  return CubicsAtDirections(first.cols()).partialPivLu().solve(forces).transpose();
 }
 
 }  // namespace tissueform

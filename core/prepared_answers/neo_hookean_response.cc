@@ -17,16 +17,14 @@
 #include "core/elasticity/neo_hookean_expansion.h"
 #include "core/prepared_answers/chosen_vertices.h"
 #include "core/prepared_answers/clustered_columns.h"
-#include "core/prepared_answers/panel_response.h"
+#include "core/prepared_answers/neo_hookean_series.h"
 #include "core/prepared_answers/pose_numbers.h"
 #include "core/prepared_answers/pose_samples.h"
-#include "core/prepared_answers/third_order_estimate.h"
+#include "core/prepared_answers/series_estimate.h"
 
 namespace tissueform {
 namespace {
 
-// Pairs that are solved for in one pass over the factor.
-constexpr Eigen::Index kPairsPerPass = 24;
 // Of the converged answers that the estimate is measured by, and what is put on top of their
 // median: the 99th percentile of random poses. (The worst of a few says less: one pose of the
 // bundled head had 4 times the median.)
@@ -42,14 +40,6 @@ constexpr double kEstimateThatDoublesMm = 0.5;
 
 Eigen::Index NumHandles(const MeshPreparation& preparation) {
   return static_cast<Eigen::Index>(preparation.constraints().handles().size());
-}
-
-Eigen::Index NumFirst(const MeshPreparation& preparation) {
-  return ElasticSystem::kColumnsPerHandle * NumHandles(preparation);
-}
-
-Eigen::Index NumColumns(const MeshPreparation& preparation) {
-  return NumFirst(preparation) + NumFieldPairs(kNumbersPerHandle * NumHandles(preparation));
 }
 
 absl::Status CheckOptions(const NeoHookeanResponseOptions& options) {
@@ -76,16 +66,20 @@ class NeoHookeanResponse : public VertexResponse {
         elastic_(elastic),
         options_(std::move(options)),
         chosen_(std::move(chosen)),
-        centroids_(HandleCentroids(*preparation_)) {}
+        centroids_(HandleCentroids(*preparation_)),
+        sizes_(*preparation_) {}
 
   // `free`: those of the chosen vertices.
   absl::Status Prepare(const std::vector<int32_t>& free, const Cancellation& cancellation) {
-    Eigen::MatrixXd columns(3 * static_cast<Eigen::Index>(free.size()), NumColumns(*preparation_));
-    columns.leftCols(NumFirst(*preparation_)) = RowsOfVertices(elastic_.response_columns(), free);
-    TF_RETURN_IF_ERROR(PrepareSecondOrder(free, cancellation, &columns));
-    TF_RETURN_IF_ERROR(Calibrate(free, columns, cancellation));
+    TF_ASSIGN_OR_RETURN(
+        NeoHookeanSeries series,
+        MakeNeoHookeanSeries(*preparation_, elastic_, free, options_.observer, cancellation));
+    damping_ = std::move(series.damping);
+    estimate_.emplace(series.linear, series.columns.middleCols(sizes_.linear, sizes_.pairs),
+                      preparation_->mesh().BoundingBoxDiagonal());
+    TF_RETURN_IF_ERROR(Calibrate(free, series.columns, cancellation));
     TF_RETURN_IF_ERROR(cancellation.Check());
-    Compress(preparation_->mesh().positions()(free, Eigen::all), columns);
+    Compress(preparation_->mesh().positions()(free, Eigen::all), series.columns);
     return absl::OkStatus();
   }
 
@@ -116,6 +110,7 @@ class NeoHookeanResponse : public VertexResponse {
     chosen_.Describe(&answers);
     columns_->Describe(&answers);
     estimate_->Describe(&answers);
+    if (damping_) damping_->Describe(&answers);
     AnswerNumbers& numbers = answers.numbers;
     numbers.model = static_cast<double>(AnswerModel::kNeoHookean);
     numbers.tolerance_mm = options_.tolerance_mm;
@@ -134,7 +129,8 @@ class NeoHookeanResponse : public VertexResponse {
   int num_terms() const override { return static_cast<int>(columns_->num_columns()); }
   int num_terms_before() const override { return static_cast<int>(columns_->num_columns_before()); }
   int64_t bytes_held() const override {
-    return columns_->bytes_held() + chosen_.bytes_held() + estimate_->bytes_held();
+    return columns_->bytes_held() + chosen_.bytes_held() + estimate_->bytes_held() +
+           (damping_ ? damping_->bytes_held() : 0);
   }
 
  private:
@@ -147,11 +143,17 @@ class NeoHookeanResponse : public VertexResponse {
 
   Use UseOf(absl::Span<const HandlePose> poses) const {
     const Eigen::VectorXd numbers = PoseNumbers(poses, centroids_);
-    const Eigen::VectorXd products = PairProducts(numbers);
+    const Eigen::VectorXd pairs = PairProducts(numbers);
     Use use;
-    use.factors.resize(NumColumns(*preparation_));
-    use.factors << elastic_.Coefficients(poses), products;
-    use.series_mm = estimate_->Mm(products);
+    use.factors.resize(sizes_.columns());
+    use.factors.head(sizes_.linear + sizes_.pairs) << elastic_.Coefficients(poses), pairs;
+    std::optional<double> ratio;
+    if (damping_) {
+      const Eigen::VectorXd triples = TripleProducts(numbers);
+      ratio = damping_->Ratio(pairs, triples);
+      use.factors.tail(sizes_.triples) = triples / (1 + *ratio);
+    }
+    use.series_mm = estimate_->Mm(pairs, ratio);
     use.error_mm =
         std::max(use.series_mm + rounding_mm_ + cut_per_mm_ * estimate_->FirstOrderMm(numbers),
                  chosen_.RoundingBoundMm(poses));
@@ -162,52 +164,6 @@ class NeoHookeanResponse : public VertexResponse {
     positions->resize(chosen_.size(), 3);
     columns_->Evaluate(use.factors, positions);
     chosen_.Complete(poses, positions);
-  }
-
-  // Displacements, a unit of each number: of all vertices, 3 #V by #numbers.
-  Eigen::MatrixXd LinearFields() const {
-    Eigen::MatrixXd coefficients = Eigen::MatrixXd::Zero(
-        NumFirst(*preparation_), kNumbersPerHandle * static_cast<Eigen::Index>(centroids_.size()));
-    for (size_t h = 0; h < centroids_.size(); ++h) {
-      const Eigen::Index first = ElasticSystem::kColumnsPerHandle * static_cast<Eigen::Index>(h);
-      for (int axis = 0; axis < 3; ++axis) {
-        const Eigen::Index number = kNumbersPerHandle * static_cast<Eigen::Index>(h) + axis;
-        // v -> A (v - c) displaces by A (v - o) + A (o - c), o the origin of the columns.
-        const Eigen::Matrix3d A = CrossMatrix(Eigen::Vector3d::Unit(axis));
-        const Eigen::Vector3d b = A * (elastic_.origin() - centroids_[h]);
-        for (int i = 0; i < 3; ++i) {
-          for (int j = 0; j < 3; ++j) coefficients(first + 4 * i + j, number) = A(i, j);
-          coefficients(first + 4 * i + 3, number) = b[i];
-        }
-        coefficients(first + 4 * axis + 3, number + 3) = 1;
-      }
-    }
-    return elastic_.response_columns() * coefficients;
-  }
-
-  absl::Status PrepareSecondOrder(const std::vector<int32_t>& free,
-                                  const Cancellation& cancellation, Eigen::MatrixXd* columns) {
-    const Eigen::MatrixXd fields = LinearFields();
-    const Eigen::MatrixXd forces =
-        SecondOrderForces(preparation_->elements(), preparation_->stiffness(),
-                          preparation_->options().poisson_ratio, fields);
-    const Eigen::Index pairs = forces.cols();
-    const Eigen::MatrixXd at_rest = Eigen::MatrixXd::Zero(
-        3 * static_cast<Eigen::Index>(preparation_->constraints().constrained().size()),
-        kPairsPerPass);
-    for (Eigen::Index first = 0; first < pairs; first += kPairsPerPass) {
-      TF_RETURN_IF_ERROR(cancellation.Check());
-      TellProgress(options_.observer, PreparationStage::kAnswers, first, pairs);
-      const Eigen::Index count = std::min(kPairsPerPass, pairs - first);
-      TF_ASSIGN_OR_RETURN(
-          const Eigen::MatrixXd second,
-          elastic_.Solve(-forces.middleCols(first, count), at_rest.leftCols(count)));
-      columns->middleCols(NumFirst(*preparation_) + first, count) = RowsOfVertices(second, free);
-    }
-    TellProgress(options_.observer, PreparationStage::kAnswers, pairs, pairs);
-    estimate_.emplace(RowsOfVertices(fields, free), columns->rightCols(pairs),
-                      preparation_->mesh().BoundingBoxDiagonal());
-    return absl::OkStatus();
   }
 
   // Turned for typical poses; what is cut and how many digits are kept is judged by others, of
@@ -271,7 +227,7 @@ class NeoHookeanResponse : public VertexResponse {
   }
 
   Eigen::MatrixXd FactorsOf(const std::vector<std::vector<HandlePose>>& samples) const {
-    Eigen::MatrixXd factors(NumColumns(*preparation_), static_cast<Eigen::Index>(samples.size()));
+    Eigen::MatrixXd factors(sizes_.columns(), static_cast<Eigen::Index>(samples.size()));
     for (size_t s = 0; s < samples.size(); ++s) {
       factors.col(static_cast<Eigen::Index>(s)) = UseOf(samples[s]).factors;
     }
@@ -339,7 +295,9 @@ class NeoHookeanResponse : public VertexResponse {
   const NeoHookeanResponseOptions options_;
   const ChosenVertices chosen_;
   const std::vector<Eigen::Vector3d> centroids_;
-  std::optional<ThirdOrderEstimate> estimate_;
+  const SeriesSizes sizes_;
+  std::optional<ThirdOrderDamping> damping_;  // where there is a third order
+  std::optional<SeriesEstimate> estimate_;
   std::optional<ClusteredColumns> columns_;
   double cut_per_mm_ = 0;  // of the first order
   double rounding_mm_ = 0;
@@ -348,12 +306,8 @@ class NeoHookeanResponse : public VertexResponse {
 }  // namespace
 
 int64_t NeoHookeanResponseBytes(const MeshPreparation& preparation, Eigen::Index num_vertices) {
-  const Eigen::Index pairs = NumFieldPairs(kNumbersPerHandle * NumHandles(preparation));
-  // Forces of all pairs, a pass of solutions and the fields, of all vertices.
-  const int64_t of_all = 3 * preparation.mesh().num_vertices() *
-                         (pairs + kPairsPerPass + kNumbersPerHandle * NumHandles(preparation));
-  return of_all * static_cast<int64_t>(sizeof(double)) +
-         ClusteredColumns::BytesNeeded(num_vertices, NumColumns(preparation));
+  return NeoHookeanSeriesBytes(preparation) +
+         ClusteredColumns::BytesNeeded(num_vertices, SeriesSizes(preparation).columns());
 }
 
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateNeoHookeanResponse(

@@ -27,7 +27,11 @@ struct Credentials {
 struct Authenticated {
   std::shared_ptr<const Principal> principal = {};  // never null
   std::chrono::system_clock::time_point expires = std::chrono::system_clock::time_point::max();
-  std::string token_id = {};  // SHA-256 of the token: names it in revocations; empty: none
+  // What revocations know it by. The SHA-256 of what of the token is signed; empty: there is none.
+  std::string token_id = {};
+  std::string token_name = {};  // its `jti`; empty: it has none
+  // Before all revocations, where the token does not say.
+  std::chrono::system_clock::time_point issued = std::chrono::system_clock::time_point::min();
 };
 
 // Says who makes a call. Thread-safe; called on gRPC's threads, so it waits for nobody.

@@ -17,6 +17,7 @@ namespace tissueform {
 enum class CallKind {
   kNewWork,  // refused while the server drains
   kUpkeep,   // looks or tidies up: always welcome
+  kStream,   // new work for as long as its client likes: a drag, a watch
 };
 
 // What is known of a call. Views and references live as long as the call of the observer.
@@ -28,6 +29,7 @@ struct ObservedCall {
   std::string_view address;      // of the client, without its port; empty where there is no network
   std::string_view request_id;   // well formed
   std::string_view traceparent;  // well formed, or empty
+  bool served = false;           // OnBegin was OK
 };
 
 // Is told of every call: metrics, audit. Thread-safe; called on gRPC's threads and on workers, so

@@ -9,7 +9,6 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_replace.h"
 #include "grpcpp/security/auth_context.h"
 #include "grpcpp/server_context.h"
 #include "spdlog/spdlog.h"
@@ -17,6 +16,7 @@
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "server/auth/identity.h"
+#include "server/calls/client_address.h"
 #include "server/calls/status_conversion.h"
 
 namespace tissueform {
@@ -45,15 +45,6 @@ Credentials CredentialsOf(const grpc::CallbackServerContext* context) {
     credentials.certificate_names.emplace_back(name.data(), name.size());
   }
   return credentials;
-}
-
-// "ipv4:192.0.2.1:1234", "ipv6:%5B::1%5D:1234" and "unix:" as gRPC says them: without the port.
-std::string AddressOf(const grpc::CallbackServerContext* context) {
-  if (context == nullptr) return {};
-  std::string peer = context->peer();
-  peer.resize(std::min(peer.rfind(':'), peer.size()));
-  return absl::StrReplaceAll(peer.substr(std::min(peer.find(':') + 1, peer.size())),
-                             {{"%5B", ""}, {"%5D", ""}});
 }
 
 // As the W3C has it: "00-", 32 hexadecimal digits, "-", 16, "-", 2. Others go to no log.
@@ -113,7 +104,7 @@ CallScope::CallScope(const grpc::CallbackServerContext* context, std::string_vie
       gate_(gate),
       start_(std::chrono::steady_clock::now()),
       authenticated_({.principal = Nobody()}),
-      address_(AddressOf(context)),
+      address_(ClientAddress(context, CredentialsOf(context), gate->gateway_name())),
       request_id_(RequestIdOr(Header(context, kRequestIdHeader))),
       traceparent_(TraceparentOr(Header(context, "traceparent"))),
       admission_(Admit(context)) {}
@@ -125,13 +116,19 @@ absl::Status CallScope::Admit(const grpc::CallbackServerContext* context) {
                         gate_->authenticator()->Authenticate(CredentialsOf(context)));
     if (gate_->may_call_) TF_RETURN_IF_ERROR(gate_->may_call_(principal(), method_));
   }
-  if (kind_ == CallKind::kNewWork && gate_->draining()) {
+  if (kind_ != CallKind::kUpkeep && gate_->draining()) {
     return WithReason(
         absl::UnavailableError(
             "the server is draining and takes no new work; try another one, or again in a minute"),
         ErrorReason::kServerDraining);
   }
-  return gate_->observer() == nullptr ? absl::OkStatus() : gate_->observer()->OnBegin(Observed());
+  if (gate_->observer() != nullptr) TF_RETURN_IF_ERROR(gate_->observer()->OnBegin(Observed()));
+  if (gate_->quotas() != nullptr && !principal().anonymous()) {
+    TF_RETURN_IF_ERROR(gate_->quotas()->Begin(principal().name, kind_));
+    counted_ = true;
+  }
+  served_ = true;
+  return absl::OkStatus();
 }
 
 CallScope::CallScope(CallScope&& other) noexcept
@@ -140,10 +137,12 @@ CallScope::CallScope(CallScope&& other) noexcept
       gate_(std::exchange(other.gate_, nullptr)),
       start_(other.start_),
       authenticated_(other.authenticated_),  // not moved: what is left still has a principal
+      counted_(std::exchange(other.counted_, false)),
       address_(std::move(other.address_)),
       request_id_(std::move(other.request_id_)),
       traceparent_(std::move(other.traceparent_)),
       resource_(std::move(other.resource_)),
+      served_(other.served_),
       admission_(std::move(other.admission_)) {}
 
 ObservedCall CallScope::Observed() const {
@@ -153,7 +152,8 @@ ObservedCall CallScope::Observed() const {
           .resource = resource_,
           .address = address_,
           .request_id = request_id_,
-          .traceparent = traceparent_};
+          .traceparent = traceparent_,
+          .served = served_};
 }
 
 absl::Status CallScope::Renew(const std::string& token) {
@@ -169,6 +169,18 @@ absl::Status CallScope::Renew(const std::string& token) {
   return absl::OkStatus();
 }
 
+void CallScope::RenewFrom(const Authenticated& other) {
+  if (may_end_early() && *other.principal == principal() &&
+      other.expires > authenticated_.expires) {
+    authenticated_ = other;
+  }
+}
+
+absl::Status CallScope::StillGood() const {
+  if (!may_end_early()) return absl::OkStatus();
+  return gate_->authenticator()->StillGood(authenticated_);
+}
+
 void CallScope::SetResource(std::string resource) {
   resource_ = std::move(resource);
   if (gate_->observer() != nullptr) gate_->observer()->OnResource(Observed());
@@ -181,7 +193,8 @@ CallScope::~CallScope() {
   gate_->Leave();
 }
 
-void CallScope::TellEnd(const absl::Status& outcome) const {
+void CallScope::TellEnd(const absl::Status& outcome) {
+  if (std::exchange(counted_, false)) gate_->quotas()->End(principal().name, kind_);
   if (gate_->observer() == nullptr) return;
   gate_->observer()->OnEnd(Observed(), outcome, std::chrono::steady_clock::now() - start_);
 }

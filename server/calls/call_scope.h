@@ -17,24 +17,32 @@
 #include "core/base/mutex.h"
 #include "server/auth/authenticator.h"
 #include "server/calls/call_observer.h"
+#include "server/calls/call_quotas.h"
 
 namespace tissueform {
 
-// What stands before every call: who makes it, who is told of it, whether the server takes new
-// work; and how many calls are open. Thread-safe.
+// What stands before every call: who makes it, who is told of it, how many a principal may make,
+// whether the server takes new work; and how many calls are open. Thread-safe.
 class ServiceGate {
  public:
   // Whether somebody who is known may call a method ("MeshService.GetMesh") at all.
   using MayCall = std::function<absl::Status(const Principal& caller, std::string_view method)>;
 
-  // Both may be null, and must outlive the calls. Without an authenticator everybody is anonymous
-  // and may call everything, as where `may_call` is empty.
+  // All may be null, and must outlive the calls. Without an authenticator everybody is anonymous,
+  // of nobody's quotas, and may call everything. `gateway_name`: see ClientAddress.
   explicit ServiceGate(Authenticator* authenticator = nullptr, CallObserver* observer = nullptr,
+                       CallQuotas* quotas = nullptr, std::string gateway_name = {},
                        MayCall may_call = nullptr)
-      : authenticator_(authenticator), observer_(observer), may_call_(std::move(may_call)) {}
+      : authenticator_(authenticator),
+        observer_(observer),
+        quotas_(quotas),
+        gateway_name_(std::move(gateway_name)),
+        may_call_(std::move(may_call)) {}
 
   Authenticator* authenticator() const { return authenticator_; }
   CallObserver* observer() const { return observer_; }
+  CallQuotas* quotas() const { return quotas_; }
+  const std::string& gateway_name() const { return gateway_name_; }
 
   void StartDraining() { draining_ = true; }
   bool draining() const { return draining_; }
@@ -50,6 +58,8 @@ class ServiceGate {
 
   Authenticator* const authenticator_;
   CallObserver* const observer_;
+  CallQuotas* const quotas_;
+  const std::string gateway_name_;
   const MayCall may_call_;
   std::atomic<bool> draining_ = false;
 
@@ -65,6 +75,10 @@ inline constexpr char kRequestIdHeader[] = "x-request-id";
 // `from_client` where it is well formed (1 to 64 letters, digits, "-", "_" or "."), else a new one:
 // what goes to the log must not carry anything else.
 std::string RequestIdOr(std::string_view from_client);
+
+// How often a call that lasts asks whether its caller is still good: what is revoked ends within a
+// second.
+inline constexpr std::chrono::milliseconds kStandingPeriod{500};
 
 // The common beginning and end of every rpc: made first, asked for its admission, ended once with
 // the outcome. The place where a caller is authenticated and observers are told.
@@ -82,8 +96,8 @@ class CallScope {
   CallScope(CallScope&& other) noexcept;
   CallScope& operator=(CallScope&&) = delete;
 
-  // OK, or why the call is not served: Unavailable, Unauthenticated, or what the gate's MayCall and
-  // the observer say.
+  // OK, or why the call is not served: Unavailable, Unauthenticated, ResourceExhausted
+  // (a quota), or what the gate's MayCall and the observer say.
   const absl::Status& admission() const { return admission_; }
   const Principal& principal() const { return *authenticated_.principal; }
   const Authenticated& authenticated() const { return authenticated_; }
@@ -92,6 +106,13 @@ class CallScope {
   // The call stands on this token from now on. Errors: those of the authenticator;
   // Unauthenticated (it is another's). Nothing to do where nobody logs in.
   absl::Status Renew(const std::string& token);
+  // On that of another call, where it is the same caller's and ends later.
+  void RenewFrom(const Authenticated& other);
+
+  // For calls that last: whether this one may go on. Asked again every kStandingPeriod; not where
+  // nobody logs in.
+  bool may_end_early() const { return gate_ != nullptr && gate_->authenticator() != nullptr; }
+  absl::Status StillGood() const;
 
   // Says what the call is about ("sessions/{id}"), once it is known that its caller may use it.
   void SetResource(std::string resource);
@@ -101,7 +122,7 @@ class CallScope {
 
  private:
   ObservedCall Observed() const;
-  void TellEnd(const absl::Status& outcome) const;
+  void TellEnd(const absl::Status& outcome);
   absl::Status Admit(const grpc::CallbackServerContext* context);
 
   std::string_view method_;
@@ -109,10 +130,12 @@ class CallScope {
   ServiceGate* gate_;  // null once ended, or moved from
   std::chrono::steady_clock::time_point start_;
   Authenticated authenticated_;
+  bool counted_ = false;  // by the quotas
   std::string address_;
   std::string request_id_;
   std::string traceparent_;
   std::string resource_;
+  bool served_ = false;  // the observer let it begin
   absl::Status admission_;
 };
 

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <string>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/string_view.h"
+#include "google/protobuf/util/time_util.h"
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 
@@ -37,6 +39,14 @@ std::string Details(const absl::Status& status, const std::string& message) {
   details.set_code(static_cast<int>(status.code()));
   details.set_message(message);
   details.add_details()->PackFrom(proto);
+  int64_t wait_ms = 0;
+  const auto retry = info.metadata.find("retry_after_ms");
+  if (retry != info.metadata.end() && absl::SimpleAtoi(retry->second, &wait_ms)) {
+    google::rpc::RetryInfo retry_info;
+    *retry_info.mutable_retry_delay() =
+        google::protobuf::util::TimeUtil::MillisecondsToDuration(wait_ms);
+    details.add_details()->PackFrom(retry_info);
+  }
   return details.SerializeAsString();
 }
 

@@ -37,6 +37,9 @@ class BeastConnection final : public ReplyStream,
 
   // Any thread.
   void Run() {
+    Error gone;
+    const auto other_end = stream_.socket().remote_endpoint(gone);
+    if (!gone) peer_ = other_end.address().to_string();
     entry_.Set(weak_from_this());
     Post([self = shared_from_this()] {
       self->AwaitRequest(self->context_->limits.header_deadline);
@@ -147,6 +150,7 @@ class BeastConnection final : public ReplyStream,
 
   void OnHead() {
     request_head_ = ToHead(parser_->get());
+    request_head_.peer = peer_;
     context_->counters->Add(GatewayEvent::kRequest);
     const HttpDecision decision = context_->handler->Decide(request_head_);
     switch (decision.kind) {
@@ -238,7 +242,8 @@ class BeastConnection final : public ReplyStream,
       context_->counters->Add(GatewayEvent::kTooManySockets);
       return Write(context_->handler->ReplyWith(503), true);
     }
-    std::make_shared<BeastSocket>(context_, std::move(stream_), parser_->release())->Run();
+    std::make_shared<BeastSocket>(context_, std::move(stream_), parser_->release())
+        ->Run(request_head_);
   }
 
   // Says that nothing more comes and reads what the client still sends, so that it is not reset
@@ -312,6 +317,7 @@ class BeastConnection final : public ReplyStream,
   const boost::beast::tcp_stream::executor_type executor_;
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::string_body>> parser_;
+  std::string peer_;  // see HttpHead
   HttpHead request_head_;
   bool awaits_request_ = false;
   // Of a reply in pieces.

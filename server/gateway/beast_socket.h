@@ -37,11 +37,11 @@ class BeastSocket final : public Socket,
   ~BeastSocket() override { --context_->sockets; }
 
   // Answers the request; on the strand.
-  void Run() {
+  void Run(const HttpHead& head) {
     namespace websocket = boost::beast::websocket;
     entry_.Set(weak_from_this());
     context_->counters->Add(GatewayEvent::kSocket);
-    user_ = context_->handler->OpenSocket(shared_from_this());
+    user_ = context_->handler->OpenSocket(shared_from_this(), head);
     boost::beast::get_lowest_layer(ws_).expires_never();
     ws_.set_option(websocket::stream_base::timeout{context_->limits.start_deadline,
                                                    context_->limits.stall_deadline, true});

@@ -10,15 +10,43 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "server/transport/network_address.h"
+#include "server/transport/tls_credentials.h"
 
 namespace tissueform {
 
+namespace {
+
+absl::Status CheckServers(const GatewayOptions& options) {
+  if (options.insecure || !options.upstream.roots.empty()) return absl::OkStatus();
+  for (const std::string& server : options.servers) {
+    std::string host = server.substr(0, server.rfind(':'));
+    if (host.size() > 2 && host.front() == '[') host = host.substr(1, host.size() - 2);
+    if (absl::StartsWith(server, "unix:") || IsLoopback(host)) continue;
+    return absl::FailedPreconditionError(
+        absl::StrCat("--server ", server,
+                     " is another machine, and tokens go there; give "
+                     "--server-ca FILE, or --insecure if the network between "
+                     "is yours alone"));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
 absl::StatusOr<std::unique_ptr<Gateway>> Gateway::Start(const GatewayOptions& options) {
+  TF_RETURN_IF_ERROR(CheckLoginConfig(options.login));
+  TF_RETURN_IF_ERROR(CheckServers(options));
+  TF_RETURN_IF_ERROR(ForwardedAddresses::CheckProxies(options.trusted_proxies));
+  std::unique_ptr<RotatedFiles> tls_files;
+  if (!options.upstream.roots.empty()) {
+    TF_ASSIGN_OR_RETURN(tls_files, RotatedFiles::Load(options.upstream));
+  }
   WebFiles files;
   if (!options.web.empty()) {
     TF_ASSIGN_OR_RETURN(files, WebFiles::Load(options.web));
   }
-  auto gateway = absl::WrapUnique(new Gateway(options, std::move(files)));
+  auto gateway = absl::WrapUnique(new Gateway(options, std::move(files), std::move(tls_files)));
   TF_ASSIGN_OR_RETURN(gateway->http_, HttpServer::Start({.host = options.host,
                                                          .port = options.port,
                                                          .threads = options.threads,
@@ -27,11 +55,14 @@ absl::StatusOr<std::unique_ptr<Gateway>> Gateway::Start(const GatewayOptions& op
   return gateway;
 }
 
-Gateway::Gateway(const GatewayOptions& options, WebFiles files)
+Gateway::Gateway(const GatewayOptions& options, WebFiles files,
+                 std::unique_ptr<RotatedFiles> tls_files)
     : options_(options),
-      pool_(options.servers, options.limits),
+      tls_files_(std::move(tls_files)),
+      pool_(options.servers, options.limits, MakeChannelCredentials(tls_files_.get())),
       routes_(AccessRules(options.host, options.allowed_hosts, options.allowed_origins),
-              std::move(files), &pool_, &counters_) {}
+              ForwardedAddresses(options.trusted_proxies), std::move(files), options.login, &pool_,
+              &counters_) {}
 
 std::string Gateway::Url() const {
   const bool is_ipv6 = absl::StrContains(options_.host, ':');

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -21,13 +22,16 @@ class Gateway {
  public:
   // Listens when it returns; servers need not be there yet.
   //
-  // Errors: Unavailable, naming the address, when it cannot be listened on; those of
-  // WebFiles::Load.
+  // Errors: Unavailable, naming the address, when it cannot be listened on; FailedPrecondition
+  // (servers on other machines without encryption); those of CheckLoginConfig, WebFiles::Load,
+  // RotatedFiles::Load and ForwardedAddresses::CheckProxies.
   static absl::StatusOr<std::unique_ptr<Gateway>> Start(const GatewayOptions& options);
 
   // "http://127.0.0.1:8080", also when the options said port 0.
   std::string Url() const;
   int port() const { return http_->port(); }
+  // Calls `answered` on one of the threads that serve, later: proof that they do.
+  void Ask(std::function<void()> answered) { http_->Post(std::move(answered)); }
   const GatewayCounters& counters() const { return counters_; }
   const ServerPool& pool() const { return pool_; }
 
@@ -36,12 +40,13 @@ class Gateway {
   void Drain() { http_->Drain(); }
 
  private:
-  Gateway(const GatewayOptions& options, WebFiles files);
+  Gateway(const GatewayOptions& options, WebFiles files, std::unique_ptr<RotatedFiles> tls_files);
 
   // Constant.
   const GatewayOptions options_;
 
   // Self-synchronised; each may use those before it, and is destroyed before them.
+  const std::unique_ptr<RotatedFiles> tls_files_;  // null: servers without encryption
   GatewayCounters counters_;
   ServerPool pool_;
   GatewayRoutes routes_;

@@ -9,6 +9,8 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/string_view.h"
 
+#include "server/program/program_options.h"
+
 namespace tissueform {
 namespace {
 
@@ -73,6 +75,43 @@ void AddLimits(CLI::App& app, GatewayLimits* limits) {
              "after SIGTERM or SIGINT, how long clients may take to read their last frames");
 }
 
+void AddLogin(CLI::App& app, LoginConfig* login) {
+  app.add_option("--oidc-issuer", login->issuer,
+                 "identity provider by which the planner logs its users in; without it there is no "
+                 "login")
+      ->type_name("URL");
+  app.add_option("--oidc-client-id", login->client_id,
+                 "the planner's name at the provider: a public client with PKCE")
+      ->type_name("ID");
+  app.add_option("--oidc-audience", login->audience,
+                 "for whom tokens are asked for: the server's --token-audience")
+      ->type_name("AUDIENCE");
+  app.add_option("--oidc-scope", login->scopes, "scopes that are asked for, in one argument")
+      ->capture_default_str()
+      ->type_name("SCOPES");
+}
+
+void AddUpstreamOptions(CLI::App& app, GatewayOptions* options) {
+  CLI::Option* ca = app.add_option("--server-ca", options->upstream.roots,
+                                   "authorities in PEM of the servers' certificates: calls to them "
+                                   "are encrypted. Renewed by rewriting the file")
+                        ->type_name("FILE");
+  CLI::Option* certificate =
+      app.add_option("--cert", options->upstream.certificate,
+                     "the gateway's own certificate, for servers that ask for one")
+          ->type_name("FILE")
+          ->needs(ca);
+  CLI::Option* key = app.add_option("--key", options->upstream.key, "its key")
+                         ->type_name("FILE")
+                         ->needs(certificate);
+  certificate->needs(key);
+  app.add_flag("--insecure", options->insecure,
+               "without --server-ca also to servers on other machines");
+  app.add_option("--trust-forwarded-from", options->trusted_proxies,
+                 "address of a proxy before the gateway whose X-Forwarded-For counts")
+      ->type_name("ADDRESS");
+}
+
 // "HOST:PORT", IPv6 in brackets.
 std::string SetListen(const std::string& text, GatewayOptions* options) {
   const size_t colon = text.rfind(':');
@@ -91,7 +130,6 @@ std::string SetListen(const std::string& text, GatewayOptions* options) {
 }  // namespace
 
 void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
-  app.set_config("--config", "", "file with any of these options, as `name = value` lines");
   app.add_option("--server", options->servers,
                  "address of a tissueform-server, HOST:PORT or unix:/PATH; several may be named")
       ->required()
@@ -106,6 +144,7 @@ void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
          "the network: there is no login and no TLS here")
       ->default_str("127.0.0.1:8080")
       ->type_name("HOST:PORT");
+  AddUpstreamOptions(app, options);
   app.add_option("--web", options->web, "folder of the built planner; without it none is served")
       ->type_name("DIR");
   app.add_option("--allow-host", options->allowed_hosts,
@@ -118,11 +157,13 @@ void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
   app.add_option("--threads", options->threads, "threads that read and write")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
+  AddLogin(app, &options->login);
   AddLimits(app, &options->limits);
   app.add_option("--log-level", options->log_level,
                  "what is logged on stderr, without names, paths or content")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
+  AddConfiguration(app, "TISSUEFORM_GATEWAY_");  // last: it looks at all options
 }
 
 }  // namespace tissueform

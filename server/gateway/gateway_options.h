@@ -9,12 +9,19 @@
 #include "CLI/CLI.hpp"
 
 #include "server/gateway/gateway_limits.h"
+#include "server/gateway/login_config.h"
+#include "server/transport/rotated_files.h"
 
 namespace tissueform {
 
 // Everything that can be set about a gateway.
 struct GatewayOptions {
   std::vector<std::string> servers;  // as gRPC has addresses
+  // Encryption to the servers: `roots` of their certificates, and the gateway's own. Empty: none.
+  RotatedFiles::Paths upstream = {};
+  bool insecure = false;  // to servers on other machines without encryption all the same
+  // Proxies whose X-Forwarded-For counts.
+  std::vector<std::string> trusted_proxies = {};
   std::string host = "127.0.0.1";
   int port = 8080;  // 0: any free one
   std::string web;  // folder of the planner; empty: none is served
@@ -22,12 +29,12 @@ struct GatewayOptions {
   std::vector<std::string> allowed_origins;
   int threads = 2;
   GatewayLimits limits;
+  LoginConfig login = {};
   std::string log_level = "info";
 };
 
 // Adds one option a setting to `app`, with its default in the help; parsing writes into `options`,
-// which must outlive it. A config file in TOML or INI form with the same names may be given by
-// --config.
+// which must outlive it. They may stand in a file and in the environment too (AddConfiguration).
 void AddGatewayOptions(CLI::App& app, GatewayOptions* options);
 
 }  // namespace tissueform

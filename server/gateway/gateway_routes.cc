@@ -21,11 +21,16 @@
 namespace tissueform {
 namespace {
 
-// No inline script, nothing from elsewhere.
-constexpr absl::string_view kContentSecurityPolicy =
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
-    "font-src 'self'; connect-src 'self'; worker-src 'self'; manifest-src 'self'; base-uri 'none'; "
-    "form-action 'none'; frame-ancestors 'none'";
+// No inline script, nothing from elsewhere; the identity provider may be asked, where there is one.
+std::string SecurityPolicy(const LoginConfig& login) {
+  const std::string provider = OriginOfIssuer(login);
+  return absl::StrCat(
+      "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+      "font-src 'self'; connect-src 'self'",
+      provider.empty() ? "" : " ", provider,
+      "; worker-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; "
+      "frame-ancestors 'none'");
+}
 
 constexpr absl::string_view kExposedHeaders =
     "grpc-status, grpc-message, grpc-status-details-bin, x-tissueform-session, x-tissueform-node, "
@@ -49,16 +54,6 @@ constexpr std::array<std::pair<int, absl::string_view>, 11> kSentences = {{
     {503, "no server takes calls now, or the gateway is full; try again in a moment\n"},
 }};
 
-HttpFields CommonFields() {
-  return {{"server", "tissueform"},
-          {"content-security-policy", std::string(kContentSecurityPolicy)},
-          {"x-content-type-options", "nosniff"},
-          {"x-frame-options", "DENY"},
-          {"referrer-policy", "no-referrer"},
-          {"cross-origin-opener-policy", "same-origin"},
-          {"cross-origin-resource-policy", "same-origin"}};
-}
-
 bool IsReading(const HttpHead& head) { return head.method == "GET" || head.method == "HEAD"; }
 
 bool OffersSubprotocol(const HttpHead& head) {
@@ -73,9 +68,25 @@ bool OffersSubprotocol(const HttpHead& head) {
 
 }  // namespace
 
-GatewayRoutes::GatewayRoutes(AccessRules rules, WebFiles files, ServerPool* pool,
-                             GatewayCounters* counters)
-    : rules_(std::move(rules)), files_(std::move(files)), pool_(pool), counters_(counters) {}
+GatewayRoutes::GatewayRoutes(AccessRules rules, ForwardedAddresses addresses, WebFiles files,
+                             const LoginConfig& login, ServerPool* pool, GatewayCounters* counters)
+    : rules_(std::move(rules)),
+      addresses_(std::move(addresses)),
+      files_(std::move(files)),
+      login_json_(std::make_shared<const std::string>(LoginConfigJson(login))),
+      security_policy_(SecurityPolicy(login)),
+      pool_(pool),
+      counters_(counters) {}
+
+HttpFields GatewayRoutes::CommonFields() const {
+  return {{"server", "tissueform"},
+          {"content-security-policy", security_policy_},
+          {"x-content-type-options", "nosniff"},
+          {"x-frame-options", "DENY"},
+          {"referrer-policy", "no-referrer"},
+          {"cross-origin-opener-policy", "same-origin"},
+          {"cross-origin-resource-policy", "same-origin"}};
+}
 
 HttpReply GatewayRoutes::ReplyWith(int status) {
   HttpReply reply = {.status = status, .fields = CommonFields()};
@@ -104,6 +115,7 @@ HttpDecision GatewayRoutes::Decide(const HttpHead& head) {
     return {.kind = HttpDecision::kReply, .reply = ReplyWith(fine ? 200 : 503)};
   }
   if (path == "/call") return DecideSocket(head);
+  if (path == "/config.json") return DecideConfig(head);
   if (head.method == "OPTIONS") return Preflight(head);
   if (head.method == "POST") return DecideCall(head);
   return DecideFile(head);
@@ -123,6 +135,14 @@ HttpDecision GatewayRoutes::DecideCall(const HttpHead& head) {
     return Refuse(GatewayEvent::kWrongContentType, 415);
   }
   return {.kind = HttpDecision::kStream};
+}
+
+HttpDecision GatewayRoutes::DecideConfig(const HttpHead& head) {
+  if (!IsReading(head)) return Refuse(GatewayEvent::kWrongMethod, 405);
+  HttpReply reply = {.fields = CommonFields(), .body = login_json_};
+  reply.fields.emplace_back("content-type", "application/json");
+  reply.fields.emplace_back("cache-control", "no-store");
+  return {.kind = HttpDecision::kReply, .reply = std::move(reply)};
 }
 
 HttpDecision GatewayRoutes::DecideFile(const HttpHead& head) {
@@ -155,13 +175,14 @@ std::shared_ptr<ReplySource> GatewayRoutes::Stream(const HttpHead& head, std::st
   HttpFields fields = CommonFields();
   for (auto& field : OriginFields(head)) fields.push_back(std::move(field));
   fields.emplace_back("access-control-expose-headers", std::string(kExposedHeaders));
-  auto call = std::make_shared<WebCall>(std::move(reply), std::move(fields));
+  auto call = std::make_shared<WebCall>(std::move(reply), std::move(fields), addresses_.Of(head));
   call->Begin(head, body, pool_, counters_);
   return call;
 }
 
-std::shared_ptr<SocketUser> GatewayRoutes::OpenSocket(std::shared_ptr<Socket> socket) {
-  return std::make_shared<SocketCall>(std::move(socket), pool_, counters_);
+std::shared_ptr<SocketUser> GatewayRoutes::OpenSocket(std::shared_ptr<Socket> socket,
+                                                      const HttpHead& head) {
+  return std::make_shared<SocketCall>(std::move(socket), addresses_.Of(head), pool_, counters_);
 }
 
 }  // namespace tissueform

@@ -9,8 +9,10 @@
 #include "absl/strings/string_view.h"
 
 #include "server/gateway/access_rules.h"
+#include "server/gateway/forwarded_addresses.h"
 #include "server/gateway/gateway_counters.h"
 #include "server/gateway/http_server.h"
+#include "server/gateway/login_config.h"
 #include "server/gateway/server_pool.h"
 #include "server/gateway/web_files.h"
 
@@ -20,27 +22,35 @@ namespace tissueform {
 class GatewayRoutes final : public HttpHandler {
  public:
   // `pool` and `counters` must outlive it.
-  GatewayRoutes(AccessRules rules, WebFiles files, ServerPool* pool, GatewayCounters* counters);
+  GatewayRoutes(AccessRules rules, ForwardedAddresses addresses, WebFiles files,
+                const LoginConfig& login, ServerPool* pool, GatewayCounters* counters);
 
   HttpDecision Decide(const HttpHead& head) override;
   std::shared_ptr<ReplySource> Stream(const HttpHead& head, std::string body,
                                       std::shared_ptr<ReplyStream> reply) override;
-  std::shared_ptr<SocketUser> OpenSocket(std::shared_ptr<Socket> socket) override;
+  std::shared_ptr<SocketUser> OpenSocket(std::shared_ptr<Socket> socket,
+                                         const HttpHead& head) override;
   HttpReply ReplyWith(int status) override;
 
  private:
   HttpDecision Refuse(GatewayEvent event, int status);
   HttpDecision DecideSocket(const HttpHead& head);
   HttpDecision DecideCall(const HttpHead& head);
+  HttpDecision DecideConfig(const HttpHead& head);
   HttpDecision DecideFile(const HttpHead& head);
   // What a browser asks before a page of another origin may make a call.
   HttpDecision Preflight(const HttpHead& head);
   // For pages of other origins that are allowed.
   HttpFields OriginFields(const HttpHead& head) const;
+  // Of every answer.
+  HttpFields CommonFields() const;
 
   // Constant.
   const AccessRules rules_;
+  const ForwardedAddresses addresses_;
   const WebFiles files_;
+  const std::shared_ptr<const std::string> login_json_;
+  const std::string security_policy_;
 
   // Self-synchronised.
   ServerPool* const pool_;

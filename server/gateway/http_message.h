@@ -20,6 +20,7 @@ struct HttpHead {
   std::string method;  // "GET"
   std::string target;  // with its query
   HttpFields fields = {};
+  std::string peer = {};      // address of the other end, without a port
   bool wants_socket = false;  // asks for a WebSocket
 
   // The first of this name; empty when there is none.

@@ -11,6 +11,7 @@
 
 #include "spdlog/spdlog.h"
 #include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/strand.hpp>
 #include <sys/socket.h>
 
@@ -56,6 +57,8 @@ class BeastServer final : public HttpServer {
   }
 
   int port() const override { return listener_->port(); }
+
+  void Post(std::function<void()> job) override { boost::asio::post(context_.io, std::move(job)); }
 
   void Drain() override {
     context_.draining = true;

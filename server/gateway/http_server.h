@@ -103,7 +103,8 @@ class HttpHandler {
   virtual HttpDecision Decide(const HttpHead& head) = 0;
   virtual std::shared_ptr<ReplySource> Stream(const HttpHead& head, std::string body,
                                               std::shared_ptr<ReplyStream> reply) = 0;
-  virtual std::shared_ptr<SocketUser> OpenSocket(std::shared_ptr<Socket> socket) = 0;
+  virtual std::shared_ptr<SocketUser> OpenSocket(std::shared_ptr<Socket> socket,
+                                                 const HttpHead& head) = 0;
   // A reply of the server itself (431, 413, 400), with the fields that all have.
   virtual HttpReply ReplyWith(int status) = 0;
 };
@@ -126,6 +127,8 @@ class HttpServer {
   virtual ~HttpServer() = default;
 
   virtual int port() const = 0;
+  // Runs `job` on one of its threads, later.
+  virtual void Post(std::function<void()> job) = 0;
   // Accepts nothing more, tells all connections, waits for them up to the deadline of the limits,
   // closes those that are left and waits for what had been posted by then. Once.
   virtual void Drain() = 0;

@@ -4,7 +4,10 @@
 #include <csignal>
 #include <cstdio>
 #include <ctime>
+#include <functional>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "CLI/CLI.hpp"
 #include "grpc/support/log.h"
@@ -13,6 +16,8 @@
 
 #include "server/gateway/gateway.h"
 #include "server/gateway/gateway_options.h"
+#include "server/program/program_options.h"
+#include "server/program/systemd_notices.h"
 
 namespace {
 
@@ -23,7 +28,7 @@ constexpr char kDescription[] =
     "SIGTERM or SIGINT: tells every client, exit code 0.\n"
     "Research software, not a medical device: not for diagnosis or treatment.";
 
-enum ExitCode : int { kExitDone = 0, kExitFailed = 1, kExitWrongUse = 2 };
+enum ExitCode : int { kExitDone = 0, kExitFailed = 1 };
 
 // Between two lines of the log that tell what was counted.
 constexpr time_t kTellSeconds = 60;
@@ -56,7 +61,11 @@ ExitCode Serve(const tissueform::GatewayOptions& options) {
   }
   std::printf("listening on %s\n", (*gateway)->Url().c_str());
   std::fflush(stdout);
+  const tissueform::SystemdWatchdog watchdog(
+      [&gateway](std::function<void()> answered) { (*gateway)->Ask(std::move(answered)); });
+  tissueform::TellSystemdReady();
   ServeUntilSignal(**gateway);
+  tissueform::TellSystemdStopping();
   (*gateway)->Drain();
   spdlog::info("done; counts: {}", (*gateway)->counters().Text());
   return kExitDone;
@@ -72,14 +81,7 @@ int main(int argc, char** argv) {
   CLI::App app(kDescription, "tissueform-gateway");
   tissueform::GatewayOptions options;
   tissueform::AddGatewayOptions(app, &options);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::CallForHelp& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "tissueform-gateway: %s; see --help\n", error.what());
-    return kExitWrongUse;
-  }
+  if (const std::optional<int> end = tissueform::ParseProgramOptions(app, argc, argv)) return *end;
   spdlog::set_default_logger(spdlog::stderr_color_mt("tissueform-gateway"));
   spdlog::set_level(spdlog::level::from_str(options.log_level));
   // What clients and servers do wrong comes back as a status.

@@ -4,10 +4,10 @@
 #include "server/gateway/server_pool.h"
 
 #include <cstdint>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "grpcpp/create_channel.h"
-#include "grpcpp/security/credentials.h"
 #include "grpcpp/support/channel_arguments.h"
 
 #include "server/gateway/stable_hash.h"
@@ -34,18 +34,16 @@ grpc::ChannelArguments Arguments(const GatewayLimits& limits) {
   return arguments;
 }
 
-std::shared_ptr<grpc::Channel> Connect(const std::string& address,
-                                       const grpc::ChannelArguments& arguments) {
-  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
-}
-
 std::vector<std::shared_ptr<grpc::Channel>> ConnectForHealth(
-    const std::vector<std::string>& addresses, const GatewayLimits& limits) {
+    const std::vector<std::string>& addresses, const GatewayLimits& limits,
+    const std::shared_ptr<grpc::ChannelCredentials>& credentials) {
   grpc::ChannelArguments arguments = Arguments(limits);
   arguments.SetServiceConfigJSON(ServerHealth::HealthServiceConfig());
   std::vector<std::shared_ptr<grpc::Channel>> channels;
   channels.reserve(addresses.size());
-  for (const std::string& address : addresses) channels.push_back(Connect(address, arguments));
+  for (const std::string& address : addresses) {
+    channels.push_back(grpc::CreateCustomChannel(address, credentials, arguments));
+  }
   return channels;
 }
 
@@ -57,8 +55,12 @@ CallSlot::~CallSlot() {
   --channel_->calls;
 }
 
-ServerPool::ServerPool(const std::vector<std::string>& addresses, const GatewayLimits& limits)
-    : limits_(limits), addresses_(addresses), health_(ConnectForHealth(addresses, limits)) {
+ServerPool::ServerPool(const std::vector<std::string>& addresses, const GatewayLimits& limits,
+                       std::shared_ptr<grpc::ChannelCredentials> credentials)
+    : limits_(limits),
+      addresses_(addresses),
+      credentials_(std::move(credentials)),
+      health_(ConnectForHealth(addresses, limits, credentials_)) {
   channels_.resize(addresses.size());
 }
 
@@ -93,7 +95,8 @@ absl::StatusOr<CallSlot> ServerPool::Take(absl::string_view session) {
                      " calls open to this server, as many as it may; try again in a moment"));
   }
   auto channel = std::make_unique<ServerChannel>();
-  channel->channel = Connect(addresses_[server], Arguments(limits_));
+  channel->channel =
+      grpc::CreateCustomChannel(addresses_[server], credentials_, Arguments(limits_));
   channel->stub = std::make_unique<grpc::GenericStub>(channel->channel);
   channel->calls = 1;
   channels.push_back(std::move(channel));

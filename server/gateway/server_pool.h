@@ -11,6 +11,7 @@
 #include "absl/strings/string_view.h"
 #include "grpcpp/channel.h"
 #include "grpcpp/generic/generic_stub.h"
+#include "grpcpp/security/credentials.h"
 
 #include "core/base/mutex.h"
 #include "server/gateway/gateway_limits.h"
@@ -45,11 +46,13 @@ class CallSlot {
   ServerChannel* channel_;
 };
 
-// The servers behind the gateway. // Thread-safe.
+// The servers behind the gateway. Thread-safe.
 class ServerPool {
  public:
   // `addresses` as gRPC has them: "host:port", "unix:/path". At least one.
-  ServerPool(const std::vector<std::string>& addresses, const GatewayLimits& limits);
+  ServerPool(
+      const std::vector<std::string>& addresses, const GatewayLimits& limits,
+      std::shared_ptr<grpc::ChannelCredentials> credentials = grpc::InsecureChannelCredentials());
 
   // A place for a call. One that names a session goes to the same server of those that are healthy,
   // whichever gateway is asked (rendezvous hashing); one that names none (empty) to the first of
@@ -70,6 +73,7 @@ class ServerPool {
   // Constant.
   const GatewayLimits limits_;
   const std::vector<std::string> addresses_;
+  const std::shared_ptr<grpc::ChannelCredentials> credentials_;
 
   // Self-synchronised.
   ServerHealth health_;

@@ -7,6 +7,7 @@
 
 #include "server/gateway/method_table.h"
 #include "server/gateway/web_call.h"
+#include "server/transport/network_address.h"
 
 namespace tissueform {
 
@@ -40,13 +41,14 @@ void SocketCall::OnFrame(const SocketFrame& frame, std::string* message) {
 }
 
 void SocketCall::Start(absl::string_view payload) {
-  const absl::StatusOr<CallStart> start = ParseStart(payload);
+  absl::StatusOr<CallStart> start = ParseStart(payload);
   if (!start.ok()) {
     const GatewayEvent event = start.status().code() == absl::StatusCode::kUnimplemented
                                    ? GatewayEvent::kMethodRefused
                                    : GatewayEvent::kMetadataRefused;
     return Fail(event, start.status(), SocketClose::kProtocolError);
   }
+  start->metadata[kClientAddressHeader] = client_address_;
   const auto session = start->metadata.find("x-tissueform-session");
   absl::StatusOr<CallSlot> slot =
       pool_->Take(session != start->metadata.end() ? session->second : "");

@@ -24,9 +24,13 @@ class SocketCall final : public SocketUser,
                          public UpstreamUser,
                          public std::enable_shared_from_this<SocketCall> {
  public:
-  // `pool` and `counters` outlive it.
-  SocketCall(std::shared_ptr<Socket> socket, ServerPool* pool, GatewayCounters* counters)
-      : socket_(std::move(socket)), pool_(pool), counters_(counters) {}
+  // `client_address`: what the server is told. `pool` and `counters` outlive it.
+  SocketCall(std::shared_ptr<Socket> socket, std::string client_address, ServerPool* pool,
+             GatewayCounters* counters)
+      : socket_(std::move(socket)),
+        client_address_(std::move(client_address)),
+        pool_(pool),
+        counters_(counters) {}
 
   void OnOpen() override;
   void OnMessage(std::string message) override;
@@ -51,6 +55,7 @@ class SocketCall final : public SocketUser,
 
   // Constant until the socket is gone.
   std::shared_ptr<Socket> socket_;
+  const std::string client_address_;
   ServerPool* const pool_;
   GatewayCounters* const counters_;
   // The strand's.

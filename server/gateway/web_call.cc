@@ -11,6 +11,7 @@
 #include "server/gateway/call_metadata.h"
 #include "server/gateway/method_table.h"
 #include "server/gateway/web_frames.h"
+#include "server/transport/network_address.h"
 
 namespace tissueform {
 namespace {
@@ -61,8 +62,9 @@ absl::Status WebCall::TryBegin(const HttpHead& head, absl::string_view body, Ser
                    absl::UnimplementedError(
                        "this method goes over a WebSocket: GET /call, see docs/gateway.md"));
   }
-  const auto start = StartOf(head);
+  auto start = StartOf(head);
   if (!start.ok()) return counted(GatewayEvent::kMetadataRefused, start.status());
+  start->metadata[kClientAddressHeader] = client_address_;
   const auto message = ParseWebRequest(body);
   if (!message.ok()) return counted(GatewayEvent::kMalformedFrame, message.status());
   auto slot = pool->Take(head.Field("x-tissueform-session"));

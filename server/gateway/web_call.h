@@ -23,9 +23,11 @@ class WebCall final : public ReplySource,
                       public UpstreamUser,
                       public std::enable_shared_from_this<WebCall> {
  public:
-  // `fields`: of every reply of the gateway.
-  WebCall(std::shared_ptr<ReplyStream> reply, HttpFields fields)
-      : reply_(std::move(reply)), fields_(std::move(fields)) {}
+  // `fields`: of every reply of the gateway. `client_address`: what the server is told.
+  WebCall(std::shared_ptr<ReplyStream> reply, HttpFields fields, std::string client_address)
+      : reply_(std::move(reply)),
+        fields_(std::move(fields)),
+        client_address_(std::move(client_address)) {}
 
   // Once. Makes the call, or tells the client why not. `pool` outlives it.
   void Begin(const HttpHead& head, absl::string_view body, ServerPool* pool,
@@ -48,6 +50,7 @@ class WebCall final : public ReplySource,
 
   std::shared_ptr<ReplyStream> reply_;
   const HttpFields fields_;
+  const std::string client_address_;
   std::shared_ptr<UpstreamCall> upstream_;
   bool begun_ = false;
   bool sending_ = false;

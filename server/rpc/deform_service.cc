@@ -96,15 +96,14 @@ grpc::ServerUnaryReactor* DeformService::DeformOnce(grpc::CallbackServerContext*
 grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* DeformService::Deform(
     grpc::CallbackServerContext* context) {
   return new DeformStreamReactor(
-      CallScope(context, "DeformService.Deform", CallKind::kNewWork, gate_), limits_, access_,
+      CallScope(context, "DeformService.Deform", CallKind::kStream, gate_), limits_, access_,
       registry_, streams_, watches_, timer_);
 }
 
 grpc::ServerWriteReactor<grpc::ByteBuffer>* DeformService::Watch(
     grpc::CallbackServerContext* context, const grpc::ByteBuffer* request) {
-  return new WatchStreamReactor(
-      CallScope(context, "DeformService.Watch", CallKind::kNewWork, gate_), *request, limits_,
-      access_, registry_, watches_);
+  return new WatchStreamReactor(CallScope(context, "DeformService.Watch", CallKind::kStream, gate_),
+                                *request, limits_, access_, registry_, watches_, timer_);
 }
 
 grpc::ServerUnaryReactor* DeformService::AcknowledgeWatch(
@@ -114,7 +113,7 @@ grpc::ServerUnaryReactor* DeformService::AcknowledgeWatch(
       context, "DeformService.AcknowledgeWatch", gate_,
       [&](CallScope& scope, const EndCall& end) -> absl::Status {
         TF_ASSIGN_OR_RETURN(const std::string watch, ParseWatchName(request->watch()));
-        TF_RETURN_IF_ERROR(watches_->Acknowledge(watch, request->number(), scope.principal().name));
+        TF_RETURN_IF_ERROR(watches_->Acknowledge(watch, request->number(), scope.authenticated()));
         end(absl::OkStatus());
         return absl::OkStatus();
       });

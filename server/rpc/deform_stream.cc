@@ -44,6 +44,7 @@ DeformStreamReactor::DeformStreamReactor(CallScope scope, const ServiceLimits& l
   if (admission.ok()) {
     deadline_ = timer_->Start(std::chrono::steady_clock::now() + limits_.configuration_deadline,
                               [this] { EndUnlessConfigured(); });
+    WaitForStanding();
     StartRead(&request_);
   } else {
     End(admission);
@@ -87,6 +88,30 @@ void DeformStreamReactor::OnCancel() {
   Advance();
 }
 
+void DeformStreamReactor::WaitForStanding() {
+  if (!scope_.may_end_early()) return;
+  standing_ = timer_->Start(std::chrono::steady_clock::now() + kStandingPeriod,
+                            [this] { CheckStanding(); });
+}
+
+void DeformStreamReactor::CheckStanding() {
+  {
+    MutexLock lock(mutex_);
+    if (finished_) return;
+    const absl::Status good = scope_.StillGood();
+    if (good.ok()) {
+      WaitForStanding();
+      return;
+    }
+    End(good);
+  }
+  // As in OnCancel, with the outcome that is there already.
+  *cancelled_ = true;
+  registry_->CancelWait(cancelled_);
+  MutexLock lock(mutex_);
+  Advance();
+}
+
 void DeformStreamReactor::EndUnlessConfigured() {
   MutexLock lock(mutex_);
   if (flow_.has_value()) return;
@@ -104,11 +129,14 @@ void DeformStreamReactor::OnDone() {
     timer_->Cancel(deadline_);
   }
   DeadlineTimer::Id rest;
+  DeadlineTimer::Id standing;
   {
     MutexLock lock(mutex_);  // whoever called Finish may still hold it
     rest = rest_;
+    standing = standing_;
   }
   timer_->Cancel(rest);
+  timer_->Cancel(standing);
   DeadlineTimer::Id word;
   {
     MutexLock lock(followers_mutex_);  // the publisher is gone: no other word will come
@@ -194,7 +222,7 @@ absl::Status DeformStreamReactor::TakeConfiguration() {
   TF_RETURN_IF_ERROR(
       AllowedSession(access_, &scope_, request_.configuration().session(), Need::kDrag).status());
   TF_ASSIGN_OR_RETURN(stream_request_, ReadStreamRequest(request_.configuration(), limits_));
-  flow_.emplace(stream_request_.max_unacked);
+  flow_.emplace(stream_request_.max_unacked, &streams_->measures());
   StartOpening();
   return absl::OkStatus();
 }

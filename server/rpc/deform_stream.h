@@ -65,6 +65,10 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   void TellFollowers() ABSL_LOCKS_EXCLUDED(mutex_, followers_mutex_);
   void Tell(int followers) ABSL_LOCKS_EXCLUDED(mutex_);
 
+  // Its caller's token may have ended.
+  void WaitForStanding() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void CheckStanding() ABSL_LOCKS_EXCLUDED(mutex_);
+
   // The client has had its time for the configuration.
   void EndUnlessConfigured() ABSL_LOCKS_EXCLUDED(mutex_);
 
@@ -152,7 +156,8 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   std::optional<WaitingPose> to_commit_ ABSL_GUARDED_BY(mutex_);  // the newest that is to be kept
   bool committing_ ABSL_GUARDED_BY(mutex_) = false;
   std::chrono::steady_clock::time_point estimated_at_ ABSL_GUARDED_BY(mutex_);
-  DeadlineTimer::Id rest_ ABSL_GUARDED_BY(mutex_);  // Id(): nothing is waited for
+  DeadlineTimer::Id rest_ ABSL_GUARDED_BY(mutex_);      // Id(): nothing is waited for
+  DeadlineTimer::Id standing_ ABSL_GUARDED_BY(mutex_);  // the next check; Id(): there is none
   bool write_in_flight_ ABSL_GUARDED_BY(mutex_) = false;
   bool finished_ ABSL_GUARDED_BY(mutex_) = false;
   std::optional<absl::Status> outcome_ ABSL_GUARDED_BY(mutex_);  // set: nothing new is started

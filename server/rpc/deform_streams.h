@@ -12,6 +12,7 @@
 #include "absl/status/status.h"
 
 #include "core/base/mutex.h"
+#include "server/session/frame_flow.h"
 
 namespace tissueform {
 
@@ -35,8 +36,13 @@ class DeformStreams {
   std::map<std::string, int64_t> CountByPrincipal() const;
   int size() const;
 
+  // Of all streams there were.
+  FrameMeasures& measures() { return measures_; }
+  const FrameMeasures& measures() const { return measures_; }
+
  private:
   const int max_streams_;
+  FrameMeasures measures_;
 
   mutable Mutex mutex_;
   std::set<DeformStreamReactor*> streams_ ABSL_GUARDED_BY(mutex_);

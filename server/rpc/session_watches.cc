@@ -79,11 +79,12 @@ void SessionWatches::Remove(const std::string& watch) {
 }
 
 absl::Status SessionWatches::Acknowledge(const std::string& watch, uint64_t number,
-                                         const std::string& principal) {
+                                         const Authenticated& by) {
+  const std::string principal = by.principal == nullptr ? "" : by.principal->name;
   MutexLock lock(mutex_);
   const auto found = watches_.find(watch);
   if (found != watches_.end() && found->second.principal == principal) {
-    return found->second.watcher->Acknowledge(number);
+    return found->second.watcher->Acknowledge(number, by);
   }
   return WithReason(absl::NotFoundError(absl::StrCat("no watch \"watches/", watch,
                                                      "\": it has ended; begin another one")),

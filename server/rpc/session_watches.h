@@ -13,6 +13,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/mutex.h"
+#include "server/auth/authenticator.h"
 #include "server/rpc/watch_channel.h"
 #include "server/session/limits.h"
 #include "server/session/session_registry.h"
@@ -26,8 +27,9 @@ v1::DeformNotice DrainingAt(std::chrono::system_clock::time_point end);
 // A watcher who is acknowledged frames.
 class CreditedWatcher : public Watcher {
  public:
-  // Errors: InvalidArgument (a frame that was not sent).
-  virtual absl::Status Acknowledge(uint64_t number) = 0;
+  // `by` whom it is acknowledged: its token may be newer than the watch's. Errors: InvalidArgument
+  // (a frame that was not sent).
+  virtual absl::Status Acknowledge(uint64_t number, const Authenticated& by) = 0;
   // Ends where it may not watch any more.
   virtual void AskAgain() = 0;
 
@@ -59,8 +61,7 @@ class SessionWatches {
   void Remove(const std::string& watch);
 
   // Errors: NotFound (also where the watch is another's), those of CreditedWatcher::Acknowledge.
-  absl::Status Acknowledge(const std::string& watch, uint64_t number,
-                           const std::string& principal = "");
+  absl::Status Acknowledge(const std::string& watch, uint64_t number, const Authenticated& by = {});
 
   // As the registry's observer.
   void OnSessionEvent(const std::string& session_id, SessionRegistry::Event event);

@@ -51,12 +51,14 @@ absl::StatusOr<std::string> ParseWatchName(const std::string& name) {
 
 WatchStreamReactor::WatchStreamReactor(CallScope scope, const grpc::ByteBuffer& request,
                                        const ServiceLimits& limits, const Access& access,
-                                       SessionRegistry* registry, SessionWatches* watches)
+                                       SessionRegistry* registry, SessionWatches* watches,
+                                       DeadlineTimer* timer)
     : scope_(std::move(scope)),
       limits_(limits),
       access_(access),
       registry_(registry),
       watches_(watches),
+      timer_(timer),
       id_(RandomId()),
       principal_(scope_.principal().name) {
   const absl::Status admission =
@@ -64,6 +66,7 @@ WatchStreamReactor::WatchStreamReactor(CallScope scope, const grpc::ByteBuffer& 
   MutexLock lock(mutex_);
   if (admission.ok()) {
     opening_ = true;
+    WaitForStanding();
     // Opening goes on when that is done: then the library has bound the reactor.
     StartSendInitialMetadata();
   } else {
@@ -112,7 +115,10 @@ void WatchStreamReactor::Join(const std::shared_ptr<Session>& session) {
   absl::StatusOr<SessionWatches::Joined> joined = watches_->Add(id_, session_id_, this, principal_);
   // Once more: who was told between the two that less may be watched did not find this watch.
   absl::Status allowed = joined.status();
-  if (allowed.ok()) allowed = access_.MaySession(scope_.principal(), session_id_, Need::kLook);
+  if (allowed.ok()) {
+    MutexLock lock(mutex_);
+    allowed = access_.MaySession(scope_.principal(), session_id_, Need::kLook);
+  }
   if (!allowed.ok() || joined->has_frame) {
     FinishOpening(allowed);
     return;
@@ -172,10 +178,37 @@ void WatchStreamReactor::OnCancel() {
 
 void WatchStreamReactor::OnDone() {
   watches_->Remove(id_);
+  DeadlineTimer::Id standing;
   {
     MutexLock lock(mutex_);  // whoever called Finish may still hold it
+    standing = standing_;
   }
+  timer_->Cancel(standing);
   delete this;
+}
+
+void WatchStreamReactor::WaitForStanding() {
+  if (!scope_.may_end_early()) return;
+  standing_ = timer_->Start(std::chrono::steady_clock::now() + kStandingPeriod,
+                            [this] { CheckStanding(); });
+}
+
+void WatchStreamReactor::CheckStanding() {
+  {
+    MutexLock lock(mutex_);
+    if (finished_) return;
+    const absl::Status good = scope_.StillGood();
+    if (good.ok()) {
+      WaitForStanding();
+      return;
+    }
+    End(good);
+  }
+  // As in OnCancel, with the outcome that is there already.
+  *cancelled_ = true;
+  registry_->CancelWait(cancelled_);
+  MutexLock lock(mutex_);
+  Advance();
 }
 
 void WatchStreamReactor::Show(const std::shared_ptr<const WatchedFrame>& frame) {
@@ -196,13 +229,14 @@ void WatchStreamReactor::EndWatch(const absl::Status& outcome) {
   Advance();
 }
 
-absl::Status WatchStreamReactor::Acknowledge(uint64_t number) {
+absl::Status WatchStreamReactor::Acknowledge(uint64_t number, const Authenticated& by) {
   MutexLock lock(mutex_);
   if (number > last_sent_) {
     return absl::InvalidArgumentError(
         absl::StrCat("ack of frame ", number, ", but the last one that was sent is ", last_sent_,
                      "; acknowledge frames that arrived"));
   }
+  scope_.RenewFrom(by);
   while (!unacked_.empty() && unacked_.front() <= number) unacked_.pop_front();
   Advance();
   return absl::OkStatus();

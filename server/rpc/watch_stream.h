@@ -20,6 +20,7 @@
 #include "server/access/access.h"
 #include "server/calls/call_scope.h"
 #include "server/rpc/session_watches.h"
+#include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
 #include "server/session/session_registry.h"
 
@@ -37,7 +38,8 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
  public:
   // `request` is a WatchRequest; all other pointers must outlive the stream.
   WatchStreamReactor(CallScope scope, const grpc::ByteBuffer& request, const ServiceLimits& limits,
-                     const Access& access, SessionRegistry* registry, SessionWatches* watches);
+                     const Access& access, SessionRegistry* registry, SessionWatches* watches,
+                     DeadlineTimer* timer);
 
   void OnSendInitialMetadataDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -47,10 +49,14 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   void Show(const std::shared_ptr<const WatchedFrame>& frame) override;
   void Tell(const v1::DeformNotice& notice) override;
   void EndWatch(const absl::Status& outcome) override;
-  absl::Status Acknowledge(uint64_t number) override;
+  absl::Status Acknowledge(uint64_t number, const Authenticated& by) override;
   void AskAgain() override;
 
  private:
+  // Its caller's token may have ended.
+  void WaitForStanding() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void CheckStanding() ABSL_LOCKS_EXCLUDED(mutex_);
+
   absl::Status ReadRequest(const grpc::ByteBuffer& bytes);
 
   void TakeSession(absl::StatusOr<std::shared_ptr<Session>> session) ABSL_LOCKS_EXCLUDED(mutex_);
@@ -72,6 +78,7 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   const Access& access_;
   SessionRegistry* const registry_;
   SessionWatches* const watches_;
+  DeadlineTimer* const timer_;
   const std::string id_;
   const std::string principal_;
   std::string session_id_;
@@ -88,6 +95,7 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   std::deque<v1::DeformNotice> notices_ ABSL_GUARDED_BY(mutex_);
   std::deque<uint64_t> unacked_ ABSL_GUARDED_BY(mutex_);  // rising
   uint64_t last_sent_ ABSL_GUARDED_BY(mutex_) = 0;
+  DeadlineTimer::Id standing_ ABSL_GUARDED_BY(mutex_);  // the next check; Id(): there is none
   bool finished_ ABSL_GUARDED_BY(mutex_) = false;
   std::optional<absl::Status> ending_ ABSL_GUARDED_BY(mutex_);   // after what may still be sent
   std::optional<absl::Status> outcome_ ABSL_GUARDED_BY(mutex_);  // set: nothing new is started

@@ -23,7 +23,11 @@ absl::Status FrameFlow::CheckSequence(uint64_t sequence) const {
 absl::Status FrameFlow::Put(uint64_t sequence, std::vector<HandlePose> poses) {
   TF_RETURN_IF_ERROR(CheckSequence(sequence));
   const int64_t coalesced_count = mailbox_.has_value() ? mailbox_->coalesced_count + 1 : 0;
-  mailbox_ = {sequence, coalesced_count, std::move(poses)};
+  mailbox_ = {sequence, coalesced_count, std::move(poses), std::chrono::steady_clock::now()};
+  if (measures_ != nullptr) {
+    ++measures_->poses;
+    if (coalesced_count > 0) ++measures_->coalesced_poses;
+  }
   last_sequence_ = sequence;
   estimated_.reset();
   return absl::OkStatus();
@@ -37,7 +41,11 @@ absl::Status FrameFlow::Acknowledge(uint64_t sequence, std::optional<int32_t> re
         absl::StrCat("ack of frame ", sequence, ", refinement ", acknowledged.second,
                      ", which was not sent; acknowledge frames that arrived"));
   }
-  while (!unacked_.empty() && unacked_.front() <= acknowledged) {
+  while (!unacked_.empty() && unacked_.front().number <= acknowledged) {
+    if (measures_ != nullptr && unacked_.front().number == acknowledged) {
+      measures_->picture_age.Observe(std::chrono::steady_clock::now() -
+                                     unacked_.front().pose_arrived);
+    }
     unacked_.pop_front();
   }
   return absl::OkStatus();
@@ -63,6 +71,7 @@ bool FrameFlow::StartRefinement(bool at_rest) {
 void FrameFlow::PutBack(WaitingPose pose) {
   if (mailbox_.has_value()) {
     mailbox_->coalesced_count += pose.coalesced_count + 1;
+    if (measures_ != nullptr) ++measures_->coalesced_poses;
   } else {
     mailbox_ = std::move(pose);
   }
@@ -93,6 +102,19 @@ void FrameFlow::FinishEstimate(AnswerFrame frame, WaitingPose pose) {
   Offer(std::move(frame));
 }
 
+std::optional<WaitingPose> FrameFlow::StartOn(std::optional<WaitingPose> pose) {
+  if (pose.has_value()) pose_arrived_ = pose->arrived;
+  return pose;
+}
+
+std::optional<AnswerFrame> FrameFlow::TakeFrame() {
+  if (frame_.has_value() && measures_ != nullptr) {
+    ++measures_->frames;
+    measures_->latency.Observe(std::chrono::steady_clock::now() - pose_arrived_);
+  }
+  return std::exchange(frame_, std::nullopt);
+}
+
 void FrameFlow::Offer(AnswerFrame frame) {
   if (frame_.has_value()) {
     // The same pose, and the same credit: nothing else is computed while a frame waits.
@@ -100,7 +122,7 @@ void FrameFlow::Offer(AnswerFrame frame) {
   } else {
     frame.refinement = CountFrames(frame.sequence);
     last_frame_ = FrameNumber(frame.sequence, frame.refinement);
-    unacked_.push_back(*last_frame_);
+    unacked_.push_back({*last_frame_, pose_arrived_});
   }
   if (frame.refinement > 0) {
     frame.coalesced_count = 0;  // told by the first frame of the pose

@@ -3,6 +3,8 @@
 
 #pragma once
 
+#include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -12,6 +14,7 @@
 
 #include "absl/status/status.h"
 
+#include "core/base/duration_histogram.h"
 #include "core/constraints/handle_pose.h"
 #include "core/deformation/deformer.h"
 
@@ -22,6 +25,16 @@ struct WaitingPose {
   uint64_t sequence = 0;
   int64_t coalesced_count = 0;  // poses that it replaced
   std::vector<HandlePose> poses;
+  std::chrono::steady_clock::time_point arrived = {};
+};
+
+// What the drags of a server have done, for whoever watches it. Thread-safe.
+struct FrameMeasures {
+  std::atomic<int64_t> poses = 0;
+  std::atomic<int64_t> coalesced_poses = 0;  // replaced by a newer one before they were answered
+  std::atomic<int64_t> frames = 0;           // taken to be written
+  DurationHistogram latency;                 // of each: since its pose came
+  DurationHistogram picture_age;  // since the pose of a frame came, when the client has used it
 };
 
 // An answer to a pose, on its way to the client.
@@ -44,7 +57,9 @@ struct AnswerFrame {
 class FrameFlow {
  public:
   // At most `max_unacked` frames are on their way without acknowledgement.
-  explicit FrameFlow(size_t max_unacked) : max_unacked_(max_unacked) {}
+  // `measures`, which may be null, must outlive it.
+  explicit FrameFlow(size_t max_unacked, FrameMeasures* measures = nullptr)
+      : max_unacked_(max_unacked), measures_(measures) {}
 
   // The client. A pose replaces the one that waits. Errors: InvalidArgument when `sequence` does
   // not rise.
@@ -64,7 +79,7 @@ class FrameFlow {
   // waits for its write (a newer pose may still come for the next one): a solve is under way then.
   bool StartSolve();
   // The newest pose at this moment. REQUIRES: StartSolve was true.
-  std::optional<WaitingPose> TakePose() { return std::exchange(mailbox_, std::nullopt); }
+  std::optional<WaitingPose> TakePose() { return StartOn(std::exchange(mailbox_, std::nullopt)); }
   // A pose that was taken and could not be answered, to be answered later unless a newer one waits.
   void PutBack(WaitingPose pose);
   // The answer, or nothing when there is none. One whose solve was given up (summary.cancelled) is
@@ -77,7 +92,9 @@ class FrameFlow {
   // only when the hand rests: `at_rest`.
   bool StartRefinement(bool at_rest);
   // REQUIRES: StartRefinement was true.
-  std::optional<WaitingPose> TakeRefinement() { return std::exchange(estimated_, std::nullopt); }
+  std::optional<WaitingPose> TakeRefinement() {
+    return StartOn(std::exchange(estimated_, std::nullopt));
+  }
   bool has_estimate() const { return estimated_.has_value(); }
 
   // What to do with an answer that is not the last one to its pose.
@@ -90,7 +107,7 @@ class FrameFlow {
   void OfferEarly(AnswerFrame frame);
 
   // The frame that is to be written now, if any.
-  std::optional<AnswerFrame> TakeFrame() { return std::exchange(frame_, std::nullopt); }
+  std::optional<AnswerFrame> TakeFrame();
 
   // Something is prepared or solved.
   bool busy() const { return busy_; }
@@ -102,6 +119,14 @@ class FrameFlow {
  private:
   // Sequence of the pose and how often it was refined; frames go out in rising order.
   using FrameNumber = std::pair<uint64_t, int32_t>;
+  using TimePoint = std::chrono::steady_clock::time_point;
+  struct SentFrame {
+    FrameNumber number;
+    TimePoint pose_arrived;
+  };
+
+  // The pose that is answered from now on.
+  std::optional<WaitingPose> StartOn(std::optional<WaitingPose> pose);
 
   // Neither is something under way, nor does a frame wait, and there is a credit.
   bool MayStart() const;
@@ -111,11 +136,13 @@ class FrameFlow {
   void Offer(AnswerFrame frame);
 
   const size_t max_unacked_;
+  FrameMeasures* const measures_;
 
   std::optional<uint64_t> last_sequence_;
   std::optional<WaitingPose> mailbox_;
   std::optional<WaitingPose> estimated_;  // answered by an estimate only
-  std::deque<FrameNumber> unacked_;       // frames made and not acknowledged, rising
+  std::deque<SentFrame> unacked_;         // frames made and not acknowledged, rising
+  TimePoint pose_arrived_;                // of the pose that is or was answered last
   std::optional<FrameNumber> last_frame_;
   std::optional<AnswerFrame> frame_;
   bool busy_ = false;

@@ -4,8 +4,11 @@
 #include "server/session/memory_budget.h"
 
 #include <algorithm>
+#include <memory>
+#include <string>
 #include <utility>
 
+#include "absl/memory/memory.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
@@ -14,6 +17,9 @@
 
 namespace tissueform {
 namespace {
+
+// When a session that nobody uses any longer may be evicted (SessionEndings::kInUse).
+constexpr int64_t kSessionsInUseMs = 10'000;
 
 std::string Mebibytes(int64_t bytes) {
   return absl::StrFormat("%.1f MiB", static_cast<double>(bytes) / (1 << 20));
@@ -62,25 +68,59 @@ int64_t MemoryBudget::most_reserved_bytes() const {
   return most_reserved_bytes_;
 }
 
-absl::Status MemoryBudget::Take(int64_t bytes, absl::string_view what) {
-  if (TryTake(bytes)) {
-    return absl::OkStatus();
+void MemoryBudget::set_account_limit(int64_t bytes, AccountReclaimer reclaimer) {
+  account_limit_bytes_ = bytes;
+  account_reclaimer_ = std::move(reclaimer);
+}
+
+MemoryBudget* MemoryBudget::AccountOf(const std::string& owner) {
+  if (owner.empty() || account_limit_bytes_ == 0) return this;
+  MutexLock lock(accounts_mutex_);
+  std::unique_ptr<MemoryBudget>& account = accounts_[owner];
+  if (account == nullptr) {
+    account = absl::WrapUnique(new MemoryBudget(account_limit_bytes_, this));
+    account->set_reclaimer([this, owner](int64_t bytes) { account_reclaimer_(owner, bytes); });
   }
+  return account.get();
+}
+
+absl::Status MemoryBudget::Take(int64_t bytes, absl::string_view what) {
+  bool taken = TryTake(bytes);
   // Once more and no oftener: it has given back all that can be spared, and another may have taken
   // that. No lock is held, since what is reclaimed comes back through GiveBack.
-  if (reclaimer_) {
+  if (!taken && reclaimer_) {
     reclaimer_(bytes);
-    if (TryTake(bytes)) {
-      return absl::OkStatus();
-    }
+    taken = TryTake(bytes);
   }
+  if (!taken) return Refusal(bytes, what);
+  if (whole_ == nullptr) return absl::OkStatus();
+  const absl::Status of_whole = whole_->Take(bytes, what);
+  if (!of_whole.ok()) GiveBackHere(bytes);
+  return of_whole;
+}
+
+absl::Status MemoryBudget::Refusal(int64_t bytes, absl::string_view what) const {
+  const std::string needs =
+      absl::StrCat("no room for the ", what, ": it needs ", Mebibytes(bytes), ", and ",
+                   Mebibytes(reserved_bytes()), " of ", Mebibytes(limit_bytes_));
+  const ErrorMetadata numbers = {{"needed_bytes", absl::StrCat(bytes)},
+                                 {"limit_bytes", absl::StrCat(limit_bytes_)}};
+  if (whole_ == nullptr) {
+    return WithReason(
+        absl::ResourceExhaustedError(absl::StrCat(
+            needs,
+            " are taken; delete sessions or meshes, or raise --memory-budget-mib of the "
+            "server")),
+        ErrorReason::kMemoryBudgetFull, numbers);
+  }
+  ErrorMetadata of_quota = numbers;
+  of_quota["quota"] = "memory-mib";
+  of_quota["retry_after_ms"] = absl::StrCat(kSessionsInUseMs);
   return WithReason(
       absl::ResourceExhaustedError(absl::StrCat(
-          "no room for the ", what, ": it needs ", Mebibytes(bytes), ", and ",
-          Mebibytes(reserved_bytes()), " of ", Mebibytes(limit_bytes_),
-          " are taken; delete sessions or meshes, or raise --memory-budget-mib of the server")),
-      ErrorReason::kMemoryBudgetFull,
-      {{"needed_bytes", absl::StrCat(bytes)}, {"limit_bytes", absl::StrCat(limit_bytes_)}});
+          needs, " that you may have are taken; delete sessions, try again in ",
+          kSessionsInUseMs / 1000, " s, or ask for more (--quota-memory-mib of the server)")),
+      ErrorReason::kQuotaExceeded, of_quota);
 }
 
 bool MemoryBudget::TryTake(int64_t bytes) {
@@ -95,6 +135,11 @@ bool MemoryBudget::TryTake(int64_t bytes) {
 }
 
 void MemoryBudget::GiveBack(int64_t bytes) {
+  GiveBackHere(bytes);
+  if (whole_ != nullptr) whole_->GiveBack(bytes);
+}
+
+void MemoryBudget::GiveBackHere(int64_t bytes) {
   MutexLock lock(mutex_);
   reserved_bytes_ -= bytes;
 }

@@ -235,6 +235,16 @@ int MeshCatalog::RemoveIdle(Clock::Duration idle) {
   return static_cast<int>(removed.size());
 }
 
+MeshCatalog::Held MeshCatalog::CountHeld() const {
+  MutexLock lock(mutex_);
+  Held held;
+  for (const auto& [sha256, entry] : meshes_) {
+    ++held.meshes;
+    held.bytes += entry.mesh->reservation.bytes();
+  }
+  return held;
+}
+
 std::vector<std::string> MeshCatalog::UsedSince(Clock::TimePoint since) {
   std::vector<std::string> used;
   MutexLock lock(mutex_);

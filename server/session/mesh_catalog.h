@@ -108,6 +108,13 @@ class MeshCatalog {
   // Returns how many.
   int RemoveIdle(Clock::Duration idle);
 
+  // In memory, and the bytes that they have reserved.
+  struct Held {
+    int64_t meshes = 0;
+    int64_t bytes = 0;
+  };
+  Held CountHeld() const;
+
   // Those in memory that somebody holds, or has asked for after `since`.
   std::vector<std::string> UsedSince(Clock::TimePoint since);
   // Takes a mesh out of memory and store unless it is one of these, or is on its way here. The
@@ -137,7 +144,7 @@ class MeshCatalog {
   const UnixClock unix_clock_;
   std::function<void(const std::string&)> on_removed_ = [](const std::string& /*sha256*/) {};
 
-  Mutex mutex_;
+  mutable Mutex mutex_;
   std::map<std::string, Entry, std::less<>> meshes_ ABSL_GUARDED_BY(mutex_);
   std::multiset<std::string> arriving_ ABSL_GUARDED_BY(mutex_);
   std::set<std::string> removing_ ABSL_GUARDED_BY(mutex_);

@@ -27,8 +27,9 @@ void SessionMaker::Make(SessionRecord record, std::shared_ptr<const StoredMesh> 
                              preparation = std::move(preparation), caller = std::move(caller),
                              follower = std::move(follower), done = std::move(done)]() mutable {
     caller.Tell(SessionStage::kAssembling);
-    absl::StatusOr<std::shared_ptr<Session>> session = Session::Create(
-        record, std::move(mesh), preparation, budget_, pool_, clock_, caller.cancellation);
+    absl::StatusOr<std::shared_ptr<Session>> session =
+        Session::Create(record, std::move(mesh), preparation, budget_->AccountOf(record.owner),
+                        pool_, clock_, caller.cancellation);
     follower.reset();
     if (!session.ok()) {
       preparation.reset();

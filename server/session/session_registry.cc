@@ -189,6 +189,11 @@ int SessionRegistry::size() const {
   return static_cast<int>(sessions_.table.num_loaded_in_table());
 }
 
+int SessionRegistry::CountKnown() const {
+  MutexLock lock(sessions_.mutex);
+  return static_cast<int>(sessions_.table.num_known());
+}
+
 int SessionRegistry::CountMadeFrom(const std::string& mesh_sha256) const {
   MutexLock lock(sessions_.mutex);
   return sessions_.table.CountMadeFrom(mesh_sha256);

@@ -161,6 +161,8 @@ class SessionRegistry {
   // In memory.
   std::vector<std::shared_ptr<Session>> Loaded() const;
   int size() const;
+  // In memory or not.
+  int CountKnown() const;
   // In memory or not, those that are being made and those whose record is not gone yet.
   int CountMadeFrom(const std::string& mesh_sha256) const;
 

@@ -206,7 +206,7 @@ std::shared_ptr<SharedPreparation> SharedPreparations::Find(const SessionRecord&
   std::weak_ptr<SharedPreparation>& known = known_[std::move(digest)];
   std::shared_ptr<SharedPreparation> preparation = known.lock();
   if (preparation == nullptr) {
-    preparation = std::make_shared<SharedPreparation>(budget_, pool_);
+    preparation = std::make_shared<SharedPreparation>(budget_->AccountOf(record.owner), pool_);
     known = preparation;
   }
   return preparation;

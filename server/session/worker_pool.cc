@@ -47,17 +47,23 @@ WorkerPool::~WorkerPool() {
   }
 }
 
-void WorkerPool::Post(Lane lane, Job job) {
+void WorkerPool::Post(Lane lane, Job job, std::chrono::steady_clock::time_point since) {
   MutexLock lock(mutex_);
   Queue& queue = queues_[static_cast<size_t>(lane)];
-  queue.jobs.push_back(std::move(job));
+  queue.jobs.push_back({std::move(job), since});
   ++unfinished_;
   // Under the lock: once the job has run, whoever waited for it may destroy the pool.
   queue.job_or_stop.NotifyOne();
 }
 
+size_t WorkerPool::CountQueued(Lane lane) const {
+  MutexLock lock(mutex_);
+  return queues_[static_cast<size_t>(lane)].jobs.size();
+}
+
 void WorkerPool::Work(Lane lane) {
   BecomeNicer(kNiceness[static_cast<size_t>(lane)]);
+  LaneMeasures& measures = measures_[static_cast<size_t>(lane)];
   MutexLock lock(mutex_);
   Queue& queue = queues_[static_cast<size_t>(lane)];
   while (true) {
@@ -67,11 +73,14 @@ void WorkerPool::Work(Lane lane) {
     if (queue.jobs.empty()) {
       return;
     }
-    Job job = std::move(queue.jobs.front());
+    QueuedJob job = std::move(queue.jobs.front());
     queue.jobs.pop_front();
     mutex_.Unlock();
-    job();
-    job = nullptr;  // what it holds goes before anybody sees it finished
+    const auto start = std::chrono::steady_clock::now();
+    measures.waited.Observe(start - job.since);
+    job.job();
+    measures.ran.Observe(std::chrono::steady_clock::now() - start);
+    job.job = nullptr;  // what it holds goes before anybody sees it finished
     mutex_.Lock();
     if (--unfinished_ == 0 && stopping_) {
       for (Queue& other : queues_) other.job_or_stop.NotifyAll();
@@ -84,9 +93,10 @@ Strand::Strand(WorkerPool* pool) : queue_(std::make_shared<Queue>(pool)) {}
 void Strand::Post(Lane lane, WorkerPool::Job job) {
   // The job may own this strand, and may have run before this function ends.
   const std::shared_ptr<Queue> queue = queue_;
+  const auto now = std::chrono::steady_clock::now();
   {
     MutexLock lock(queue->mutex);
-    queue->jobs.push_back({lane, std::move(job)});
+    queue->jobs.push_back({lane, std::move(job), now});
     // Set until the queue is empty: one RunOne of a strand is on its way at most, which keeps the
     // order without a lock over a running job.
     if (queue->running) {
@@ -94,7 +104,8 @@ void Strand::Post(Lane lane, WorkerPool::Job job) {
     }
     queue->running = true;
   }
-  queue->pool->Post(lane, [queue] { RunOne(queue); });
+  queue->pool->Post(
+      lane, [queue] { RunOne(queue); }, now);
 }
 
 void Strand::RunOne(const std::shared_ptr<Queue>& queue) {
@@ -107,6 +118,7 @@ void Strand::RunOne(const std::shared_ptr<Queue>& queue) {
   job();
   job = nullptr;  // what it holds goes while it is still this strand's turn
   Lane next = Lane::kBatch;
+  std::chrono::steady_clock::time_point since;
   {
     MutexLock lock(queue->mutex);
     if (queue->jobs.empty()) {
@@ -114,8 +126,10 @@ void Strand::RunOne(const std::shared_ptr<Queue>& queue) {
       return;
     }
     next = queue->jobs.front().lane;
+    since = queue->jobs.front().since;
   }
-  queue->pool->Post(next, [queue] { RunOne(queue); });
+  queue->pool->Post(
+      next, [queue] { RunOne(queue); }, since);
 }
 
 }  // namespace tissueform

@@ -4,13 +4,16 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <deque>
 #include <functional>
 #include <memory>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include "core/base/duration_histogram.h"
 #include "core/base/mutex.h"
 
 namespace tissueform {
@@ -33,6 +36,12 @@ class WorkerPool {
  public:
   using Job = std::function<void()>;
 
+  // What a lane has done. Thread-safe.
+  struct LaneMeasures {
+    DurationHistogram waited;  // each job, since it was posted, or its strand was given it
+    DurationHistogram ran;
+  };
+
   // REQUIRES: num_threads > 0, for each lane.
   explicit WorkerPool(int num_threads);
   // Runs what is queued, then ends.
@@ -40,17 +49,29 @@ class WorkerPool {
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
-  void Post(Lane lane, Job job);
+  void Post(Lane lane, Job job) { Post(lane, std::move(job), std::chrono::steady_clock::now()); }
+  // One that waits since then.
+  void Post(Lane lane, Job job, std::chrono::steady_clock::time_point since);
+
+  const LaneMeasures& measures(Lane lane) const { return measures_[static_cast<size_t>(lane)]; }
+  // Jobs that no thread has taken yet; what waits in strands is not in a lane.
+  size_t CountQueued(Lane lane) const;
 
  private:
+  struct QueuedJob {
+    Job job;
+    std::chrono::steady_clock::time_point since;
+  };
   struct Queue {
-    std::deque<Job> jobs;
+    std::deque<QueuedJob> jobs;
     ConditionVariable job_or_stop;
   };
 
   void Work(Lane lane);
 
-  Mutex mutex_;
+  std::array<LaneMeasures, kNumLanes> measures_;
+
+  mutable Mutex mutex_;
   std::array<Queue, kNumLanes> queues_ ABSL_GUARDED_BY(mutex_);
   // Queued or running, in all lanes: a job may post to another lane while the pool ends.
   int unfinished_ ABSL_GUARDED_BY(mutex_) = 0;
@@ -75,6 +96,7 @@ class Strand {
   struct LaneJob {
     Lane lane = Lane::kBatch;
     WorkerPool::Job job;
+    std::chrono::steady_clock::time_point since;
   };
   struct Queue {
     explicit Queue(WorkerPool* worker_pool) : pool(worker_pool) {}

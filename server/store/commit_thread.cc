@@ -33,6 +33,7 @@ CommitThread::~CommitThread() {
 }
 
 void CommitThread::Submit(Job job) {
+  job.submitted = std::chrono::steady_clock::now();
   {
     MutexLock lock(mutex_);
     waiting_.push_back(std::move(job));
@@ -97,6 +98,7 @@ void CommitThread::Answer(std::vector<Job> jobs) {
   }
   if (log_holds_erased_) TruncateLog();
   for (size_t i = 0; i < jobs.size(); ++i) {
+    latency_.Observe(std::chrono::steady_clock::now() - jobs[i].submitted);
     if (jobs[i].done) jobs[i].done(std::move(answers[i]));
   }
 }

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <chrono>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -11,6 +12,7 @@
 
 #include "absl/status/status.h"
 
+#include "core/base/duration_histogram.h"
 #include "core/base/mutex.h"
 #include "server/store/database.h"
 
@@ -33,6 +35,7 @@ class CommitThread {
     bool erases = false;
     // Called once, on this thread, without a lock held. It may submit, but not Run.
     std::function<void(absl::Status)> done = nullptr;
+    std::chrono::steady_clock::time_point submitted = {};  // set by Submit
   };
 
   // `check` is asked after every commit; its error is the answer to all that was in it.
@@ -46,6 +49,9 @@ class CommitThread {
   void Submit(Job job);
   // Submits and waits. Any thread but its own, where it is an Internal error.
   absl::Status Run(Job job);
+
+  // Of each job, from Submit to its answer.
+  const DurationHistogram& latency() const { return latency_; }
 
  private:
   void Loop();
@@ -61,6 +67,8 @@ class CommitThread {
   const std::unique_ptr<Database> database_;
   const std::function<absl::Status()> check_;
   bool log_holds_erased_ = false;
+
+  DurationHistogram latency_;
 
   Mutex mutex_;
   ConditionVariable changed_;

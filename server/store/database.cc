@@ -33,6 +33,9 @@ constexpr char kSettings[] =
     "PRAGMA foreign_keys=ON;"
     "PRAGMA trusted_schema=OFF;"
     "PRAGMA cell_size_check=ON;";
+constexpr char kSettingsForReading[] =
+    "PRAGMA trusted_schema=OFF;"
+    "PRAGMA cell_size_check=ON;";
 
 bool NoRoom(int error_number) {
   return error_number == ENOSPC || error_number == EDQUOT || error_number == EFBIG;
@@ -149,15 +152,24 @@ absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::string& path
   // Made here, so that nobody else may read it, whatever the umask; SQLite gives its other files
   // the same rights.
   TF_RETURN_IF_ERROR(OpenFile::Open(path, O_RDWR | O_CREAT).status());
+  return Open(path, SQLITE_OPEN_READWRITE, kSettings);
+}
+
+absl::StatusOr<std::unique_ptr<Database>> Database::OpenForReading(const std::string& path) {
+  TF_RETURN_IF_ERROR(OpenFile::Open(path, O_RDONLY).status());
+  return Open(path, SQLITE_OPEN_READONLY, kSettingsForReading);
+}
+
+absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::string& path, int flags,
+                                                         const char* settings) {
   sqlite3* handle = nullptr;
-  const int result =
-      sqlite3_open_v2(path.c_str(), &handle, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, nullptr);
+  const int result = sqlite3_open_v2(path.c_str(), &handle, flags | SQLITE_OPEN_NOMUTEX, nullptr);
   if (handle == nullptr) return absl::ResourceExhaustedError("no memory for a database");
   std::unique_ptr<Database> database(new Database(path, handle));
   if (result != SQLITE_OK) return database->Error();
   sqlite3_extended_result_codes(handle, 1);
   sqlite3_busy_timeout(handle, kBusyMs);
-  TF_RETURN_IF_ERROR(database->Execute(kSettings));
+  TF_RETURN_IF_ERROR(database->Execute(settings));
   return database;
 }
 

@@ -63,6 +63,8 @@ class Database {
 
   // Opens the database, or makes an empty one; sync its folder then.
   static absl::StatusOr<std::unique_ptr<Database>> Open(const std::string& path);
+  // For reading a file that nobody writes; no other file is made beside it. Errors: NotFound.
+  static absl::StatusOr<std::unique_ptr<Database>> OpenForReading(const std::string& path);
   ~Database();
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;
@@ -85,6 +87,8 @@ class Database {
  private:
   Database(std::string path, sqlite3* handle) : path_(std::move(path)), handle_(handle) {}
 
+  static absl::StatusOr<std::unique_ptr<Database>> Open(const std::string& path, int flags,
+                                                        const char* settings);
   absl::Status Error() const;
 
   const std::string path_;

@@ -55,6 +55,8 @@ class DurableStore final : public Stores {
   PredictionStore& predictions() override;
   CaseStore& cases() override;
   CommitThread* commit_thread() override;
+  const DurationHistogram* latency() const override;
+  std::string folder() const override;
 
   const std::vector<DamagedItem>& damaged() const;
 

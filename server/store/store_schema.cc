@@ -136,7 +136,7 @@ absl::StatusOr<bool> CopyRows(Database& damaged, Database& fresh, const Table& t
 
 }  // namespace
 
-absl::Status PrepareSchema(Database& database, int64_t now_s) {
+absl::StatusOr<int64_t> SchemaVersionOf(Database& database) {
   TF_ASSIGN_OR_RETURN(const int64_t version, Pragma(database, "PRAGMA user_version"));
   TF_ASSIGN_OR_RETURN(const int64_t application, Pragma(database, "PRAGMA application_id"));
   TF_ASSIGN_OR_RETURN(const int64_t pages, Pragma(database, "SELECT count(*) FROM sqlite_schema"));
@@ -149,6 +149,11 @@ absl::Status PrepareSchema(Database& database, int64_t now_s) {
         "database ", database.path(), " has been written by a newer server (version ", version,
         ", this one knows ", kSchemaVersion, "); start that one, or name another --data-dir"));
   }
+  return version;
+}
+
+absl::Status PrepareSchema(Database& database, int64_t now_s) {
+  TF_ASSIGN_OR_RETURN(const int64_t version, SchemaVersionOf(database));
   if (version == kSchemaVersion) return absl::OkStatus();
   TF_RETURN_IF_ERROR(database.Execute("BEGIN IMMEDIATE"));
   absl::Cleanup roll_back = [&database] {

@@ -29,10 +29,15 @@ namespace tissueform {
 // nobody had a right.
 inline constexpr int64_t kSchemaVersion = 4;
 
+// The version of a database of ours; 0 for an empty one. Nothing is changed.
+//
+// Errors: FailedPrecondition (a newer version, or not a database of ours), or those of Database.
+absl::StatusOr<int64_t> SchemaVersionOf(Database& database);
+
 // Makes the tables in an empty database, or brings those of a version before up to date, in one
 // transaction; rows that had no times get `now_s`.
 //
-// Errors: FailedPrecondition (a newer version, or not a database of ours), or those of Database.
+// Errors: those of SchemaVersionOf.
 absl::Status PrepareSchema(Database& database, int64_t now_s);
 
 // OK when SQLite finds nothing wrong with the file; otherwise DataLoss with its first complaint.

@@ -3,6 +3,9 @@
 
 #pragma once
 
+#include <string>
+
+#include "core/base/duration_histogram.h"
 #include "server/store/case_store.h"
 #include "server/store/mesh_store.h"
 #include "server/store/prediction_store.h"
@@ -29,6 +32,10 @@ class Stores {
   // Of the database in which other rooms keep rows of theirs, too; null: nothing outlives the
   // process.
   virtual CommitThread* commit_thread() { return nullptr; }
+  // Of each reading or writing of rows, until it is durable; null where nothing is.
+  virtual const DurationHistogram* latency() const { return nullptr; }
+  // Where it is kept; empty: in memory.
+  virtual std::string folder() const { return {}; }
 };
 
 }  // namespace tissueform

@@ -3,6 +3,7 @@
 
 import { type ChildProcess, execFileSync, spawn } from "node:child_process";
 import { chmodSync, cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -66,15 +67,21 @@ export class Planner {
   private gateway: Program | null = null;
   private readonly browsers: Browser[] = [];
 
-  /** `casePath`: of a case; left out: one of the bundled head with three segments, without the surfaces that surround it. */
-  static async start(casePath?: string): Promise<Planner> {
-    const planner = new Planner();
+  private constructor(private readonly serverOptions: string[]) {}
+
+  /**
+   * `casePath`: of a case; left out: one of the bundled head with three segments, without the surfaces that surround it.
+   * `options`: more of the programs.
+   */
+  static async start(casePath?: string, options: { gateway?: string[]; server?: string[] } = {}): Promise<Planner> {
+    const planner = new Planner(options.server ?? []);
     chmodSync(planner.folder, 0o700);
     if (casePath !== undefined) planner.casePath = casePath;
     else execFileSync(join(BIN, "tissueform"), ["case", "pack", planner.writePlan(false), "--out", planner.casePath]);
     await planner.startServer();
     planner.gateway = await Program.start("tissueform-gateway", [
       "--server", planner.serverAddress, "--listen", "127.0.0.1:0", "--web", WEB, "--drain-seconds", "1",
+      ...(options.gateway ?? []),
     ]);
     return planner;
   }
@@ -103,7 +110,7 @@ export class Planner {
   async startServer(): Promise<void> {
     const port = this.serverAddress.split(":")[1];
     const data = join(this.folder, "data");
-    const options = ["--port", port, "--data-dir", data, "--workers", "2", "--drain-seconds", "3"];
+    const options = ["--port", port, "--data-dir", data, "--workers", "2", "--drain-seconds", "3", ...this.serverOptions];
     this.server = await Program.start("tissueform-server", options);
     this.serverAddress = this.server.address;
   }
@@ -142,15 +149,17 @@ export class Planner {
   }
 }
 
-/** A page that fails its test when it asks another host, breaks the content security policy or throws. */
-export async function openPage(context: BrowserContext, url: string): Promise<{ page: Page; faults: string[] }> {
+/** A page that fails its test when it asks a host that is not its own or one of `others` (whose pages may ask what they like), breaks the content security policy or throws. */
+export async function openPage(context: BrowserContext, url: string, others: string[] = []): Promise<{ page: Page; faults: string[] }> {
   const page = await context.newPage();
   const faults: string[] = [];
-  const host = new URL(url).host;
+  const foreign = others.map((address) => new URL(address).host);
+  const hosts = [new URL(url).host, ...foreign];
   page.on("pageerror", (error) => faults.push(error.message));
   page.on("request", (request) => {
     const asked = new URL(request.url());
-    if (asked.protocol.startsWith("http") && asked.host !== host) faults.push(`asked ${asked.host}`);
+    const isTheirs = page.url() !== "about:blank" && foreign.includes(new URL(page.url()).host);
+    if (!isTheirs && asked.protocol.startsWith("http") && !hosts.includes(asked.host)) faults.push(`asked ${asked.host}`);
   });
   page.on("console", (message) => {
     if (message.text().includes("Content Security Policy")) faults.push(message.text());
@@ -230,4 +239,19 @@ export async function typeMove(page: Page, label: string, value: string): Promis
 
 export async function takeSegment(page: Page, label: string): Promise<void> {
   await page.locator(".segments button", { hasText: label }).click();
+}
+
+const AXE = readFileSync(process.env.TISSUEFORM_AXE ?? createRequire(join(process.cwd(), "package.json")).resolve("axe-core/axe.min.js"), "utf8");
+
+/** Findings of axe-core that are serious or worse, one a line. */
+export async function seriousFindings(page: Page): Promise<string[]> {
+  // As a script of the browser, not of the page: the page's policy allows no inline script.
+  await page.evaluate(AXE);
+  return page.evaluate(async () => {
+    const { violations, passes } = await (globalThis as any).axe.run();
+    if (passes.length < 10) return ["axe-core has looked at next to nothing"];
+    return violations
+      .filter(({ impact }: any) => impact === "serious" || impact === "critical")
+      .map(({ id, nodes }: any) => `${id}: ${nodes.map((node: any) => node.html).join(" ")}`);
+  });
 }

@@ -1,30 +1,11 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { createRequire } from "node:module";
-import { readFileSync } from "node:fs";
-import { join } from "node:path";
-import type { Page } from "playwright-core";
-import { Planner, type Hook, live, moved, openCase, openPage, state, takeSegment, typeMove } from "./planner";
+import { Planner, type Hook, live, moved, openCase, openPage, seriousFindings, state, takeSegment, typeMove } from "./planner";
 
 let planner: Planner;
 beforeAll(async () => (planner = await Planner.start()));
 afterAll(() => planner.stop());
-
-const AXE = readFileSync(process.env.TISSUEFORM_AXE ?? createRequire(join(process.cwd(), "package.json")).resolve("axe-core/axe.min.js"), "utf8");
-
-/** Findings of axe-core that are serious or worse, one a line. */
-async function seriousFindings(page: Page): Promise<string[]> {
-  // As a script of the browser, not of the page: the page's policy allows no inline script.
-  await page.evaluate(AXE);
-  return page.evaluate(async () => {
-    const { violations, passes } = await (globalThis as any).axe.run();
-    if (passes.length < 10) return ["axe-core has looked at next to nothing"];
-    return violations
-      .filter(({ impact }: any) => impact === "serious" || impact === "critical")
-      .map(({ id, nodes }: any) => `${id}: ${nodes.map((node: any) => node.html).join(" ")}`);
-  });
-}
 
 describe.each(["light", "dark"] as const)("in %s colours axe-core finds nothing serious", (colorScheme) => {
   test("on the first page and in the planner", async () => {

@@ -68,8 +68,7 @@ TEST_F(AccessCommandTest, WhatIsSharedIsListedUntilItIsTakenBack) {
 }
 
 TEST_F(AccessCommandTest, ALinkIsAllThatGoesToStdout) {
-  const ProcessResult link =
-      Ask({"session", "link", session_->name(), "--hours", "1"});
+  const ProcessResult link = Ask({"session", "link", session_->name(), "--hours", "1"});
   EXPECT_EQ(link.exit_code, 0) << link.err;
   EXPECT_THAT(link.out, MatchesRegex("tfl_[A-Za-z0-9_-]+\n"));
   EXPECT_EQ(link.out.size(), 48U);

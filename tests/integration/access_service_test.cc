@@ -162,8 +162,7 @@ TEST_F(AccessServiceTest, AFollowLinkWatchesUntilItIsTakenBack) {
   v1::DeleteFollowLinksRequest request;
   request.set_session(session_);
   google::protobuf::Empty response;
-  ASSERT_TRUE(
-      stubs_->access->DeleteFollowLinks(ContextOf(ann_).get(), request, &response).ok());
+  ASSERT_TRUE(stubs_->access->DeleteFollowLinks(ContextOf(ann_).get(), request, &response).ok());
   EXPECT_EQ(EndOf(watch.get()).error_code(), Code::UNAUTHENTICATED);
   EXPECT_EQ(stubs_->access->WhoAmI(ContextOf(follower).get(), {}, &who).error_code(),
             Code::UNAUTHENTICATED);

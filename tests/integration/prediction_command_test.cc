@@ -1,6 +1,8 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include <algorithm>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -145,6 +147,39 @@ TEST_F(PredictionCommandTest, ExportsAreTheResultWithItsProvenance) {
   const Json whole = ReadJson("after.json");
   ASSERT_EQ(whole["positions_mm"].size(), static_cast<size_t>(after.mesh.num_vertices()));
   EXPECT_EQ(whole["positions_mm"][7][2], after.mesh.positions()(7, 2));
+}
+
+TEST_F(PredictionCommandTest, RangesOfThePlanGiveAnExportTheBandThatDeformGives) {
+  Json plan = Json::parse(std::ifstream(SourcePath("tests/data/plans/bar/plan.json")));
+  plan["version"] = 2;
+  plan["mesh"] = SourcePath("tests/data/plans/bar/bar.vtu");
+  plan["model"] = "neo_hookean";
+  plan["uncertainty"] = {{"youngs_modulus_factor_95", 2}};
+  Write("plan.json", plan.dump());
+  const ProcessResult created = Prediction({"create", "plan.json", "--allow-outside"});
+  ASSERT_THAT(created, Succeeds());
+  const std::string name = created.out.substr(0, created.out.find('\n'));
+  const std::vector<std::string> exporting = {"export",          name,    "--plan",   "plan.json",
+                                              "--allow-outside", "--out", "after.vtu"};
+  EXPECT_THAT(Prediction(exporting), Succeeds());
+  ASSERT_EQ(Run({"deform", "plan.json", "--allow-outside", "--out", "deform.vtu"}).exit_code, 0);
+  constexpr const char* kArray = "material_uncertainty_p95_mm";
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile after, ReadTetMesh(Path("after.vtu")));
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile deform, ReadTetMesh(Path("deform.vtu")));
+  ASSERT_NE(FindAttribute(after.point_data, kArray), nullptr);
+  const std::vector<double> band = ToDoubles(*FindAttribute(after.point_data, kArray));
+  const std::vector<double> of_deform = ToDoubles(*FindAttribute(deform.point_data, kArray));
+  EXPECT_THAT(band, ::testing::Pointwise(::testing::DoubleNear(1e-3), of_deform));  // of float32
+  EXPECT_GT(*std::max_element(band.begin(), band.end()), 0.01);
+  EXPECT_TRUE(ReadJson("after.vtu.json").contains("material_uncertainty"));
+
+  plan["poisson_ratio"] = 0.4;
+  Write("plan.json", plan.dump());
+  const ProcessResult changed = Prediction(exporting);
+  EXPECT_EQ(changed.exit_code, 0);
+  EXPECT_THAT(changed.err, HasSubstr("its uncertainty from the material is not told"));
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile without, ReadTetMesh(Path("after.vtu")));
+  EXPECT_EQ(FindAttribute(without.point_data, kArray), nullptr);
 }
 
 TEST_F(PredictionCommandTest, ExportRefusesAnotherMeshAndWritesNothing) {

@@ -11,6 +11,7 @@
 #include "absl/strings/str_format.h"
 
 #include "client/cli/online/resource_text.h"
+#include "client/cli/online/server_connection.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/status_macros.h"
 
@@ -20,7 +21,7 @@ namespace {
 constexpr int kMostHours = 24 * 365;
 
 struct LinkOptions {
-  std::string server;
+  ServerConnection server;
   std::string session;
   std::string case_name;
   std::optional<int> hours;
@@ -28,7 +29,7 @@ struct LinkOptions {
 
 // The token alone goes to stdout, where a script takes it.
 absl::Status MakeLink(const LinkOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   std::optional<std::chrono::seconds> lifetime;
   if (options.hours.has_value()) lifetime = std::chrono::hours(*options.hours);
   const std::string case_name =
@@ -43,7 +44,7 @@ absl::Status MakeLink(const LinkOptions& options) {
 }
 
 absl::Status EndLinks(const LinkOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   const std::string session = FullName("sessions", options.session);
   TF_RETURN_IF_ERROR(client->access().DeleteFollowLinks(session));
   absl::PrintF("%s has no follow links any more\n", session);

@@ -9,7 +9,7 @@
 
 #include "absl/strings/str_format.h"
 
-#include "client/cli/online/resource_text.h"
+#include "client/cli/online/server_connection.h"
 #include "client/cli/shared/companion.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/status_macros.h"
@@ -18,7 +18,7 @@ namespace tissueform {
 namespace {
 
 struct ShareOptions {
-  std::string server;
+  ServerConnection server;
   std::string resource;
   std::string principal;
   std::string role = "viewer";
@@ -29,7 +29,7 @@ const char* RoleText(v1::ShareRole role) {
 }
 
 absl::Status AddShare(const ShareOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   v1::Share share;
   share.set_resource(options.resource);
   share.set_principal(options.principal);
@@ -40,7 +40,7 @@ absl::Status AddShare(const ShareOptions& options) {
 }
 
 absl::Status ListShares(const ShareOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_ASSIGN_OR_RETURN(const std::vector<v1::Share> shares,
                       client->access().ListShares(options.resource));
   absl::PrintF("%-40s %s\n", "principal", "role");
@@ -52,7 +52,7 @@ absl::Status ListShares(const ShareOptions& options) {
 }
 
 absl::Status RemoveShare(const ShareOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_RETURN_IF_ERROR(client->access().DeleteShare(options.resource, options.principal));
   absl::PrintF("%s is not shared with %s any more\n", options.resource, options.principal);
   return absl::OkStatus();

@@ -10,6 +10,7 @@
 #include "absl/strings/str_join.h"
 
 #include "client/cli/online/resource_text.h"
+#include "client/cli/online/server_connection.h"
 #include "client/cli/shared/companion.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/status_macros.h"
@@ -17,8 +18,8 @@
 namespace tissueform {
 namespace {
 
-absl::Status TellWho(const std::string& server) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(server, {}));
+absl::Status TellWho(const ServerConnection& server) {
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(server));
   TF_ASSIGN_OR_RETURN(const v1::Caller caller, client->access().WhoAmI());
   absl::PrintF("principal  %s\n",
                caller.principal().empty() ? "nobody by name" : caller.principal());
@@ -34,7 +35,7 @@ absl::Status TellWho(const std::string& server) {
 }  // namespace
 
 void AddWhoamiCommand(CLI::App& app, CommandWork* work) {
-  auto server = std::make_shared<std::string>();
+  auto server = std::make_shared<ServerConnection>();
   CLI::App* command = app.add_subcommand(kWhoamiCommand.name, kWhoamiCommand.description);
   AddServerOption(command, server.get());
   command->callback([server, work] { *work = [server] { return TellWho(*server); }; });

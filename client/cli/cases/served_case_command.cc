@@ -15,6 +15,7 @@
 
 #include "client/cli/cases/packed_case.h"
 #include "client/cli/online/resource_text.h"
+#include "client/cli/online/server_connection.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/status_macros.h"
 #include "core/case_file/case_reader.h"
@@ -23,7 +24,7 @@ namespace tissueform {
 namespace {
 
 struct ServedCaseOptions {
-  std::string server;
+  ServerConnection server;
   std::string file;
   std::string name;
   std::string title;
@@ -65,7 +66,7 @@ absl::Status Publish(const ServedCaseOptions& options) {
                         absl::StrCat(options.file, ": ", contents.status().message(),
                                      "; `tissueform case pack` makes cases"));
   }
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   const std::string& title = options.title.empty() ? contents->title : options.title;
   TF_ASSIGN_OR_RETURN(const v1::Case published, PublishCase(client.get(), *contents, bytes, title));
   PrintCaseHead();
@@ -74,7 +75,7 @@ absl::Status Publish(const ServedCaseOptions& options) {
 }
 
 absl::Status List(const ServedCaseOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_ASSIGN_OR_RETURN(const std::vector<v1::Case> cases, client->cases().List());
   PrintCaseHead();
   for (const v1::Case& found : cases) PrintCase(found);
@@ -83,7 +84,7 @@ absl::Status List(const ServedCaseOptions& options) {
 }
 
 absl::Status Show(const ServedCaseOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_ASSIGN_OR_RETURN(const v1::Case found, client->cases().Get(options.FullCase()));
   absl::PrintF("case    %s\ntitle   %s\nbytes   %d\nsent    %s\n", found.name(), found.title(),
                found.total_bytes(), TimeText(found.create_time()));
@@ -91,7 +92,7 @@ absl::Status Show(const ServedCaseOptions& options) {
 }
 
 absl::Status Delete(const ServedCaseOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_RETURN_IF_ERROR(client->cases().Delete(options.FullCase()));
   absl::PrintF("%s is deleted\n", options.FullCase());
   return absl::OkStatus();

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -17,6 +18,8 @@
 #include "client/cli/shared/report_parts.h"
 #include "client/cli/shared/result_writer.h"
 #include "client/cli/shared/stage_progress.h"
+#include "client/cli/shared/uncertainty_results.h"
+#include "client/cli/shared/uncertainty_text.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
@@ -39,6 +42,7 @@ struct ModelResult {
   DeformationQuality quality;
   double prepare_seconds = 0;  // what the models before it had not prepared yet
   double solve_seconds = 0;
+  std::optional<MaterialBand> band;        // of elastic models, where the plan has ranges
   std::vector<RegionDistances> distances;  // to the reference
 };
 
@@ -80,25 +84,32 @@ absl::Status CheckOutputs(const CompareOptions& options, const std::vector<std::
   return absl::OkStatus();
 }
 
-absl::StatusOr<ModelResult> RunModel(const std::string& name, const PlanProblem& problem,
-                                     const std::shared_ptr<MeshPreparation>& preparation,
-                                     int solver_threads) {
-  const StageProgress progress("predicting by " + name);
-  ModelResult result;
-  result.model = name;
-  DeformerOptions options = problem.deformer;
-  TF_ASSIGN_OR_RETURN(options.model, ModelFromName(name));
-  options.neo_hookean.newton_blas_threads = solver_threads;
+absl::Status Predict(const PlanProblem& problem,
+                     const std::shared_ptr<MeshPreparation>& preparation, int solver_threads,
+                     ModelResult* result) {
+  const StageProgress progress("predicting by " + result->model);
   Stopwatch stopwatch;
   std::unique_ptr<Deformer> deformer;
   {
     const BlasThreadsScope factorising(solver_threads);  // as deform does
-    TF_ASSIGN_OR_RETURN(deformer, CreateDeformer(preparation, options));
+    TF_ASSIGN_OR_RETURN(deformer, CreateDeformer(preparation, problem.deformer));
   }
-  result.prepare_seconds = stopwatch.Restart();
-  TF_ASSIGN_OR_RETURN(result.deformation, deformer->Deform(problem.poses));
-  result.solve_seconds = stopwatch.Seconds();
+  result->prepare_seconds = stopwatch.Restart();
+  TF_ASSIGN_OR_RETURN(result->deformation, deformer->Deform(problem.poses));
+  result->solve_seconds = stopwatch.Seconds();
+  return absl::OkStatus();
+}
+
+absl::StatusOr<ModelResult> RunModel(const std::string& name, PlanProblem problem,
+                                     const std::shared_ptr<MeshPreparation>& preparation,
+                                     int solver_threads) {
+  ModelResult result;
+  result.model = name;
+  TF_ASSIGN_OR_RETURN(problem.deformer.model, ModelFromName(name));
+  problem.deformer.neo_hookean.newton_blas_threads = solver_threads;
+  TF_RETURN_IF_ERROR(Predict(problem, preparation, solver_threads, &result));
   result.quality = MeasureDeformation(*problem.mesh, result.deformation.positions);
+  result.band = FindMaterialBandOrWarn(problem, result.deformation.positions, preparation);
   return result;
 }
 
@@ -164,7 +175,8 @@ absl::Status WriteResults(const CompareOptions& options, const ModelComparison& 
     TF_ASSIGN_OR_RETURN(with_arrays.deformer.model, ModelFromName(result.model));
     AddDifferenceArrays(reference, positions, &with_arrays.point_data);
     TF_RETURN_IF_ERROR(WriteResult(ResultPath(options, result.model), comparison.plan, with_arrays,
-                                   result.deformation.positions));
+                                   result.deformation.positions,
+                                   result.band ? &*result.band : nullptr));
   }
   return absl::OkStatus();
 }
@@ -193,6 +205,7 @@ OrderedJson ResultToJson(const ModelResult& result) {
       json["regions"][name] = DistancesToJson(distances);
     }
   }
+  if (result.band) json["material_uncertainty"] = MaterialBandToJson(*result.band);
   return json;
 }
 
@@ -213,6 +226,7 @@ void PrintTables(const CompareOptions& options, const ModelComparison& compariso
     absl::PrintF("\n%s: %.3f s to prepare, %.3f s to solve, %d inverted tets%s\n", result.model,
                  result.prepare_seconds, result.solve_seconds, result.quality.inverted_tets,
                  result.deformation.summary.converged ? "" : ", NOT CONVERGED");
+    if (result.band) absl::PrintF("%s\n", MaterialBandText(*result.band));
     if (result.model == options.reference) continue;
     PrintDistanceHeadline();
     PrintDistances(result.distances);

@@ -14,6 +14,7 @@
 #include "client/cli/load/bare_transport.h"
 #include "client/cli/load/load_report.h"
 #include "client/cli/load/load_run.h"
+#include "client/cli/online/server_connection.h"
 #include "client/cli/online/server_process.h"
 #include "client/cli/shared/companion.h"
 #include "client/cli/shared/demo_paths.h"
@@ -29,7 +30,7 @@ constexpr std::chrono::seconds kServerStartDeadline{30};
 
 struct LoadCommandOptions {
   LoadOptions load;
-  std::string server;
+  ServerConnection server;
   std::string plan;
   std::string model = "linear_elastic";
   std::string encoding = "float32";
@@ -59,8 +60,8 @@ absl::Status Run(const LoadCommandOptions& options) {
   TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan));
   problem.deformer.model = ModelOf(options.model);
   std::unique_ptr<ServerProcess> server;
-  std::string address = options.server;
-  if (address.empty()) {
+  ServerConnection connection = options.server;
+  if (connection.address.empty()) {
     TF_ASSIGN_OR_RETURN(const std::string program, FindProgram("tissueform-server"));
     TF_ASSIGN_OR_RETURN(
         server,
@@ -68,12 +69,13 @@ absl::Status Run(const LoadCommandOptions& options) {
                              {"--in-memory", "--host", "127.0.0.1", "--port", "0", "--max-sessions",
                               "4096", "--max-streams", "4096", "--log-level", "warn"},
                              kServerStartDeadline));
-    address = server->address();
+    connection = {.address = server->address()};
   }
   absl::FPrintF(stderr, "plan %s: %d vertices, %d tets, %s; preparing %d drags on %s ...\n", path,
                 problem.mesh->num_vertices(), problem.mesh->num_tets(), options.model,
-                options.load.sessions + options.load.slow_readers + options.load.refining, address);
-  TF_ASSIGN_OR_RETURN(LoadResult result, RunLoad(address, problem, options.load));
+                options.load.sessions + options.load.slow_readers + options.load.refining,
+                connection.address);
+  TF_ASSIGN_OR_RETURN(LoadResult result, RunLoad(connection, problem, options.load));
   if (load.bare && !result.drags.empty() && result.drags.front().frames > 0) {
     const DragLoad& drags = result.drags.front();
     TF_ASSIGN_OR_RETURN(
@@ -95,8 +97,10 @@ absl::Status Run(const LoadCommandOptions& options) {
 
 void AddOptions(CLI::App* command, LoadCommandOptions* options) {
   LoadOptions& load = options->load;
-  command->add_option("--server", options->server, "a server that runs; else one is started")
+  command
+      ->add_option("--server", options->server.address, "a server that runs; else one is started")
       ->type_name("HOST:PORT");
+  AddConnectionOptions(command, &options->server.options);
   command->add_option("--plan", options->plan, "another plan than the bundled head");
   command->add_option("--model", options->model, "what answers the drags")
       ->check(CLI::IsMember({"gradient_field", "linear_elastic", "neo_hookean"}))

@@ -47,12 +47,11 @@ class LoadDrag {
     bool int16 = false;
   };
 
-  static absl::StatusOr<std::unique_ptr<LoadDrag>> Open(const std::string& address,
+  static absl::StatusOr<std::unique_ptr<LoadDrag>> Open(const ServerConnection& server,
                                                         const PlanProblem& problem,
                                                         const Kind& kind) {
     auto drag = std::unique_ptr<LoadDrag>(new LoadDrag(kind, NamedPoses(problem)));
-    TF_ASSIGN_OR_RETURN(drag->client_,
-                        TissueformClient::Connect(address, {.own_connection = true}));
+    TF_ASSIGN_OR_RETURN(drag->client_, ConnectTo(server, /*own_connection=*/true));
     TF_ASSIGN_OR_RETURN(drag->session_, MakePlanSession(drag->client_.get(), problem, nullptr));
     DeformStream::Options stream;
     stream.vertices.kind = AnswerVertices::Kind::kSkin;
@@ -196,10 +195,10 @@ std::vector<DragGroup> GroupsOf(const LoadOptions& options) {
   return groups;
 }
 
-absl::Status Open(const std::string& address, const PlanProblem& problem, DragGroup* group) {
+absl::Status Open(const ServerConnection& server, const PlanProblem& problem, DragGroup* group) {
   for (int i = 0; i < group->count; ++i) {
     TF_ASSIGN_OR_RETURN(std::unique_ptr<LoadDrag> drag,
-                        LoadDrag::Open(address, problem, group->kind));
+                        LoadDrag::Open(server, problem, group->kind));
     group->drags.push_back(std::move(drag));
   }
   return absl::OkStatus();
@@ -236,20 +235,19 @@ void RunAll(const LoadOptions& options, const std::vector<DragGroup>& groups,
 
 }  // namespace
 
-absl::StatusOr<LoadResult> RunLoad(const std::string& address, const PlanProblem& problem,
+absl::StatusOr<LoadResult> RunLoad(const ServerConnection& server, const PlanProblem& problem,
                                    const LoadOptions& options) {
   LoadResult result;
   const Stopwatch preparing;
   std::vector<DragGroup> groups = GroupsOf(options);
-  for (DragGroup& group : groups) TF_RETURN_IF_ERROR(Open(address, problem, &group));
+  for (DragGroup& group : groups) TF_RETURN_IF_ERROR(Open(server, problem, &group));
   // Whatever drags there are, the mesh is on the server while churn makes sessions of it.
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client,
-                      TissueformClient::Connect(address, {}));
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client, ConnectTo(server));
   TF_ASSIGN_OR_RETURN(const v1::Mesh mesh, UploadMeshOf(client.get(), problem));
   std::vector<std::unique_ptr<Churn>> churn;
   for (int i = 0; i < options.churn; ++i) {
     TF_ASSIGN_OR_RETURN(std::unique_ptr<TissueformClient> own,
-                        TissueformClient::Connect(address, {.own_connection = true}));
+                        ConnectTo(server, /*own_connection=*/true));
     churn.push_back(std::make_unique<Churn>(std::move(own), SessionRequestOf(problem, mesh.name()),
                                             i, options.churn));
   }

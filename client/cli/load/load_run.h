@@ -10,6 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "client/cli/online/server_connection.h"
 #include "core/problem/plan_problem.h"
 
 namespace tissueform {
@@ -48,9 +49,9 @@ struct LoadResult {
   std::vector<absl::Status> errors;       // of drags and churn; what was not asked for is one
 };
 
-// Runs it against the server at `address`. Errors while the drags are prepared; later ones are
+// Runs it against `server`. Errors while the drags are prepared; later ones are
 // told in the result.
-absl::StatusOr<LoadResult> RunLoad(const std::string& address, const PlanProblem& problem,
+absl::StatusOr<LoadResult> RunLoad(const ServerConnection& server, const PlanProblem& problem,
                                    const LoadOptions& options);
 
 }  // namespace tissueform

@@ -16,6 +16,7 @@
 #include "absl/strings/str_format.h"
 
 #include "client/cli/online/drag.h"
+#include "client/cli/online/server_connection.h"
 #include "client/cli/online/session_wait.h"
 #include "client/cli/shared/companion.h"
 #include "client/cli/shared/stats_json.h"
@@ -36,7 +37,7 @@ using SteadyClock = std::chrono::steady_clock;
 
 struct DragCommandOptions {
   std::string plan;
-  std::string server;
+  ServerConnection server;
   double seconds = 20;
   double poses_per_second = 30;
   double give_up_seconds = 60;
@@ -180,8 +181,7 @@ absl::Status Run(const DragCommandOptions& options) {
   sigaction(SIGINT, &action, nullptr);
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan));
   TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client,
-                      TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client, ConnectTo(options.server));
   return Drag(client.get(), problem, options);
 }
 
@@ -191,9 +191,7 @@ void AddDragCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<DragCommandOptions>();
   CLI::App* command = app.add_subcommand(kDragCommand.name, kDragCommand.description);
   command->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
-  command->add_option("--server", options->server, "where the server listens")
-      ->required()
-      ->type_name("HOST:PORT");
+  AddServerOption(command, &options->server);
   command->add_option("--seconds", options->seconds, "how long")
       ->check(CLI::Range(0.1, 86400.0))
       ->capture_default_str();

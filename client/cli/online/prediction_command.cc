@@ -19,6 +19,7 @@
 #include "client/cli/compare/comparison_report.h"
 #include "client/cli/online/prediction_export.h"
 #include "client/cli/online/resource_text.h"
+#include "client/cli/online/server_connection.h"
 #include "client/cli/online/session_command.h"
 #include "client/cli/online/session_wait.h"
 #include "client/cli/shared/companion.h"
@@ -37,7 +38,7 @@ namespace tissueform {
 namespace {
 
 struct PredictionOptions {
-  std::string server;
+  ServerConnection server;
   std::string name;
   std::string plan;
   PlanReadOptions reading;
@@ -101,7 +102,7 @@ absl::Status Create(const PredictionOptions& options) {
   if (options.plan.empty() && options.session.empty()) {
     return absl::InvalidArgumentError("name a plan, a session (--session), or both");
   }
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_ASSIGN_OR_RETURN(const v1::Prediction prediction, MakePrediction(options, client.get()));
   absl::PrintF("%s\n", prediction.name());
   absl::PrintF("%s, %d vertices, largest movement %.3g mm, %d tets inverted; %s\n",
@@ -114,7 +115,7 @@ absl::Status Create(const PredictionOptions& options) {
 }
 
 absl::Status List(const PredictionOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   const std::string session = options.session.empty() ? "" : FullSessionName(options.session);
   TF_ASSIGN_OR_RETURN(const std::vector<v1::Prediction> predictions,
                       client->predictions().List(session, options.FullCase()));
@@ -135,7 +136,7 @@ absl::Status List(const PredictionOptions& options) {
 }
 
 absl::Status Show(const PredictionOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_ASSIGN_OR_RETURN(const v1::Prediction prediction,
                       client->predictions().Get(options.FullPrediction()));
   PrintReport(options.json, prediction.DebugString(), ProvenanceJson(prediction));
@@ -177,7 +178,7 @@ absl::Status Compare(const PredictionOptions& options) {
   if (!options.other.empty()) other = FullName("predictions", options.other);
   TF_ASSIGN_OR_RETURN(const AnswerVertices vertices, ComparedVertices(options));
   const char* where = options.skin ? "skin" : options.vertices.empty() ? "all" : "listed";
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_ASSIGN_OR_RETURN(const ComparedPredictions compared,
                       client->predictions().Compare(options.FullPrediction(), other,
                                                     /*differences=*/false, vertices));
@@ -215,7 +216,7 @@ absl::StatusOr<std::optional<PredictionMesh>> ReadGeometry(const PredictionOptio
 
 absl::Status Export(const PredictionOptions& options) {
   TF_RETURN_IF_ERROR(CheckWritable(options.out));
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   PredictionCalls& calls = client->predictions();
   TF_ASSIGN_OR_RETURN(const v1::Prediction prediction, calls.Get(options.FullPrediction()));
   TF_ASSIGN_OR_RETURN(const std::optional<PredictionMesh> mesh, ReadGeometry(options, prediction));
@@ -227,7 +228,7 @@ absl::Status Export(const PredictionOptions& options) {
 }
 
 absl::Status Delete(const PredictionOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_RETURN_IF_ERROR(client->predictions().Delete(options.FullPrediction()));
   absl::PrintF("%s is deleted\n", options.FullPrediction());
   return absl::OkStatus();

@@ -3,17 +3,22 @@
 
 #include "client/cli/online/prediction_export.h"
 
+#include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "absl/strings/strip.h"
 
 #include "client/cli/online/resource_text.h"
 #include "client/cli/shared/result_writer.h"
+#include "client/cli/shared/uncertainty_results.h"
+#include "client/cli/shared/uncertainty_text.h"
 #include "client/cpp/plan_session.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
@@ -23,6 +28,7 @@
 #include "proto/conversion/answer_conversion.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "proto/conversion/model_conversion.h"
+#include "proto/conversion/session_conversion.h"
 
 namespace tissueform {
 namespace {
@@ -74,6 +80,17 @@ OrderedJson PositionsJson(const Positions& positions) {
   return rows;
 }
 
+// Prediction.recipe_sha256 of what the plan makes now.
+std::string RecipeSha256(const PlanProblem& problem) {
+  const SessionRequest whole = SessionRequestOf(problem, "");
+  SessionRequest recipe;
+  recipe.stiffness = whole.stiffness;
+  recipe.poisson_ratio = whole.poisson_ratio;
+  recipe.fixed = whole.fixed;
+  recipe.handles = whole.handles;
+  return RequestFingerprint(ToProto(recipe));
+}
+
 absl::Status WriteJson(const std::string& path, const OrderedJson& json) {
   return WriteFileAtomically(path, json.dump(1) + "\n");
 }
@@ -85,6 +102,13 @@ absl::StatusOr<PredictionMesh> ReadPlanOf(const v1::Prediction& prediction, cons
   TF_ASSIGN_OR_RETURN(Plan plan, ReadPlan(path, reading));
   TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan));
   if (MeshNameOf(problem) != prediction.mesh()) return OtherMesh(prediction, path);
+  if (problem.uncertainty && RecipeSha256(problem) != prediction.recipe_sha256()) {
+    absl::FPrintF(stderr,
+                  "warning: %s has other regions, stiffness or Poisson's ratio by now than %s was "
+                  "made with; its uncertainty from the material is not told\n",
+                  path, prediction.name());
+    problem.uncertainty.reset();
+  }
   // Stresses are those of the model that has answered.
   TF_ASSIGN_OR_RETURN(problem.deformer.model, ToModel(prediction.model(), problem.deformer.model));
   problem.deformer.preparation.poisson_ratio = prediction.poisson_ratio();
@@ -177,7 +201,11 @@ absl::Status ExportPrediction(const std::string& path, const v1::Prediction& pre
         absl::StrCat(path, " needs the mesh; name its plan (--plan) or its file (--mesh)"));
   }
   if (ending == ".vtu") {
-    TF_RETURN_IF_ERROR(WriteResult(path, mesh->plan, mesh->problem, positions));
+    const std::optional<MaterialBand> band =
+        FindMaterialBandOrWarn(mesh->problem, positions, /*preparation=*/nullptr);
+    if (band) json["material_uncertainty"] = MaterialBandToJson(*band);
+    TF_RETURN_IF_ERROR(
+        WriteResult(path, mesh->plan, mesh->problem, positions, band ? &*band : nullptr));
   } else if (ending == ".stl" || ending == ".ply") {
     TF_RETURN_IF_ERROR(WriteSkin(path, mesh->problem, positions));
   } else {

@@ -39,7 +39,8 @@ absl::Status WriteSkin(const std::string& path, const PlanProblem& problem,
 // Where it comes from: mesh, model and settings, poses, quality, software, time, notice.
 nlohmann::ordered_json ProvenanceJson(const v1::Prediction& prediction);
 
-// Writes by the ending of `path`: .vtu (WriteResult), .stl or .ply (WriteSkin), each with its
+// Writes by the ending of `path`: .vtu (WriteResult, with the band of uncertainty where the plan
+// has ranges and still makes what was predicted), .stl or .ply (WriteSkin), each with its
 // provenance in a file PATH.json beside it; or .json, the provenance with the positions of all
 // vertices in LPS, for which `mesh` may be null.
 //

@@ -31,10 +31,4 @@ std::string FullName(const std::string& collection, const std::string& name) {
   return absl::StartsWith(name, prefix) ? name : absl::StrCat(prefix, name);
 }
 
-void AddServerOption(CLI::App* command, std::string* server) {
-  command->add_option("--server", *server, "where the server listens")
-      ->required()
-      ->type_name("HOST:PORT");
-}
-
 }  // namespace tissueform

@@ -24,7 +24,4 @@ std::string ModelText(v1::DeformationModel model);
 // `name` with "COLLECTION/" before it, unless it has that.
 std::string FullName(const std::string& collection, const std::string& name);
 
-// The required option --server.
-void AddServerOption(CLI::App* command, std::string* server);
-
 }  // namespace tissueform

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "client/cli/online/server_connection.h"
 #include "client/cli/online/session_wait.h"
 #include "client/cli/shared/companion.h"
 #include "client/cli/shared/option_checks.h"
@@ -26,7 +27,7 @@ namespace {
 struct RunOptions {
   std::string plan;
   PlanReadOptions reading;
-  std::string server;
+  ServerConnection server;
   std::string out;
   std::string stats;
 };
@@ -34,8 +35,7 @@ struct RunOptions {
 // Fills `stats` as far as preparing and solving know it.
 absl::StatusOr<Positions> PredictOnServer(const RunOptions& options, const PlanProblem& problem,
                                           PredictionStats* stats) {
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client,
-                      TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client, ConnectTo(options.server));
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<PlanSession> session,
                       MakePlanSession(client.get(), problem, /*stop=*/nullptr));
   const StageProgress progress("solving");
@@ -81,9 +81,7 @@ void AddRunCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<RunOptions>();
   CLI::App* command = app.add_subcommand(kRunCommand.name, kRunCommand.description);
   command->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
-  command->add_option("--server", options->server, "where the server listens")
-      ->required()
-      ->type_name("HOST:PORT");
+  AddServerOption(command, &options->server);
   command
       ->add_option("--out", options->out,
                    "the deformed mesh to write, with point array displacement_mm")

@@ -13,6 +13,7 @@
 #include "absl/strings/strip.h"
 #include "nlohmann/json.hpp"
 
+#include "client/cli/online/server_connection.h"
 #include "client/cli/shared/companion.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/status_macros.h"
@@ -21,7 +22,7 @@ namespace tissueform {
 namespace {
 
 struct ServerInfoOptions {
-  std::string server;
+  ServerConnection server;
   bool json = false;
 };
 
@@ -73,7 +74,7 @@ void PrintTable(const v1::ServerInfo& info) {
 }
 
 absl::Status Run(const ServerInfoOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_ASSIGN_OR_RETURN(const v1::ServerInfo info, client->GetServerInfo());
   if (options.json) {
     absl::PrintF("%s\n", InfoJson(info).dump(2));
@@ -88,9 +89,7 @@ absl::Status Run(const ServerInfoOptions& options) {
 void AddServerInfoCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<ServerInfoOptions>();
   CLI::App* command = app.add_subcommand(kServerInfoCommand.name, kServerInfoCommand.description);
-  command->add_option("--server", options->server, "where the server listens")
-      ->required()
-      ->type_name("HOST:PORT");
+  AddServerOption(command, &options->server);
   command->add_flag("--json", options->json, "print JSON instead of a table");
   command->footer("Example:\n  tissueform server-info --server localhost:50051");
   command->callback([options, work] { *work = [options] { return Run(*options); }; });

@@ -11,6 +11,7 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 
+#include "client/cli/online/server_connection.h"
 #include "client/cli/online/upload_lines.h"
 #include "client/cli/shared/companion.h"
 #include "client/cpp/tissueform_client.h"
@@ -23,7 +24,7 @@ namespace tissueform {
 namespace {
 
 struct ServerMeshOptions {
-  std::string server;
+  ServerConnection server;
   std::string mesh;
 };
 
@@ -56,7 +57,7 @@ void PrintHead() {
 
 absl::Status Upload(const ServerMeshOptions& options) {
   TF_ASSIGN_OR_RETURN(const TetMeshFile file, ReadTetMesh(options.mesh));
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   const Stopwatch stopwatch;
   UploadLines lines([](const std::string& line) { absl::FPrintF(stderr, "%s\n", line); },
                     [&stopwatch] { return stopwatch.Seconds(); });
@@ -68,7 +69,7 @@ absl::Status Upload(const ServerMeshOptions& options) {
 }
 
 absl::Status List(const ServerMeshOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_ASSIGN_OR_RETURN(const std::vector<v1::Mesh> meshes, client->ListMeshes());
   PrintHead();
   for (const v1::Mesh& mesh : meshes) PrintMesh(mesh);
@@ -77,7 +78,7 @@ absl::Status List(const ServerMeshOptions& options) {
 }
 
 absl::Status Delete(const ServerMeshOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_RETURN_IF_ERROR(client->DeleteMesh(FullMeshName(options.mesh)));
   absl::PrintF("%s is deleted\n", FullMeshName(options.mesh));
   return absl::OkStatus();
@@ -93,9 +94,7 @@ void AddServerMeshCommand(CLI::App& app, CommandWork* work) {
                        absl::Status (*run)(const ServerMeshOptions&)) {
     CLI::App* sub = command->add_subcommand(companion.name, companion.description);
     if (what != nullptr) sub->add_option("MESH", options->mesh, what)->required();
-    sub->add_option("--server", options->server, "where the server listens")
-        ->required()
-        ->type_name("HOST:PORT");
+    AddServerOption(sub, &options->server);
     sub->callback([options, work, run] { *work = [options, run] { return run(*options); }; });
   };
   add(kMeshUploadCommand,

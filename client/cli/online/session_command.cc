@@ -14,6 +14,7 @@
 #include "absl/strings/str_join.h"
 
 #include "client/cli/online/resource_text.h"
+#include "client/cli/online/server_connection.h"
 #include "client/cli/online/session_wait.h"
 #include "client/cli/shared/companion.h"
 #include "client/cli/shared/option_checks.h"
@@ -26,7 +27,7 @@ namespace tissueform {
 namespace {
 
 struct SessionOptions {
-  std::string server;
+  ServerConnection server;
   std::string name;
   // Of an update; empty: as it is.
   std::string etag;
@@ -44,7 +45,7 @@ std::string StateText(const v1::Session& session) {
 }
 
 absl::Status List(const SessionOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_ASSIGN_OR_RETURN(const std::vector<v1::Session> sessions, client->ListSessions());
   absl::PrintF("%-44s %-16s %-16s %-20s %s\n", "session", "state", "model", "last used", "handles");
   for (const v1::Session& session : sessions) {
@@ -57,7 +58,7 @@ absl::Status List(const SessionOptions& options) {
 }
 
 absl::Status Show(const SessionOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_ASSIGN_OR_RETURN(const v1::Session session, client->GetSession(FullSessionName(options.name)));
   absl::PrintF("%s\n", session.DebugString());
   return absl::OkStatus();
@@ -110,7 +111,7 @@ absl::Status Update(const SessionOptions& options) {
     request.mutable_stiffness()->set_cell_array(options.stiffness_array);
   }
   if (options.poisson_ratio.has_value()) request.set_poisson_ratio(*options.poisson_ratio);
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   if (!options.regions.empty()) TF_RETURN_IF_ERROR(SetRegions(options, client.get(), &request));
   TF_ASSIGN_OR_RETURN(const v1::Session session, UpdateAndTell(client.get(), request));
   absl::PrintF("%s is prepared anew: %s, handles %s, %d vertices fixed, etag %s\n", session.name(),
@@ -120,7 +121,7 @@ absl::Status Update(const SessionOptions& options) {
 }
 
 absl::Status Delete(const SessionOptions& options) {
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_RETURN_IF_ERROR(client->DeleteSession(FullSessionName(options.name)));
   absl::PrintF("%s is deleted\n", FullSessionName(options.name));
   return absl::OkStatus();

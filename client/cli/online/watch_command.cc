@@ -14,6 +14,7 @@
 #include "absl/strings/str_format.h"
 #include "google/protobuf/util/time_util.h"
 
+#include "client/cli/online/server_connection.h"
 #include "client/cli/online/session_command.h"
 #include "client/cli/shared/companion.h"
 #include "client/cpp/tissueform_client.h"
@@ -24,7 +25,7 @@ namespace tissueform {
 namespace {
 
 struct WatchCommandOptions {
-  std::string server;
+  ServerConnection server;
   std::string session;
   int64_t seconds = 0;  // 0: until it ends
 };
@@ -98,7 +99,7 @@ void Receive(WatchStream* watch, Seen* seen) {
 
 absl::Status Run(const WatchCommandOptions& options) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);  // seen at once, also through a pipe
-  TF_ASSIGN_OR_RETURN(const auto client, TissueformClient::Connect(options.server, {}));
+  TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   const std::string session = FullSessionName(options.session);
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<WatchStream> watch,
                       client->Watch(session, {.max_unacked = {}, .on_notice = TellNotice}));
@@ -124,9 +125,7 @@ void AddWatchCommand(CLI::App& app, CommandWork* work) {
   CLI::App* command = app.add_subcommand(kWatchCommand.name, kWatchCommand.description);
   command->add_option("SESSION", options->session, "its name, with \"sessions/\" or without")
       ->required();
-  command->add_option("--server", options->server, "where the server listens")
-      ->required()
-      ->type_name("HOST:PORT");
+  AddServerOption(command, &options->server);
   command->add_option("--seconds", options->seconds, "how long; 0: until it ends")
       ->check(CLI::Range(0, 86400))
       ->capture_default_str();

@@ -5,69 +5,140 @@ import "./styles/base.css";
 import "./styles/start.css";
 import "./styles/planner.css";
 import "./styles/panel.css";
-import { sentenceOf, toCallError } from "./calls/call_error";
+import { Bearer } from "./calls/bearer";
+import { Code, sentenceOf, toCallError } from "./calls/call_error";
 import { Gateway } from "./calls/gateway";
 import { type CaseFile, openCase } from "./case/case_file";
 import { serverSource } from "./case/case_sources";
 import type { ModelInfo } from "./generated/tissueform/v1/server_info_pb";
+import { isLinkToken } from "./live/follow_links";
+import { Login } from "./login/login";
+import { fetchLoginConfig } from "./login/login_config";
+import { OidcProvider } from "./login/provider";
 import { casesPage } from "./pages/cases_page";
-import { followerPage } from "./pages/follower_page";
+import { LINK_HAS_ENDED, followerPage } from "./pages/follower_page";
 import { plannerPage } from "./pages/planner_page";
+import { signInPage } from "./pages/sign_in_page";
+import { accountBox, loginBanner } from "./panels/account_box";
 import { button, el } from "./panels/dom";
+import { restoreWork, workOf } from "./workbench/work";
+import type { Workbench } from "./workbench/workbench";
 
 // What stands behind the # says which page this is:
 //
 //   nothing                            the list of cases
 //   #case={sha256}                     the planner of a case
-//   #follow={session}&case={sha256}    read-only, beside somebody who plans
+//   #follow={session}&case={sha256}    read-only, beside somebody who plans; where the server has logins, the link's token
+//                                      stands in the session's place, and nobody needs to sign in
 
 /** For tests and measurements: what the page holds now. Nothing of the page asks it. */
 interface TestHook {
-  bench?: unknown;
+  bench?: Workbench;
   follower?: unknown;
   view?: unknown;
 }
 
-const gateway = new Gateway(location.origin);
+const gateway = new Gateway(location.origin, new Bearer());
+/** Null where nobody logs in. */
+let login: Login | null = null;
+let banner: HTMLElement | null = null;
 const hook: TestHook = {};
 (globalThis as unknown as { tissueform: TestHook }).tissueform = hook;
 
+async function start(): Promise<void> {
+  try {
+    if (isLinkToken(parameters().follow)) gateway.bearer.token = parameters().follow;
+    else if (!(await signIn())) return;
+    await route();
+  } catch (thrown) {
+    showProblem("The planner cannot be opened", thrown, [button("Try again", () => location.reload())]);
+  }
+}
+
+/** True when the pages may be shown; else the user is on their way to the provider, or is asked to sign in. */
+async function signIn(): Promise<boolean> {
+  const config = await fetchLoginConfig(location.origin);
+  if (config === null) return true;
+  const user = new Login(new OidcProvider(config), config.issuer, gateway.bearer);
+  login = user;
+  banner = loginBanner(user, () => (hook.bench === undefined ? null : workOf(hook.bench)));
+  user.watch((state) => {
+    if (state.kind === "out") show(signInPage(user, state.problem));
+  });
+  await user.begin();
+  return user.state.kind === "in";
+}
+
+function parameters(): { caseId: string; follow: string } {
+  const all = new URLSearchParams(location.hash.slice(1));
+  return { caseId: all.get("case") ?? "", follow: all.get("follow") ?? "" };
+}
+
 async function route(): Promise<void> {
-  const parameters = new URLSearchParams(location.hash.slice(1));
-  const caseId = parameters.get("case") ?? "";
-  const follow = parameters.get("follow");
+  const { caseId, follow } = parameters();
   if (!/^[0-9a-f]{64}$/.test(caseId)) {
-    show(casesPage(gateway, (entry) => go(entry.name.replace("cases/", ""))));
+    show(casesPage(gateway, (entry) => go(entry.name.replace("cases/", "")), account()));
     return;
   }
+  const name = `cases/${caseId}`;
   try {
-    const name = `cases/${caseId}`;
-    const [file, models] = await Promise.all([fetchCase(name), fetchModels()]);
-    if (follow !== null) openFollower(file, `sessions/${follow}`);
-    else await openPlanner(file, name, models);
+    if (isLinkToken(follow)) await openLink(name);
+    else if (follow !== "") openFollower(await fetchCase(name), `sessions/${follow}`, null);
+    else await openPlanner(name);
   } catch (thrown) {
-    showProblem(sentenceOf(thrown));
+    const buttons = [button("Try again", () => void route()), button("Cases", () => (location.hash = ""))];
+    showProblem("The case cannot be opened", thrown, buttons);
   }
+}
+
+function account(): HTMLElement | null {
+  return login === null ? null : accountBox(login);
 }
 
 function go(caseId: string): void {
   location.hash = `case=${caseId}`;
 }
 
-async function openPlanner(file: CaseFile, name: string, models: readonly ModelInfo[]): Promise<void> {
-  const link = (session: string) => `${location.origin}${location.pathname}#follow=${session.replace("sessions/", "")}&case=${name.replace("cases/", "")}`;
-  const { element, bench } = plannerPage(gateway, file, name, models, link, () => (location.hash = ""));
+async function openPlanner(name: string): Promise<void> {
+  const [file, models, hasLogins] = await Promise.all([fetchCase(name), fetchModels(), knowsCallers()]);
+  const followUrl = (follow: string) => `${location.origin}${location.pathname}#follow=${follow}&case=${name.replace("cases/", "")}`;
+  const parts = { followUrl, hasLogins, account: account() };
+  const { element, bench } = plannerPage(gateway, file, name, models, parts, () => (location.hash = ""));
   hook.bench = bench;
   hook.view = bench.view;
   show(element);
   await bench.start();
+  if (login !== null) restoreWork(bench, login.work);
 }
 
-function openFollower(file: CaseFile, session: string): void {
-  const { element, follower } = followerPage(gateway, file, session);
+function openFollower(file: CaseFile, session: string, endsAt: Date | null): void {
+  const { element, follower } = followerPage(gateway, file, session, { endsAt, account: account() });
   hook.follower = follower;
   hook.view = follower.view;
   show(element);
+}
+
+/** The token says which session it is for. */
+async function openLink(name: string): Promise<void> {
+  try {
+    const { onlySession, expireTime } = await gateway.access.whoAmI({});
+    openFollower(await fetchCase(name), onlySession, expireTime === undefined ? null : new Date(1000 * Number(expireTime.seconds)));
+  } catch (thrown) {
+    if (toCallError(thrown).code !== Code.Unauthenticated) throw thrown;
+    showProblem("There is nothing to follow", LINK_HAS_ENDED, []);
+  }
+}
+
+/** Whether the server asks who calls; one that does not may be older than the question. */
+async function knowsCallers(): Promise<boolean> {
+  if (login === null) return false;
+  try {
+    return (await gateway.access.whoAmI({})).principal !== "";
+  } catch (thrown) {
+    const error = toCallError(thrown);
+    if (error.code === Code.Unimplemented) return false;
+    throw error;
+  }
 }
 
 async function fetchCase(name: string): Promise<CaseFile> {
@@ -85,19 +156,20 @@ async function fetchModels(): Promise<readonly ModelInfo[]> {
   }
 }
 
-function showProblem(text: string): void {
+function showProblem(title: string, thrown: unknown, buttons: HTMLElement[]): void {
+  const text = sentenceOf(thrown);
   const sheet = [
-    el("h1", { text: "The case cannot be opened" }),
+    el("h1", { text: title }),
     el("p", { class: "problem", text, attributes: { role: "alert" } }),
-    el("div", { class: "buttons" }, [button("Try again", () => void route()), button("Cases", () => (location.hash = ""))]),
+    el("div", { class: "buttons" }, buttons),
   ];
   show(el("main", { class: "start" }, [el("div", { class: "sheet" }, sheet)]));
 }
 
 function show(element: HTMLElement): void {
-  document.body.replaceChildren(element);
+  document.body.replaceChildren(element, ...(banner === null ? [] : [banner]));
 }
 
 // A page of its own for each case: what belonged to the one before is gone with it.
 addEventListener("hashchange", () => location.reload());
-void route();
+void start();

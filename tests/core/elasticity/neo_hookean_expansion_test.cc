@@ -5,6 +5,7 @@
 
 #include "gtest/gtest.h"
 
+#include "core/elasticity/elastic_stiffness.h"
 #include "core/elasticity/neo_hookean_energy.h"
 #include "tests/testing/meshes.h"
 
@@ -38,6 +39,18 @@ struct Body {
   // The part of the forces that is even in the size: Q(u, u) with what is of fourth order.
   Eigen::VectorXd SecondDifference(const Eigen::VectorXd& field, double size) {
     return (Forces(size * field) + Forces(-size * field)) / (2 * size * size);
+  }
+
+  // The part of the forces along t v + t^2 w that is odd in t, without its linear part: the third
+  // order with what is of fifth.
+  Eigen::VectorXd ThirdDifference(const Eigen::VectorXd& v, const Eigen::VectorXd& w, double t) {
+    const SparseMatrix K = ElasticStiffness(elements, vertex_cells, stiffness, kPoissonRatio, 1);
+    const Eigen::VectorXd odd = 0.5 * (Forces(t * v + t * t * w) - Forces(-t * v + t * t * w));
+    return (odd - t * (K * v)) / (t * t * t);
+  }
+
+  Eigen::MatrixXd ThirdOrder(const Eigen::MatrixXd& first, const Eigen::MatrixXd& second) const {
+    return ThirdOrderForces(elements, stiffness, kPoissonRatio, first, second);
   }
 
   Eigen::MatrixXd SecondOrder(const Eigen::MatrixXd& fields) const {
@@ -95,6 +108,54 @@ TEST(NeoHookeanExpansionTest, RotationsLinearPartIsHeldByForcesOfItsStretch) {
   const Eigen::VectorXd stiffness_times =
       (body.Forces(kSmall * second) - body.Forces(-kSmall * second)) / (2 * kSmall);
   EXPECT_LT((body.SecondOrder(linear) + stiffness_times).norm(), 1e-6 * stiffness_times.norm());
+}
+
+// Random fields of one size and another.
+Eigen::MatrixXd RandomFields(const Body& body, Eigen::Index count) {
+  return 0.1 * Eigen::MatrixXd::Random(3 * body.mesh.num_vertices(), count);
+}
+
+TEST(NeoHookeanExpansionTest, ThirdOrderIsTheThirdDifferenceOfTheForces) {
+  Body body;
+  const Eigen::VectorXd v = RandomFields(body, 1);
+  const Eigen::VectorXd w = RandomFields(body, 1);
+  const Eigen::VectorXd third = body.ThirdOrder(v, w);
+  const double far = (body.ThirdDifference(v, w, 0.2) - third).norm();
+  const double near = (body.ThirdDifference(v, w, 0.02) - third).norm();
+  EXPECT_LT(near, 2e-3 * third.norm());
+  EXPECT_NEAR(far / near, 100, 20);
+}
+
+// The columns by one field alone, made of several.
+TEST(NeoHookeanExpansionTest, TriplesAreTheCubicOfAllNumbers) {
+  Body body;
+  const Eigen::MatrixXd first = RandomFields(body, 3);
+  const Eigen::MatrixXd second = RandomFields(body, NumFieldPairs(3));
+  const Eigen::MatrixXd triples = body.ThirdOrder(first, second);
+  ASSERT_EQ(triples.cols(), NumFieldTriples(3));
+  const Eigen::Vector3d n(0.7, -1.3, 0.4);
+  Eigen::VectorXd w = Eigen::VectorXd::Zero(first.rows());
+  Eigen::Index pair = 0;
+  for (int a = 0; a < 3; ++a) {
+    for (int b = a; b < 3; ++b) w += (a == b ? 1 : 2) * n[a] * n[b] * second.col(pair++);
+  }
+  const Eigen::VectorXd whole = body.ThirdOrder(first * n, w);
+  EXPECT_LT((triples * TripleProducts(n) - whole).norm(), 1e-11 * whole.norm());
+}
+
+// Turning is exact: along sin R's part and (1 - cos) R's part nothing strains to third order.
+TEST(NeoHookeanExpansionTest, RotationsHaveNoThirdOrderForces) {
+  Body body;
+  const Eigen::Vector3d n(0.3, -0.2, 0.5);  // sine times axis
+  Eigen::VectorXd v(3 * body.mesh.num_vertices());
+  Eigen::VectorXd w(v.size());
+  for (Eigen::Index i = 0; i < body.mesh.num_vertices(); ++i) {
+    const Eigen::Vector3d x = body.mesh.positions().row(i);
+    v.segment<3>(3 * i) = n.cross(x);
+    w.segment<3>(3 * i) = 0.5 * n.cross(n.cross(x));
+  }
+  const double alone = body.ThirdOrder(v, Eigen::VectorXd::Zero(v.size())).norm();
+  EXPECT_LT(body.ThirdOrder(v, w).norm(), 1e-12 * alone);
 }
 
 }  // namespace

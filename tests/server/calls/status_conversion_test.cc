@@ -53,6 +53,17 @@ TEST(StatusConversionTest, ErrorsCarryTheirReasonAsGoogleRpcSaysIt) {
   EXPECT_EQ(info.metadata().at("limit"), "64");
 }
 
+TEST(StatusConversionTest, WhenToTryAgainIsToldAsGoogleHasIt) {
+  const google::rpc::Status details = DetailsOf(
+      ToGrpcStatus(WithReason(absl::ResourceExhaustedError("too often"),
+                              ErrorReason::kQuotaExceeded, {{"retry_after_ms", "1500"}})));
+  ASSERT_EQ(details.details_size(), 2);
+  google::rpc::RetryInfo retry;
+  ASSERT_TRUE(details.details(1).UnpackTo(&retry));
+  EXPECT_EQ(retry.retry_delay().seconds(), 1);
+  EXPECT_EQ(retry.retry_delay().nanos(), 500'000'000);
+}
+
 TEST(StatusConversionTest, TheClientGetsBackWhatTheServerHad) {
   const absl::Status status =
       WithReason(absl::NotFoundError("no such mesh"), ErrorReason::kMeshNotFound, {{"a", "b=c"}});

@@ -23,13 +23,14 @@ class GatewayTest : public ::testing::Test {
   GatewayTest() { Restart({}); }
   ~GatewayTest() override { EXPECT_EQ(StatusOf(Ask(port(), "GET /healthz HTTP/1.1")), 200); }
 
-  // A gateway with these limits in its place.
-  void Restart(const GatewayLimits& limits) {
+  // A gateway with these limits, and this login, in its place.
+  void Restart(const GatewayLimits& limits, const LoginConfig& login = {}) {
     gateway_.reset();
     GatewayOptions options;
     options.servers = {server_.address()};
     options.port = 0;
     options.limits = limits;
+    options.login = login;
     auto gateway = Gateway::Start(options);
     ASSERT_TRUE(gateway.ok()) << gateway.status();
     gateway_ = *std::move(gateway);

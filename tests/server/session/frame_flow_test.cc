@@ -3,6 +3,7 @@
 
 #include "server/session/frame_flow.h"
 
+#include <numeric>
 #include <optional>
 
 #include "gmock/gmock.h"
@@ -284,6 +285,27 @@ TEST(FrameFlowTest, ClosingWhileASolveRunsWaitsForItsFrame) {
   EXPECT_FALSE(flow.Done()) << "its frame waits";
   EXPECT_TRUE(flow.TakeFrame().has_value());
   EXPECT_TRUE(flow.Done());
+}
+
+TEST(FrameFlowTest, MeasuresPosesFramesAndAcknowledgements) {
+  FrameMeasures measures;
+  FrameFlow flow(2, &measures);
+  ASSERT_THAT(flow.Put(1, {}), IsOk());
+  ASSERT_THAT(flow.Put(2, {}), IsOk());
+  EXPECT_EQ(SolveAndTake(&flow).sequence, 2);
+  ASSERT_THAT(flow.Put(3, {}), IsOk());
+  EXPECT_EQ(SolveAndTake(&flow).sequence, 3);
+  EXPECT_EQ(measures.poses, 3);
+  EXPECT_EQ(measures.coalesced_poses, 1);
+  EXPECT_EQ(measures.frames, 2);
+  const auto count = [](const DurationHistogram& histogram) {
+    const auto counts = histogram.Read().counts;
+    return std::accumulate(counts.begin(), counts.end(), uint64_t{0});
+  };
+  EXPECT_EQ(count(measures.latency), 2);
+  EXPECT_EQ(count(measures.picture_age), 0);
+  ASSERT_THAT(flow.Acknowledge(3, std::nullopt), IsOk());
+  EXPECT_EQ(count(measures.picture_age), 1) << "the frame that is looked at, not those before it";
 }
 
 TEST(FrameFlowTest, ASolveWithoutAnswerFreesTheWay) {

@@ -4,6 +4,7 @@
 #include "server/session/memory_budget.h"
 
 #include <atomic>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -11,12 +12,14 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/base/error_reason.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::tissueform::testing::IsOk;
 using ::tissueform::testing::StatusIs;
@@ -103,6 +106,42 @@ TEST(MemoryBudgetTest, ThreadsNeverTakeMoreThanThereIs) {
   }
   EXPECT_FALSE(exceeded);
   EXPECT_EQ(budget.reserved_bytes(), 0);
+}
+
+TEST(MemoryBudgetTest, AnOwnerHasAPartOfTheWholeAndTakesNothingFromAnother) {
+  MemoryBudget budget(100);
+  std::vector<std::string> asked;
+  budget.set_account_limit(
+      60, [&](const std::string& owner, int64_t /*bytes*/) { asked.push_back(owner); });
+  MemoryBudget* one = budget.AccountOf("one");
+  EXPECT_EQ(one, budget.AccountOf("one"));
+  EXPECT_EQ(budget.AccountOf(""), &budget) << "nobody's share is the whole";
+  ASSERT_OK_AND_ASSIGN(MemoryReservation first, one->Reserve(50, "session"));
+  EXPECT_EQ(budget.reserved_bytes(), 50);
+  const absl::Status over = first.Resize(61, "factor");
+  EXPECT_EQ(ReasonOf(over), "QUOTA_EXCEEDED");
+  EXPECT_EQ(ErrorInfoOf(over).metadata.at("quota"), "memory-mib");
+  EXPECT_THAT(asked, ElementsAre("one"));
+  ASSERT_OK_AND_ASSIGN(const MemoryReservation second, budget.AccountOf("two")->Reserve(50, "s"));
+  const absl::Status full = first.Resize(60, "factor");
+  EXPECT_EQ(ReasonOf(full), "MEMORY_BUDGET_FULL") << "of all, not of the owner";
+  EXPECT_EQ(one->reserved_bytes(), 50) << "nothing is left of what was refused";
+  EXPECT_EQ(budget.reserved_bytes(), 100);
+  EXPECT_THAT(first.Resize(10, "session"), IsOk());
+  EXPECT_EQ(one->reserved_bytes(), 10);
+  EXPECT_EQ(budget.reserved_bytes(), 60);
+}
+
+TEST(MemoryBudgetTest, WhatAnOwnerGivesBackMakesRoomForTheSameOwner) {
+  MemoryBudget budget(100);
+  MemoryReservation idle;
+  budget.set_account_limit(
+      60, [&](const std::string& /*owner*/, int64_t /*bytes*/) { idle = MemoryReservation(); });
+  MemoryBudget* one = budget.AccountOf("one");
+  ASSERT_OK_AND_ASSIGN(idle, one->Reserve(40, "idle"));
+  ASSERT_OK_AND_ASSIGN(const MemoryReservation fresh, one->Reserve(50, "fresh"));
+  EXPECT_EQ(one->reserved_bytes(), 50);
+  EXPECT_EQ(budget.reserved_bytes(), 50);
 }
 
 TEST(MemoryBudgetTest, TheMostThatWasReservedIsRemembered) {

@@ -8,6 +8,7 @@
 #include <future>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <unistd.h>
 #include <vector>
 
@@ -54,6 +55,33 @@ TEST(WorkerPoolTest, NoLaneWaitsForAnother) {
     }
     end.set_value();
   }
+}
+
+TEST(WorkerPoolTest, MeasuresWaitingAndRunningOfEachLane) {
+  WorkerPool pool(1);
+  std::promise<void> end;
+  std::promise<void> started;
+  const std::shared_future<void> ended = end.get_future().share();
+  pool.Post(Lane::kSolves, [ended, &started] {
+    started.set_value();
+    ended.wait();
+  });
+  started.get_future().wait();
+  Strand strand(&pool);
+  std::promise<void> last;
+  for (int i = 0; i < 3; ++i) strand.Post(Lane::kSolves, [] {});
+  EXPECT_EQ(pool.CountQueued(Lane::kSolves), 1) << "of a strand one at a time";
+  EXPECT_EQ(pool.CountQueued(Lane::kBatch), 0);
+  end.set_value();
+  strand.Post(Lane::kBatch, [&last] { last.set_value(); });
+  last.get_future().wait();
+  const auto count = [](const DurationHistogram& histogram) {
+    const auto counts = histogram.Read().counts;
+    return std::accumulate(counts.begin(), counts.end(), uint64_t{0});
+  };
+  EXPECT_EQ(count(pool.measures(Lane::kSolves).waited), 4);
+  EXPECT_EQ(count(pool.measures(Lane::kSolves).ran), 4);
+  EXPECT_EQ(count(pool.measures(Lane::kBatch).waited), 1);
 }
 
 TEST(WorkerPoolTest, LaterLanesLeaveTheProcessorsToEarlierOnes) {

@@ -1,25 +1,29 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { type Client, createClient } from "@connectrpc/connect";
+import { type Client, type Interceptor, createClient } from "@connectrpc/connect";
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import type { DescMethod, MessageShape } from "@bufbuild/protobuf";
+import { AccessService } from "../generated/tissueform/v1/access_service_pb";
 import { CaseService } from "../generated/tissueform/v1/case_service_pb";
 import { DeformService } from "../generated/tissueform/v1/deform_service_pb";
 import { MeshService } from "../generated/tissueform/v1/mesh_service_pb";
 import { PredictionService } from "../generated/tissueform/v1/prediction_service_pb";
 import { ServerInfoService } from "../generated/tissueform/v1/server_info_pb";
 import { SessionService } from "../generated/tissueform/v1/session_service_pb";
-import type { CallError } from "./call_error";
+import { Bearer } from "./bearer";
+import { CallError, Code, toCallError } from "./call_error";
 import { type CallHandlers, type CallOptions, CallSocket, type Socket, type SocketFactory } from "./call_socket";
 
 const UNARY_DEADLINE_MS = 60_000;
 
 /**
  * The page's own gateway: services for unary calls and bounded downloads over gRPC-Web, `open` for what lives long, over a
- * socket of its own.
+ * socket of its own. The token of `bearer` goes with every call. Where the server does not take it and there is another one, a
+ * unary call is made again with that, and a call over a socket ends with an error that passes.
  */
 export class Gateway {
+  readonly access: Client<typeof AccessService>;
   readonly cases: Client<typeof CaseService>;
   readonly meshes: Client<typeof MeshService>;
   readonly sessions: Client<typeof SessionService>;
@@ -30,9 +34,16 @@ export class Gateway {
   /** `base`: where the page comes from, as "http://127.0.0.1:8080". */
   constructor(
     readonly base: string,
+    readonly bearer: Bearer = new Bearer(),
     private readonly sockets: SocketFactory = () => webSocket(base),
   ) {
-    const transport = createGrpcWebTransport({ baseUrl: base, useBinaryFormat: true, defaultTimeoutMs: UNARY_DEADLINE_MS });
+    const transport = createGrpcWebTransport({
+      baseUrl: base,
+      useBinaryFormat: true,
+      defaultTimeoutMs: UNARY_DEADLINE_MS,
+      interceptors: [withToken(bearer)],
+    });
+    this.access = createClient(AccessService, transport);
     this.cases = createClient(CaseService, transport);
     this.meshes = createClient(MeshService, transport);
     this.sessions = createClient(SessionService, transport);
@@ -42,7 +53,18 @@ export class Gateway {
   }
 
   open<M extends DescMethod>(method: M, handlers: CallHandlers<MessageShape<M["output"]>>, options?: CallOptions): CallSocket<M> {
-    return new CallSocket(this.sockets, method, handlers, options);
+    const { token } = this.bearer;
+    const onEnd = (error: CallError | null) => {
+      if (error?.code === Code.Unauthenticated) void this.refused(error, token, (told) => handlers.onEnd(told));
+      else handlers.onEnd(error);
+    };
+    const metadata = { ...this.bearer.headers, ...options?.metadata };
+    return new CallSocket(this.sockets, method, { onMessage: (message, frame) => handlers.onMessage(message, frame), onEnd }, { ...options, metadata });
+  }
+
+  private async refused(error: CallError, token: string, onEnd: (error: CallError) => void): Promise<void> {
+    const isReplaced = await this.bearer.replace(token);
+    onEnd(isReplaced ? new CallError(Code.Unavailable, "the login is being renewed") : error);
   }
 
   /**
@@ -66,6 +88,25 @@ export class Gateway {
       call.halfClose();
     });
   }
+}
+
+/** Of unary calls and downloads. */
+function withToken(bearer: Bearer): Interceptor {
+  return (next) => async (request) => {
+    const { token } = bearer;
+    const ask = () => {
+      Object.entries(bearer.headers).forEach(([name, value]) => request.header.set(name, value));
+      return next(request);
+    };
+    try {
+      return await ask();
+    } catch (thrown) {
+      // The messages of a stream are gone once they were sent.
+      const isRefused = toCallError(thrown).code === Code.Unauthenticated && !request.stream;
+      if (!isRefused || !(await bearer.replace(token))) throw thrown;
+      return ask();
+    }
+  };
 }
 
 /** Metadata by which a proxy may send all calls of a session to one server. */

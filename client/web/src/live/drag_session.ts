@@ -49,11 +49,14 @@ const KEPT_SEND_TIMES = 256;
  * off another one is opened, which is sent the newest poses again. Commits are repeated until the server says that it keeps them.
  */
 export class DragSession {
+  private readonly unwatch: () => void;
   private call: CallSocket<typeof DeformService.method.deform> | null = null;
   private stopTimer: (() => void) | null = null;
   private readonly backoff = new Backoff();
   private isClosed = false;
   private isStarted = false;
+  /** The token that the open call stands on. */
+  private toldToken = "";
 
   private sequence = 0n;
   private poses: HandlePose[] | null = null;
@@ -62,12 +65,13 @@ export class DragSession {
   private readonly sendTimes = new Map<bigint, number>();
 
   constructor(
-    private readonly gateway: Pick<Gateway, "open">,
+    private readonly gateway: Pick<Gateway, "open" | "bearer">,
     private readonly configuration: DeformConfiguration,
     private readonly listener: DragListener,
     private readonly timer: Timer = browserTimer,
     private readonly now: () => number = () => performance.now(),
   ) {
+    this.unwatch = gateway.bearer.watch((token) => this.renew(token));
     this.connect();
   }
 
@@ -88,12 +92,14 @@ export class DragSession {
   /** Nothing is told afterwards. */
   close(): void {
     this.isClosed = true;
+    this.unwatch();
     this.stopTimer?.();
     this.call?.cancel();
   }
 
   private connect(): void {
     this.isStarted = false;
+    this.toldToken = this.gateway.bearer.token;
     const call = this.gateway.open(
       DeformService.method.deform,
       { onMessage: (message, frame) => this.receive(message, frame), onEnd: (error) => this.broken(error) },
@@ -101,6 +107,13 @@ export class DragSession {
     );
     call.send(create(DeformRequestSchema, { message: { case: "configuration", value: this.configuration } }));
     this.call = call;
+  }
+
+  // The open drag stands on the new token from now on.
+  private renew(token: string): void {
+    if (token === "" || token === this.toldToken || !this.isStarted) return;
+    this.toldToken = token;
+    this.call?.send(create(DeformRequestSchema, { message: { case: "token", value: token } }));
   }
 
   private sendNewest(commit: boolean): void {
@@ -120,6 +133,7 @@ export class DragSession {
 
   private start(started: DeformStarted): void {
     this.isStarted = true;
+    this.renew(this.gateway.bearer.token);
     this.backoff.reset();
     this.listener.onStarted(started);
     this.sendNewest(this.uncommitted !== null);
@@ -152,6 +166,7 @@ export class DragSession {
     const cause = error ?? new CallError(Code.Unavailable, "the server has ended the drag");
     if (!cause.isPassing) {
       this.isClosed = true;
+      this.unwatch();
       this.listener.onEnd(cause);
       return;
     }

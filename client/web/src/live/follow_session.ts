@@ -38,25 +38,30 @@ export interface FollowListener {
 
 /** Follows a session that somebody else drags; opens the watch again where the connection breaks off. */
 export class FollowSession {
+  private readonly unwatch: () => void;
   private call: CallSocket<typeof DeformService.method.watch> | null = null;
   private stopTimer: (() => void) | null = null;
   private readonly backoff = new Backoff();
   private isClosed = false;
   private watch = "";
   private form: WatchForm | null = null;
+  /** The newest picture that was shown; null: none yet. */
+  private used: bigint | null = null;
 
   constructor(
-    private readonly gateway: Pick<Gateway, "open"> & { deform: Pick<Gateway["deform"], "acknowledgeWatch"> },
+    private readonly gateway: Pick<Gateway, "open" | "bearer"> & { deform: Pick<Gateway["deform"], "acknowledgeWatch"> },
     private readonly session: string,
     private readonly listener: FollowListener,
     private readonly timer: Timer = browserTimer,
   ) {
+    this.unwatch = gateway.bearer.watch((token) => this.renew(token));
     this.connect();
   }
 
   /** Nothing is told afterwards. */
   close(): void {
     this.isClosed = true;
+    this.unwatch();
     this.stopTimer?.();
     this.call?.cancel();
   }
@@ -75,6 +80,7 @@ export class FollowSession {
     const { message } = response;
     if (message.case === "started") {
       this.watch = message.value.watch;
+      this.used = null;
       this.form = message.value.form ?? null;
       this.backoff.reset();
       this.listener.onStarted();
@@ -91,9 +97,19 @@ export class FollowSession {
     const positions = asFloats(raw, frame.frame.positions);
     const watch = this.watch;
     this.listener.onPicture({ frame, origin: frame.origin, vertices: this.form.vertices, positions }, () => {
-      // A watch that has ended meanwhile needs no acknowledgement; its end is told by itself.
-      this.gateway.deform.acknowledgeWatch({ watch, number: frame.number }, { headers: sessionMetadata(this.session) }).catch(() => {});
+      if (watch === this.watch) this.used = frame.number;
+      this.acknowledge(watch, frame.number);
     });
+  }
+
+  // A watch that has ended meanwhile needs no acknowledgement; its end is told by itself.
+  private acknowledge(watch: string, number: bigint): void {
+    this.gateway.deform.acknowledgeWatch({ watch, number }, { headers: sessionMetadata(this.session) }).catch(() => {});
+  }
+
+  // A watch stands on the token of its newest acknowledgement: said once more where nobody drags.
+  private renew(token: string): void {
+    if (token !== "" && this.used !== null) this.acknowledge(this.watch, this.used);
   }
 
   private broken(error: CallError | null): void {
@@ -101,6 +117,7 @@ export class FollowSession {
     const cause = error ?? new CallError(Code.Unavailable, "the server has ended the watch");
     if (!cause.isPassing) {
       this.isClosed = true;
+      this.unwatch();
       this.listener.onEnd(cause);
       return;
     }

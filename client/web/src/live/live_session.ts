@@ -107,6 +107,8 @@ export class LiveSession {
     const isOver = () => attempt !== this.attempt;
     const backoff = new Backoff();
     let isThere = exists;
+    // Taken and yet missing: it belongs to whoever was signed in here before.
+    let wasMissing = false;
     for (let mended = 0; ; ) {
       try {
         const session = await this.prepare(isThere, isOver);
@@ -118,8 +120,9 @@ export class LiveSession {
         const error = toCallError(thrown);
         if (error.isPassing) await this.wait(error, backoff.next());
         else if (++mended > MOST_MENDED) return this.fail(error);
-        else if (isThere && error.code === Code.NotFound) isThere = false;
+        else if (isThere && error.code === Code.NotFound) [isThere, wasMissing] = [false, true];
         else if (error.reason === "NO_PREPARED_ANSWERS" && this.choice.isPrepared) this.choice = { ...this.choice, isPrepared: false, ranges: null };
+        else if (error.reason === "SESSION_ID_TAKEN" && wasMissing) this.session = await newSession(this.caseName);
         else if (error.reason === "SESSION_ID_TAKEN") isThere = true;
         else return this.fail(error);
         if (isOver()) return null;

@@ -27,7 +27,7 @@ export async function uploadCase(gateway: Gateway, source: CaseSource, sha256: s
       onMessage: (message) => (answer = message),
       onEnd: (error) => (error === null ? resolve() : reject(error)),
     });
-    const header = { $typeName: "tissueform.v1.CaseHeader" as const, sha256, totalBytes: BigInt(source.totalBytes), title: clipTitle(title) };
+    const header = { $typeName: "tissueform.v1.CaseHeader" as const, sha256, totalBytes: BigInt(source.totalBytes), title: clipTitle(title), project: "" };
     call.send(create(UploadCaseRequestSchema, { message: { case: "header", value: header } }));
     const sendChunk = (offset: number, data: Uint8Array, finishWrite: boolean) => {
       const value = { $typeName: "tissueform.v1.CaseChunk" as const, writeOffset: BigInt(offset), data, finishWrite };

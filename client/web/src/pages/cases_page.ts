@@ -11,7 +11,7 @@ import { formatBytes } from "../planning/numbers";
 import { el, newId } from "../panels/dom";
 
 /** The first page: the server's cases, and a place where a case file is dropped. */
-export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void): HTMLElement {
+export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void, account: HTMLElement | null): HTMLElement {
   const list = el("ul", { class: "cases" });
   const told = el("p", { class: "told", attributes: { role: "status" } });
   const problem = el("p", { class: "problem", attributes: { role: "alert" } });
@@ -44,6 +44,7 @@ export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void): HTML
   void showList();
   return el("main", { class: "start" }, [
     el("div", { class: "sheet" }, [
+      account,
       el("h1", { text: "Tissueform" }),
       el("p", { class: "lead", text: "Move the bone, see the face follow." }),
       el("h2", { text: "Cases" }),

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { sentenceOf, toCallError } from "../calls/call_error";
+import { type CallError, Code, sentenceOf, toCallError } from "../calls/call_error";
 import { type Gateway, sessionMetadata } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
 import { WatchOrigin } from "../generated/tissueform/v1/deform_service_pb";
@@ -11,17 +11,18 @@ import { FollowSession, type FollowedPicture } from "../live/follow_session";
 import { fromMessages } from "../live/pose_messages";
 import { el } from "../panels/dom";
 import { lookByKey } from "../panels/keyboard";
-import { noticeBox, statusBar } from "../panels/status_bar";
+import { noticeBox, statusBar, timeText } from "../panels/status_bar";
 import { viewBar } from "../panels/view_bar";
 import type { HeadView } from "../scene/head_view";
 import { followedRest } from "../workbench/face_colors";
 import { pictureBox } from "./planner_page";
 
 /** A read-only page that shows what a planner's page shows. */
-export function followerPage(gateway: Gateway, file: CaseFile, session: string): { element: HTMLElement; follower: Follower } {
+export function followerPage(gateway: Gateway, file: CaseFile, session: string, link: { endsAt: Date | null; account: HTMLElement | null }): { element: HTMLElement; follower: Follower } {
   const notice = noticeBox();
   const { element: picture, view } = pictureBox(file, notice.show);
-  const status = statusBar(`${file.manifest.title === "" ? "Case" : file.manifest.title}, followed`, null, () => {}, null);
+  const status = statusBar(`${file.manifest.title === "" ? "Case" : file.manifest.title}, followed`, { links: null, onLeave: null, onRetry: null, account: link.account });
+  if (link.endsAt !== null) status.element.append(el("span", { class: "quiet", text: `Link works until ${timeText(link.endsAt)}` }));
   status.connection({ kind: "preparing", text: "Joining", share: null });
   const follower = new Follower(gateway, file, session, view, {
     onLive: (isLive, text) => status.connection(isLive ? { kind: "live" } : { kind: "broken", text }),
@@ -34,6 +35,14 @@ export function followerPage(gateway: Gateway, file: CaseFile, session: string):
   picture.append(notice.element);
   return { element: el("div", { class: "planner following" }, [status.element, el("main", {}, [picture, viewBar(view)])]), follower };
 }
+
+/** Why there is nothing more to see, as a sentence. */
+export function endOfWatch(error: CallError): string {
+  if (error.code === Code.Unauthenticated) return LINK_HAS_ENDED;
+  return error.reason === "SESSION_NOT_FOUND" ? "The session that you followed has ended." : sentenceOf(error);
+}
+
+export const LINK_HAS_ENDED = "The link has expired, or was ended. Ask whoever sent it for another one.";
 
 interface FollowerListener {
   onLive(isLive: boolean, text: string): void;
@@ -68,7 +77,7 @@ export class Follower {
         if (notice.case === "evicted") listener.onNotice("The session is being prepared again.");
       },
       onBroken: (error) => listener.onLive(false, sentenceOf(error)),
-      onEnd: (error) => listener.onEnd(error.reason === "SESSION_NOT_FOUND" ? "The session that you followed has ended." : sentenceOf(error)),
+      onEnd: (error) => listener.onEnd(endOfWatch(error)),
     });
   }
 

@@ -3,6 +3,7 @@
 
 import type { Gateway } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
+import { FollowLinks } from "../live/follow_links";
 import { button, el, onceAPicture } from "../panels/dom";
 import { exportPanel } from "../panels/export_panel";
 import { bindKeys, helpDialog } from "../panels/keyboard";
@@ -40,20 +41,31 @@ export function pictureBox(file: CaseFile, onNotice: (text: string) => void): { 
 /** An answer that takes longer than this is waited for in words. */
 const LATE_MS = 500;
 
-/** The planner of one case. `followLink`: for who follows this session. */
+/** What a page is given by who opens it. */
+export interface PageParts {
+  /** Makes the address of a follower's page. */
+  followUrl(sessionOrToken: string): string;
+  /** Whether the server knows who calls: then links are of tokens that end. */
+  hasLogins: boolean;
+  account: HTMLElement | null;
+}
+
+/** The planner of one case. */
 export function plannerPage(
   gateway: Gateway,
   file: CaseFile,
   caseName: string,
   models: readonly ModelInfo[],
-  followLink: (session: string) => string,
+  { followUrl, hasLogins, account }: PageParts,
   onLeave: () => void,
 ): { element: HTMLElement; bench: Workbench } {
   const notice = noticeBox();
   const { element: picture, view } = pictureBox(file, notice.show);
   const bench = new Workbench(gateway, file, caseName, view, models);
   const leave = () => void bench.live.end().then(onLeave);
-  const status = statusBar(file.manifest.title === "" ? "Case" : file.manifest.title, () => followLink(bench.live.session), leave, () => void bench.live.retry());
+  const links = new FollowLinks(gateway, hasLogins, () => bench.live.session, caseName, followUrl);
+  const title = file.manifest.title === "" ? "Case" : file.manifest.title;
+  const status = statusBar(title, { links, onLeave: leave, onRetry: () => void bench.live.retry(), account });
   bench.connection.watch(status.connection);
   bench.followers.watch(status.followers);
   const showAge = () => {

@@ -1,8 +1,10 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+import { sentenceOf } from "../calls/call_error";
 import type { Connection } from "../live/live_session";
-import { button, el } from "./dom";
+import type { FollowLinks } from "../live/follow_links";
+import { button, el, whileBusy } from "./dom";
 
 /** "nobody follows", "2 follow" */
 export function followersText(count: number): string {
@@ -20,8 +22,18 @@ export interface StatusBar {
 
 const FRESH_MS = 1000;
 
-/** How page and server stand to each other, in words; `link`: what a follower opens, null on a follower's page. */
-export function statusBar(title: string, link: (() => string) | null, onLeave: () => void, onRetry: (() => void) | null): StatusBar {
+/** What a page's bar holds beside words. */
+export interface StatusBarParts {
+  /** Null on a follower's page. */
+  links: FollowLinks | null;
+  onLeave: (() => void) | null;
+  onRetry: (() => void) | null;
+  /** Who is signed in; null where nobody is. */
+  account: HTMLElement | null;
+}
+
+/** How page and server stand to each other, in words. */
+export function statusBar(title: string, { links, onLeave, onRetry, account }: StatusBarParts): StatusBar {
   const dot = el("span", { class: "dot", attributes: { "aria-hidden": "true" } });
   const state = el("span", { attributes: { role: "status" } });
   const age = el("span", { class: "quiet age" });
@@ -29,18 +41,16 @@ export function statusBar(title: string, link: (() => string) | null, onLeave: (
   const progress = el("progress", { attributes: { max: "1", "aria-label": "Progress" } });
   progress.hidden = true;
   const retry = onRetry === null ? null : button("Try again", onRetry);
-  const copied = el("span", { class: "quiet", attributes: { role: "status" } });
-  const copy = link === null ? null : button("Copy follow link", () => void copyLink(link(), copied));
-  const back = button("Cases", onLeave, { attributes: { title: "Back to the list of cases; the session ends" } });
+  const back = onLeave === null ? null : button("Cases", onLeave, { attributes: { title: "Back to the list of cases; the session ends" } });
   const element = el("header", {}, [
-    link === null ? null : back,
+    back,
     el("h1", { text: title }),
     el("span", { class: "state" }, [dot, state, progress, age]),
     retry,
     follow,
-    copy,
-    copied,
+    links === null ? null : linkButtons(links),
     el("span", { class: "notice-mark", text: "Not a medical device" }),
+    account,
   ]);
   return {
     element,
@@ -79,13 +89,43 @@ function describe(connection: Connection): string {
   }
 }
 
-async function copyLink(link: string, told: HTMLElement): Promise<void> {
+/** Makes links for who follows, and ends them where the server knows who calls. */
+function linkButtons(links: FollowLinks): HTMLElement {
+  const told = el("span", { class: "quiet", attributes: { role: "status" } });
+  const fail = (thrown: unknown) => (told.textContent = sentenceOf(thrown));
+  const end = button("End all links", () => {
+    const run = async () => {
+      await links.endAll();
+      told.textContent = "all links have ended";
+    };
+    void whileBusy(end, run, fail);
+  });
+  end.hidden = !links.hasLogins;
+  const copy = button("Copy follow link", () => {
+    const run = async () => {
+      const { url, endsAt } = await links.make();
+      const isCopied = await copyText(url);
+      told.textContent = [isCopied ? "copied" : "", endsAt === null ? "" : `works until ${timeText(endsAt)}`].filter((part) => part !== "").join(", ");
+    };
+    void whileBusy(copy, run, fail);
+  });
+  return el("span", { class: "links" }, [copy, end, told]);
+}
+
+/** With the day where that is not today. */
+export function timeText(time: Date): string {
+  const isToday = time.toDateString() === new Date().toDateString();
+  return isToday ? time.toLocaleTimeString([], { timeStyle: "short" }) : time.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
+}
+
+async function copyText(text: string): Promise<boolean> {
   try {
-    await navigator.clipboard.writeText(link);
-    told.textContent = "copied";
+    await navigator.clipboard.writeText(text);
+    return true;
   } catch {
     // Without the right to write there the person copies it.
-    window.prompt("Link for who follows", link);
+    window.prompt("Link for who follows", text);
+    return false;
   }
 }
 

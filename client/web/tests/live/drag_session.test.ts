@@ -3,6 +3,7 @@
 
 import { create } from "@bufbuild/protobuf";
 import { describe, expect, test } from "vitest";
+import { Bearer } from "../../src/calls/bearer";
 import { CallError, Code } from "../../src/calls/call_error";
 import { CallSocket } from "../../src/calls/call_socket";
 import type { Gateway } from "../../src/calls/gateway";
@@ -21,7 +22,9 @@ function drag() {
   const pictures: { picture: Picture; used: () => void }[] = [];
   const errors: CallError[] = [];
   let now = 0;
+  const bearer = new Bearer();
   const gateway = {
+    bearer,
     open: (method: any, handlers: any, options: any) => {
       const socket = new FakeSocket();
       sockets.push(socket);
@@ -29,7 +32,7 @@ function drag() {
       socket.onopen?.();
       return call;
     },
-  } as unknown as Pick<Gateway, "open">;
+  } as unknown as Pick<Gateway, "open" | "bearer">;
   const session = new DragSession(
     gateway,
     create(DeformConfigurationSchema, { session: "sessions/abc" }),
@@ -47,7 +50,7 @@ function drag() {
     () => now,
   );
   const last = () => sockets[sockets.length - 1];
-  return { session, sockets, timers, told, pictures, errors, last, sleep: (ms: number) => (now += ms) };
+  return { session, sockets, timers, told, pictures, errors, last, bearer, sleep: (ms: number) => (now += ms) };
 }
 
 const STARTED = { message: { case: "started" as const, value: {} } };
@@ -56,6 +59,26 @@ const frame = (sequence: bigint, refinement = 0) => ({
 });
 
 describe("a drag", () => {
+  test("goes on with a new token, which it is told once", () => {
+    const { last, bearer } = drag();
+    bearer.token = "first";
+    expect(last().deformRequests()).toHaveLength(1);
+    last().answer(STARTED);
+    bearer.token = "second";
+    bearer.token = "second";
+    bearer.token = "";
+    const told = last().deformRequests().flatMap(({ message }) => (message.case === "token" ? [message.value] : []));
+    expect(told).toEqual(["first", "second"]);
+  });
+
+  test("that is over hears of no more tokens", () => {
+    const { session, last, bearer } = drag();
+    last().answer(STARTED);
+    session.close();
+    bearer.token = "late";
+    expect(last().deformRequests().some(({ message }) => message.case === "token")).toBe(false);
+  });
+
   test("begins with its configuration and sends the newest poses once the server listens", () => {
     const { session, last, told } = drag();
     session.sendPoses(POSES, false);

@@ -3,6 +3,7 @@
 
 import { create, toBinary } from "@bufbuild/protobuf";
 import { expect, test, vi } from "vitest";
+import { Bearer } from "../../src/calls/bearer";
 import { CallSocket } from "../../src/calls/call_socket";
 import { FrameKind, encodeFrame } from "../../src/calls/frame";
 import { WatchOrigin, WatchResponseSchema } from "../../src/generated/tissueform/v1/deform_service_pb";
@@ -17,8 +18,10 @@ function follow() {
   const pictures: { picture: FollowedPicture; used: () => void }[] = [];
   const timers: (() => void)[] = [];
   const acknowledgeWatch = vi.fn(() => Promise.resolve({}));
+  const bearer = new Bearer();
   const gateway = {
     deform: { acknowledgeWatch },
+    bearer,
     open: (method: any, handlers: any, options: any) => {
       const socket = new FakeSocket();
       sockets.push(socket);
@@ -43,7 +46,7 @@ function follow() {
     const payload = toBinary(WatchResponseSchema, create(WatchResponseSchema, { message }));
     sockets[sockets.length - 1].onmessage?.({ data: encodeFrame(FrameKind.Message, payload).buffer });
   };
-  return { sockets, told, pictures, timers, acknowledgeWatch, answer };
+  return { sockets, told, pictures, timers, acknowledgeWatch, bearer, answer };
 }
 
 const started = (vertices: number[], encoding = PositionEncoding.FLOAT32) => ({
@@ -65,6 +68,18 @@ test("a watch asks once, and acknowledges what was used", () => {
   expect(acknowledgeWatch).not.toHaveBeenCalled();
   pictures[0].used();
   expect(acknowledgeWatch.mock.calls[0]).toMatchObject([{ watch: "watches/1", number: 7n }, {}]);
+});
+
+test("a new token is told by acknowledging once more", () => {
+  const { answer, pictures, acknowledgeWatch, bearer } = follow();
+  answer(started([4]));
+  bearer.token = "before any picture";
+  expect(acknowledgeWatch).not.toHaveBeenCalled();
+  answer(frame(7n, [1, 2, 3]));
+  pictures[0].used();
+  bearer.token = "renewed";
+  expect(acknowledgeWatch).toHaveBeenCalledTimes(2);
+  expect(acknowledgeWatch.mock.calls[1]).toMatchObject([{ watch: "watches/1", number: 7n }, {}]);
 });
 
 test("another form holds for the frames after it", () => {

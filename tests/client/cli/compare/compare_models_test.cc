@@ -1,6 +1,10 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include <fstream>
+#include <string>
+#include <vector>
+
 #include "nlohmann/json.hpp"
 
 #include "core/mesh_io/tet_mesh_io.h"
@@ -68,6 +72,34 @@ TEST_F(CompareModelsTest, FolderGetsAResultWithDifferencesOfEachModel) {
   EXPECT_NE(FindAttribute(arap.point_data, "displacement_mm"), nullptr);
   EXPECT_THAT(Read("models.csv"), AllOf(StartsWith("model,reference,region,vertices,mean_mm"),
                                         HasSubstr("\narap,neo_hookean,handle top,25,")));
+}
+
+TEST_F(CompareModelsTest, RangesOfThePlanGiveEveryElasticModelTheBandThatDeformGivesIt) {
+  nlohmann::json plan = nlohmann::json::parse(std::ifstream(BarPlan()));
+  plan["version"] = 2;
+  plan["mesh"] = TestDataPath("plans/bar/bar.vtu");
+  plan["uncertainty"] = {{"youngs_modulus_factor_95", 2}};
+  Write("plan.json", plan.dump());
+  const ProcessResult result =
+      Run({"compare", "plan.json", "--allow-outside", "--out", "compared", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json models = nlohmann::json::parse(result.out)["models"];
+  for (const std::string model : {"gradient_field", "arap", "linear_elastic", "neo_hookean"}) {
+    const bool is_elastic = model == "linear_elastic" || model == "neo_hookean";
+    EXPECT_EQ(models[model].contains("material_uncertainty"), is_elastic) << model;
+    ASSERT_OK_AND_ASSIGN(const TetMeshFile compared,
+                         ReadTetMesh(Path("compared/" + model + ".vtu")));
+    const Attribute* band = FindAttribute(compared.point_data, "material_uncertainty_p95_mm");
+    ASSERT_EQ(band != nullptr, is_elastic) << model;
+    if (!is_elastic) continue;
+    ASSERT_EQ(
+        Run({"deform", "plan.json", "--allow-outside", "--out", "alone.vtu", "--model", model})
+            .exit_code,
+        0);
+    ASSERT_OK_AND_ASSIGN(const TetMeshFile alone, ReadTetMesh(Path("alone.vtu")));
+    EXPECT_EQ(ToDoubles(*band),
+              ToDoubles(*FindAttribute(alone.point_data, "material_uncertainty_p95_mm")));
+  }
 }
 
 TEST_F(CompareModelsTest, TableHasABlockForEachModelButTheReference) {

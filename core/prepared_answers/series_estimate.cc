@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/prepared_answers/third_order_estimate.h"
+#include "core/prepared_answers/series_estimate.h"
 
 #include <algorithm>
 #include <cmath>
@@ -52,8 +52,8 @@ std::vector<Eigen::Index> MostMoved(const Eigen::MatrixXd& columns) {
 
 }  // namespace
 
-ThirdOrderEstimate::ThirdOrderEstimate(const Eigen::MatrixXd& first, const Eigen::MatrixXd& second,
-                                       double size_mm)
+SeriesEstimate::SeriesEstimate(const Eigen::MatrixXd& first, const Eigen::MatrixXd& second,
+                               double size_mm)
     : size_mm_(size_mm), first_gains_(Gains(first)), second_gains_(Gains(second)) {
   const std::vector<Eigen::Index> vertices = MostMoved(second);
   probes_.resize(3 * static_cast<Eigen::Index>(vertices.size()), second.cols());
@@ -63,15 +63,16 @@ ThirdOrderEstimate::ThirdOrderEstimate(const Eigen::MatrixXd& first, const Eigen
   }
 }
 
-double ThirdOrderEstimate::UnscaledMm(const Eigen::VectorXd& products) const {
+double SeriesEstimate::UnscaledMm(const Eigen::VectorXd& pairs, std::optional<double> ratio) const {
   if (probes_.rows() == 0) return 0;
-  const Eigen::VectorXf moves = probes_ * products.cast<float>();
+  const Eigen::VectorXf moves = probes_ * pairs.cast<float>();
   const double together = LargestMove(moves.cast<double>()).second;
-  const double single = second_gains_.cwiseProduct(products).norm();
-  return std::pow(together * single, 0.75) / std::sqrt(size_mm_);
+  const double single = second_gains_.cwiseProduct(pairs).norm();
+  const double third_order = std::pow(together * single, 0.75) / std::sqrt(size_mm_);
+  return ratio ? third_order * *ratio / (1 + *ratio) : third_order;
 }
 
-void ThirdOrderEstimate::Describe(PortableAnswers* answers) const {
+void SeriesEstimate::Describe(PortableAnswers* answers) const {
   answers->numbers.size_mm = size_mm_;
   answers->numbers.estimate_scale = scale_;
   answers->first_gains.assign(first_gains_.begin(), first_gains_.end());
@@ -80,7 +81,7 @@ void ThirdOrderEstimate::Describe(PortableAnswers* answers) const {
   answers->probes.assign(rows.data(), rows.data() + rows.size());
 }
 
-int64_t ThirdOrderEstimate::bytes_held() const {
+int64_t SeriesEstimate::bytes_held() const {
   return probes_.size() * static_cast<int64_t>(sizeof(float)) +
          (first_gains_.size() + second_gains_.size()) * static_cast<int64_t>(sizeof(double));
 }

@@ -1,0 +1,26 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+
+namespace tissueform {
+
+// How a server is reached and who one is there. Files are PEM.
+struct ConnectionOptions {
+  // Encrypted, to a server whose certificate names the host that was given; so is whatever names a
+  // file of TLS.
+  bool tls = false;
+  std::string tls_ca = {};  // authorities of the server's certificate; empty: the system's
+  // One's own certificate and its key, for servers that ask for one.
+  std::string tls_certificate = {};
+  std::string tls_key = {};
+  // The token that says who one is; read again when it is renewed. Only its owner may read it.
+  std::string token_file = {};
+  bool insecure = false;  // a server off this machine without encryption all the same
+
+  bool encrypted() const { return tls || !tls_ca.empty() || !tls_certificate.empty(); }
+};
+
+}  // namespace tissueform

@@ -1,0 +1,35 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+/** The token that goes with every call. In memory only; "": none, as where nobody logs in. */
+export class Bearer {
+  private current = "";
+  private readonly listeners = new Set<(token: string) => void>();
+  /** Finds another token in place of one that the server does not take; false where it cannot. */
+  renewer: (() => Promise<boolean>) | null = null;
+
+  get token(): string {
+    return this.current;
+  }
+
+  set token(token: string) {
+    this.current = token;
+    this.listeners.forEach((listener) => listener(token));
+  }
+
+  get headers(): Record<string, string> {
+    return this.current === "" ? {} : { authorization: `Bearer ${this.current}` };
+  }
+
+  /** `listener` hears of every new token until it calls the result. */
+  watch(listener: (token: string) => void): () => void {
+    this.listeners.add(listener);
+    return () => this.listeners.delete(listener);
+  }
+
+  /** The server does not take `refused`: whether there is another one now, with which the call may be made again. */
+  async replace(refused: string): Promise<boolean> {
+    if (this.current !== refused) return this.current !== "";
+    return (await this.renewer?.()) ?? false;
+  }
+}

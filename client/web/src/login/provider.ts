@@ -1,0 +1,162 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import * as oauth from "oauth4webapi";
+import type { LoginConfig } from "./login_config";
+import type { Redirect } from "./redirect";
+
+export interface Tokens {
+  accessToken: string;
+  /** Null where the provider gives none: the login ends with the token. */
+  refreshToken: string | null;
+  lifetimeMs: number;
+}
+
+export interface User {
+  /** As the provider calls them. */
+  name: string;
+  idToken: string;
+}
+
+/** What a login needs of an identity provider; tests have their own. All reject as `loginSentence` tells. */
+export interface Provider {
+  /** Where the user is asked; `isSilent`: is not asked, and the answer is an error where that would be needed. */
+  authorizationUrl(redirect: Redirect, redirectUri: string): Promise<string>;
+  /** `answer`: the query with which the user came back. */
+  exchange(answer: URLSearchParams, redirect: Redirect, redirectUri: string): Promise<Tokens & { user: User }>;
+  renew(refreshToken: string): Promise<Tokens>;
+  /** Where the user is signed out at the provider, too; null where it has no such place. */
+  endSessionUrl(user: User, redirectUri: string): Promise<string | null>;
+}
+
+/** What only the page itself may know of a login that begins. */
+export function newSecrets(): Pick<Redirect, "state" | "nonce" | "verifier"> {
+  return { state: oauth.generateRandomState(), nonce: oauth.generateRandomNonce(), verifier: oauth.generateRandomCodeVerifier() };
+}
+
+const DEADLINE_MS = 10_000;
+/** Of a token whose lifetime the provider does not tell. */
+const UNTOLD_LIFETIME_S = 300;
+
+/** OpenID Connect's code flow with PKCE, as a public client. What the provider says of itself is asked for once. */
+export class OidcProvider implements Provider {
+  private readonly client: oauth.Client;
+  private readonly issuer: URL;
+  private server: Promise<oauth.AuthorizationServer> | null = null;
+
+  constructor(private readonly config: LoginConfig) {
+    this.client = { client_id: config.clientId };
+    this.issuer = new URL(config.issuer);
+  }
+
+  async authorizationUrl(redirect: Redirect, redirectUri: string): Promise<string> {
+    const server = await this.discover();
+    const url = new URL(server.authorization_endpoint ?? fail("the identity provider names no place to log in"));
+    const parameters = {
+      client_id: this.config.clientId,
+      redirect_uri: redirectUri,
+      response_type: "code",
+      scope: this.config.scope,
+      state: redirect.state,
+      nonce: redirect.nonce,
+      code_challenge: await oauth.calculatePKCECodeChallenge(redirect.verifier),
+      code_challenge_method: "S256",
+      ...(this.config.audience === "" ? {} : { audience: this.config.audience }),
+      ...this.resource,
+      ...(redirect.isSilent ? { prompt: "none" } : {}),
+    };
+    Object.entries(parameters).forEach(([name, value]) => url.searchParams.set(name, value));
+    return url.href;
+  }
+
+  async exchange(answer: URLSearchParams, redirect: Redirect, redirectUri: string): Promise<Tokens & { user: User }> {
+    const server = await this.discover();
+    const valid = oauth.validateAuthResponse(server, this.client, answer, redirect.state);
+    const options = { ...this.options, additionalParameters: this.resource };
+    const response = await oauth.authorizationCodeGrantRequest(server, this.client, oauth.None(), valid, redirectUri, redirect.verifier, options);
+    const tokens = await oauth.processAuthorizationCodeResponse(server, this.client, response, { expectedNonce: redirect.nonce, requireIdToken: true });
+    return { ...tokensOf(tokens), user: userOf(tokens) };
+  }
+
+  async renew(refreshToken: string): Promise<Tokens> {
+    const server = await this.discover();
+    const options = { ...this.options, additionalParameters: this.resource };
+    const response = await oauth.refreshTokenGrantRequest(server, this.client, oauth.None(), refreshToken, options);
+    const tokens = tokensOf(await oauth.processRefreshTokenResponse(server, this.client, response));
+    return { ...tokens, refreshToken: tokens.refreshToken ?? refreshToken };
+  }
+
+  async endSessionUrl(user: User, redirectUri: string): Promise<string | null> {
+    const { end_session_endpoint: endpoint } = await this.discover();
+    if (typeof endpoint !== "string") return null;
+    const url = new URL(endpoint);
+    const parameters = { client_id: this.config.clientId, id_token_hint: user.idToken, post_logout_redirect_uri: redirectUri };
+    Object.entries(parameters).forEach(([name, value]) => url.searchParams.set(name, value));
+    return url.href;
+  }
+
+  // Providers that know RFC 8707 call the audience a resource, which must be a URI.
+  private get resource(): Record<string, string> {
+    return /^[a-z][a-z0-9+.-]*:/i.test(this.config.audience) ? { resource: this.config.audience } : {};
+  }
+
+  // Without TLS the gateway names providers on loopback only.
+  private get options() {
+    return { [oauth.allowInsecureRequests]: this.issuer.protocol === "http:", signal: () => AbortSignal.timeout(DEADLINE_MS) };
+  }
+
+  private discover(): Promise<oauth.AuthorizationServer> {
+    this.server ??= oauth
+      .discoveryRequest(this.issuer, this.options)
+      .then((response) => oauth.processDiscoveryResponse(this.issuer, response))
+      .catch((thrown) => {
+        this.server = null;
+        throw thrown;
+      });
+    return this.server;
+  }
+}
+
+function fail(text: string): never {
+  throw new Error(text);
+}
+
+function tokensOf(response: oauth.TokenEndpointResponse): Tokens {
+  return {
+    accessToken: response.access_token,
+    refreshToken: response.refresh_token ?? null,
+    lifetimeMs: 1000 * (response.expires_in ?? UNTOLD_LIFETIME_S),
+  };
+}
+
+function userOf(response: oauth.TokenEndpointResponse): User {
+  const claims = oauth.getValidatedIdTokenClaims(response);
+  const names = [claims?.name, claims?.preferred_username, claims?.email, claims?.sub];
+  const name = names.find((value): value is string => typeof value === "string" && value !== "") ?? "";
+  return { name, idToken: response.id_token ?? "" };
+}
+
+/** The provider could not sign the user in without asking them something. */
+export function needsUser(thrown: unknown): boolean {
+  const asking = ["login_required", "interaction_required", "consent_required", "account_selection_required"];
+  return thrown instanceof oauth.AuthorizationResponseError && asking.includes(thrown.error);
+}
+
+/** The provider has refused, so that asking once more the same way is no use. */
+export function isRefusal(thrown: unknown): boolean {
+  return thrown instanceof oauth.ResponseBodyError && thrown.status < 500;
+}
+
+/** Why a login failed, as a sentence. Nothing of what the provider sent stands in it but its own word for the error. */
+export function loginSentence(thrown: unknown, issuer: string): string {
+  const host = new URL(issuer).host;
+  if (globalThis.crypto?.subtle === undefined) return "This page was not opened by https, without which browsers do not log in.";
+  if (thrown instanceof oauth.AuthorizationResponseError || thrown instanceof oauth.ResponseBodyError) {
+    const word = /^[a-z_]{1,40}$/.test(thrown.error) ? thrown.error : "for no known reason";
+    return `The identity provider (${host}) has refused the login: ${word}.`;
+  }
+  if (thrown instanceof oauth.OperationProcessingError || thrown instanceof oauth.UnsupportedOperationError) {
+    return `The answer of the identity provider (${host}) does not belong to this login, or is not what was asked for.`;
+  }
+  return `The identity provider (${host}) does not answer. Try again in a moment.`;
+}

@@ -1,0 +1,106 @@
+#!/usr/bin/env bash
+# Copyright 2026 The Tissueform Authors.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+#
+# Installs the server's and the gateway's packages into a fresh Debian 12, starts both, asks them as clients do, installs
+# them again over a changed configuration, removes and purges them.
+#
+#   deploy/test_packages.sh [FOLDER_OF_PACKAGES]     build/packages; made where they are missing
+#
+# Needs root, mmdebstrap and a Debian mirror. Takes half a minute to two, most of it for the
+# mirror: not a part of .ci/run.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+if [[ ${TISSUEFORM_OWN_MOUNTS:-} != yes ]]; then
+  # What is mounted goes with this process.
+  TISSUEFORM_OWN_MOUNTS=yes exec unshare --mount --propagation private "$0" "$@"
+fi
+
+packages=${1:-build/packages}
+if ! compgen -G "$packages/tissueform-gateway_*.deb" >/dev/null; then
+  deploy/build_packages.sh "$packages" tissueform-server tissueform-gateway >/dev/null
+fi
+scratch=$(mktemp -d)
+root=$scratch/root
+started=()
+
+finish() {
+  local pid
+  for pid in "${started[@]}"; do kill "$pid" 2>/dev/null || true; done
+  umount "$root/proc" 2>/dev/null || true
+  rm -rf --one-file-system "$scratch"
+}
+trap finish EXIT
+
+fail() {
+  echo "test_packages.sh: $*" >&2
+  cat "$scratch"/*.log >&2 2>/dev/null || true
+  exit 1
+}
+ok() { echo "ok: $*"; }
+inside() { DEBIAN_FRONTEND=noninteractive chroot "$root" "$@"; }
+
+if command -v lintian >/dev/null; then
+  # The project has no address for mail yet.
+  lintian --allow-root --fail-on error,warning --suppress-tags bogus-mail-host,bogus-mail-host-in-debian-changelog \
+    "$packages"/tissueform-{server,gateway}_*.deb || fail "lintian has found something"
+  ok "lintian finds nothing"
+fi
+
+mmdebstrap --quiet --variant=apt bookworm "$root" >"$scratch/debootstrap.log" 2>&1 || fail "no fresh root"
+mount -t proc proc "$root/proc"
+cp "$packages"/tissueform-{server,gateway}_*.deb "$root/tmp/"
+inside apt-get update -qq >"$scratch/install.log" 2>&1 || fail "no mirror"
+inside sh -c 'apt-get install -y -qq --no-install-recommends /tmp/tissueform-*.deb' >"$scratch/install.log" 2>&1 || fail "they cannot be installed"
+ok "installed into a fresh Debian 12 ($(du -sm --exclude=proc "$root" | cut -f 1) MB with it)"
+[[ $(inside stat -c '%a %U:%G' /var/lib/tissueform) == "700 tissueform:tissueform" ]] || fail "the data folder is not the server's alone"
+for package in tissueform-server tissueform-gateway; do
+  [[ -L $root/etc/systemd/system/multi-user.target.wants/$package.service ]] || fail "$package.service is not enabled"
+done
+ok "users, data folder and services are there"
+
+# start NAME USER COMMAND...: sets `address` to what it listens on.
+start() {
+  local name=$1 user=$2 tries
+  shift 2
+  touch "$scratch/$name.out"
+  chroot --userspec="$user:$user" "$root" "$@" >"$scratch/$name.out" 2>"$scratch/$name.log" &
+  started+=($!)
+  for ((tries = 0; tries < 300; ++tries)); do
+    address=$(sed -n 's/^listening on //p' "$scratch/$name.out")
+    [[ -z $address ]] || return 0
+    kill -0 "${started[-1]}" 2>/dev/null || break
+    sleep 0.1
+  done
+  fail "$name does not start"
+}
+start server tissueform tissueform-server --config /etc/tissueform/server.ini --port 0
+server=$address
+start gateway tissueform-gateway tissueform-gateway --config /etc/tissueform/gateway.ini --server "$server" --listen 127.0.0.1:0
+gateway=$address
+
+/usr/bin/python3 deploy/ask_health.py "$server" "$gateway" || fail "they do not answer"
+ok "server and gateway serve from what was installed"
+inside runuser -u tissueform -- tissueform-server backup /tmp/backup --config /etc/tissueform/server.ini >/dev/null || fail "no backup of the running server"
+ok "the running server is backed up by its own user"
+
+for pid in "${started[1]}" "${started[0]}"; do
+  kill -TERM "$pid"
+  wait "$pid" || fail "one of them does not end well"
+done
+started=()
+ok "both end with exit code 0"
+
+echo '# ours' >>"$root/etc/tissueform/server.ini"
+inside sh -c 'apt-get install -y -qq --reinstall /tmp/tissueform-*.deb' >"$scratch/install.log" 2>&1 || fail "they cannot be installed again"
+grep -q '^# ours' "$root/etc/tissueform/server.ini" || fail "the configuration was overwritten"
+ok "installed again, the changed configuration stays"
+
+inside apt-get remove -y -qq tissueform-server tissueform-gateway >"$scratch/install.log" 2>&1 || fail "they cannot be removed"
+[[ ! -e $root/usr/bin/tissueform-server && -e $root/etc/tissueform/server.ini && -e $root/var/lib/tissueform/tissueform.db ]] || fail "removed wrongly"
+inside apt-get purge -y -qq tissueform-server tissueform-gateway >"$scratch/install.log" 2>&1 || fail "they cannot be purged"
+[[ ! -e $root/etc/tissueform && -e $root/var/lib/tissueform/tissueform.db ]] || fail "purged wrongly"
+left=$(find "$root/etc" "$root/usr" "$root/lib/systemd" -name '*tissueform*' ! -path '*/python*' | head)
+[[ -z $left ]] || fail "left behind: $left"
+ok "removed and purged; what the server has kept stays"

@@ -1,0 +1,38 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "server/monitoring/metrics_page.h"
+#include "server/session/frame_flow.h"
+#include "server/session/memory_budget.h"
+#include "server/session/mesh_catalog.h"
+#include "server/session/session_registry.h"
+#include "server/session/worker_pool.h"
+#include "server/store/stores.h"
+
+namespace tissueform {
+
+// What becomes of sessions beside calls. Thread-safe.
+class SessionEventCounts {
+ public:
+  void Count(SessionEvent event) { ++counts_[static_cast<size_t>(event)]; }
+  int64_t Read(SessionEvent event) const { return counts_[static_cast<size_t>(event)]; }
+
+ private:
+  std::atomic<int64_t> counts_[3] = {};
+};
+
+// The page tells what these keep; all must outlive it.
+void AddFrameMetrics(const FrameMeasures& measures, MetricsPage* page);
+void AddLaneMetrics(const WorkerPool& pool, MetricsPage* page);
+void AddSessionMetrics(const SessionRegistry& registry, const SessionEventCounts& events,
+                       MetricsPage* page);
+void AddMemoryMetrics(const MemoryBudget& budget, const MeshCatalog& catalog, MetricsPage* page);
+// Of a store on a disk; of one in memory there is nothing to tell.
+void AddStoreMetrics(const Stores& stores, MetricsPage* page);
+
+}  // namespace tissueform

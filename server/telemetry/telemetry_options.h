@@ -1,0 +1,21 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+
+#include "CLI/CLI.hpp"
+
+namespace tissueform {
+
+// What a server tells who operates it, and where.
+struct TelemetryOptions {
+  int metrics_port = -1;  // of loopback; 0: any free one; -1: no metrics
+  std::string log_format = "text";
+};
+
+// Adds --metrics-port and --log-format; see AddServerOptions.
+void AddTelemetryOptions(CLI::App& app, TelemetryOptions* options);
+
+}  // namespace tissueform

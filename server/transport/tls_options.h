@@ -1,0 +1,35 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+
+#include "CLI/CLI.hpp"
+#include "absl/status/status.h"
+
+namespace tissueform {
+
+// How a server is reached: encrypted, and by whom.
+struct TlsOptions {
+  std::string certificate = {};  // chain in PEM; empty: no TLS
+  std::string key = {};
+  std::string client_ca = {};  // authorities of clients' certificates; empty: none is asked for
+  // Who has no certificate of these authorities is turned away; otherwise only who has a bad one.
+  bool client_certificate_required = true;
+  // The name in the gateway's certificate: it alone may say whom it speaks for.
+  std::string gateway_name = {};
+  bool insecure = false;  // off loopback without TLS or without logins all the same
+
+  bool enabled() const { return !certificate.empty(); }
+};
+
+// `options` must outlive the parsing.
+void AddTlsOptions(CLI::App& app, TlsOptions* options);
+
+// What is missing before strangers may reach a server that listens on `host`. `has_tokens`: it asks
+// callers for tokens. Errors: FailedPrecondition (see --insecure), InvalidArgument (options that do
+// not fit together).
+absl::Status CheckExposure(const std::string& host, const TlsOptions& options, bool has_tokens);
+
+}  // namespace tissueform
