@@ -19,7 +19,10 @@ WORKDIR /src
 RUN deploy/install_packages.sh build && rm -rf /var/lib/apt/lists/*
 COPY . .
 ARG JOBS
-RUN deploy/build_web.sh \
+# The secret, which need not be there: authorities that npm shall trust beside its own, where a proxy looks into TLS.
+RUN --mount=type=secret,id=authorities \
+    if [ -e /run/secrets/authorities ]; then export NODE_EXTRA_CA_CERTS=/run/secrets/authorities; fi \
+    && deploy/build_web.sh \
     && deploy/build.sh release tissueform-server tissueform-gateway \
     && deploy/build_packages.sh /packages tissueform-server tissueform-gateway
 

@@ -69,7 +69,12 @@ fi
 based=$((SECONDS - begin))
 
 begin=$SECONDS
-"${tool[@]}" build --format docker --pull-never ${JOBS:+--build-arg "JOBS=$JOBS"} --tag tissueform --file "$file" "$context" >"$scratch/build.log" 2>&1 || fail "it is not built"
+authorities=()
+# npm in the builder trusts whom this machine trusts.
+if [[ -z $packages && -e /etc/ssl/certs/ca-certificates.crt ]]; then
+  authorities=(--secret "id=authorities,src=/etc/ssl/certs/ca-certificates.crt")
+fi
+"${tool[@]}" build --format docker --pull-never "${authorities[@]}" ${JOBS:+--build-arg "JOBS=$JOBS"} --tag tissueform --file "$file" "$context" >"$scratch/build.log" 2>&1 || fail "it is not built"
 built=$((SECONDS - begin))
 
 container=$("${tool[@]}" from --pull-never tissueform)

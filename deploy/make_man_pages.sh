@@ -17,8 +17,8 @@ commands=(
   "tissueform"
   "tissueform mesh check" "tissueform mesh generate"
   "tissueform plan build" "tissueform plan check" "tissueform plan fit" "tissueform case pack"
-  "tissueform deform" "tissueform run" "tissueform demo" "tissueform load" "tissueform server-info" "tissueform compare" "tissueform experiments" "tissueform bench"
-  "tissueform token" "tissueform token keygen" "tissueform token make" "tissueform token show"
+  "tissueform deform" "tissueform run" "tissueform demo" "tissueform load" "tissueform server-info" "tissueform doctor" "tissueform compare" "tissueform experiments" "tissueform bench"
+  "tissueform login" "tissueform logout" "tissueform token" "tissueform token keygen" "tissueform token make" "tissueform token show"
   "tissueform-server" "tissueform-gateway"
 )
 
@@ -32,6 +32,6 @@ for command in "${commands[@]}"; do
   # Defaults that are those of this machine stay out.
   help2man --no-info --version-string="$version" --name="${name%.}" "$programs/$command" |
     sed -e "s/^\.TH [^ ]* /.TH ${page^^} /" -e "s/^$command \\\\- /$page \\\\- /" \
-        -e 's/^\(.*\\-\(threads\|workers\|budget\\-mib\) .*\]\)=[0-9]*/\1/' >"$out/$page.1.new"
+        -e 's/^\(.*\\-\(threads\|workers\|budget\\-mib\)\(\\fR\)* .*\]\)=[0-9]*/\1/' >"$out/$page.1.new"
   mv "$out/$page.1.new" "$out/$page.1"
 done

@@ -18,6 +18,7 @@
 
 #include "core/base/freed_memory.h"
 #include "server/backup_commands.h"
+#include "server/monitoring/log_lines.h"
 #include "server/program/program_options.h"
 #include "server/program/systemd_notices.h"
 #include "server/server_options.h"
@@ -34,13 +35,13 @@ constexpr char kDescription[] =
 enum ExitCode : int { kExitDone = 0, kExitFailed = 1 };
 
 constexpr uint64_t kTerminationSignals =
-    (uint64_t{1} << (SIGTERM - 1)) | (uint64_t{1} << (SIGINT - 1));
+    (uint64_t{1} << (SIGTERM - 1)) | (uint64_t{1} << (SIGINT - 1)) | (uint64_t{1} << (SIGHUP - 1));
 
-// Blocks SIGTERM and SIGINT for every thread that there will be. In main() it would be too late:
-// OpenBLAS starts threads when it is loaded, and a second signal, while the server drains, would
-// end the process by one of them. Handlers would not do either: METIS takes SIGTERM for a jump of
-// its own while it orders a matrix, and leaves a handler behind that lasts for one signal. The
-// system call itself, as nothing is initialised yet that the sanitizers' wrappers need.
+// Blocks SIGTERM, SIGINT and SIGHUP for every thread that there will be. In main() it would be too
+// late: OpenBLAS starts threads when it is loaded, and a second signal, while the server drains,
+// would end the process by one of them. Handlers would not do either: METIS takes SIGTERM for a
+// jump of its own while it orders a matrix, and leaves a handler behind that lasts for one signal.
+// The system call itself, as nothing is initialised yet that the sanitizers' wrappers need.
 __attribute__((no_sanitize("address", "thread", "undefined"))) void BlockTerminationSignals() {
   syscall(SYS_rt_sigprocmask, SIG_BLOCK, &kTerminationSignals, nullptr,
           sizeof(kTerminationSignals));
@@ -50,13 +51,15 @@ __attribute__((no_sanitize("address", "thread", "undefined"))) void BlockTermina
 __attribute__((section(".preinit_array"),
                used)) void (*const run_first)() = BlockTerminationSignals;
 
-void WaitForTerminationSignal() {
+// SIGHUP is how log rotation says that files were moved.
+void WaitForTerminationSignal(tissueform::TissueformServer* server) {
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGHUP);
   int number = 0;
-  sigwait(&signals, &number);
+  while (sigwait(&signals, &number) == 0 && number == SIGHUP) server->CheckFiles();
 }
 
 ExitCode Serve(const tissueform::ServerOptions& options) {
@@ -70,7 +73,7 @@ ExitCode Serve(const tissueform::ServerOptions& options) {
   const tissueform::SystemdWatchdog watchdog(
       [&server](std::function<void()> answered) { (*server)->Ask(std::move(answered)); });
   tissueform::TellSystemdReady();
-  WaitForTerminationSignal();
+  WaitForTerminationSignal(server->get());
   tissueform::TellSystemdStopping();
   (*server)->Drain();
   spdlog::info("done");
@@ -90,5 +93,6 @@ int main(int argc, char** argv) {
   if (const std::optional<int> end = commands.Run()) return *end;
   spdlog::set_default_logger(spdlog::stderr_color_mt("tissueform"));
   spdlog::set_level(spdlog::level::from_str(options.log_level));
+  tissueform::SetLogFormat(options.telemetry.log_format);
   return Serve(options);
 }

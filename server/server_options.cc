@@ -89,19 +89,6 @@ void AddLimits(CLI::App& app, ServerOptions* options) {
             Into(&options->max_connections_per_address));
 }
 
-void AddAccessLimits(CLI::App& app, AccessOptions* access) {
-  AddNumber(app, "--max-shares-per-resource", access->max_shares_per_resource, 1, kMaxCount,
-            "principals with whom one session, prediction, case or project is shared",
-            Into(&access->max_shares_per_resource));
-  AddNumber(app, "--max-links-per-session", access->max_links_per_session, 1, kMaxCount,
-            "follow links of one session that have not ended",
-            Into(&access->max_links_per_session));
-  AddNumber(app, "--max-link-hours", access->max_link_lifetime.count(), 1, kMaxDays * 24,
-            "hours after which a follow link ends at the latest", [access](const int64_t& hours) {
-              access->max_link_lifetime = std::chrono::hours(hours);
-            });
-}
-
 void AddQuotas(CLI::App& app, Quotas* quotas) {
   AddNumber(app, "--quota-calls-per-second", quotas->calls_per_second, 1, kMaxCount,
             "of one principal, as all quotas: calls a second on average, twice as many at once",
@@ -118,6 +105,19 @@ void AddQuotas(CLI::App& app, Quotas* quotas) {
             MebibytesInto(&quotas->memory_bytes));
   AddNumber(app, "--quota-disk-mib", quotas->disk_bytes / kMebibyte, 1, kMaxMebibytes,
             "meshes, cases and predictions kept", MebibytesInto(&quotas->disk_bytes));
+}
+
+void AddAccessLimits(CLI::App& app, AccessOptions* access) {
+  AddNumber(app, "--max-shares-per-resource", access->max_shares_per_resource, 1, kMaxCount,
+            "principals with whom one session, prediction, case or project is shared",
+            Into(&access->max_shares_per_resource));
+  AddNumber(app, "--max-links-per-session", access->max_links_per_session, 1, kMaxCount,
+            "follow links of one session that have not ended",
+            Into(&access->max_links_per_session));
+  AddNumber(app, "--max-link-hours", access->max_link_lifetime.count(), 1, kMaxDays * 24,
+            "hours after which a follow link ends at the latest", [access](const int64_t& hours) {
+              access->max_link_lifetime = std::chrono::hours(hours);
+            });
 }
 
 }  // namespace

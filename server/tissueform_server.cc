@@ -35,6 +35,8 @@ namespace {
 constexpr size_t kTransportQuotaBytes = size_t{512} << 20;
 // Chunks are 1 MiB at most; regions of a mesh of a million vertices fit too.
 constexpr int kMaxReceiveBytes = 4 << 20;
+// A token of 8 KiB, and what else a client says of itself; longer headers gRPC refuses.
+constexpr int kMaxMetadataBytes = 16 << 10;
 constexpr int kKeepaliveMilliseconds = 25'000;
 constexpr int kKeepaliveTimeoutMilliseconds = 10'000;
 constexpr int kMinClientPingMilliseconds = 10'000;
@@ -63,6 +65,7 @@ void SetTransportLimits(const ServerOptions& options, grpc::ServerBuilder* build
   builder->SetMaxReceiveMessageSize(kMaxReceiveBytes);
   builder->SetMaxSendMessageSize(-1);  // an answer is as large as its mesh
   builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, options.max_calls_per_connection);
+  builder->AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, kMaxMetadataBytes);
   // A client whose machine is gone is noticed, and its stream ends.
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMilliseconds);
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMilliseconds);
@@ -134,7 +137,8 @@ absl::StatusOr<std::unique_ptr<Stores>> OpenStores(const ServerOptions& options)
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
     const ServerOptions& options, Authenticator* authenticator) {
-  TF_RETURN_IF_ERROR(CheckExposure(options.host, options.tls, options.tokens.configured()));
+  const bool has_logins = authenticator != nullptr || options.tokens.configured();
+  TF_RETURN_IF_ERROR(CheckExposure(options.host, options.tls, has_logins));
   Parts parts;
   TF_ASSIGN_OR_RETURN(parts.telemetry, Telemetry::Start(options.telemetry));
   TF_ASSIGN_OR_RETURN(parts.tls_files, LoadServerFiles(options.tls));
@@ -168,8 +172,11 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       authenticator_(parts.authenticator == nullptr
                          ? nullptr
                          : std::make_unique<LinkAuthenticator>(&access_, parts.authenticator)),
-      gate_(authenticator_.get(), telemetry_->observer(), &quotas_, options.tls.gateway_name,
-            &Access::MayCall),
+      gate_({.authenticator = authenticator_.get(),
+             .may_call = &Access::MayCall,
+             .observer = telemetry_.get(),
+             .quotas = &quotas_,
+             .gateway_name = options.tls.gateway_name}),
       budget_(options.memory_budget_bytes),
       stores_(WatchStores(std::move(parts.stores), &access_changes_)),
       catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),
@@ -229,6 +236,7 @@ absl::Status TissueformServer::ServeMetrics() {
   AddSessionMetrics(registry_, telemetry_->session_events(), &*metrics_);
   AddMemoryMetrics(budget_, catalog_, &*metrics_);
   AddStoreMetrics(*stores_, &*metrics_);
+  AddSecurityMetrics({}, &*metrics_);
   metrics_->AddGauge("tissueform_streams", "Drags open.", {},
                      [this] { return static_cast<double>(streams_.size()); });
   metrics_->AddGauge("tissueform_watches", "Watches open.", {},

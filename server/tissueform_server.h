@@ -73,6 +73,8 @@ class TissueformServer {
 
   // Calls `answered` later, when the lanes that planners wait for have each done a job.
   void Ask(std::function<void()> answered);
+  // Files that it writes may have been moved away. Any thread.
+  void CheckFiles() { telemetry_->CheckFiles(); }
 
   const MemoryBudget& memory_budget() const { return budget_; }
   Stores& stores() { return *stores_; }
@@ -91,7 +93,7 @@ class TissueformServer {
   struct Parts {
     std::unique_ptr<Telemetry> telemetry;
     std::unique_ptr<RotatedFiles> tls_files;     // null without TLS
-    std::unique_ptr<TokenAuthenticator> tokens;  // null: nobody logs in
+    std::unique_ptr<TokenAuthenticator> tokens;  // null: none are configured
     Authenticator* authenticator = nullptr;      // null: nobody logs in
     std::unique_ptr<Stores> stores;
   };

@@ -22,8 +22,9 @@ void AddAccuracyRows(const AccuracyCase& problem, const std::vector<AccuracyResu
 CsvTable AccuracySummary();
 void AddSummaryRows(const AccuracyCase& problem, const AccuracyResult& result, CsvTable* table);
 
-// For people: p50 / p95 / max in mm to CalculiX's neo-Hookean answer on the places of a head's
-// skin, one row for each case and place. A case without places or without this reference adds none.
+// For people: p50 / p95 / p99 / max in mm to CalculiX's neo-Hookean answer on the places of a
+// head's skin, one row for each case and place. A case without places or without this reference
+// adds none.
 CsvTable PlaceSummary();
 void AddPlaceSummaryRows(const AccuracyCase& problem, const AccuracyResult& result,
                          CsvTable* table);

@@ -27,7 +27,7 @@ class FrameBenchmark {
     kBasis,              // gradient field, the bar's one handle
     kBasisThreeHandles,  // gradient field, the handle cut in three
     kElastic,            // linear elasticity, one handle
-    kNeoHookean,         // in second order, one handle
+    kNeoHookean,         // in third order, one handle
   };
 
   // Makes the answers once and checks that they lie within a millionth of the bar's diagonal of the

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "client/cli/access/audit_command.h"
 #include "client/cli/access/token_command.h"
 #include "client/cli/bench/bench_command.h"
 #include "client/cli/compare/compare_command.h"
@@ -41,6 +42,10 @@ int main(int argc, char** argv) {
     tissueform::AddCompanionCommand(app, tissueform::kShareCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kWhoamiCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kServerInfoCommand, words, work);
+    tissueform::AddAuditCommand(app, work);
+    tissueform::AddCompanionCommand(app, tissueform::kDoctorCommand, words, work);
+    tissueform::AddCompanionCommand(app, tissueform::kLoginCommand, words, work);
+    tissueform::AddCompanionCommand(app, tissueform::kLogoutCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kDemoCommand, words, work);
   });
 }

@@ -3,7 +3,9 @@
 //
 // The companion of `tissueform` that speaks with servers.
 
+#include "client/cli/access/doctor_command.h"
 #include "client/cli/access/follow_link_command.h"
+#include "client/cli/access/login_command.h"
 #include "client/cli/access/share_command.h"
 #include "client/cli/access/whoami_command.h"
 #include "client/cli/cases/case_command.h"
@@ -34,6 +36,9 @@ int main(int argc, char** argv) {
     tissueform::AddShareCommand(app, work);
     tissueform::AddWhoamiCommand(app, work);
     tissueform::AddServerInfoCommand(app, work);
+    tissueform::AddDoctorCommand(app, work);
+    tissueform::AddLoginCommand(app, work);
+    tissueform::AddLogoutCommand(app, work);
     tissueform::AddDemoCommand(app, tissueform::OpenPlannerOfPlan, work);
   });
 }

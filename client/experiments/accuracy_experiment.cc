@@ -84,7 +84,7 @@ struct Tables {
     return WriteFileAtomically(
         options.Path("accuracy_summary.md"),
         absl::StrCat("Mean / max in mm\n\n", summary.Markdown(),
-                     "\np50 / p95 / max in mm to CalculiX neo-Hookean\n\n",
+                     "\np50 / p95 / p99 / max in mm to CalculiX neo-Hookean\n\n",
                      place_summary.Markdown(),
                      "\nForward / up in mm: foremost vertex; mean of the place\n\n",
                      movement_summary.Markdown(), "\n", kCsvNotice, "\n"));

@@ -16,5 +16,6 @@ export default defineConfig({
   },
   test: {
     include: ["tests/**/*.test.ts"],
+    setupFiles: ["tests/testing/web_crypto.ts"],
   },
 });

@@ -60,6 +60,10 @@ constexpr size_t kNumNumbers = sizeof(AnswerNumbers) / sizeof(double);
 
 using NumberList = std::array<double, kNumNumbers>;
 
+uint32_t VersionOf(const PortableAnswers& answers) {
+  return answers.third_lengths.empty() ? 1 : kAnswerFormatVersion;
+}
+
 AnswerReading Failed(AnswerError error, std::string message) {
   return {.error = error, .message = std::move(message), .answers = {}};
 }
@@ -103,7 +107,7 @@ std::string WriteAnswers(const PortableAnswers& answers) {
     end = entry.offset + entry.count * BytesOf(entry.type);
   }
   std::string bytes(Aligned(end), '\0');
-  Head head = {{}, kAnswerFormatVersion, static_cast<uint32_t>(entries.size())};
+  Head head = {{}, VersionOf(answers), static_cast<uint32_t>(entries.size())};
   std::memcpy(head.magic, kMagic, kMagicBytes);
   std::memcpy(bytes.data(), &head, sizeof(head));
   std::memcpy(bytes.data() + sizeof(Head), entries.data(), entries.size() * sizeof(Entry));
@@ -125,10 +129,10 @@ AnswerReading ReadAnswers(std::string_view bytes, size_t most_bytes) {
     return Failed(AnswerError::kNotAnswers, "the bytes do not begin as prepared answers do");
   }
   std::memcpy(&head, bytes.data(), sizeof(head));
-  if (head.version != kAnswerFormatVersion) {
-    return Failed(AnswerError::kVersion, "prepared answers of version " +
-                                             std::to_string(head.version) + "; this reader knows " +
-                                             std::to_string(kAnswerFormatVersion));
+  if (head.version < 1 || head.version > kAnswerFormatVersion) {
+    return Failed(AnswerError::kVersion,
+                  "prepared answers of version " + std::to_string(head.version) +
+                      "; this reader knows 1 to " + std::to_string(kAnswerFormatVersion));
   }
   std::map<uint32_t, Entry> table;
   if (!ReadTable(bytes, head.num_sections, &table)) {
@@ -161,6 +165,9 @@ AnswerReading ReadAnswers(std::string_view bytes, size_t most_bytes) {
   NumberList list;
   std::copy(numbers.begin(), numbers.end(), list.begin());
   reading.answers.numbers = std::bit_cast<AnswerNumbers>(list);
+  if (VersionOf(reading.answers) > head.version) {
+    return Failed(AnswerError::kInconsistent, "a section belongs to a later version");
+  }
   if (std::string wrong = CheckAnswers(reading.answers); !wrong.empty()) {
     return Failed(AnswerError::kInconsistent, std::move(wrong));
   }

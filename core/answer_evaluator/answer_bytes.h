@@ -12,7 +12,9 @@
 
 namespace tissueform {
 
-inline constexpr uint32_t kAnswerFormatVersion = 1;
+// The newest that is read. Written is the lowest that has what is there: 2 with a third order,
+// which readers of 1 would pass over.
+inline constexpr uint32_t kAnswerFormatVersion = 2;
 inline constexpr size_t kMostAnswerBytes = size_t{256} << 20;
 
 enum class AnswerError {

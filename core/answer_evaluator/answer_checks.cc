@@ -81,7 +81,8 @@ bool HasNothingElse(const PortableAnswers& answers, bool is_gradient, bool is_ne
   const bool no_clusters = answers.centroids.empty() && answers.clusters.empty() &&
                            answers.cluster_vertices.empty() && answers.first_gains.empty() &&
                            answers.second_gains.empty() && answers.probes.empty() &&
-                           IsPacked(answers.cluster_map, 0, 0);
+                           answers.second_lengths.empty() && answers.third_lengths.empty() &&
+                           answers.third_gains.empty() && IsPacked(answers.cluster_map, 0, 0);
   return (is_gradient || no_expansion) && (is_neo ? no_compression : no_clusters);
 }
 
@@ -144,11 +145,19 @@ bool ClustersFit(const PortableAnswers& answers, const AnswerSizes& sizes) {
          IsPacked(answers.cluster_map, sizes.columns, sizes.factors);
 }
 
+// All of it or nothing.
+bool ThirdOrderFits(const PortableAnswers& answers, const AnswerSizes& sizes) {
+  if (sizes.triples == 0) return answers.second_lengths.empty() && answers.third_gains.empty();
+  return answers.second_lengths.size() % sizes.pairs == 0 &&
+         answers.third_lengths.size() % sizes.triples == 0 &&
+         answers.third_gains.size() == sizes.triples;
+}
+
 bool SeriesFits(const PortableAnswers& answers, const AnswerSizes& sizes) {
   return answers.origins.size() == 3 && answers.centroids.size() == 3 * sizes.handles &&
-         answers.first_gains.size() == 6 * sizes.handles &&
+         answers.first_gains.size() == 6 * sizes.handles && answers.numbers.size_mm > 0 &&
          answers.second_gains.size() == sizes.pairs &&
-         answers.probes.size() % (3 * sizes.pairs) == 0 && answers.numbers.size_mm > 0;
+         answers.probes.size() % (3 * sizes.pairs) == 0 && ThirdOrderFits(answers, sizes);
 }
 
 }  // namespace

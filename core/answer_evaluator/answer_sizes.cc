@@ -26,7 +26,8 @@ AnswerSizes SizesOf(const PortableAnswers& answers) {
   if (IsModel(answers, AnswerModel::kNeoHookean)) {
     const size_t numbers = 6 * sizes.handles;
     sizes.pairs = numbers * (numbers + 1) / 2;
-    sizes.factors += sizes.pairs;
+    if (!answers.third_lengths.empty()) sizes.triples = sizes.pairs * (numbers + 2) / 3;
+    sizes.factors += sizes.pairs + sizes.triples;
     if (sizes.columns > 0) sizes.full_map_cols = answers.cluster_map.lower.size() / sizes.columns;
   } else if (sizes.rows > 0) {
     sizes.full_columns = answers.columns.lower.size() / sizes.rows;

@@ -84,9 +84,10 @@ struct PortableAnswers {
   std::vector<double> first_gains;
   std::vector<double> second_gains;
   std::vector<float> probes;  // three rows for each by #pairs
-  // Of a third order, empty without one: any number of rows by #pairs, and by #triples.
+  // With a third order: any number of rows by #pairs, and by #triples; gains of the triples.
   std::vector<float> second_lengths;
   std::vector<float> third_lengths;
+  std::vector<double> third_gains;
 };
 
 // Calls visit(number, what) for all that travels, in the order of the bytes. The numbers are those
@@ -120,6 +121,7 @@ void VisitSections(Answers& answers, const Visitor& visit) {
   visit(42, answers.probes);
   visit(43, answers.second_lengths);
   visit(44, answers.third_lengths);
+  visit(45, answers.third_gains);
 }
 
 }  // namespace tissueform

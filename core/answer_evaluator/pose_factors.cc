@@ -63,6 +63,31 @@ std::vector<double> NumbersOf(const PortableAnswers& answers, std::span<const An
   return numbers;
 }
 
+// The length of what a matrix of that many columns gives of the products.
+double LengthOf(const std::vector<float>& rows, const std::vector<double>& products) {
+  double square = 0;
+  for (size_t first = 0; first < rows.size(); first += products.size()) {
+    double sum = 0;
+    for (size_t p = 0; p < products.size(); ++p) sum += double{rows[first + p]} * products[p];
+    square += sum * sum;
+  }
+  return std::sqrt(square);
+}
+
+// How long the third order is beside the second.
+double RatioOf(const PortableAnswers& answers, const std::vector<double>& pairs,
+               const std::vector<double>& triples) {
+  const double second = LengthOf(answers.second_lengths, pairs);
+  return second > 0 ? LengthOf(answers.third_lengths, triples) / second : 0;
+}
+
+// The root of the sum of the squares of what single products do.
+double SingleMm(const std::vector<double>& gains, const std::vector<double>& products) {
+  double square = 0;
+  for (size_t p = 0; p < products.size(); ++p) square += std::pow(gains[p] * products[p], 2);
+  return std::sqrt(square);
+}
+
 // Of second order: c (|u2| s2)^(3/4) / L^(1/2).
 double EstimateMm(const PortableAnswers& answers, const std::vector<double>& products) {
   const size_t pairs = products.size();
@@ -78,29 +103,51 @@ double EstimateMm(const PortableAnswers& answers, const std::vector<double>& pro
     }
     farthest = std::fmax(farthest, std::sqrt(square));
   }
-  double single = 0;
-  for (size_t p = 0; p < pairs; ++p) {
-    single += std::pow(answers.second_gains[p] * products[p], 2);
-  }
-  return answers.numbers.estimate_scale * std::pow(farthest * std::sqrt(single), 0.75) /
+  const double single = SingleMm(answers.second_gains, products);
+  return answers.numbers.estimate_scale * std::pow(farthest * single, 0.75) /
          std::sqrt(answers.numbers.size_mm);
+}
+
+// For all pairs a <= b, those of two different ones twice.
+std::vector<double> PairProductsOf(const std::vector<double>& numbers) {
+  std::vector<double> products;
+  for (size_t a = 0; a < numbers.size(); ++a) {
+    for (size_t b = a; b < numbers.size(); ++b) {
+      products.push_back((a == b ? 1 : 2) * numbers[a] * numbers[b]);
+    }
+  }
+  return products;
+}
+
+// For all a <= b <= c, as often as there are orders of the three.
+std::vector<double> TripleProductsOf(const std::vector<double>& numbers) {
+  std::vector<double> products;
+  for (size_t a = 0; a < numbers.size(); ++a) {
+    for (size_t b = a; b < numbers.size(); ++b) {
+      for (size_t c = b; c < numbers.size(); ++c) {
+        const double orders = a == c ? 1 : a == b || b == c ? 3 : 6;
+        products.push_back(orders * numbers[a] * numbers[b] * numbers[c]);
+      }
+    }
+  }
+  return products;
 }
 
 PoseFactors NeoHookeanFactors(const PortableAnswers& answers, std::span<const AnswerPose> poses) {
   PoseFactors result;
   AddElasticFactors(answers, poses, &result.factors);
   const std::vector<double> numbers = NumbersOf(answers, poses);
-  std::vector<double> products;
-  double first_order = 0;
-  for (size_t a = 0; a < numbers.size(); ++a) {
-    first_order += std::pow(answers.first_gains[a] * numbers[a], 2);
-    for (size_t b = a; b < numbers.size(); ++b) {
-      products.push_back((a == b ? 1 : 2) * numbers[a] * numbers[b]);
-    }
+  const std::vector<double> pairs = PairProductsOf(numbers);
+  result.factors.insert(result.factors.end(), pairs.begin(), pairs.end());
+  double series_mm = EstimateMm(answers, pairs);
+  if (!answers.third_lengths.empty()) {
+    const std::vector<double> triples = TripleProductsOf(numbers);
+    const double ratio = RatioOf(answers, pairs, triples);
+    for (const double product : triples) result.factors.push_back(product / (1 + ratio));
+    series_mm = std::fmax(series_mm, SingleMm(answers.third_gains, triples)) * ratio / (1 + ratio);
   }
-  result.factors.insert(result.factors.end(), products.begin(), products.end());
-  result.model_error_mm = EstimateMm(answers, products) + answers.numbers.rounding_mm +
-                          answers.numbers.cut_per_mm * std::sqrt(first_order);
+  result.model_error_mm = series_mm + answers.numbers.rounding_mm +
+                          answers.numbers.cut_per_mm * SingleMm(answers.first_gains, numbers);
   return result;
 }
 

@@ -61,6 +61,7 @@ std::string Lines(uint64_t first, uint64_t last) {
 // What the rest of a file says about a line that does not fit.
 struct Rest {
   bool has_expected_number = false;
+  bool has_same_number = false;
   bool follows_last_good = false;  // a later line is sealed to the last good one
   bool any_sealed = false;         // to the line before it: the key is right
   std::optional<uint64_t>
@@ -126,7 +127,7 @@ class Verification {
   bool Misfit(const AuditLine& line, std::ifstream* stream) {
     const uint64_t expected = report_.last.number + 1;
     const uint64_t number = line.number;
-    const Rest rest = ReadRest(stream, std::string(line.mac));
+    const Rest rest = ReadRest(stream, std::string(line.mac), number);
     if (rest.follower == expected + 1) {
       return Found(AuditFault::kChanged,
                    absl::StrCat("line n=", expected, " is not what was written"));
@@ -134,7 +135,8 @@ class Verification {
     if (number < expected) {
       return Found(AuditFault::kInserted, absl::StrCat("line n=", number, " stands here again"));
     }
-    if (rest.follows_last_good) {
+    // A line that was moved here stands at no other place.
+    if (rest.follows_last_good && (number == expected || rest.has_same_number)) {
       return Found(AuditFault::kInserted,
                    absl::StrCat("this line n=", number, " was not written by the server"));
     }
@@ -201,12 +203,14 @@ class Verification {
     return true;
   }
 
-  Rest ReadRest(std::ifstream* stream, std::string mac) const {
+  // After a line with this mac and number.
+  Rest ReadRest(std::ifstream* stream, std::string mac, uint64_t number = 0) const {
     Rest rest;
     bool is_next = true;
     for (RawLine raw; Next(stream, &raw);) {
       const std::optional<AuditLine> line = ParseAuditLine(raw.text);
       if (!line.has_value()) continue;
+      rest.has_same_number |= line->number == number;
       rest.has_expected_number |= line->number == report_.last.number + 1;
       rest.follows_last_good |= IsSealed(*line, report_.last.mac, key_);
       const bool sealed = IsSealed(*line, mac, key_);

@@ -44,8 +44,8 @@ absl::Status WriteAll(int descriptor, absl::string_view contents, const std::str
 }
 
 absl::Status WriteNewFile(const std::string& temporary, absl::string_view contents,
-                          const std::string& path) {
-  const int descriptor = open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+                          const std::string& path, int mode) {
+  const int descriptor = open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
   if (descriptor < 0) return SystemError(errno, path);
   const absl::Status status = WriteAll(descriptor, contents, path);
   if (close(descriptor) != 0 && status.ok()) return SystemError(errno, path);
@@ -82,11 +82,11 @@ absl::Status CheckWritable(const std::string& path) {
   return absl::OkStatus();
 }
 
-absl::Status WriteFileAtomically(const std::string& path, absl::string_view contents) {
+absl::Status WriteFileAtomically(const std::string& path, absl::string_view contents, int mode) {
   TF_RETURN_IF_ERROR(CheckWritable(path));
   const std::string temporary = TemporaryName(path);
   absl::Cleanup remove_temporary = [&temporary] { unlink(temporary.c_str()); };
-  TF_RETURN_IF_ERROR(WriteNewFile(temporary, contents, path));
+  TF_RETURN_IF_ERROR(WriteNewFile(temporary, contents, path, mode));
   if (rename(temporary.c_str(), path.c_str()) != 0) return SystemError(errno, path);
   std::move(remove_temporary).Cancel();
   SyncFolderOf(path);

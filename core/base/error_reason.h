@@ -48,6 +48,7 @@ enum class ErrorReason {
   kTooManyCases,
   kCaseDamagedOnItsWay,
   kQuotaExceeded,
+  kAuditNotWritten,
   // Of a code, where nothing more was said.
   kInvalidRequest,
   kNotFound,

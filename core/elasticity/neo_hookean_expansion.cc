@@ -40,33 +40,42 @@ Matrix3d SecondOrderStress(const ElasticModuli& moduli, const Gradient& a, const
   return P;
 }
 
-constexpr auto kLanes = static_cast<Eigen::Index>(ThirdOrderBatch::kLanes);
+constexpr auto kTetsAtOnce = static_cast<Eigen::Index>(ThirdOrderBatch::kLanes);
 
-// Writes a tet's gradients into a lane. `fields`: a run of memory for every coordinate of a vertex.
+// A number of every field, or of every direction, in a lane.
+template <typename Vector>
+using OfLane = Eigen::Map<Vector, 0, Eigen::InnerStride<9 * kTetsAtOnce>>;
+
+// Writes a tet's gradients into a lane. `fields`: a column for every coordinate of a vertex.
 void FillLane(const PiecewiseLinearElements& elements, Eigen::Index tet,
               const Eigen::MatrixXd& fields, const Eigen::Matrix3d& hats, Eigen::Index lane,
               ThirdOrderBatch* batch) {
   const auto num_first = static_cast<Eigen::Index>(batch->num_fields);
-  for (Eigen::Index f = 0; f < fields.rows(); ++f) {
-    const auto at = [&](int corner) -> Eigen::Vector3d {
-      return fields.row(f).segment<3>(Eigen::Index{3} * elements.cells(tet, corner));
+  const Eigen::Index num_second = fields.rows() - num_first;
+  Eigen::MatrixX3d edges(fields.rows(), 3);
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const auto at = [&](int corner) {
+      return fields.col(Eigen::Index{3} * elements.cells(tet, corner) + i);
     };
-    const Eigen::Vector3d base = at(0);
-    Matrix3d edges;
-    edges << at(1) - base, at(2) - base, at(3) - base;
-    const Matrix3d gradient = edges * hats.transpose();
-    double* const to = f < num_first ? batch->first.data() + 9 * kLanes * f
-                                     : batch->second.data() + 9 * kLanes * (f - num_first);
-    for (Eigen::Index i = 0; i < 9; ++i) to[i * kLanes + lane] = gradient(i / 3, i % 3);
+    for (int a = 0; a < 3; ++a) edges.col(a) = at(a + 1) - at(0);
+    const Eigen::MatrixX3d gradients = edges.lazyProduct(hats.transpose());
+    for (Eigen::Index j = 0; j < 3; ++j) {
+      const Eigen::Index to = (3 * i + j) * kTetsAtOnce + lane;
+      OfLane<Eigen::VectorXd>(batch->first.data() + to, num_first) =
+          gradients.col(j).head(num_first);
+      OfLane<Eigen::VectorXd>(batch->second.data() + to, num_second) =
+          gradients.col(j).tail(num_second);
+    }
   }
 }
 
 // Adds what a lane's tet pulls at its corners. `forces`: a column for every coordinate.
 void AddLane(const PiecewiseLinearElements& elements, Eigen::Index tet, Eigen::Index lane,
              const ThirdOrderBatch& batch, Eigen::MatrixXd* forces) {
-  using Strided = Eigen::Map<const Eigen::VectorXd, 0, Eigen::InnerStride<9 * kLanes>>;
+  Eigen::VectorXd pulls(forces->rows());
   for (Eigen::Index i = 0; i < 9; ++i) {
-    const Strided pulls(batch.loads.data() + i * kLanes + lane, forces->rows());
+    pulls =
+        OfLane<const Eigen::VectorXd>(batch.loads.data() + i * kTetsAtOnce + lane, forces->rows());
     forces->col(Eigen::Index{3} * elements.cells(tet, static_cast<int>(1 + i / 3)) + i % 3) +=
         pulls;
     forces->col(Eigen::Index{3} * elements.cells(tet, 0) + i % 3) -= pulls;
@@ -153,19 +162,19 @@ Eigen::MatrixXd ThirdOrderForces(const PiecewiseLinearElements& elements,
   fields << first.transpose(), second.transpose();
   Eigen::MatrixXd forces = Eigen::MatrixXd::Zero(NumFieldTriples(first.cols()), first.rows());
   ThirdOrderBatch batch(static_cast<size_t>(first.cols()));
-  for (Eigen::Index begin = 0; begin < elements.num_cells(); begin += kLanes) {
-    for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
+  for (Eigen::Index begin = 0; begin < elements.num_cells(); begin += kTetsAtOnce) {
+    for (Eigen::Index lane = 0; lane < kTetsAtOnce; ++lane) {
       // The last tet fills the lanes behind it, which are left out below.
       const Eigen::Index tet = std::min(begin + lane, elements.num_cells() - 1);
       const Eigen::Matrix3d hats = HatGradients<4>(elements, tet);
       FillLane(elements, tet, fields, hats, lane, &batch);
       const double weight = stiffness[tet] * elements.measures[tet];
       for (Eigen::Index i = 0; i < 9; ++i) {
-        batch.hats[static_cast<size_t>(i * kLanes + lane)] = weight * hats(i % 3, i / 3);
+        batch.hats[static_cast<size_t>(i * kTetsAtOnce + lane)] = weight * hats(i % 3, i / 3);
       }
     }
     EvaluateThirdOrder(unit.shear, unit.bulk, &batch);
-    const Eigen::Index end = std::min(begin + kLanes, elements.num_cells());
+    const Eigen::Index end = std::min(begin + kTetsAtOnce, elements.num_cells());
     for (Eigen::Index tet = begin; tet < end; ++tet) {
       AddLane(elements, tet, tet - begin, batch, &forces);
     }

@@ -8,8 +8,8 @@
 namespace tissueform {
 namespace {
 
-constexpr size_t kLanes = ThirdOrderBatch::kLanes;
-constexpr size_t kMatrix = ThirdOrderBatch::kMatrix;
+constexpr size_t kThirdOrderLanes = ThirdOrderBatch::kLanes;
+constexpr size_t kThirdOrderMatrix = ThirdOrderBatch::kMatrix;
 
 // Where pair (a, b) lies, a <= b.
 inline __attribute__((always_inline)) size_t PairOf(size_t a, size_t b, size_t count) {
@@ -23,26 +23,27 @@ inline __attribute__((always_inline)) void ThirdOrderStress(double mu, double K,
                                                             const double (&G)[3][3],
                                                             const double (&H)[3][3],
                                                             double (&P)[3][3]) {
-  double C2[3][3];
-  double C3[3][3];
+  double cofactors[3][3];
+  double mixed_cofactors[3][3];
   double minors = 0;
   double mixed_minors = 0;
   double determinant = 0;
-  double GG = 0;
-  double GH = 0;
+  double norm2 = 0;
+  double product = 0;
   for (int i = 0; i < 3; ++i) {
     const int p = (i + 1) % 3, q = (i + 2) % 3;
     for (int j = 0; j < 3; ++j) {
       const int r = (j + 1) % 3, s = (j + 2) % 3;
-      C2[i][j] = G[p][r] * G[q][s] - G[p][s] * G[q][r];
-      C3[i][j] = G[p][r] * H[q][s] + H[p][r] * G[q][s] - G[p][s] * H[q][r] - H[p][s] * G[q][r];
-      GG += G[i][j] * G[i][j];
-      GH += G[i][j] * H[i][j];
+      cofactors[i][j] = G[p][r] * G[q][s] - G[p][s] * G[q][r];
+      mixed_cofactors[i][j] =
+          G[p][r] * H[q][s] + H[p][r] * G[q][s] - G[p][s] * H[q][r] - H[p][s] * G[q][r];
+      norm2 += G[i][j] * G[i][j];
+      product += G[i][j] * H[i][j];
     }
-    minors += C2[i][i];
-    mixed_minors += C3[i][i];
+    minors += cofactors[i][i];
+    mixed_minors += mixed_cofactors[i][i];
   }
-  for (int j = 0; j < 3; ++j) determinant += G[0][j] * C2[0][j];
+  for (int j = 0; j < 3; ++j) determinant += G[0][j] * cofactors[0][j];
   const double a1 = G[0][0] + G[1][1] + G[2][2];
   const double a2 = H[0][0] + H[1][1] + H[2][2];
   const double j1 = a1;
@@ -56,8 +57,8 @@ inline __attribute__((always_inline)) void ThirdOrderStress(double mu, double K,
   const double h2 = -5.0 / 3.0 * j2 + 20.0 / 9.0 * j11;
   const double h3 = -5.0 / 3.0 * j3 + 40.0 / 9.0 * j1 * j2 - 220.0 / 81.0 * j11 * j1;
   const double s1 = 2.0 * a1;
-  const double s2 = 2.0 * a2 + GG;
-  const double s3 = 2.0 * GH;
+  const double s2 = 2.0 * a2 + norm2;
+  const double s3 = 2.0 * product;
   const double m1 = 3.0 * h1 + s1;
   const double m2 = 3.0 * h2 + h1 * s1 + s2;
   const double m3 = 3.0 * h3 + h2 * s1 + h1 * s2 + s3;
@@ -68,8 +69,8 @@ inline __attribute__((always_inline)) void ThirdOrderStress(double mu, double K,
   const double of_unit = mu * g3 + K * j3 - mu * m3 / 3.0 + of_c2 * a2 + of_c1 * a1;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      P[i][j] = mu * (g1 * H[i][j] + g2 * G[i][j]) + of_c3 * C3[i][j] +
-                of_c2 * (C2[i][j] - H[j][i]) - of_c1 * G[j][i];
+      P[i][j] = mu * (g1 * H[i][j] + g2 * G[i][j]) + of_c3 * mixed_cofactors[i][j] +
+                of_c2 * (cofactors[i][j] - H[j][i]) - of_c1 * G[j][i];
     }
     P[i][i] += of_unit;
   }
@@ -83,19 +84,19 @@ inline __attribute__((always_inline)) void EvaluateDirection(double shear, doubl
   const double* v[3];
   const double* w[6];
   for (size_t i = 0; i < 3; ++i) {
-    v[i] = batch.first.data() + n[i] * kMatrix;
-    w[i] = batch.second.data() + PairOf(n[i], n[i], batch.num_fields) * kMatrix;
+    v[i] = batch.first.data() + n[i] * kThirdOrderMatrix;
+    w[i] = batch.second.data() + PairOf(n[i], n[i], batch.num_fields) * kThirdOrderMatrix;
     const size_t low = i == 2 ? 1 : 0;
     const size_t high = i == 0 ? 1 : 2;
-    w[3 + i] = batch.second.data() + PairOf(n[low], n[high], batch.num_fields) * kMatrix;
+    w[3 + i] = batch.second.data() + PairOf(n[low], n[high], batch.num_fields) * kThirdOrderMatrix;
   }
   const double* const hats = batch.hats.data();
-  for (size_t k = 0; k < kLanes; ++k) {
+  for (size_t k = 0; k < kThirdOrderLanes; ++k) {
     double G[3][3];
     double H[3][3];
     for (size_t i = 0; i < 3; ++i) {
       for (size_t j = 0; j < 3; ++j) {
-        const size_t at = (3 * i + j) * kLanes + k;
+        const size_t at = (3 * i + j) * kThirdOrderLanes + k;
         G[i][j] = v[0][at] + v[1][at] + v[2][at];
         H[i][j] = w[0][at] + w[1][at] + w[2][at] + 2.0 * (w[3][at] + w[4][at] + w[5][at]);
       }
@@ -103,10 +104,11 @@ inline __attribute__((always_inline)) void EvaluateDirection(double shear, doubl
     double P[3][3];
     ThirdOrderStress(shear, bulk, G, H, P);
     for (size_t a = 0; a < 3; ++a) {
-      const double* const hat = hats + 3 * a * kLanes + k;
+      const double* const hat = hats + 3 * a * kThirdOrderLanes + k;
       for (size_t i = 0; i < 3; ++i) {
-        loads[(3 * a + i) * kLanes + k] =
-            P[i][0] * hat[0] + P[i][1] * hat[kLanes] + P[i][2] * hat[2 * kLanes];
+        loads[(3 * a + i) * kThirdOrderLanes + k] = P[i][0] * hat[0] +
+                                                    P[i][1] * hat[kThirdOrderLanes] +
+                                                    P[i][2] * hat[2 * kThirdOrderLanes];
       }
     }
   }
@@ -117,7 +119,7 @@ inline __attribute__((always_inline)) void EvaluateDirections(double shear, doub
   double* loads = batch->loads.data();
   for (size_t a = 0; a < batch->num_fields; ++a) {
     for (size_t b = a; b < batch->num_fields; ++b) {
-      for (size_t c = b; c < batch->num_fields; ++c, loads += kMatrix) {
+      for (size_t c = b; c < batch->num_fields; ++c, loads += kThirdOrderMatrix) {
         EvaluateDirection(shear, bulk, *batch, {a, b, c}, loads);
       }
     }
@@ -138,9 +140,9 @@ void ThirdOrderBaseline(double shear, double bulk, ThirdOrderBatch* batch) {
   EvaluateDirections(shear, bulk, batch);
 }
 
-using Evaluate = void (*)(double, double, ThirdOrderBatch*);
+using EvaluateThird = void (*)(double, double, ThirdOrderBatch*);
 
-Evaluate BestThirdOrder() {
+EvaluateThird BestThirdOrder() {
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
       __builtin_cpu_supports("avx512vl")) {
     return ThirdOrderAvx512;
@@ -149,16 +151,18 @@ Evaluate BestThirdOrder() {
                                                                          : ThirdOrderBaseline;
 }
 
-const Evaluate kThirdOrder = BestThirdOrder();
+const EvaluateThird kThirdOrder = BestThirdOrder();
 
 }  // namespace
 
 ThirdOrderBatch::ThirdOrderBatch(size_t count)
     : num_fields(count),
-      first(count * kMatrix),
-      second(static_cast<size_t>(NumFieldPairs(static_cast<Eigen::Index>(count))) * kMatrix),
-      hats(kMatrix),
-      loads(static_cast<size_t>(NumFieldTriples(static_cast<Eigen::Index>(count))) * kMatrix) {}
+      first(count * kThirdOrderMatrix),
+      second(static_cast<size_t>(NumFieldPairs(static_cast<Eigen::Index>(count))) *
+             kThirdOrderMatrix),
+      hats(kThirdOrderMatrix),
+      loads(static_cast<size_t>(NumFieldTriples(static_cast<Eigen::Index>(count))) *
+            kThirdOrderMatrix) {}
 
 void EvaluateThirdOrder(double shear, double bulk, ThirdOrderBatch* batch) {
   kThirdOrder(shear, bulk, batch);

@@ -10,7 +10,6 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "core/base/percentiles.h"
 #include "core/base/status_macros.h"
 #include "core/deformation/deformation_checks.h"
 #include "core/deformation/neo_hookean_deformer.h"
@@ -76,6 +75,7 @@ class NeoHookeanResponse : public VertexResponse {
         MakeNeoHookeanSeries(*preparation_, elastic_, free, options_.observer, cancellation));
     damping_ = std::move(series.damping);
     estimate_.emplace(series.linear, series.columns.middleCols(sizes_.linear, sizes_.pairs),
+                      series.columns.rightCols(sizes_.triples),
                       preparation_->mesh().BoundingBoxDiagonal());
     TF_RETURN_IF_ERROR(Calibrate(free, series.columns, cancellation));
     TF_RETURN_IF_ERROR(cancellation.Check());
@@ -136,6 +136,7 @@ class NeoHookeanResponse : public VertexResponse {
  private:
   // What the columns are multiplied with, and what that leaves out.
   struct Use {
+    SeriesEstimate::Terms terms;
     Eigen::VectorXd factors;
     double series_mm = 0;  // estimated
     double error_mm = 0;   // with what was cut of the columns, and rounding
@@ -143,17 +144,16 @@ class NeoHookeanResponse : public VertexResponse {
 
   Use UseOf(absl::Span<const HandlePose> poses) const {
     const Eigen::VectorXd numbers = PoseNumbers(poses, centroids_);
-    const Eigen::VectorXd pairs = PairProducts(numbers);
     Use use;
+    use.terms.pairs = PairProducts(numbers);
     use.factors.resize(sizes_.columns());
-    use.factors.head(sizes_.linear + sizes_.pairs) << elastic_.Coefficients(poses), pairs;
-    std::optional<double> ratio;
+    use.factors.head(sizes_.linear + sizes_.pairs) << elastic_.Coefficients(poses), use.terms.pairs;
     if (damping_) {
-      const Eigen::VectorXd triples = TripleProducts(numbers);
-      ratio = damping_->Ratio(pairs, triples);
-      use.factors.tail(sizes_.triples) = triples / (1 + *ratio);
+      use.terms.triples = TripleProducts(numbers);
+      use.terms.ratio = damping_->Ratio(use.terms.pairs, use.terms.triples);
+      use.factors.tail(sizes_.triples) = use.terms.triples / (1 + use.terms.ratio);
     }
-    use.series_mm = estimate_->Mm(pairs, ratio);
+    use.series_mm = estimate_->Mm(use.terms);
     use.error_mm =
         std::max(use.series_mm + rounding_mm_ + cut_per_mm_ * estimate_->FirstOrderMm(numbers),
                  chosen_.RoundingBoundMm(poses));
@@ -192,23 +192,31 @@ class NeoHookeanResponse : public VertexResponse {
           options_.tolerance_mm * (1 + UseOf(tried[s]).series_mm / kEstimateThatDoublesMm);
     }
     columns_.emplace(rest, columns, uses);
-    MeasureCut(rest, columns, tried);
+    MeasureCut(rest, columns, tried, uses.tried);
   }
 
+  // `factors`: of the poses tried.
   void MeasureCut(const Positions& rest, const Eigen::MatrixXd& columns,
-                  const std::vector<std::vector<HandlePose>>& tried) {
+                  const std::vector<std::vector<HandlePose>>& tried,
+                  const Eigen::MatrixXd& factors) {
     // Of the rest positions and of the sum: single precision's half unit of each.
     constexpr double kRoundings = 2 * 5.97e-8;
+    // So many poses read the columns once.
+    constexpr Eigen::Index kAtOnce = 20;
     if (rest.rows() == 0) return;
     rounding_mm_ = kRoundings * rest.rowwise().norm().maxCoeff();
     double worst = 0;
     FloatPositions answer;
-    for (const std::vector<HandlePose>& poses : tried) {
-      const Use use = UseOf(poses);
-      columns_->Evaluate(use.factors, &answer);
+    Eigen::MatrixXd exact;
+    for (Eigen::Index s = 0; s < factors.cols(); ++s) {
+      if (s % kAtOnce == 0) {
+        exact = columns * factors.middleCols(s, std::min(kAtOnce, factors.cols() - s));
+      }
+      columns_->Evaluate(factors.col(s), &answer);
       const Positions off = answer.cast<double>() - rest -
-                            (columns * use.factors).reshaped<Eigen::RowMajor>(rest.rows(), 3);
-      const double moved = estimate_->FirstOrderMm(PoseNumbers(poses, centroids_));
+                            exact.col(s % kAtOnce).reshaped<Eigen::RowMajor>(rest.rows(), 3);
+      const double moved =
+          estimate_->FirstOrderMm(PoseNumbers(tried[static_cast<size_t>(s)], centroids_));
       if (moved > 0) worst = std::max(worst, off.rowwise().norm().maxCoeff() / moved);
     }
     cut_per_mm_ = kCutAllowance * worst;
@@ -253,24 +261,21 @@ class NeoHookeanResponse : public VertexResponse {
     control.on_progress = [&cancellation](const Deformation& /*so_far*/) {
       return cancellation.Check().ok();
     };
-    std::vector<double> ratios;
+    std::vector<SeriesEstimate::Measured> measured;
     for (const std::vector<HandlePose>& poses : CalibrationPoses()) {
       TF_ASSIGN_OR_RETURN(const Deformation converged, deformer->Deform(poses, control));
       TF_RETURN_IF_ERROR(cancellation.Check());
       if (!converged.summary.converged) continue;  // nothing is learnt from it
-      const Use use = UseOf(poses);
+      Use use = UseOf(poses);
       const Positions displacements =
           (converged.positions - preparation_->mesh().positions())(free, Eigen::all);
       const double error =
           LargestMove(columns * use.factors - displacements.reshaped<Eigen::RowMajor>());
-      if (use.series_mm > 0) ratios.push_back(error / use.series_mm);
+      measured.push_back({std::move(use.terms), error});
     }
-    // Where nothing converged it is taken for as bad as on the worst body that was tried.
-    constexpr double kWorstScale = 50;
-    const double allowance =
-        kEstimateAllowance +
-        kAllowancePerHandle * static_cast<double>(NumHandles(*preparation_) - 1);
-    estimate_->set_scale(allowance * (ratios.empty() ? kWorstScale : Percentile(ratios, 50)));
+    estimate_->Calibrate(
+        measured, kEstimateAllowance +
+                      kAllowancePerHandle * static_cast<double>(NumHandles(*preparation_) - 1));
     return absl::OkStatus();
   }
 

@@ -31,18 +31,14 @@ struct NeoHookeanResponseOptions {
 // Bytes that a response of so many vertices needs at most, while it is made.
 int64_t NeoHookeanResponseBytes(const MeshPreparation& preparation, Eigen::Index num_vertices);
 
-// The neo-Hookean model at `vertices` (any order) to second order in the poses. With
-// f(u) = K u + Q(u, u) + ... its forces about rest (SecondOrderForces), u1 the linear answer, which
-// has the handles exactly where the poses put them, and v1 its part linear in rotation vectors and
-// translations,
-//   u = u1 + u2,   K u2 = -Q(v1, v1),   u2 = 0 on all constrained vertices.
-// u1 has 12 columns a handle (ElasticSystem), u2 one for every pair of the 6 numbers a handle. No
-// pose with a scale other than 1 is covered.
+// The neo-Hookean model at `vertices` (any order) as a series in the poses (NeoHookeanSeries): to
+// the third order with one handle, to the second with several. No pose with a scale other than 1 is
+// covered.
 //
-// Unlike those of the linear models its error is an ESTIMATE: what the third order adds is
-// measured, when it is made, against converged answers to a few poses (see ThirdOrderEstimate),
-// such that 99 of 100 random poses err less, most of them a quarter to a third. What compression
-// puts off is measured too and counted in.
+// Unlike those of the linear models its error is an ESTIMATE: what the series leaves out is
+// measured, when it is made, against converged answers to a few poses (see SeriesEstimate), such
+// that 99 of 100 random poses err less, most of them a quarter to a third. What compression puts
+// off is measured too and counted in.
 //
 // Factorises the elastic system if no model has done so. bytes_held() are its own columns; it keeps
 // the preparation, which knows the coefficients.

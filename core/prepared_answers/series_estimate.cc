@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/percentiles.h"
+
 namespace tissueform {
 namespace {
 
@@ -53,8 +55,11 @@ std::vector<Eigen::Index> MostMoved(const Eigen::MatrixXd& columns) {
 }  // namespace
 
 SeriesEstimate::SeriesEstimate(const Eigen::MatrixXd& first, const Eigen::MatrixXd& second,
-                               double size_mm)
-    : size_mm_(size_mm), first_gains_(Gains(first)), second_gains_(Gains(second)) {
+                               const Eigen::MatrixXd& third, double size_mm)
+    : size_mm_(size_mm),
+      first_gains_(Gains(first)),
+      second_gains_(Gains(second)),
+      third_gains_(Gains(third)) {
   const std::vector<Eigen::Index> vertices = MostMoved(second);
   probes_.resize(3 * static_cast<Eigen::Index>(vertices.size()), second.cols());
   for (size_t p = 0; p < vertices.size(); ++p) {
@@ -63,27 +68,54 @@ SeriesEstimate::SeriesEstimate(const Eigen::MatrixXd& first, const Eigen::Matrix
   }
 }
 
-double SeriesEstimate::UnscaledMm(const Eigen::VectorXd& pairs, std::optional<double> ratio) const {
+void SeriesEstimate::Calibrate(const std::vector<Measured>& measured, double allowance) {
+  constexpr double kWorstScale = 50;
+  std::vector<double> by_second;
+  std::vector<double> by_third;
+  for (const auto& [terms, error_mm] : measured) {
+    const double part = terms.triples.size() > 0 ? terms.ratio / (1 + terms.ratio) : 1;
+    const double second = part * BySecondOrder(terms.pairs);
+    const double third = part * ByThirdOrder(terms.triples);
+    if (second > 0) by_second.push_back(error_mm / second);
+    if (third > 0) by_third.push_back(error_mm / third);
+  }
+  const auto scale = [allowance](std::vector<double> ratios) {
+    return allowance * (ratios.empty() ? kWorstScale : Percentile(std::move(ratios), 50));
+  };
+  second_scale_ = scale(std::move(by_second));
+  third_scale_ = scale(std::move(by_third));
+}
+
+double SeriesEstimate::Mm(const Terms& terms) const {
+  const double second = second_scale_ * BySecondOrder(terms.pairs);
+  if (terms.triples.size() == 0) return second;
+  return std::max(second, third_scale_ * ByThirdOrder(terms.triples)) * terms.ratio /
+         (1 + terms.ratio);
+}
+
+double SeriesEstimate::BySecondOrder(const Eigen::VectorXd& pairs) const {
   if (probes_.rows() == 0) return 0;
   const Eigen::VectorXf moves = probes_ * pairs.cast<float>();
   const double together = LargestMove(moves.cast<double>()).second;
   const double single = second_gains_.cwiseProduct(pairs).norm();
-  const double third_order = std::pow(together * single, 0.75) / std::sqrt(size_mm_);
-  return ratio ? third_order * *ratio / (1 + *ratio) : third_order;
+  return std::pow(together * single, 0.75) / std::sqrt(size_mm_);
 }
 
 void SeriesEstimate::Describe(PortableAnswers* answers) const {
   answers->numbers.size_mm = size_mm_;
-  answers->numbers.estimate_scale = scale_;
+  answers->numbers.estimate_scale = second_scale_;
   answers->first_gains.assign(first_gains_.begin(), first_gains_.end());
   answers->second_gains.assign(second_gains_.begin(), second_gains_.end());
+  const Eigen::VectorXd third_gains = third_scale_ * third_gains_;
+  answers->third_gains.assign(third_gains.begin(), third_gains.end());
   const Eigen::MatrixXf rows = probes_.transpose();  // column by column: row-major
   answers->probes.assign(rows.data(), rows.data() + rows.size());
 }
 
 int64_t SeriesEstimate::bytes_held() const {
   return probes_.size() * static_cast<int64_t>(sizeof(float)) +
-         (first_gains_.size() + second_gains_.size()) * static_cast<int64_t>(sizeof(double));
+         (first_gains_.size() + second_gains_.size() + third_gains_.size()) *
+             static_cast<int64_t>(sizeof(double));
 }
 
 }  // namespace tissueform

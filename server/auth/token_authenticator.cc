@@ -17,6 +17,7 @@ namespace {
 constexpr char kKeysOption[] = "--token-keys";
 constexpr char kUrlOption[] = "--token-jwks-url";
 constexpr char kRevocationsOption[] = "--token-revocations";
+constexpr std::chrono::seconds kBetweenLines{1};
 
 void LogAlarm(const absl::Status& taken) {
   if (taken.ok()) return;
@@ -77,8 +78,21 @@ bool TokenAuthenticator::TakeKeys(const char* option, const absl::StatusOr<std::
 
 absl::StatusOr<Authenticated> TokenAuthenticator::Authenticate(const Credentials& credentials) {
   absl::StatusOr<Authenticated> known = Identify(credentials);
-  if (!known.ok()) failures_.Count(known.status());
+  if (!known.ok()) Tell(known.status());
   return known;
+}
+
+void TokenAuthenticator::Tell(const absl::Status& refusal) {
+  failures_.Count(refusal);
+  MutexLock lock(log_mutex_);
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_line_) {
+    ++unlogged_;
+    return;
+  }
+  next_line_ = now + kBetweenLines;
+  spdlog::info("a caller was refused: {}; {} others since the last such line",
+               std::string(refusal.message()), std::exchange(unlogged_, 0));
 }
 
 absl::StatusOr<Authenticated> TokenAuthenticator::Identify(const Credentials& credentials) {
@@ -123,7 +137,7 @@ absl::Status TokenAuthenticator::Check(const Authenticated& authenticated) const
 
 absl::Status TokenAuthenticator::StillGood(const Authenticated& authenticated) {
   absl::Status good = Check(authenticated);
-  if (!good.ok()) failures_.Count(good);
+  if (!good.ok()) Tell(good);
   return good;
 }
 

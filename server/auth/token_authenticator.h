@@ -4,6 +4,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
+#include "core/base/mutex.h"
 #include "server/auth/authenticator.h"
 #include "server/auth/file_watcher.h"
 #include "server/auth/jwks_fetcher.h"
@@ -57,6 +59,8 @@ class TokenAuthenticator : public Authenticator {
   absl::StatusOr<Authenticated> Identify(const Credentials& credentials);
   absl::StatusOr<Authenticated> Verify(absl::string_view token);
   absl::Status Check(const Authenticated& authenticated) const;
+  // Counts it, and logs one a second: who floods the server shall not flood its log.
+  void Tell(const absl::Status& refusal) ABSL_LOCKS_EXCLUDED(log_mutex_);
 
   // Constant.
   const TokenOptions options_;
@@ -67,6 +71,9 @@ class TokenAuthenticator : public Authenticator {
   TokenTrust trust_;
   TokenCache cache_;
   TokenFailures failures_;
+  Mutex log_mutex_;
+  std::chrono::steady_clock::time_point next_line_ ABSL_GUARDED_BY(log_mutex_);
+  int64_t unlogged_ ABSL_GUARDED_BY(log_mutex_) = 0;
   FileWatcher files_;
   std::unique_ptr<JwksFetcher> fetcher_;  // null: the keys are in a file; constant once it is there
 };

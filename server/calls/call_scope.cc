@@ -18,6 +18,7 @@
 #include "server/auth/identity.h"
 #include "server/calls/client_address.h"
 #include "server/calls/status_conversion.h"
+#include "server/monitoring/log_lines.h"
 
 namespace tissueform {
 namespace {
@@ -104,17 +105,18 @@ CallScope::CallScope(const grpc::CallbackServerContext* context, std::string_vie
       gate_(gate),
       start_(std::chrono::steady_clock::now()),
       authenticated_({.principal = Nobody()}),
-      address_(ClientAddress(context, CredentialsOf(context), gate->gateway_name())),
+      address_(ClientAddress(context, CredentialsOf(context), gate->checks().gateway_name)),
       request_id_(RequestIdOr(Header(context, kRequestIdHeader))),
       traceparent_(TraceparentOr(Header(context, "traceparent"))),
       admission_(Admit(context)) {}
 
 absl::Status CallScope::Admit(const grpc::CallbackServerContext* context) {
   gate_->Enter();
-  if (gate_->authenticator() != nullptr) {
+  if (gate_->checks().authenticator != nullptr) {
     TF_ASSIGN_OR_RETURN(authenticated_,
-                        gate_->authenticator()->Authenticate(CredentialsOf(context)));
-    if (gate_->may_call_) TF_RETURN_IF_ERROR(gate_->may_call_(principal(), method_));
+                        gate_->checks().authenticator->Authenticate(CredentialsOf(context)));
+    if (gate_->checks().may_call)
+      TF_RETURN_IF_ERROR(gate_->checks().may_call(principal(), method_));
   }
   if (kind_ != CallKind::kUpkeep && gate_->draining()) {
     return WithReason(
@@ -122,9 +124,10 @@ absl::Status CallScope::Admit(const grpc::CallbackServerContext* context) {
             "the server is draining and takes no new work; try another one, or again in a minute"),
         ErrorReason::kServerDraining);
   }
-  if (gate_->observer() != nullptr) TF_RETURN_IF_ERROR(gate_->observer()->OnBegin(Observed()));
-  if (gate_->quotas() != nullptr && !principal().anonymous()) {
-    TF_RETURN_IF_ERROR(gate_->quotas()->Begin(principal().name, kind_));
+  if (gate_->checks().observer != nullptr)
+    TF_RETURN_IF_ERROR(gate_->checks().observer->OnBegin(Observed()));
+  if (gate_->checks().quotas != nullptr && !principal().anonymous()) {
+    TF_RETURN_IF_ERROR(gate_->checks().quotas->Begin(principal().name, kind_));
     counted_ = true;
   }
   served_ = true;
@@ -157,10 +160,10 @@ ObservedCall CallScope::Observed() const {
 }
 
 absl::Status CallScope::Renew(const std::string& token) {
-  if (gate_->authenticator() == nullptr) return absl::OkStatus();
+  if (gate_->checks().authenticator == nullptr) return absl::OkStatus();
   const std::string bearer = absl::StrCat("Bearer ", token);
   TF_ASSIGN_OR_RETURN(Authenticated renewed,
-                      gate_->authenticator()->Authenticate({.authorization = {bearer}}));
+                      gate_->checks().authenticator->Authenticate({.authorization = {bearer}}));
   if (*renewed.principal != principal()) {
     return absl::UnauthenticatedError(
         "the new token is another's, or allows something else; open another stream with it");
@@ -178,12 +181,12 @@ void CallScope::RenewFrom(const Authenticated& other) {
 
 absl::Status CallScope::StillGood() const {
   if (!may_end_early()) return absl::OkStatus();
-  return gate_->authenticator()->StillGood(authenticated_);
+  return gate_->checks().authenticator->StillGood(authenticated_);
 }
 
 void CallScope::SetResource(std::string resource) {
   resource_ = std::move(resource);
-  if (gate_->observer() != nullptr) gate_->observer()->OnResource(Observed());
+  if (gate_->checks().observer != nullptr) gate_->checks().observer->OnResource(Observed());
 }
 
 CallScope::~CallScope() {
@@ -194,19 +197,26 @@ CallScope::~CallScope() {
 }
 
 void CallScope::TellEnd(const absl::Status& outcome) {
-  if (std::exchange(counted_, false)) gate_->quotas()->End(principal().name, kind_);
-  if (gate_->observer() == nullptr) return;
-  gate_->observer()->OnEnd(Observed(), outcome, std::chrono::steady_clock::now() - start_);
+  if (std::exchange(counted_, false)) gate_->checks().quotas->End(principal().name, kind_);
+  if (gate_->checks().observer == nullptr) return;
+  gate_->checks().observer->OnEnd(Observed(), outcome, std::chrono::steady_clock::now() - start_);
 }
 
 grpc::Status CallScope::End(const absl::Status& outcome) {
   const std::chrono::duration<double, std::milli> elapsed =
       std::chrono::steady_clock::now() - start_;
-  const auto level = outcome.ok() || outcome.code() == absl::StatusCode::kCancelled
-                         ? spdlog::level::debug
-                         : spdlog::level::info;
-  spdlog::log(level, "{} {} {:.1f} ms, request {}", method_,
-              absl::StatusCodeToString(outcome.code()), elapsed.count(), request_id_);
+  // Who knocks without being let in is counted, and logged, by the authenticator.
+  const bool quiet = outcome.ok() || outcome.code() == absl::StatusCode::kCancelled ||
+                     absl::IsUnauthenticated(admission_);
+  const auto level = quiet ? spdlog::level::debug : spdlog::level::info;
+  const std::string code = absl::StatusCodeToString(outcome.code());
+  const CallOfLogLine call = {.request_id = request_id_,
+                              .method = method_,
+                              .code = code,
+                              .duration = elapsed,
+                              .traceparent = traceparent_};
+  const LogLinesOfCall lines(call);
+  spdlog::log(level, "{} {} {:.1f} ms, request {}", method_, code, elapsed.count(), request_id_);
   TellEnd(outcome);
   std::exchange(gate_, nullptr)->Leave();
   return ToGrpcStatus(outcome);

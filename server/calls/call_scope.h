@@ -21,28 +21,25 @@
 
 namespace tissueform {
 
+// What every call is asked, and who is told of it. All pointers may be null, and must outlive the
+// calls.
+struct CallChecks {
+  Authenticator* authenticator = nullptr;  // null: everybody is anonymous
+  // Whether somebody who is known may call a method ("MeshService.GetMesh") at all; empty: yes.
+  std::function<absl::Status(const Principal& caller, std::string_view method)> may_call = {};
+  CallObserver* observer = nullptr;
+  CallQuotas* quotas = nullptr;   // not of who is anonymous
+  std::string gateway_name = {};  // see ClientAddress
+};
+
 // What stands before every call: who makes it, who is told of it, how many a principal may make,
 // whether the server takes new work; and how many calls are open. Thread-safe.
 class ServiceGate {
  public:
-  // Whether somebody who is known may call a method ("MeshService.GetMesh") at all.
-  using MayCall = std::function<absl::Status(const Principal& caller, std::string_view method)>;
+  explicit ServiceGate(CallChecks checks) : checks_(std::move(checks)) {}
+  ServiceGate() : ServiceGate(CallChecks{}) {}
 
-  // All may be null, and must outlive the calls. Without an authenticator everybody is anonymous,
-  // of nobody's quotas, and may call everything. `gateway_name`: see ClientAddress.
-  explicit ServiceGate(Authenticator* authenticator = nullptr, CallObserver* observer = nullptr,
-                       CallQuotas* quotas = nullptr, std::string gateway_name = {},
-                       MayCall may_call = nullptr)
-      : authenticator_(authenticator),
-        observer_(observer),
-        quotas_(quotas),
-        gateway_name_(std::move(gateway_name)),
-        may_call_(std::move(may_call)) {}
-
-  Authenticator* authenticator() const { return authenticator_; }
-  CallObserver* observer() const { return observer_; }
-  CallQuotas* quotas() const { return quotas_; }
-  const std::string& gateway_name() const { return gateway_name_; }
+  const CallChecks& checks() const { return checks_; }
 
   void StartDraining() { draining_ = true; }
   bool draining() const { return draining_; }
@@ -56,11 +53,7 @@ class ServiceGate {
   void Enter();
   void Leave();
 
-  Authenticator* const authenticator_;
-  CallObserver* const observer_;
-  CallQuotas* const quotas_;
-  const std::string gateway_name_;
-  const MayCall may_call_;
+  const CallChecks checks_;
   std::atomic<bool> draining_ = false;
 
   Mutex mutex_;
@@ -96,8 +89,8 @@ class CallScope {
   CallScope(CallScope&& other) noexcept;
   CallScope& operator=(CallScope&&) = delete;
 
-  // OK, or why the call is not served: Unavailable, Unauthenticated, ResourceExhausted
-  // (a quota), or what the gate's MayCall and the observer say.
+  // OK, or why the call is not served: Unavailable, Unauthenticated, ResourceExhausted (a quota),
+  // or what the gate's may_call and the observer say.
   const absl::Status& admission() const { return admission_; }
   const Principal& principal() const { return *authenticated_.principal; }
   const Authenticated& authenticated() const { return authenticated_; }
@@ -111,7 +104,9 @@ class CallScope {
 
   // For calls that last: whether this one may go on. Asked again every kStandingPeriod; not where
   // nobody logs in.
-  bool may_end_early() const { return gate_ != nullptr && gate_->authenticator() != nullptr; }
+  bool may_end_early() const {
+    return gate_ != nullptr && gate_->checks().authenticator != nullptr;
+  }
   absl::Status StillGood() const;
 
   // Says what the call is about ("sessions/{id}"), once it is known that its caller may use it.

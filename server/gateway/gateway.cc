@@ -8,8 +8,11 @@
 #include "absl/memory/memory.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "spdlog/spdlog.h"
 
+#include "core/base/software_version.h"
 #include "core/base/status_macros.h"
+#include "server/monitoring/process_metrics.h"
 #include "server/transport/network_address.h"
 #include "server/transport/tls_credentials.h"
 
@@ -52,6 +55,7 @@ absl::StatusOr<std::unique_ptr<Gateway>> Gateway::Start(const GatewayOptions& op
                                                          .threads = options.threads,
                                                          .limits = options.limits},
                                                         &gateway->routes_, &gateway->counters_));
+  TF_RETURN_IF_ERROR(gateway->ServeMetrics());
   return gateway;
 }
 
@@ -63,6 +67,18 @@ Gateway::Gateway(const GatewayOptions& options, WebFiles files,
       routes_(AccessRules(options.host, options.allowed_hosts, options.allowed_origins),
               ForwardedAddresses(options.trusted_proxies), std::move(files), options.login, &pool_,
               &counters_) {}
+
+absl::Status Gateway::ServeMetrics() {
+  if (options_.metrics_port < 0) return absl::OkStatus();
+  metrics_.emplace();
+  AddProcessMetrics("tissueform_gateway", SoftwareVersion(), &*metrics_);
+  AddCounterMetrics(counters_, &*metrics_);
+  metrics_->AddGauge("tissueform_gateway_ready", "1 while a server behind it takes calls.", {},
+                     [this] { return pool_.IsReady() ? 1.0 : 0.0; });
+  TF_RETURN_IF_ERROR(metrics_->Serve(options_.metrics_port));
+  spdlog::info("metrics on http://127.0.0.1:{}/metrics", metrics_->port());
+  return absl::OkStatus();
+}
 
 std::string Gateway::Url() const {
   const bool is_ipv6 = absl::StrContains(options_.host, ':');

@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -14,6 +15,7 @@
 #include "server/gateway/gateway_routes.h"
 #include "server/gateway/http_server.h"
 #include "server/gateway/server_pool.h"
+#include "server/monitoring/metrics_page.h"
 
 namespace tissueform {
 
@@ -24,7 +26,7 @@ class Gateway {
   //
   // Errors: Unavailable, naming the address, when it cannot be listened on; FailedPrecondition
   // (servers on other machines without encryption); those of CheckLoginConfig, WebFiles::Load,
-  // RotatedFiles::Load and ForwardedAddresses::CheckProxies.
+  // RotatedFiles::Load, ForwardedAddresses::CheckProxies and MetricsPage::Serve.
   static absl::StatusOr<std::unique_ptr<Gateway>> Start(const GatewayOptions& options);
 
   // "http://127.0.0.1:8080", also when the options said port 0.
@@ -32,6 +34,8 @@ class Gateway {
   int port() const { return http_->port(); }
   // Calls `answered` on one of the threads that serve, later: proof that they do.
   void Ask(std::function<void()> answered) { http_->Post(std::move(answered)); }
+  // On which Prometheus finds the page of metrics; 0: there is none.
+  int metrics_port() const { return metrics_.has_value() ? metrics_->port() : 0; }
   const GatewayCounters& counters() const { return counters_; }
   const ServerPool& pool() const { return pool_; }
 
@@ -42,6 +46,8 @@ class Gateway {
  private:
   Gateway(const GatewayOptions& options, WebFiles files, std::unique_ptr<RotatedFiles> tls_files);
 
+  absl::Status ServeMetrics();
+
   // Constant.
   const GatewayOptions options_;
 
@@ -51,6 +57,7 @@ class Gateway {
   ServerPool pool_;
   GatewayRoutes routes_;
   std::unique_ptr<HttpServer> http_;
+  std::optional<MetricsPage> metrics_;  // reads what the others count
 };
 
 }  // namespace tissueform

@@ -51,4 +51,19 @@ std::string GatewayCounters::Text() const {
   return text;
 }
 
+void AddCounterMetrics(const GatewayCounters& counters, MetricsPage* page) {
+  for (size_t i = 0; i < kGatewayEventNames.size(); ++i) {
+    const auto event = static_cast<GatewayEvent>(i);
+    const auto read = [&counters, event] { return static_cast<double>(counters.Count(event)); };
+    const std::string name(GatewayEventName(event));
+    if (event < GatewayEvent::kMalformedRequest) {
+      page->AddCounter("tissueform_gateway_events_total",
+                       "Requests, WebSockets and calls that have come.", {{"event", name}}, read);
+    } else {
+      page->AddCounter("tissueform_gateway_refusals_total",
+                       "What was refused or given up, by reason.", {{"reason", name}}, read);
+    }
+  }
+}
+
 }  // namespace tissueform

@@ -10,6 +10,8 @@
 
 #include "absl/strings/string_view.h"
 
+#include "server/monitoring/metrics_page.h"
+
 namespace tissueform {
 
 // What a gateway counts: what it has done, and why it has refused something.
@@ -57,5 +59,9 @@ class GatewayCounters {
  private:
   std::array<std::atomic<int64_t>, static_cast<size_t>(GatewayEvent::kLast) + 1> counts_ = {};
 };
+
+// What it has done as tissueform_gateway_events_total, the rest as
+// tissueform_gateway_refusals_total; `counters` must outlive the page.
+void AddCounterMetrics(const GatewayCounters& counters, MetricsPage* page);
 
 }  // namespace tissueform

@@ -163,6 +163,15 @@ void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
                  "what is logged on stderr, without names, paths or content")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
+  app.add_option("--log-format", options->log_format,
+                 "how lines of the log look: for people, or one JSON object each")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
+  app.add_option(
+         "--metrics-port", options->metrics_port,
+         "port of 127.0.0.1 on which Prometheus finds /metrics; 0 takes a free one (default: "
+         "there is none)")
+      ->check(CLI::Range(0, 65535));
   AddConfiguration(app, "TISSUEFORM_GATEWAY_");  // last: it looks at all options
 }
 

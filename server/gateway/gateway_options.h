@@ -31,6 +31,8 @@ struct GatewayOptions {
   GatewayLimits limits;
   LoginConfig login = {};
   std::string log_level = "info";
+  std::string log_format = "text";
+  int metrics_port = -1;  // of loopback; 0: any free one; -1: no metrics
 };
 
 // Adds one option a setting to `app`, with its default in the help; parsing writes into `options`,

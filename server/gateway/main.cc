@@ -16,6 +16,7 @@
 
 #include "server/gateway/gateway.h"
 #include "server/gateway/gateway_options.h"
+#include "server/monitoring/log_lines.h"
 #include "server/program/program_options.h"
 #include "server/program/systemd_notices.h"
 
@@ -84,6 +85,7 @@ int main(int argc, char** argv) {
   if (const std::optional<int> end = tissueform::ParseProgramOptions(app, argc, argv)) return *end;
   spdlog::set_default_logger(spdlog::stderr_color_mt("tissueform-gateway"));
   spdlog::set_level(spdlog::level::from_str(options.log_level));
+  tissueform::SetLogFormat(options.log_format);
   // What clients and servers do wrong comes back as a status.
   gpr_set_log_function([](gpr_log_func_args* args) { spdlog::debug("gRPC: {}", args->message); });
   return Serve(options);

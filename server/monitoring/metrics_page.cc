@@ -80,8 +80,8 @@ class MetricsPage::Families : public prometheus::Collectable {
   }
 
   void Add(const std::string& name, const std::string& help, MetricType type, Labels labels,
-           const Read& read) {
-    Add(name, help, type, std::move(labels), [read, type](ClientMetric* metric) {
+           Read read) {
+    Add(name, help, type, std::move(labels), [read = std::move(read), type](ClientMetric* metric) {
       const double value = read();
       SetValue(type, value, metric);
       return !std::isnan(value);

@@ -104,13 +104,17 @@ std::optional<std::string> Quoted(const std::string& value) {
 }
 
 std::string Line(const CLI::Option& option) {
-  const std::string name = option.get_single_name();
+  const std::string& name = option.get_single_name();
   std::vector<std::string> values = option.results();
   if (IsFlag(option))
     return absl::StrCat(name, " = ", option.count() > 0 && !IsNo(values.back()) ? "true" : "false",
                         "\n");
   if (values.empty()) {
     if (option.get_default_str().empty()) return absl::StrCat("# ", name, " is not set\n");
+    // Where it is given, others must or must not be: its default goes without saying.
+    if (!option.get_needs().empty() || !option.get_excludes().empty()) {
+      return absl::StrCat("# ", name, " = ", option.get_default_str(), "\n");
+    }
     values = {option.get_default_str()};
   }
   std::vector<std::string> quoted;

@@ -80,9 +80,9 @@ void SessionWatches::Remove(const std::string& watch) {
 
 absl::Status SessionWatches::Acknowledge(const std::string& watch, uint64_t number,
                                          const Authenticated& by) {
-  const std::string principal = by.principal == nullptr ? "" : by.principal->name;
   MutexLock lock(mutex_);
   const auto found = watches_.find(watch);
+  const std::string& principal = by.principal == nullptr ? std::string() : by.principal->name;
   if (found != watches_.end() && found->second.principal == principal) {
     return found->second.watcher->Acknowledge(number, by);
   }

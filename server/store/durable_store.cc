@@ -95,9 +95,9 @@ MeshStore& DurableStore::meshes() { return parts_->meshes; }
 UploadStore& DurableStore::uploads() { return *parts_->uploads; }
 PredictionStore& DurableStore::predictions() { return parts_->predictions; }
 CaseStore& DurableStore::cases() { return parts_->cases; }
-CommitThread* DurableStore::commit_thread() { return &parts_->thread; }
 const DurationHistogram* DurableStore::latency() const { return &parts_->thread.latency(); }
 std::string DurableStore::folder() const { return parts_->folder.path(); }
+CommitThread* DurableStore::commit_thread() { return &parts_->thread; }
 const std::vector<DamagedItem>& DurableStore::damaged() const { return parts_->damaged; }
 
 }  // namespace tissueform

@@ -54,9 +54,9 @@ class DurableStore final : public Stores {
   UploadStore& uploads() override;
   PredictionStore& predictions() override;
   CaseStore& cases() override;
-  CommitThread* commit_thread() override;
   const DurationHistogram* latency() const override;
   std::string folder() const override;
+  CommitThread* commit_thread() override;
 
   const std::vector<DamagedItem>& damaged() const;
 

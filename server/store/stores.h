@@ -29,13 +29,13 @@ class Stores {
   virtual PredictionStore& predictions() = 0;
   virtual CaseStore& cases() = 0;
 
-  // Of the database in which other rooms keep rows of theirs, too; null: nothing outlives the
-  // process.
-  virtual CommitThread* commit_thread() { return nullptr; }
   // Of each reading or writing of rows, until it is durable; null where nothing is.
   virtual const DurationHistogram* latency() const { return nullptr; }
   // Where it is kept; empty: in memory.
   virtual std::string folder() const { return {}; }
+  // Of the database in which other rooms keep rows of theirs, too; null: nothing outlives the
+  // process.
+  virtual CommitThread* commit_thread() { return nullptr; }
 };
 
 }  // namespace tissueform

@@ -114,6 +114,29 @@ void AddMemoryMetrics(const MemoryBudget& budget, const MeshCatalog& catalog, Me
                  [&budget] { return static_cast<double>(budget.limit_bytes()); });
 }
 
+void AddSecurityMetrics(const SecurityReadings& readings, MetricsPage* page) {
+  page->AddGauge("tissueform_insecure", "1 when the server was started with --insecure.", {},
+                 [insecure = readings.insecure] { return insecure ? 1.0 : 0.0; });
+  const auto add_time = [page](const std::string& name, const std::string& help,
+                               const MetricsPage::Labels& labels, const MetricsPage::Read& read) {
+    if (read != nullptr) page->AddGauge(name, help, labels, read);
+  };
+  const char* const expiry = "tissueform_certificate_expiry_timestamp_seconds";
+  add_time(expiry, "When a certificate ends, in Unix time.", {{"certificate", "server"}},
+           readings.certificate_expires);
+  add_time(expiry, "", {{"certificate", "client_ca"}}, readings.client_ca_expires);
+  add_time("tissueform_token_keys_read_timestamp_seconds",
+           "When keys of tokens were last read and good, in Unix time.", {},
+           readings.token_keys_read);
+  add_time("tissueform_token_keys_expiry_timestamp_seconds",
+           "When the first key of tokens may be used no longer, in Unix time.", {},
+           readings.token_keys_expire);
+  if (readings.token_key_alarms == nullptr) return;
+  page->AddCounter("tissueform_token_key_alarms_total",
+                   "Times that new keys of tokens were nonsense, and the old ones stayed.", {},
+                   readings.token_key_alarms);
+}
+
 void AddStoreMetrics(const Stores& stores, MetricsPage* page) {
   const std::string folder = stores.folder();
   if (folder.empty() || stores.latency() == nullptr) return;

@@ -35,4 +35,17 @@ void AddMemoryMetrics(const MemoryBudget& budget, const MeshCatalog& catalog, Me
 // Of a store on a disk; of one in memory there is nothing to tell.
 void AddStoreMetrics(const Stores& stores, MetricsPage* page);
 
+// What the server's locks tell of themselves; a reading that is null is left out.
+struct SecurityReadings {
+  bool insecure = false;  // started with --insecure
+  // Unix times.
+  MetricsPage::Read certificate_expires = nullptr;  // the server's own
+  MetricsPage::Read client_ca_expires = nullptr;    // the first of the clients' authorities
+  MetricsPage::Read token_keys_read = nullptr;      // when keys of tokens were last read and good
+  MetricsPage::Read token_keys_expire = nullptr;    // when the first of them may be used no longer
+  // Times that new keys were nonsense and the old ones stayed.
+  MetricsPage::Read token_key_alarms = nullptr;
+};
+void AddSecurityMetrics(const SecurityReadings& readings, MetricsPage* page);
+
 }  // namespace tissueform

@@ -4,35 +4,52 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
 #include "server/calls/call_observer.h"
 #include "server/monitoring/metrics_page.h"
+#include "server/telemetry/audit_log.h"
+#include "server/telemetry/audit_observer.h"
 #include "server/telemetry/call_metrics.h"
 #include "server/telemetry/server_metrics.h"
 #include "server/telemetry/telemetry_options.h"
 
 namespace tissueform {
 
-// What a server tells of its calls. Thread-safe.
-class Telemetry {
+// What a server tells of its calls: metrics always, an audit where the options ask for one. It is
+// to be told of every call. Thread-safe.
+class Telemetry final : public CallObserver {
  public:
+  // Errors: those of AuditKey::Read and AuditLog::Open.
   static absl::StatusOr<std::unique_ptr<Telemetry>> Start(const TelemetryOptions& options);
 
-  // Is to be told of every call.
-  CallObserver* observer() { return &call_metrics_; }
+  // The audit decides: errors are its own.
+  absl::Status OnBegin(const ObservedCall& call) override;
+  void OnResource(const ObservedCall& call) override;
+  void OnEnd(const ObservedCall& call, const absl::Status& outcome,
+             std::chrono::steady_clock::duration elapsed) override;
+
   SessionEventCounts& session_events() { return session_events_; }
   const SessionEventCounts& session_events() const { return session_events_; }
 
+  // Files may have been moved away (SIGHUP).
+  void CheckFiles();
+
   // The page must end before this.
-  void AddTo(MetricsPage* page) const { call_metrics_.AddTo(page); }
+  void AddTo(MetricsPage* page) const;
 
  private:
   Telemetry() = default;
 
+  absl::Status StartAudit(const TelemetryOptions& options);
+
   CallMetrics call_metrics_;
   SessionEventCounts session_events_;
+  std::unique_ptr<AuditLog> audit_log_;  // null: there is none
+  std::optional<AuditObserver> audit_observer_;
 };
 
 }  // namespace tissueform

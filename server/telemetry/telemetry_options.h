@@ -13,9 +13,12 @@ namespace tissueform {
 struct TelemetryOptions {
   int metrics_port = -1;  // of loopback; 0: any free one; -1: no metrics
   std::string log_format = "text";
+  std::string audit_log = {};  // empty: there is none
+  std::string audit_key = {};
+  bool audit_syslog = false;
 };
 
-// Adds --metrics-port and --log-format; see AddServerOptions.
+// Adds --metrics-port, --log-format and those of the audit; see AddServerOptions.
 void AddTelemetryOptions(CLI::App& app, TelemetryOptions* options);
 
 }  // namespace tissueform

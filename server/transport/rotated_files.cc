@@ -24,6 +24,8 @@ namespace {
 
 constexpr std::chrono::seconds kLookInterval{1};
 constexpr unsigned kWatcherSeconds = 1;
+constexpr std::chrono::hours kSoon{14 * 24};
+constexpr std::chrono::hours kTellInterval{24};
 
 absl::Status CannotKeep() {
   return absl::InternalError(
@@ -158,12 +160,22 @@ absl::Status RotatedFiles::Use(const Contents& contents) {
   return absl::OkStatus();
 }
 
+void RotatedFiles::TellOfExpiry() {
+  const auto now = std::chrono::system_clock::now();
+  const auto left = expiry() - now;
+  if (identity_ == nullptr || left > kSoon || now - told_of_expiry_ < kTellInterval) return;
+  told_of_expiry_ = now;
+  spdlog::warn("the certificate ends in {} h; renew it by rewriting its file",
+               std::chrono::duration_cast<std::chrono::hours>(left).count());
+}
+
 void RotatedFiles::Watch() {
   absl::Status last;
   std::string told;
   MutexLock lock(mutex_);
   while (!ends_) {
     if (!ending_.WaitUntil(mutex_, std::chrono::steady_clock::now() + kLookInterval)) {
+      TellOfExpiry();
       const absl::Status status = LookAgain();
       // Twice the same: not just between the writing of two files that belong together.
       if (!status.ok() && status == last && told != status.message()) {

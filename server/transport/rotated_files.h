@@ -85,6 +85,8 @@ class RotatedFiles {
   absl::StatusOr<std::chrono::system_clock::time_point> Check(const Contents& contents) const;
   absl::Status Use(const Contents& contents);
   void Watch();
+  // Once a day when the certificate ends soon.
+  void TellOfExpiry();
   // OK: what stands in the files is in use.
   absl::Status LookAgain();
 
@@ -102,6 +104,7 @@ class RotatedFiles {
 
   // The thread's.
   Contents used_;
+  std::chrono::system_clock::time_point told_of_expiry_ = {};
 
   Mutex mutex_;
   ConditionVariable ending_;

@@ -19,10 +19,13 @@ export class IdentityProvider {
   private server: Server | null = null;
   private handler: (request: never, response: never) => void = () => {};
   private port = 0;
+  private readonly key = generateKeyPairSync("ec", { namedCurve: "P-256" }).privateKey.export({ format: "jwk" });
 
   static async start(): Promise<IdentityProvider> {
     const provider = new IdentityProvider();
     await provider.listen();
+    // Servers ask for keys at their start, when nobody knows yet where pages will come from.
+    provider.admit(provider.issuer);
     return provider;
   }
 
@@ -66,8 +69,7 @@ export class IdentityProvider {
 
   private configuration(redirectUri: string): Configuration {
     const device = "urn:ietf:params:oauth:grant-type:device_code";
-    const { privateKey } = generateKeyPairSync("ec", { namedCurve: "P-256" });
-    const key = { ...privateKey.export({ format: "jwk" }), kid: "today", alg: "ES256", use: "sig" };
+    const key = { ...this.key, kid: "today", alg: "ES256", use: "sig" };
     const resource = () => ({ scope: "", audience: AUDIENCE, accessTokenTTL: this.tokenSeconds, accessTokenFormat: "jwt" as const, jwt: { sign: { alg: "ES256" as const } } });
     const common = { token_endpoint_auth_method: "none" as const, id_token_signed_response_alg: "ES256" as const };
     return {

@@ -1,16 +1,18 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+import { mkdtempSync, readFileSync, readdirSync, statSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
 import type { BrowserContext, Page } from "playwright-core";
-import { IdentityProvider, enterName } from "./identity_provider";
-import { Planner, type Hook, live, moved, openPage, seriousFindings, state, takeSegment, typeMove } from "./planner";
+import { AUDIENCE, IdentityProvider, enterName } from "./identity_provider";
+import { Planner, type Hook, live, moved, openPage, seriousFindings, startCommand, state, takeSegment, typeMove } from "./planner";
 
 let provider: IdentityProvider;
 let planner: Planner;
 
 beforeAll(async () => {
   provider = await IdentityProvider.start();
-  planner = await Planner.start(undefined, { gateway: provider.gatewayOptions });
+  planner = await Planner.start(undefined, { gateway: provider.gatewayOptions, server: provider.serverOptions });
   provider.admit(planner.url);
 });
 afterEach(async () => {
@@ -37,9 +39,10 @@ async function signIn(page: Page, name: string): Promise<void> {
   await page.getByText(`Dr. ${name}`).waitFor();
 }
 
-/** A planner of `name`'s with the case open. */
-async function plannerOf(name: string) {
+/** A planner of `name`'s with the case open; `before` is done with its page first. */
+async function plannerOf(name: string, before: (page: Page) => void = () => {}) {
   const opened = await open(await planner.browse());
+  before(opened.page);
   await signIn(opened.page, name);
   await opened.page.setInputFiles("input[type=file]", planner.casePath);
   await live(opened.page);
@@ -70,21 +73,37 @@ test("who signs in plans under their name, and the token lies in no storage", as
   expect(faults).toEqual([]);
 });
 
-test("a drag outlives its tokens", async () => {
-  provider.tokenSeconds = 4;
-  const { page, faults } = await plannerOf("bea");
-  let sockets = 0;
-  page.on("websocket", () => (sockets += 1));
-  const { renewed } = provider;
+test("a drag outlives its tokens: it is told every new one, and the server takes it", async () => {
+  provider.tokenSeconds = 3;
+  const tokensTold: number[] = [];
+  const { page, faults } = await plannerOf("bea", (early) => {
+    early.on("websocket", (socket) => {
+      const at = tokensTold.push(0) - 1;
+      socket.on("framesent", ({ payload }) => (tokensTold[at] += payload.toString().includes("eyJ") ? 1 : 0));
+    });
+  });
+  const before = tokensTold.length;
+  const first = tokensTold[before - 1];
   await takeSegment(page, "Lower jaw");
-  for (let mm = 1; mm <= 4; ++mm) {
-    await expect.poll(() => provider.renewed, { timeout: 20_000, interval: 50 }).toBeGreaterThanOrEqual(renewed + mm);
+  for (let mm = 1; mm <= 2; ++mm) {
+    await expect.poll(() => tokensTold[before - 1], { timeout: 20_000, interval: 50 }).toBeGreaterThanOrEqual(first + mm);
     await typeMove(page, "Forward", String(mm));
     await moved(page, 0.6 * mm, 1.4 * mm);
   }
+  // A token that is not good would have ended the drag; no other one was begun.
   expect((await state(page)).connection).toBe("live");
-  expect(sockets).toBe(0);
+  expect(tokensTold.length).toBe(before);
   expect(faults).toEqual([]);
+});
+
+test("without a token the server answers nobody", async () => {
+  const { page } = await open(await planner.browse());
+  const status = await page.evaluate(async () => {
+    const headers = { "content-type": "application/grpc-web+proto" };
+    const response = await fetch("/tissueform.v1.CaseService/ListCases", { method: "POST", headers, body: new Uint8Array(5) });
+    return response.headers.get("grpc-status");
+  });
+  expect(status).toBe("16");
 });
 
 test("who signs out is out, here and at the provider", async () => {
@@ -131,7 +150,7 @@ test("a provider that is down is told, and asked again", async () => {
 });
 
 test("a login that ends keeps the work over the next one", async () => {
-  provider.tokenSeconds = 4;
+  provider.tokenSeconds = 3;
   const { page, faults } = await plannerOf("gina");
   await takeSegment(page, "Lower jaw");
   await provider.stop();
@@ -147,4 +166,59 @@ test("a login that ends keeps the work over the next one", async () => {
   await moved(page, 5, 9);
   expect((await state(page)).moves[1].forwardMm).toBeCloseTo(7, 9);
   expect(faults).toEqual([]);
+});
+
+test("the command logs in by a code that is entered in a browser", async () => {
+  const folder = mkdtempSync(join(planner.folder, "command-"));
+  const file = join(folder, "config/token");
+  const command = startCommand(["login", "--issuer", provider.issuer, "--client-id", "command", "--audience", AUDIENCE, "--token-file", file]);
+  const url = /or open (\S+)/.exec(await command.said("or open"))?.[1] ?? "";
+  const page = await (await planner.browse()).newPage();
+  await page.goto(url);
+  await page.getByRole("button", { name: "Continue", exact: true }).click();
+  await enterName(page, "ida");
+  await page.getByText("Sign-in Success").waitFor();
+  expect(await command.ended()).toBe(0);
+  const token = readFileSync(file, "utf8").trim();
+  const claims = () => JSON.parse(Buffer.from(readFileSync(file, "utf8").split(".")[1], "base64url").toString());
+  expect(claims()).toMatchObject({ iss: provider.issuer, aud: AUDIENCE, sub: "ida" });
+  expect(statSync(file).mode & 0o777).toBe(0o600);
+  expect(await command.said("")).not.toContain(token);
+
+  const list = ["case", "list", "--server", planner.serverAddress, "--token-file"];
+  expect(await startCommand([...list, file]).ended()).toBe(0);
+  const forged = join(folder, "forged");
+  writeFileSync(forged, token.replace(/.{8}$/, "AAAAAAAA"), { mode: 0o600 });
+  expect(await startCommand([...list, forged]).ended()).toBe(1);
+
+  expect(await startCommand(["login", "--renew", "--token-file", file]).ended()).toBe(0);
+  expect(readFileSync(file, "utf8").trim()).not.toBe(token);
+  expect(claims().sub).toBe("ida");
+  expect(await startCommand(["logout", "--token-file", file]).ended()).toBe(0);
+  expect(readdirSync(join(folder, "config"))).toEqual([]);
+});
+
+test("a follow link needs no login, shows its end, and is over when its maker ends it", async () => {
+  const { page, faults } = await plannerOf("hans");
+  await takeSegment(page, "Lower jaw");
+  await page.context().grantPermissions(["clipboard-read", "clipboard-write"], { origin: planner.url });
+  await page.getByRole("button", { name: "Copy follow link" }).click();
+  await page.getByText(/copied, until \d/).waitFor();
+  const url = await page.evaluate(() => navigator.clipboard.readText());
+  expect(url).toMatch(/#follow=tfl_[\w-]{43}&case=[0-9a-f]{64}$/);
+
+  const stranger = await planner.browse();
+  const { page: follower, faults: theirs } = await openPage(stranger, url);
+  await page.getByText("one follows").waitFor();
+  await typeMove(page, "Forward", "7");
+  await moved(follower, 5, 9);
+  await follower.getByText(/Link works until/).waitFor();
+  expect(await seriousFindings(follower)).toEqual([]);
+
+  await page.getByRole("button", { name: "End all links" }).click();
+  await page.getByText("all links have ended").waitFor();
+  await follower.getByText("The link has expired, or was ended.").waitFor();
+  const { page: late } = await openPage(stranger, url);
+  await late.getByRole("alert").getByText("The link has expired, or was ended.").waitFor();
+  expect([...faults, ...theirs]).toEqual([]);
 });

@@ -3,6 +3,7 @@
 
 import { join } from "node:path";
 import type { Page } from "playwright-core";
+import { IdentityProvider, enterName } from "./identity_provider";
 import { type Hook, Planner, live, moved, openCase, openPage, state, takeSegment, typeMove } from "./planner";
 
 // The pictures of docs/planner.md, of a case of a whole head:
@@ -73,6 +74,35 @@ test("six pictures", async () => {
   await follower.getByLabel("Opacity of the skin").fill("0.6");
   await picture(follower, "follower");
   await live(page);
+});
+
+test("the login", async () => {
+  const provider = await IdentityProvider.start();
+  const house = await Planner.start(process.env.TISSUEFORM_CASE, { gateway: provider.gatewayOptions, server: provider.serverOptions });
+  try {
+    provider.admit(house.url);
+    const page = await (await house.browse()).newPage();
+    await page.emulateMedia({ colorScheme: "light" });
+    await page.goto(house.url);
+    const button = page.getByRole("button", { name: "Sign in", exact: true });
+    await button.waitFor();
+    await page.screenshot({ path: join(FOLDER, "sign-in.jpg"), type: "jpeg", quality: 90, clip: { x: 0, y: 0, width: 1280, height: 420 } });
+    await button.click();
+    await enterName(page, "Ada Lovelace");
+    await page.getByText("Dr. Ada Lovelace").waitFor();
+    await page.setInputFiles("input[type=file]", house.casePath);
+    await live(page);
+    await takeSegment(page, "Lower jaw");
+    await typeMove(page, "Forward", "8");
+    await moved(page, 6, 12);
+    await page.context().grantPermissions(["clipboard-read", "clipboard-write"], { origin: house.url });
+    await page.getByRole("button", { name: "Copy follow link" }).click();
+    await page.getByText(/until \d/).waitFor();
+    await picture(page, "signed-in");
+  } finally {
+    await house.stop();
+    await provider.stop();
+  }
 });
 
 // README's animation, by ImageMagick: convert -delay 12 FOLDER/jaw-*.jpg -resize 800x -layers Optimize -colors 96 jaw.gif

@@ -59,6 +59,22 @@ class Program {
   }
 }
 
+/** The command `tissueform`: `said` resolves with all it has printed, once `text` is in that; `ended` with its exit code. */
+export function startCommand(options: string[]): { said(text: string): Promise<string>; ended(): Promise<number | null> } {
+  const child = spawn(join(BIN, "tissueform"), options, { stdio: ["ignore", "pipe", "inherit"] });
+  let out = "";
+  const ended = new Promise<number | null>((accept) => child.once("close", accept));
+  const said = (text: string) =>
+    new Promise<string>((accept, reject) => {
+      const look = () => out.includes(text) && accept(out);
+      child.stdout.on("data", look);
+      void ended.then(() => (out.includes(text) ? accept(out) : reject(new Error(`the command has ended and said only: ${out}`))));
+      look();
+    });
+  child.stdout.on("data", (chunk: Buffer) => (out += chunk.toString()));
+  return { said, ended: () => ended };
+}
+
 /** Server and gateway with a case of the bundled head, and a browser. */
 export class Planner {
   readonly folder = mkdtempSync(join(tmpdir(), "tissueform-e2e-"));

@@ -63,7 +63,8 @@ INSTANTIATE_TEST_SUITE_P(
         Target{"store_record", FuzzStoreRecord}, Target{"deform_stream", FuzzDeformStream},
         Target{"case_file", FuzzCaseFile}, Target{"case_upload", FuzzCaseUpload},
         Target{"answers", FuzzAnswers}, Target{"socket_frame", FuzzSocketFrame},
-        Target{"web_request", FuzzWebRequest}, Target{"gateway_connection", FuzzGatewayConnection}),
+        Target{"web_request", FuzzWebRequest}, Target{"gateway_connection", FuzzGatewayConnection},
+        Target{"token", FuzzToken}, Target{"token_keys", FuzzTokenKeys}),
     [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

@@ -76,4 +76,11 @@ void FuzzWebRequest(const uint8_t* data, size_t size);
 // ParseCaseRecord): what is accepted comes back from its own bytes.
 void FuzzStoreRecord(const uint8_t* data, size_t size);
 
+// Authorization headers, one a line, and the bytes as a token, as its header and as its claims
+// (BearerToken, SplitToken, ReadTokenHeader, ReadTokenClaims).
+void FuzzToken(const uint8_t* data, size_t size);
+
+// A key set, or PEM keys, and a revocation list (KeySet::Parse, RevocationList::Parse).
+void FuzzTokenKeys(const uint8_t* data, size_t size);
+
 }  // namespace tissueform::fuzz

@@ -98,6 +98,7 @@ class TokenStreamTest : public ServiceTest {
     ServerOptions options = TestOptions();
     options.tokens = files_.Options();
     options.tokens.leeway = std::chrono::seconds(0);
+    options.quotas.calls_per_second = 1'000'000;
     StartServer(options);
     CallersBearer().Set(EcKey().MakeToken(GoodClaims()));
     client_ = Connect();

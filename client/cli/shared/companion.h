@@ -51,6 +51,13 @@ inline constexpr CompanionCommand kWhoamiCommand = {"whoami", "tell whom a serve
                                                     "tissueform-online"};
 inline constexpr CompanionCommand kServerInfoCommand = {
     "server-info", "tell what a server is: version, models, limits", "tissueform-online"};
+inline constexpr CompanionCommand kDoctorCommand = {
+    "doctor", "tell why a server cannot be used from here, from its name to a drag",
+    "tissueform-online"};
+inline constexpr CompanionCommand kLoginCommand = {
+    "login", "log in at an identity provider: the token that servers ask for", "tissueform-online"};
+inline constexpr CompanionCommand kLogoutCommand = {
+    "logout", "remove the token that `login` has left", "tissueform-online"};
 inline constexpr CompanionCommand kExperimentsCommand = {
     "experiments", "compute the paper's figures and table again, and the models' accuracy",
     "tissueform-experiments"};

@@ -63,6 +63,7 @@ async function signIn(): Promise<boolean> {
   login = user;
   banner = loginBanner(user, () => (hook.bench === undefined ? null : workOf(hook.bench)));
   user.watch((state) => {
+    if (state.kind === "asking") show(waitingPage("Signing in"));
     if (state.kind === "out") show(signInPage(user, state.problem));
   });
   await user.begin();
@@ -143,7 +144,7 @@ async function knowsCallers(): Promise<boolean> {
 
 async function fetchCase(name: string): Promise<CaseFile> {
   const bar = el("progress", { attributes: { max: "1", value: "0", "aria-label": "Progress" } });
-  show(el("main", { class: "start" }, [el("div", { class: "sheet" }, [el("h1", { text: "Opening the case" }), bar])]));
+  show(waitingPage("Opening the case", bar));
   const entry = await gateway.cases.getCase({ name }).catch((thrown) => Promise.reject(toCallError(thrown)));
   return openCase(serverSource(gateway, entry), (share) => (bar.value = share));
 }
@@ -154,6 +155,10 @@ async function fetchModels(): Promise<readonly ModelInfo[]> {
   } catch (thrown) {
     throw toCallError(thrown);
   }
+}
+
+function waitingPage(title: string, ...below: HTMLElement[]): HTMLElement {
+  return el("main", { class: "start" }, [el("div", { class: "sheet" }, [el("h1", { text: title }), ...below])]);
 }
 
 function showProblem(title: string, thrown: unknown, buttons: HTMLElement[]): void {

@@ -21,13 +21,13 @@ using ::testing::HasSubstr;
 constexpr size_t kHeadBytes = 16;
 constexpr size_t kEntryBytes = 16;
 
-class AnswerBytesTest : public ::testing::TestWithParam<DeformationModel> {
+class AnswerBytesTest : public ::testing::TestWithParam<Evaluated> {
  protected:
   AnswerBytesTest() {
-    const auto preparation = PrepareMesh(Bar({3, 3, 6}, 2.0, 0.2), 1);
-    bytes_ = WriteAnswers(
-        (*CreateResponse(preparation, AllVertices(preparation->mesh()), {.model = GetParam()}))
-            ->Describe());
+    const auto preparation = PrepareMesh(Bar({3, 6, 6}, 2.0, 0.2), GetParam().num_handles);
+    bytes_ = WriteAnswers((*CreateResponse(preparation, AllVertices(preparation->mesh()),
+                                           {.model = GetParam().model}))
+                              ->Describe());
   }
 
   template <typename Value>
@@ -64,13 +64,26 @@ TEST_P(AnswerBytesTest, ErrorsSayWhatIsWrong) {
   EXPECT_EQ(reading.error, AnswerError::kTooLarge);
   EXPECT_THAT(reading.message, HasSubstr("at most"));
   const std::string good = bytes_;
-  Put(8, uint32_t{2});
-  reading = ReadAnswers(bytes_);
-  EXPECT_EQ(reading.error, AnswerError::kVersion);
-  EXPECT_THAT(reading.message, HasSubstr("version 2"));
+  for (const uint32_t version : {0U, 3U}) {
+    Put(8, version);
+    reading = ReadAnswers(bytes_);
+    EXPECT_EQ(reading.error, AnswerError::kVersion);
+    EXPECT_THAT(reading.message, HasSubstr("version " + std::to_string(version)));
+  }
   bytes_ = good;
   bytes_[0] = 'X';
   EXPECT_EQ(ReadAnswers(bytes_).error, AnswerError::kNotAnswers);
+}
+
+// Readers of version 1 pass over the sections of a third order, and would answer by others alone.
+TEST_P(AnswerBytesTest, SayTheLowestVersionThatHasThem) {
+  const bool third_order = GetParam().name == "neo_hookean_third_order";
+  EXPECT_EQ(bytes_[8], third_order ? 2 : 1);
+  Put(8, uint32_t{1});
+  EXPECT_EQ(ReadAnswers(bytes_).error,
+            third_order ? AnswerError::kInconsistent : AnswerError::kNone);
+  Put(8, uint32_t{2});
+  EXPECT_EQ(ReadAnswers(bytes_).error, AnswerError::kNone);
 }
 
 // Of the second section: number, type, offset, count.
@@ -116,11 +129,8 @@ TEST_P(AnswerBytesTest, SectionsOfLaterReleasesArePassedOver) {
   EXPECT_EQ(WriteAnswers(reading.answers), bytes_);
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, AnswerBytesTest,
-                         ::testing::Values(DeformationModel::kGradientField,
-                                           DeformationModel::kLinearElastic,
-                                           DeformationModel::kNeoHookean),
-                         [](const auto& test) { return NameOf(test.param); });
+INSTANTIATE_TEST_SUITE_P(Models, AnswerBytesTest, ::testing::ValuesIn(EvaluatedModels()),
+                         [](const auto& test) { return test.param.name; });
 
 }  // namespace
 }  // namespace tissueform::testing

@@ -124,17 +124,17 @@ TEST(AnswerSizeTest, AHeadWithThreeSegmentsTravelsInAFewMegabytes) {
   }
 }
 
-class EvaluatedModelTest : public ::testing::TestWithParam<DeformationModel> {
+class EvaluatedModelTest : public ::testing::TestWithParam<Evaluated> {
  protected:
-  const Problem problem_ = BarWithTwoHandles();
+  const Problem problem_ = GetParam().num_handles == 2 ? BarWithTwoHandles() : BarWithOneHandle();
   const std::unique_ptr<VertexResponse> response_ =
-      *CreateResponse(problem_.preparation, problem_.vertices, {.model = GetParam()});
+      *CreateResponse(problem_.preparation, problem_.vertices, {.model = GetParam().model});
 };
 
 TEST_P(EvaluatedModelTest, IdentityGivesRest) {
   const AnswerEvaluator evaluator(response_->Describe());
   std::vector<float> positions;
-  ASSERT_TRUE(evaluator.Answer(std::vector<AnswerPose>(2), &positions));
+  ASSERT_TRUE(evaluator.Answer(std::vector<AnswerPose>(GetParam().num_handles), &positions));
   const FloatPositions rest = problem_.preparation->mesh().positions().cast<float>();
   EXPECT_EQ(Eigen::Map<const FloatPositions>(positions.data(), rest.rows(), 3), rest);
 }
@@ -142,22 +142,23 @@ TEST_P(EvaluatedModelTest, IdentityGivesRest) {
 TEST_P(EvaluatedModelTest, PosesThatNobodyMayAskForAreNotCovered) {
   const AnswerEvaluator evaluator(response_->Describe());
   std::vector<float> positions = {1, 2, 3};
-  std::vector<AnswerPose> poses(2);
+  const auto handles = static_cast<size_t>(GetParam().num_handles);
+  std::vector<AnswerPose> poses(handles);
   ASSERT_TRUE(evaluator.Covers(poses));
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(),
                            std::numeric_limits<double>::infinity(), 1e300, -1e300}) {
-    poses[1].scale = bad;
+    poses.back().scale = bad;
     EXPECT_FALSE(evaluator.Answer(poses, &positions)) << bad;
-    poses[1] = {};
-    poses[1].rotation_vector[2] = bad;
+    poses.back() = {};
+    poses.back().rotation_vector[2] = bad;
     EXPECT_FALSE(evaluator.Answer(poses, &positions)) << bad;
-    poses[1] = {};
-    poses[1].translation_mm[0] = bad;
+    poses.back() = {};
+    poses.back().translation_mm[0] = bad;
     EXPECT_FALSE(evaluator.Answer(poses, &positions)) << bad;
-    poses[1] = {};
+    poses.back() = {};
   }
-  EXPECT_FALSE(evaluator.Covers(std::vector<AnswerPose>(1)));
-  EXPECT_FALSE(evaluator.Covers(std::vector<AnswerPose>(3)));
+  EXPECT_FALSE(evaluator.Covers(std::vector<AnswerPose>(handles - 1)));
+  EXPECT_FALSE(evaluator.Covers(std::vector<AnswerPose>(handles + 1)));
   EXPECT_FALSE(evaluator.Covers({}));
   EXPECT_EQ(positions, (std::vector<float>{1, 2, 3})) << "nothing is written";
 }
@@ -209,7 +210,7 @@ TEST_P(EvaluatedModelTest, NumbersThatAreNoneAreFound) {
   other = answers;
   other.numbers.tolerance_mm = -1;
   EXPECT_NE(CheckAnswers(other), "");
-  if (GetParam() == DeformationModel::kNeoHookean) {
+  if (GetParam().model == DeformationModel::kNeoHookean) {
     other = answers;
     other.cluster_vertices[0] = other.cluster_vertices[1];
     EXPECT_NE(CheckAnswers(other), "");
@@ -219,11 +220,8 @@ TEST_P(EvaluatedModelTest, NumbersThatAreNoneAreFound) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, EvaluatedModelTest,
-                         ::testing::Values(DeformationModel::kGradientField,
-                                           DeformationModel::kLinearElastic,
-                                           DeformationModel::kNeoHookean),
-                         [](const auto& test) { return NameOf(test.param); });
+INSTANTIATE_TEST_SUITE_P(Models, EvaluatedModelTest, ::testing::ValuesIn(EvaluatedModels()),
+                         [](const auto& test) { return test.param.name; });
 
 }  // namespace
 }  // namespace tissueform::testing

@@ -33,8 +33,8 @@ FREE, FIXED = -2, -1
 
 def read_sections(data):
     magic, version, count = struct.unpack_from("<8sII", data, 0)
-    if magic != b"TFANSWER" or version != 1:
-        sys.exit(f"not prepared answers of version 1: {magic} {version}")
+    if magic != b"TFANSWER" or version not in (1, 2):
+        sys.exit(f"not prepared answers of version 1 or 2: {magic} {version}")
     sections = {}
     for i in range(count):
         number, kind, offset, length = struct.unpack_from("<IIII", data, 16 + 16 * i)
@@ -143,12 +143,33 @@ class Answers:
 
     def neo_hookean_factors(self, poses):
         n, products = self.pairs(poses)
+        factors = [self.elastic_factors(poses), products[:, None]]
+        error = self.second_order_error(products)
+        if len(self.section(44)) > 0:
+            triples, q = self.third_order(n, products)
+            factors.append(triples[:, None] / (1 + q))
+            error = max(error, np.linalg.norm(self.section(45) * triples)) * q / (1 + q)
+        error += self.rounding_mm + self.cut_per_mm * np.linalg.norm(self.section(40) * n)
+        return np.concatenate(factors), error
+
+    def third_order(self, n, pairs):
+        """The triples' products, and how long their order is beside the second."""
+        triples = []
+        for a in range(len(n)):
+            for b in range(a, len(n)):
+                for c in range(b, len(n)):
+                    orders = (6, 3, 1)[(a == b) + (b == c)]
+                    triples.append(orders * n[a] * n[b] * n[c])
+        triples = np.array(triples)
+        second = np.linalg.norm(self.section(43).reshape(-1, len(pairs)).astype(np.float64) @ pairs)
+        third = np.linalg.norm(self.section(44).reshape(-1, len(triples)).astype(np.float64) @ triples)
+        return triples, third / second if second > 0 else 0
+
+    def second_order_error(self, products):
         moves = self.section(42).reshape(-1, len(products)).astype(np.float64) @ products
         farthest = np.linalg.norm(moves.reshape(-1, 3), axis=1).max(initial=0)
         single = np.linalg.norm(self.section(41) * products)
-        error = self.estimate_scale * (farthest * single) ** 0.75 / math.sqrt(self.size_mm)
-        error += self.rounding_mm + self.cut_per_mm * np.linalg.norm(self.section(40) * n)
-        return np.concatenate([self.elastic_factors(poses), products[:, None]]), error
+        return self.estimate_scale * (farthest * single) ** 0.75 / math.sqrt(self.size_mm)
 
     # Factors into displacements of free vertices.
 

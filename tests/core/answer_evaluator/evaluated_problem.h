@@ -26,6 +26,22 @@ inline std::string NameOf(DeformationModel model) {
   }
 }
 
+// What is evaluated: of neo_hookean one handle has a third order, several have not.
+struct Evaluated {
+  std::string name;
+  DeformationModel model;
+  int num_handles;
+};
+
+inline const std::vector<Evaluated>& EvaluatedModels() {
+  static const auto* const models =
+      new std::vector<Evaluated>{{"gradient_field", DeformationModel::kGradientField, 2},
+                                 {"linear_elastic", DeformationModel::kLinearElastic, 2},
+                                 {"neo_hookean", DeformationModel::kNeoHookean, 2},
+                                 {"neo_hookean_third_order", DeformationModel::kNeoHookean, 1}};
+  return *models;
+}
+
 inline std::vector<AnswerPose> ToAnswerPoses(const std::vector<HandlePose>& poses) {
   std::vector<AnswerPose> converted;
   for (const HandlePose& pose : poses) {

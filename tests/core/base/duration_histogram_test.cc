@@ -31,6 +31,7 @@ TEST(DurationHistogramTest, ABoundBelongsToItsOwnBucket) {
 TEST(DurationHistogramTest, NoObservationIsLostBetweenThreads) {
   DurationHistogram histogram;
   std::vector<std::thread> threads;
+  threads.reserve(4);
   for (int i = 0; i < 4; ++i) {
     threads.emplace_back([&histogram] {
       for (int j = 0; j < 10'000; ++j) histogram.Observe(microseconds(j));

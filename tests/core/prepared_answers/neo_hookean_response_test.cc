@@ -73,17 +73,19 @@ class NeoHookeanResponseTest : public ::testing::TestWithParam<int> {
   RandomNumbers random_{11};
 };
 
-// What is left out is of third order: half the pose, an eighth of the error. The linear answer's
-// falls to a quarter only.
-TEST_P(NeoHookeanResponseTest, ErrorIsOfThirdOrderInThePose) {
-  Prepared prepared(GetParam());
+// What is left out is of third order: half the pose, an eighth of the error; with one handle, whose
+// third order is there, of fourth: a sixteenth. The linear answer's falls to a quarter only.
+TEST_P(NeoHookeanResponseTest, ErrorIsOfTheOrderAfterTheLast) {
+  const bool third_order = GetParam() == 1;
+  Prepared prepared(GetParam(), 1e-9);
   ASSERT_OK_AND_ASSIGN(const auto linear, CreateLinearElasticDeformer(prepared.preparation));
   for (int sample = 0; sample < 4; ++sample) {
-    const std::vector<HandlePose> poses = prepared.Poses(0.25, &random_);
+    const std::vector<HandlePose> poses = prepared.Poses(third_order ? 0.6 : 0.25, &random_);
     std::vector<HandlePose> half = poses;
     for (HandlePose& pose : half) pose = PartOfPose(pose, 0.5);
     const double error = prepared.ErrorMm(poses);
-    EXPECT_NEAR(error / prepared.ErrorMm(half), 8, 1.5) << sample;
+    EXPECT_NEAR(error / prepared.ErrorMm(half), third_order ? 16 : 8, third_order ? 3 : 1.5)
+        << sample;
     ASSERT_OK_AND_ASSIGN(const Deformation of_linear, linear->Deform(poses));
     const Positions converged = prepared.direct->Deform(poses)->positions;
     EXPECT_LT(error, 0.3 * (of_linear.positions - converged).rowwise().norm().maxCoeff());
@@ -135,9 +137,14 @@ TEST_P(NeoHookeanResponseTest, EstimateIsSeldomExceeded) {
 // columns and digits lies from that of all is what the estimate has been raised by.
 TEST_P(NeoHookeanResponseTest, CompressionPutsOffByNoMoreThanIsSaid) {
   const Prepared fine(GetParam());
-  ASSERT_OK_AND_ASSIGN(const auto coarse,
-                       CreateNeoHookeanResponse(fine.preparation, testing::AllVertices(fine.mesh),
-                                                {.tolerance_mm = 0.002, .max_estimate_mm = 100}));
+  // With one handle these few vertices need all triples at 0.002, and what large poses are put off
+  // by counts.
+  const double tolerance_mm = GetParam() == 1 ? 0.02 : 0.002;
+  const double size = GetParam() == 1 ? 2 : 1;
+  ASSERT_OK_AND_ASSIGN(
+      const auto coarse,
+      CreateNeoHookeanResponse(fine.preparation, testing::AllVertices(fine.mesh),
+                               {.tolerance_mm = tolerance_mm, .max_estimate_mm = 100}));
   EXPECT_LT(coarse->num_terms(), fine.response->num_terms());
   EXPECT_LT(coarse->bytes_held(), fine.response->bytes_held());
   FloatPositions answer;
@@ -145,7 +152,7 @@ TEST_P(NeoHookeanResponseTest, CompressionPutsOffByNoMoreThanIsSaid) {
   int exceeded = 0;
   double tightest = 1e9;
   for (int sample = 0; sample < 1000; ++sample) {
-    const std::vector<HandlePose> poses = fine.Poses(std::abs(random_.Next()), &random_);
+    const std::vector<HandlePose> poses = fine.Poses(size * std::abs(random_.Next()), &random_);
     coarse->Evaluate(poses, &answer);
     fine.response->Evaluate(poses, &of_all);
     const double off = LargestDistance(answer, of_all.cast<double>());
@@ -166,7 +173,7 @@ TEST(NeoHookeanResponseCoverTest, CoversItsRangeAndNoScale) {
                        CreateNeoHookeanResponse(preparation, {1, 5, 100},
                                                 {.max_rotation_rad = 0.3, .max_estimate_mm = 50}));
   EXPECT_TRUE(response->error_is_estimate());
-  EXPECT_EQ(response->num_terms_before(), 12 + 21);
+  EXPECT_EQ(response->num_terms_before(), 12 + 21 + 56);
   EXPECT_LT(response->num_terms(), 12 + 21);
   EXPECT_LT(response->bytes_held(), NeoHookeanResponseBytes(*preparation, 3));
   std::vector<HandlePose> poses(1);

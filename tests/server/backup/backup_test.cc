@@ -135,7 +135,7 @@ TEST_F(BackupTest, WhatIsDeletedBetweenRowsAndFilesIsInNeither) {
   size_t snapshots = 0;
   const BackUpOptions options{.after_snapshot = [&] {
     for (const int index : deleted_after[snapshots++]) {
-      ASSERT_THAT(store_->cases().Delete(cases[static_cast<size_t>(index)]), IsOk());
+      ASSERT_THAT(store_->cases().Delete(SampleCaseKey(cases[static_cast<size_t>(index)])), IsOk());
     }
   }};
   ASSERT_THAT(BackUp(data_, backup_, options), IsOk());

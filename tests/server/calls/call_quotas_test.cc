@@ -101,7 +101,7 @@ class OnePrincipal : public Authenticator {
 
 TEST_F(CallQuotasTest, ACallThatIsOverGivesItsPlaceBackOnce) {
   OnePrincipal authenticator;
-  ServiceGate gate(&authenticator, nullptr, &quotas_);
+  ServiceGate gate({.authenticator = &authenticator, .quotas = &quotas_});
   {
     CallScope first(nullptr, "Test.Stream", CallKind::kStream, &gate);
     CallScope second(nullptr, "Test.Stream", CallKind::kStream, &gate);
@@ -117,7 +117,7 @@ TEST_F(CallQuotasTest, ACallThatIsOverGivesItsPlaceBackOnce) {
 }
 
 TEST_F(CallQuotasTest, NobodyWhoIsAnonymousHasAQuota) {
-  ServiceGate gate(nullptr, nullptr, &quotas_);
+  ServiceGate gate({.quotas = &quotas_});
   for (int i = 0; i < 100; ++i) {
     CallScope scope(nullptr, "Test.Call", CallKind::kUpkeep, &gate);
     EXPECT_TRUE(scope.End(scope.admission()).ok());

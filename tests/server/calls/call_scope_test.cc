@@ -89,13 +89,13 @@ class TrustingAuthenticator : public Authenticator {
 
 TEST(CallScopeTest, AServerWithLoginsServesNobodyElse) {
   TrustingAuthenticator authenticator;
-  ServiceGate gate(&authenticator);
+  ServiceGate gate({.authenticator = &authenticator});
   EXPECT_EQ(AdmissionOf(CallKind::kUpkeep, &gate), absl::StatusCode::kUnauthenticated);
 }
 
 TEST(CallScopeTest, AStreamGoesOnWithATokenOfTheSamePrincipalOnly) {
   TrustingAuthenticator authenticator;
-  ServiceGate gate(&authenticator);
+  ServiceGate gate({.authenticator = &authenticator});
   CallScope scope(nullptr, "Test.Call", CallKind::kNewWork, &gate);
   EXPECT_TRUE(absl::IsUnauthenticated(scope.Renew("somebody")));
   ServiceGate without_logins;
@@ -127,7 +127,7 @@ class Notes : public CallObserver {
 
 TEST(CallScopeTest, AnObserverHearsOfEveryCallOnce) {
   Notes notes;
-  ServiceGate gate(nullptr, &notes);
+  ServiceGate gate({.observer = &notes});
   CallScope scope(nullptr, "Test.Call", CallKind::kNewWork, &gate);
   CallScope moved = std::move(scope);
   moved.SetResource("sessions/a");
@@ -139,7 +139,7 @@ TEST(CallScopeTest, AnObserverHearsOfEveryCallOnce) {
 TEST(CallScopeTest, AnObserverCanRefuseACall) {
   Notes notes;
   notes.refusal = absl::UnavailableError("the audit log cannot be written");
-  ServiceGate gate(nullptr, &notes);
+  ServiceGate gate({.observer = &notes});
   EXPECT_EQ(AdmissionOf(CallKind::kUpkeep, &gate), absl::StatusCode::kUnavailable);
   EXPECT_EQ(notes.told.size(), 2);
 }

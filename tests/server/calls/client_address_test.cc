@@ -82,7 +82,7 @@ class ClientAddressTest : public ::testing::Test, public v1::ServerInfoService::
   const TestIdentity workstation_ =
       authority_.Issue({.name = "gateway.example.org", .alternatives = "DNS:workstation"});
   AddressNote note_;
-  ServiceGate gate_{nullptr, &note_, nullptr, "gateway.example.org"};
+  ServiceGate gate_{{.observer = &note_, .gateway_name = "gateway.example.org"}};
   int port_ = 0;
   std::unique_ptr<grpc::Server> server_;
 };

@@ -5,6 +5,7 @@
 
 #include <set>
 
+#include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
 namespace tissueform {
@@ -18,6 +19,21 @@ TEST(GatewayCounters, WhatHasNotHappenedIsNotTold) {
   counters.Add(GatewayEvent::kWrongHost);
   EXPECT_EQ(counters.Text(), "request=1 wrong_host=2");
   EXPECT_EQ(counters.Count(GatewayEvent::kWrongHost), 2);
+}
+
+TEST(GatewayCounters, ThePageTellsWhatWasDoneApartFromWhatWasRefused) {
+  GatewayCounters counters;
+  counters.Add(GatewayEvent::kSocketCall);
+  counters.Add(GatewayEvent::kMalformedRequest);
+  MetricsPage page;
+  AddCounterMetrics(counters, &page);
+  EXPECT_THAT(
+      page.Text(),
+      ::testing::AllOf(
+          ::testing::HasSubstr("tissueform_gateway_events_total{event=\"socket_call\"} 1\n"),
+          ::testing::HasSubstr(
+              "tissueform_gateway_refusals_total{reason=\"malformed_request\"} 1\n"),
+          ::testing::HasSubstr("tissueform_gateway_refusals_total{reason=\"client_gone\"} 0\n")));
 }
 
 TEST(GatewayCounters, EveryEventHasANameOfItsOwn) {

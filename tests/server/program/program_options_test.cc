@@ -31,6 +31,7 @@ struct Settings {
   bool quiet = false;
   std::string folder;
   std::string url;
+  std::string mode = "strict";  // of the address
   std::vector<std::string> names;
 };
 
@@ -50,7 +51,8 @@ class ProgramOptionsTest : public ::testing::Test {
     app.add_option("--port", outcome.settings.port)->check(CLI::Range(0, 9))->capture_default_str();
     CLI::Option* quiet = app.add_flag("--quiet", outcome.settings.quiet);
     app.add_option("--folder", outcome.settings.folder)->excludes(quiet);
-    app.add_option("--url", outcome.settings.url);
+    CLI::Option* url = app.add_option("--url", outcome.settings.url);
+    app.add_option("--mode", outcome.settings.mode)->needs(url)->capture_default_str();
     app.add_option("--name", outcome.settings.names);
     AddConfiguration(app, "PROGRAM_TEST_");
     std::vector<const char*> words = {"program"};
@@ -170,6 +172,12 @@ TEST_F(ProgramOptionsTest, SecretsOfAddressesAreHidden) {
       Parse({"--print-config", "--url", "https://me:verysecret@host:1/p@th?key=secrettoo"}).out;
   EXPECT_THAT(out, Not(HasSubstr("secret")));
   EXPECT_THAT(out, HasSubstr("url = https://HIDDEN@host:1/p@th?HIDDEN\n"));
+}
+
+TEST_F(ProgramOptionsTest, ADefaultThatNeedsAnotherOptionIsAComment) {
+  EXPECT_THAT(Parse({"--print-config"}).out, HasSubstr("\n# mode = strict\n"));
+  EXPECT_THAT(Parse({"--print-config", "--url", "a", "--mode", "mild"}).out,
+              HasSubstr("\nmode = mild\n"));
 }
 
 struct Program {

@@ -21,19 +21,16 @@ export function isLinkToken(text: string): boolean {
 /** A link that is asked for again is made anew when so little of its life is left. */
 const LEAST_LEFT_MS = 3_600_000;
 
-/** Links by which others follow this page's session. All reject with a CallError. */
+/** Links by which others follow this page's session and see its case. All reject with a CallError. */
 export class FollowLinks {
   private made: (FollowLink & { session: string }) | null = null;
 
-  /**
-   * `hasLogins`: where not, the session's name is the link. `caseName`: what a follower's page shows, which the link opens, too. `url` makes an address
-   * of a session's name or a token.
-   */
+  /** `hasLogins`: where not, the session's name is the link. `url` makes an address of a session's name or a token. */
   constructor(
     private readonly gateway: { access: Pick<Gateway["access"], "createFollowLink" | "deleteFollowLinks"> },
     readonly hasLogins: boolean,
-    private readonly session: () => string,
     private readonly caseName: string,
+    private readonly session: () => string,
     private readonly url: (sessionOrToken: string) => string,
     private readonly now: () => number = () => Date.now(),
   ) {}

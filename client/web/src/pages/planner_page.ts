@@ -63,7 +63,7 @@ export function plannerPage(
   const { element: picture, view } = pictureBox(file, notice.show);
   const bench = new Workbench(gateway, file, caseName, view, models);
   const leave = () => void bench.live.end().then(onLeave);
-  const links = new FollowLinks(gateway, hasLogins, () => bench.live.session, caseName, followUrl);
+  const links = new FollowLinks(gateway, hasLogins, caseName, () => bench.live.session, followUrl);
   const title = file.manifest.title === "" ? "Case" : file.manifest.title;
   const status = statusBar(title, { links, onLeave: leave, onRetry: () => void bench.live.retry(), account });
   bench.connection.watch(status.connection);

@@ -6,7 +6,7 @@ import { button, el, whileBusy } from "../panels/dom";
 
 /** What somebody sees who is not signed in; `problem`: why, "" where nothing went wrong. */
 export function signInPage(login: Login, problem: string): HTMLElement {
-  const start = button("Sign in", () => void whileBusy(start, () => login.signIn(), () => {}));
+  const start = button("Sign in", () => void whileBusy(start, () => login.signIn(), () => {}), { attributes: { type: "submit" } });
   return el("main", { class: "start" }, [
     el("div", { class: "sheet" }, [
       el("h1", { text: "Tissueform" }),

@@ -105,7 +105,7 @@ function linkButtons(links: FollowLinks): HTMLElement {
     const run = async () => {
       const { url, endsAt } = await links.make();
       const isCopied = await copyText(url);
-      told.textContent = [isCopied ? "copied" : "", endsAt === null ? "" : `works until ${timeText(endsAt)}`].filter((part) => part !== "").join(", ");
+      told.textContent = [isCopied ? "copied" : "", endsAt === null ? "" : `until ${timeText(endsAt)}`].filter((part) => part !== "").join(", ");
     };
     void whileBusy(copy, run, fail);
   });

@@ -1,0 +1,260 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/access/doctor_calls.h"
+
+#include <cmath>
+#include <future>
+#include <map>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "absl/strings/string_view.h"
+#include "grpc/health/v1/health.pb.h"
+#include "grpcpp/generic/generic_stub.h"
+
+#include "client/cpp/client_call.h"
+#include "client/cpp/mesh_upload.h"
+#include "core/base/software_version.h"
+#include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
+#include "core/mesh/tet_mesh.h"
+#include "core/mesh_payload/mesh_payload.h"
+#include "proto/conversion/geometry_conversion.h"
+#include "proto/conversion/session_conversion.h"
+#include "tissueform/v1/access_service.grpc.pb.h"
+#include "tissueform/v1/deform_service.grpc.pb.h"
+#include "tissueform/v1/mesh_service.grpc.pb.h"
+#include "tissueform/v1/server_info.grpc.pb.h"
+#include "tissueform/v1/session_service.grpc.pb.h"
+
+namespace tissueform {
+namespace {
+
+constexpr std::chrono::seconds kCallDeadline{20};
+// What servers grant when they look at a token's times.
+constexpr double kLeewaySeconds = 60;
+constexpr double kNoticedSeconds = 5;
+
+void SetDeadline(grpc::ClientContext* context) {
+  context->set_deadline(std::chrono::system_clock::now() + kCallDeadline);
+}
+
+std::string AdviceFor(const absl::Status& status) {
+  switch (status.code()) {
+    case absl::StatusCode::kUnauthenticated:
+      return "log in (`tissueform login`) or give another token (--token-file); the server's clock "
+             "counts";
+    case absl::StatusCode::kPermissionDenied:
+      return "ask whoever runs the server for the right to do this";
+    case absl::StatusCode::kResourceExhausted:
+      return "the server, or your share of it, is full: try again later, or delete what you need "
+             "no "
+             "more";
+    case absl::StatusCode::kUnavailable:
+      return "the server ends, or the connection broke: try again in a minute";
+    case absl::StatusCode::kDeadlineExceeded:
+      return "it takes too long: is the server overloaded?";
+    default:
+      return "tell whoever runs the server this line";
+  }
+}
+
+DoctorLine FailedCall(const std::string& check, const std::string& what,
+                      const absl::Status& status) {
+  return {
+      .check = check,
+      .finding = Finding::kFailed,
+      .text = absl::StrCat(what, absl::StatusCodeToString(status.code()), ": ", status.message()),
+      .advice = AdviceFor(status)};
+}
+
+// Far from every other mesh, so that it is nobody else's.
+absl::StatusOr<TetMesh> TwoTets() {
+  std::random_device random;
+  const double shift = static_cast<double>(random() % 1'000'000) * 1e-6;
+  Positions positions(5, 3);
+  positions << 0, 0, 0, 10, 0, 0, 0, 10, 0, 0, 0, 10, 10, 10, 10 + shift;
+  TetIndices tets(2, 4);
+  tets << 0, 1, 2, 3, 1, 2, 3, 4;
+  return TetMesh::Create(std::move(positions), std::move(tets));
+}
+
+SessionRequest RequestOf(const std::string& mesh) {
+  SessionRequest request;
+  request.mesh = mesh;
+  request.stiffness = 1e4;
+  request.fixed = {0};
+  request.handles = {{.name = "far", .vertices = {4}}};
+  return request;
+}
+
+// One pose, one frame.
+absl::Status DragOnce(v1::DeformService::Stub* stub, const std::string& session) {
+  grpc::ClientContext context;
+  SetDeadline(&context);
+  AddSessionHeader(session, &context);
+  const auto call = stub->Deform(&context);
+  v1::DeformRequest begin;
+  begin.mutable_configuration()->set_session(session);
+  v1::DeformRequest pose;
+  pose.mutable_pose()->set_sequence(1);
+  *pose.mutable_pose()->add_poses() =
+      ToProto(NamedPose{.handle = "far", .pose = {.translation_mm = {0, 0, 1}}});
+  bool answered = false;
+  if (call->Write(begin) && call->Write(pose)) {
+    call->WritesDone();
+    v1::DeformResponse response;
+    while (call->Read(&response)) answered = answered || response.has_frame();
+  }
+  const absl::Status end = FromGrpcStatus(call->Finish());
+  return !end.ok() || answered ? end : absl::InternalError("the drag ended without a frame");
+}
+
+}  // namespace
+
+DoctorLine DoctorCalls::CheckHealth() const {
+  grpc::ClientContext context;
+  SetDeadline(&context);
+  const grpc::health::v1::HealthCheckRequest request;
+  grpc::health::v1::HealthCheckResponse response;
+  // Debian's files of the health service are made without its stub.
+  grpc::TemplatedGenericStub<grpc::health::v1::HealthCheckRequest,
+                             grpc::health::v1::HealthCheckResponse>
+      stub(channel_);
+  std::promise<grpc::Status> done;
+  stub.UnaryCall(&context, "/grpc.health.v1.Health/Check", {}, &request, &response,
+                 [&done](grpc::Status end) { done.set_value(std::move(end)); });
+  const absl::Status status = FromGrpcStatus(done.get_future().get());
+  if (!status.ok()) {
+    DoctorLine line = FailedCall("health", "", status);
+    line.advice = "something answers, but no tissueform-server: is this its port, or a proxy's?";
+    return line;
+  }
+  if (response.status() != grpc::health::v1::HealthCheckResponse::SERVING) {
+    return {.check = "health",
+            .finding = Finding::kFailed,
+            .text = "the server says NOT_SERVING: it is about to end",
+            .advice = "it takes no new work: try again in a minute, or another server"};
+  }
+  return {.check = "health", .text = "gRPC over HTTP/2, SERVING"};
+}
+
+void DoctorCalls::CheckCaller(DoctorReport* report) const {
+  grpc::ClientContext context;
+  SetDeadline(&context);
+  v1::Caller caller;
+  const auto asked = std::chrono::system_clock::now();
+  const absl::Status status =
+      FromGrpcStatus(v1::AccessService::NewStub(channel_)->WhoAmI(&context, {}, &caller));
+  if (absl::IsUnimplemented(status)) {
+    return report->Add({.check = "login",
+                        .finding = Finding::kSkipped,
+                        .text = "the server does not tell whom it takes callers for"});
+  }
+  if (!status.ok()) return report->Add(FailedCall("login", "", status));
+  std::vector<std::string> roles(caller.roles().begin(), caller.roles().end());
+  report->Add(
+      {.check = "login",
+       .text = caller.principal().empty()
+                   ? "the server asks nobody who they are"
+                   : absl::StrCat("the server knows you as ", caller.principal(), ", roles: ",
+                                  roles.empty() ? "none" : absl::StrJoin(roles, ", "))});
+  if (!caller.has_server_time()) return;
+  const auto half = (std::chrono::system_clock::now() - asked) / 2;
+  const double here = std::chrono::duration<double>((asked + half).time_since_epoch()).count();
+  const double skew = static_cast<double>(caller.server_time().seconds()) +
+                      1e-9 * caller.server_time().nanos() - here;
+  DoctorLine line = {.check = "clock",
+                     .text = absl::StrFormat("the server's is %.1f s %s", std::abs(skew),
+                                             skew < 0 ? "behind" : "ahead")};
+  if (std::abs(skew) > kNoticedSeconds) {
+    line.finding = std::abs(skew) > kLeewaySeconds ? Finding::kFailed : Finding::kWarning;
+    line.advice = "set both clocks by NTP: tokens begin and end by the server's";
+  }
+  report->Add(std::move(line));
+}
+
+void DoctorCalls::CheckServer(DoctorReport* report) const {
+  grpc::ClientContext context;
+  SetDeadline(&context);
+  v1::ServerInfo info;
+  const absl::Status status =
+      FromGrpcStatus(v1::ServerInfoService::NewStub(channel_)->GetServerInfo(&context, {}, &info));
+  if (!status.ok()) return report->Add(FailedCall("version", "", status));
+  DoctorLine version = {.check = "version",
+                        .text = absl::StrCat("server ", info.version(), ", this program ",
+                                             SoftwareVersion(), ", protocol ", info.api_version())};
+  if (info.version() != SoftwareVersion()) {
+    version.finding = Finding::kWarning;
+    version.advice = "they understand each other; to have all features install the same version";
+  }
+  report->Add(std::move(version));
+  std::map<std::string, int64_t> limits;
+  for (const v1::ServerLimit& limit : info.limits()) limits[limit.name()] = limit.value();
+  report->Add(
+      {.check = "limits",
+       .text = absl::StrCat("meshes up to ", limits["max_vertices"], " vertices and ",
+                            limits["max_mesh_bytes"] >> 20, " MiB, ", limits["max_sessions"],
+                            " sessions in memory, ", limits["max_streams"], " drags at once")});
+  if (info.draining()) {
+    report->Add({.check = "limits",
+                 .finding = Finding::kFailed,
+                 .text = "the server is about to end and takes no new work",
+                 .advice = "try again in a minute, or another server"});
+  }
+}
+
+DoctorLine DoctorCalls::CheckWork() const {
+  constexpr char kCheck[] = "work";
+  const Stopwatch watch;
+  const absl::StatusOr<TetMesh> tets = TwoTets();
+  if (!tets.ok()) return FailedCall(kCheck, "mesh of two tets: ", tets.status());
+  const auto meshes = v1::MeshService::NewStub(channel_);
+  const MeshPayloadView payload = ViewMeshPayload(tets->positions(), tets->tets(), {});
+  UploadOptions upload;
+  upload.give_up_after = kCallDeadline;
+  const auto mesh = SendMesh(meshes.get(), payload, payload.Sha256(), kCallDeadline, upload);
+  if (!mesh.ok()) return FailedCall(kCheck, "upload: ", mesh.status());
+  v1::Session session;
+  {
+    grpc::ClientContext context;
+    SetDeadline(&context);
+    const absl::Status made = FromGrpcStatus(v1::SessionService::NewStub(channel_)->CreateSession(
+        &context, ToProto(RequestOf(mesh->name())), &session));
+    if (!made.ok()) {
+      Delete(mesh->name(), "");
+      return FailedCall(kCheck, "session: ", made);
+    }
+  }
+  const absl::Status dragged = DragOnce(v1::DeformService::NewStub(channel_).get(), session.name());
+  Delete(mesh->name(), session.name());
+  if (!dragged.ok()) return FailedCall(kCheck, "drag: ", dragged);
+  return {
+      .check = kCheck,
+      .text = absl::StrFormat("two tets uploaded, made a session, dragged and deleted in %.0f ms",
+                              watch.Seconds() * 1e3)};
+}
+
+void DoctorCalls::Delete(const std::string& mesh, const std::string& session) const {
+  google::protobuf::Empty ignored;
+  if (!session.empty()) {
+    grpc::ClientContext context;
+    SetDeadline(&context);
+    v1::DeleteSessionRequest request;
+    request.set_name(session);
+    v1::SessionService::NewStub(channel_)->DeleteSession(&context, request, &ignored);
+  }
+  grpc::ClientContext context;
+  SetDeadline(&context);
+  v1::DeleteMeshRequest request;
+  request.set_name(mesh);
+  v1::MeshService::NewStub(channel_)->DeleteMesh(&context, request, &ignored);
+}
+
+}  // namespace tissueform

@@ -1,0 +1,38 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include "grpcpp/channel.h"
+#include "grpcpp/client_context.h"
+
+#include "client/cli/access/doctor_report.h"
+
+namespace tissueform {
+
+// The questions of the doctor that are calls. Each ends within a deadline of its own.
+class DoctorCalls {
+ public:
+  explicit DoctorCalls(std::shared_ptr<grpc::Channel> channel) : channel_(std::move(channel)) {}
+
+  // Whether the health service says SERVING.
+  DoctorLine CheckHealth() const;
+  // Whom the server takes the caller for, and how far the clocks are apart: two lines.
+  void CheckCaller(DoctorReport* report) const;
+  // Versions of both sides, and what the server takes: two lines.
+  void CheckServer(DoctorReport* report) const;
+  // A mesh of two tets is uploaded, made a session, dragged, and deleted.
+  DoctorLine CheckWork() const;
+
+ private:
+  // Deletes both, whatever there is of them.
+  void Delete(const std::string& mesh, const std::string& session) const;
+
+  const std::shared_ptr<grpc::Channel> channel_;
+};
+
+}  // namespace tissueform

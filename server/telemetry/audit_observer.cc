@@ -1,0 +1,124 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/telemetry/audit_observer.h"
+
+#include <utility>
+
+#include "absl/strings/string_view.h"
+#include "nlohmann/json.hpp"
+
+#include "core/base/error_reason.h"
+#include "server/telemetry/rpc_table.h"
+
+namespace tissueform {
+namespace {
+
+// Names are shorter; with all escapes a line stays below kMaxAuditLineBytes.
+constexpr size_t kMostOfAName = 256;
+
+using Json = nlohmann::ordered_json;
+
+std::set<std::string, std::less<>> StreamNames() {
+  std::set<std::string, std::less<>> names;
+  for (Rpc& rpc : AllRpcs()) {
+    if (rpc.streams) names.insert(std::move(rpc.name));
+  }
+  return names;
+}
+
+Json Event(const char* event, absl::Time now) {
+  return {{"event", event},
+          {"time", absl::FormatTime("%Y-%m-%d%ET%H:%M:%E6SZ", now, absl::UTCTimeZone())}};
+}
+
+Json CallEvent(const char* event, absl::Time now, const ObservedCall& call) {
+  Json line = Event(event, now);
+  line["principal"] = call.principal.name.substr(0, kMostOfAName);
+  line["rpc"] = call.method;
+  line["resource"] = call.resource.substr(0, kMostOfAName);
+  line["address"] = call.address.substr(0, kMostOfAName);
+  line["request_id"] = call.request_id.substr(0, kMostOfAName);
+  return line;
+}
+
+void AddOutcome(const absl::Status& outcome, std::chrono::steady_clock::duration elapsed,
+                Json* line) {
+  (*line)["code"] = absl::StatusCodeToString(outcome.code());
+  if (!outcome.ok()) (*line)["reason"] = ReasonOf(outcome);
+  (*line)["duration_ms"] = std::chrono::duration_cast<std::chrono::milliseconds>(elapsed).count();
+}
+
+// The inside of the object.
+std::string Inside(const Json& line) {
+  const std::string text =
+      line.dump(-1, ' ', /*ensure_ascii=*/true, Json::error_handler_t::replace);
+  return text.substr(1, text.size() - 2);
+}
+
+}  // namespace
+
+AuditObserver::AuditObserver(AuditLog* log, std::function<absl::Time()> now)
+    : log_(log),
+      now_(std::move(now)),
+      left_out_({"ServerInfoService.GetServerInfo", "AccessService.WhoAmI",
+                 "DeformService.AcknowledgeWatch"}),
+      streams_(StreamNames()) {}
+
+AuditObserver::~AuditObserver() {
+  MutexLock lock(mutex_);
+  TellUntoldRefused(now_());
+}
+
+absl::Status AuditObserver::OnBegin(const ObservedCall& call) {
+  if (IsLeftOut(call.method)) return absl::OkStatus();
+  const bool streams = IsStream(call.method);
+  absl::Status reserved = log_->Reserve(streams ? 2 : 1);
+  if (reserved.ok() && streams) log_->Write(Inside(CallEvent("open", now_(), call)));
+  return reserved;
+}
+
+void AuditObserver::OnResource(const ObservedCall& call) {
+  // Of other calls the end, which comes at once, has it.
+  if (!call.served || !IsStream(call.method) || IsLeftOut(call.method)) return;
+  log_->WriteIfRoom(Inside(CallEvent("use", now_(), call)));
+}
+
+void AuditObserver::OnEnd(const ObservedCall& call, const absl::Status& outcome,
+                          std::chrono::steady_clock::duration elapsed) {
+  if (IsLeftOut(call.method)) return;
+  if (!call.served && !MayTellRefused()) return;
+  const char* const event = !call.served ? "refused" : IsStream(call.method) ? "close" : "call";
+  Json line = CallEvent(event, now_(), call);
+  AddOutcome(outcome, elapsed, &line);
+  if (call.served) {
+    log_->Write(Inside(line));
+  } else {
+    log_->WriteIfRoom(Inside(line));
+  }
+}
+
+bool AuditObserver::MayTellRefused() {
+  const absl::Time now = now_();
+  MutexLock lock(mutex_);
+  if (const int64_t second = absl::ToUnixSeconds(now); second != second_) {
+    TellUntoldRefused(now);
+    second_ = second;
+    told_ = 0;
+  }
+  if (told_ < kRefusedLinesASecond) {
+    ++told_;
+    return true;
+  }
+  ++untold_;
+  return false;
+}
+
+void AuditObserver::TellUntoldRefused(absl::Time now) {
+  if (untold_ == 0) return;
+  Json line = Event("refused_more", now);
+  line["count"] = std::exchange(untold_, 0);
+  log_->WriteIfRoom(Inside(line));
+}
+
+}  // namespace tissueform

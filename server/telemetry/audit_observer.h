@@ -1,0 +1,67 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <set>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+
+#include "core/base/mutex.h"
+#include "server/calls/call_observer.h"
+#include "server/telemetry/audit_log.h"
+
+namespace tissueform {
+
+// Writes who has called what into an audit log: a line of every call when it ends, of a stream also
+// when it opens and when it names what it is about. Nothing that a call brings or is answered goes
+// there.
+//
+// Left out are calls that touch no content: what the server is (GetServerInfo), who one is
+// (WhoAmI), and the acknowledgements of a watch. All others are refused while the log cannot be
+// written, those that only look too: a look that nobody records is what an audit is there against.
+//
+// Calls that were never let in (not known, draining, refused here) are told, too, but only so many
+// a second; of the rest the number.
+//
+// Thread-safe.
+class AuditObserver final : public CallObserver {
+ public:
+  static constexpr int kRefusedLinesASecond = 20;
+
+  // `log` must outlive it.
+  explicit AuditObserver(
+      AuditLog* log, std::function<absl::Time()> now = [] { return absl::Now(); });
+  ~AuditObserver() override;
+
+  // Errors: those of AuditLog::Reserve.
+  absl::Status OnBegin(const ObservedCall& call) override;
+  void OnResource(const ObservedCall& call) override;
+  void OnEnd(const ObservedCall& call, const absl::Status& outcome,
+             std::chrono::steady_clock::duration elapsed) override;
+
+ private:
+  bool IsLeftOut(std::string_view method) const { return left_out_.contains(method); }
+  bool IsStream(std::string_view method) const { return streams_.contains(method); }
+  // Whether one more refused call is told by a line of its own.
+  bool MayTellRefused() ABSL_LOCKS_EXCLUDED(mutex_);
+  void TellUntoldRefused(absl::Time now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  AuditLog* const log_;
+  const std::function<absl::Time()> now_;
+  const std::set<std::string, std::less<>> left_out_;
+  const std::set<std::string, std::less<>> streams_;
+
+  Mutex mutex_;
+  int64_t second_ ABSL_GUARDED_BY(mutex_) = 0;  // of the last refused call
+  int told_ ABSL_GUARDED_BY(mutex_) = 0;        // in that second
+  int64_t untold_ ABSL_GUARDED_BY(mutex_) = 0;
+};
+
+}  // namespace tissueform
