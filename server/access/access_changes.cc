@@ -39,23 +39,22 @@ absl::Status AccessChanges::Learn() {
 
 absl::Status AccessChanges::MayOwn(const Principal& caller, const std::string& resource) const {
   absl::string_view name = resource;
-  const ResourceIndex& index = access_.index_;
   if (absl::ConsumePrefix(&name, kProjectsPrefix)) return CheckAccessName(name, "project");
   TF_RETURN_IF_ERROR(CheckAccessName(resource, "resource"));
   if (absl::ConsumePrefix(&name, kSessionsPrefix)) {
     const std::string id(name);
-    if (index.FindSession(id) == nullptr) return NoSuchSession(id);
+    if (access_.index_.FindSession(id) == nullptr) return NoSuchSession(id);
     return Access::Judge(access_.SessionLevel(caller, id), Need::kOwn, NoSuchSession(id));
   }
   if (absl::ConsumePrefix(&name, kPredictionsPrefix)) {
     const std::string id(name);
-    if (index.FindPrediction(id) == nullptr) return NoPrediction(id);
+    if (access_.index_.FindPrediction(id) == nullptr) return NoPrediction(id);
     return Access::Judge(access_.PredictionLevel(caller, id), Need::kOwn, NoPrediction(id));
   }
   if (absl::ConsumePrefix(&name, kCasesPrefix)) {
     const std::string sha256(name);
     TF_ASSIGN_OR_RETURN(const CaseKey key, access_.FindCase(caller, sha256, Need::kOwn));
-    return index.FindCase(key) == nullptr ? NoCase(sha256) : absl::OkStatus();
+    return access_.index_.FindCase(key) == nullptr ? NoCase(sha256) : absl::OkStatus();
   }
   return absl::InvalidArgumentError(
       "not the name of a resource that can be shared; name a session, a prediction, a case or a "
@@ -66,10 +65,10 @@ absl::Status AccessChanges::CheckShare(const Principal& caller, const ShareRow& 
   TF_RETURN_IF_ERROR(CheckAccessName(share.principal, "principal"));
   MutexLock lock(access_.mutex_);
   TF_RETURN_IF_ERROR(MayOwn(caller, share.resource));
-  const ShareTable& table = access_.table_;
-  const bool is_new = !table.RoleOf(caller.name, share.resource, share.principal).has_value();
+  const bool is_new =
+      !access_.table_.RoleOf(caller.name, share.resource, share.principal).has_value();
   const size_t most = static_cast<size_t>(options_.max_shares_per_resource);
-  if (is_new && table.SharesOf(caller.name, share.resource).size() >= most) {
+  if (is_new && access_.table_.SharesOf(caller.name, share.resource).size() >= most) {
     return TooMany("shares", options_.max_shares_per_resource, "--max-shares-per-resource");
   }
   return absl::OkStatus();

@@ -115,7 +115,10 @@ void WatchStreamReactor::Join(const std::shared_ptr<Session>& session) {
   absl::StatusOr<SessionWatches::Joined> joined = watches_->Add(id_, session_id_, this, principal_);
   // Once more: who was told between the two that less may be watched did not find this watch.
   absl::Status allowed = joined.status();
-  if (allowed.ok()) allowed = access_.MaySession(scope_.principal(), session_id_, Need::kLook);
+  if (allowed.ok()) {
+    MutexLock lock(mutex_);
+    allowed = access_.MaySession(scope_.principal(), session_id_, Need::kLook);
+  }
   if (!allowed.ok() || joined->has_frame) {
     FinishOpening(allowed);
     return;

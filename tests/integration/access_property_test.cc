@@ -52,6 +52,7 @@ class AccessPropertyTest : public ServiceTest {
     spdlog::set_level(spdlog::level::off);
     options_ = TestOptions();
     options_.in_memory = false;
+    options_.quotas = {.calls_per_second = 1'000'000, .streams = 1'000};
     options_.data_dir = folder_ + "/data";
     Restart();
     for (uint32_t seed = 1; seed <= 4; ++seed) meshes_.emplace_back(seed);

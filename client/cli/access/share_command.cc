@@ -9,7 +9,6 @@
 
 #include "absl/strings/str_format.h"
 
-#include "client/cli/online/resource_text.h"
 #include "client/cli/online/server_connection.h"
 #include "client/cli/shared/companion.h"
 #include "client/cpp/tissueform_client.h"
