@@ -144,8 +144,7 @@ PoseFactors NeoHookeanFactors(const PortableAnswers& answers, std::span<const An
     const std::vector<double> triples = TripleProductsOf(numbers);
     const double ratio = RatioOf(answers, pairs, triples);
     for (const double product : triples) result.factors.push_back(product / (1 + ratio));
-    series_mm =
-        std::fmax(series_mm, SingleMm(answers.third_gains, triples)) * ratio / (1 + ratio);
+    series_mm = std::fmax(series_mm, SingleMm(answers.third_gains, triples)) * ratio / (1 + ratio);
   }
   result.model_error_mm = series_mm + answers.numbers.rounding_mm +
                           answers.numbers.cut_per_mm * SingleMm(answers.first_gains, numbers);

@@ -273,9 +273,9 @@ class NeoHookeanResponse : public VertexResponse {
           LargestMove(columns * use.factors - displacements.reshaped<Eigen::RowMajor>());
       measured.push_back({std::move(use.terms), error});
     }
-    estimate_->Calibrate(measured,
-                         kEstimateAllowance + kAllowancePerHandle *
-                                                  static_cast<double>(NumHandles(*preparation_) - 1));
+    estimate_->Calibrate(
+        measured, kEstimateAllowance +
+                      kAllowancePerHandle * static_cast<double>(NumHandles(*preparation_) - 1));
     return absl::OkStatus();
   }
 
