@@ -208,7 +208,11 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
     streams_.AskAgain();
     watches_.AskAgain();
   });
-  budget_.set_account_limit(MemoryQuota(options), [](const std::string& /*owner*/, int64_t) {});
+  access_.set_most_bytes(options.quotas.disk_bytes);
+  registry_.set_most_of_owner(options.quotas.sessions);
+  budget_.set_account_limit(MemoryQuota(options), [this](const std::string& owner, int64_t bytes) {
+    ReclaimOf(owner, bytes);
+  });
   budget_.set_reclaimer([this](int64_t bytes) { Reclaim(bytes); });
 }
 
@@ -303,6 +307,12 @@ absl::Status TissueformServer::Listen() {
 
 bool TissueformServer::is_exposed() const {
   return !IsLoopback(options_.host) && !(options_.tls.enabled() && tokens_ != nullptr);
+}
+
+void TissueformServer::ReclaimOf(const std::string& owner, int64_t bytes) {
+  const MemoryBudget* account = budget_.AccountOf(owner);
+  registry_.Evict(
+      [&] { return bytes <= account->limit_bytes() - account->reserved_bytes(); }, owner);
 }
 
 void TissueformServer::Reclaim(int64_t bytes) {

@@ -102,6 +102,7 @@ class TissueformServer {
 
   absl::Status Listen();
   void Reclaim(int64_t bytes);
+  void ReclaimOf(const std::string& owner, int64_t bytes);
   // Nothing is told without --metrics-port.
   absl::Status ServeMetrics();
   SecurityReadings ReadSecurity() const;

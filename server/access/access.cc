@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 
 #include "core/base/status_macros.h"
 #include "server/access/access_names.h"
+#include "server/session/quotas.h"
 #include "server/session/session_refusals.h"
 #include "server/store/store_errors.h"
 
@@ -113,7 +115,7 @@ Access::Level Access::CaseLevel(const Principal& caller, const CaseKey& key) con
 }
 
 Access::Level Access::MeshLevel(const Principal& caller, const std::string& sha256) const {
-  const std::set<std::string>& holders = table_.HoldersOf(sha256);
+  const ShareTable::Holders& holders = table_.HoldersOf(sha256);
   const bool unclaimed = caller.anonymous() && holders.empty();
   if (!IsLink(caller) && (unclaimed || holders.contains(caller.name))) return Level::kOwn;
   for (const std::string& id : index_.SessionsOf(sha256)) {
@@ -176,7 +178,7 @@ absl::Status Access::MayMesh(const Principal& caller, const std::string& sha256,
 
 bool Access::OthersHoldMesh(const Principal& caller, const std::string& sha256) const {
   MutexLock lock(mutex_);
-  const std::set<std::string>& holders = table_.HoldersOf(sha256);
+  const ShareTable::Holders& holders = table_.HoldersOf(sha256);
   if (holders.size() > (holders.contains(caller.name) ? 1U : 0U)) return true;
   for (const std::string& id : index_.SessionsOf(sha256)) {
     if (index_.FindSession(id)->owner != caller.name) return true;
@@ -245,14 +247,27 @@ absl::StatusOr<FollowLinkRow> Access::FindLink(const std::string& digest) const 
 }
 
 std::map<std::string, Access::Holdings> Access::HoldingsByOwner() const {
-  std::map<std::string, Holdings> holdings;
   MutexLock lock(mutex_);
-  for (const auto& [id, session] : index_.sessions()) ++holdings[session.owner].sessions;
-  for (const auto& [id, prediction] : index_.predictions()) {
-    holdings[prediction.owner].bytes += prediction.bytes;
-  }
-  for (const auto& [key, of_case] : index_.cases()) holdings[key.owner].bytes += of_case.bytes;
+  std::map<std::string, Holdings> holdings = index_.holdings();
+  for (const auto& [principal, bytes] : table_.mesh_bytes()) holdings[principal].bytes += bytes;
   return holdings;
+}
+
+absl::Status Access::MayKeep(const Principal& caller, int64_t bytes) const {
+  // A deleted file is gone in a moment.
+  constexpr std::chrono::seconds kUntilDeleted{5};
+  if (most_bytes_ == 0 || caller.anonymous()) return absl::OkStatus();
+  int64_t held = 0;
+  {
+    MutexLock lock(mutex_);
+    const auto own = index_.holdings().find(caller.name);
+    if (own != index_.holdings().end()) held += own->second.bytes;
+    const auto meshes = table_.mesh_bytes().find(caller.name);
+    if (meshes != table_.mesh_bytes().end()) held += meshes->second;
+  }
+  if (bytes <= most_bytes_ - held) return absl::OkStatus();
+  return QuotaExceeded("MiB of meshes, cases and predictions", "disk-mib", most_bytes_ >> 20,
+                       kUntilDeleted);
 }
 
 std::string Access::OwnerOf(const std::string& session) const {

@@ -71,12 +71,13 @@ class Access {
   // Errors: Unauthenticated.
   absl::StatusOr<FollowLinkRow> FindLink(const std::string& digest) const;
 
-  // What is kept, by owner.
-  struct Holdings {
-    int64_t sessions = 0;
-    int64_t bytes = 0;  // of predictions and cases
-  };
+  // What is kept, by owner; a mesh is held by each of those who have sent it.
+  using Holdings = ResourceIndex::Holdings;
   std::map<std::string, Holdings> HoldingsByOwner() const;
+  // Whether the caller may keep so many bytes more. Errors: ResourceExhausted (a quota).
+  absl::Status MayKeep(const Principal& caller, int64_t bytes) const;
+  // 0: as many as there is room for. Call it before anything else.
+  void set_most_bytes(int64_t most) { most_bytes_ = most; }
   // Empty where nobody with a name has it.
   std::string OwnerOf(const std::string& session) const;
 
@@ -106,6 +107,7 @@ class Access {
   bool HasGoodLink(const std::string& session) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const UnixClock clock_;
+  int64_t most_bytes_ = 0;  // of one principal
 
   mutable Mutex mutex_;
   ResourceIndex index_ ABSL_GUARDED_BY(mutex_);

@@ -160,11 +160,12 @@ void AccessChanges::RemoveLinks(const Principal& caller, const std::string& sess
   on_revoked_();
 }
 
-absl::Status AccessChanges::GrantMesh(const Principal& caller, const std::string& sha256) {
+absl::Status AccessChanges::GrantMesh(const Principal& caller, const std::string& sha256,
+                                      int64_t bytes) {
   // What nobody with a name has is open to those without one as it is.
   if (access_.MayMesh(caller, sha256, Need::kOwn).ok()) return absl::OkStatus();
   std::promise<absl::Status> kept;
-  Put({.mesh_rights = {{.principal = caller.name, .sha256 = sha256}}},
+  Put({.mesh_rights = {{.principal = caller.name, .sha256 = sha256, .bytes = bytes}}},
       [&kept](const absl::Status& status) { kept.set_value(status); });
   return kept.get_future().get();
 }
@@ -215,7 +216,7 @@ void AccessChanges::MeshRemoved(const std::string& sha256) {
   AccessRows rows;
   {
     MutexLock lock(access_.mutex_);
-    for (const std::string& holder : access_.table_.HoldersOf(sha256)) {
+    for (const auto& [holder, bytes] : access_.table_.HoldersOf(sha256)) {
       rows.mesh_rights.push_back({.principal = holder, .sha256 = sha256});
     }
   }

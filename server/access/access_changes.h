@@ -58,7 +58,7 @@ class AccessChanges {
   void RemoveLinks(const Principal& caller, const std::string& session, const Done& done);
 
   // The caller has sent the bytes of the mesh, and wants it no more. Both block on the disk.
-  absl::Status GrantMesh(const Principal& caller, const std::string& sha256);
+  absl::Status GrantMesh(const Principal& caller, const std::string& sha256, int64_t bytes);
   absl::Status ForsakeMesh(const Principal& caller, const std::string& sha256);
 
   // What there is has changed. Removed resources take their shares and links with them.

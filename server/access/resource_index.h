@@ -49,6 +49,13 @@ class ResourceIndex {
   const std::map<std::string, Prediction>& predictions() const { return predictions_; }
   const std::map<CaseKey, Case>& cases() const { return cases_; }
 
+  // Of what is kept: how much is whose.
+  struct Holdings {
+    int64_t sessions = 0;
+    int64_t bytes = 0;  // of predictions and cases
+  };
+  const std::map<std::string, Holdings>& holdings() const { return holdings_; }
+
   // Sessions and predictions that hold a mesh.
   const std::set<std::string>& SessionsOf(const std::string& mesh) const;
   const std::set<std::string>& PredictionsOf(const std::string& mesh) const;
@@ -56,6 +63,7 @@ class ResourceIndex {
  private:
   using NamesOfMesh = std::map<std::string, std::set<std::string>>;
 
+  void Hold(const std::string& owner, int64_t sessions, int64_t bytes);
   static void Forget(NamesOfMesh* names, const std::string& mesh, const std::string& id);
   static const std::set<std::string>& Of(const NamesOfMesh& names, const std::string& mesh);
 
@@ -64,6 +72,7 @@ class ResourceIndex {
   std::map<CaseKey, Case> cases_;
   NamesOfMesh sessions_of_mesh_;
   NamesOfMesh predictions_of_mesh_;
+  std::map<std::string, Holdings> holdings_;  // by owner
 };
 
 }  // namespace tissueform

@@ -27,7 +27,11 @@ void ShareTable::Add(const AccessRows& rows) {
     links_[row.digest] = row;
     links_of_session_[row.session].insert(row.digest);
   }
-  for (const MeshRight& row : rows.mesh_rights) holders_of_mesh_[row.sha256].insert(row.principal);
+  for (const MeshRight& row : rows.mesh_rights) {
+    Remove(row);
+    holders_of_mesh_[row.sha256][row.principal] = row.bytes;
+    mesh_bytes_[row.principal] += row.bytes;
+  }
 }
 
 void ShareTable::Remove(const AccessRows& rows) {
@@ -49,7 +53,13 @@ void ShareTable::Remove(const FollowLinkRow& row) {
 }
 
 void ShareTable::Remove(const MeshRight& row) {
-  EraseFrom(&holders_of_mesh_, row.sha256, row.principal);
+  const auto mesh = holders_of_mesh_.find(row.sha256);
+  if (mesh == holders_of_mesh_.end()) return;
+  const auto holder = mesh->second.find(row.principal);
+  if (holder == mesh->second.end()) return;
+  if ((mesh_bytes_[row.principal] -= holder->second) == 0) mesh_bytes_.erase(row.principal);
+  mesh->second.erase(holder);
+  if (mesh->second.empty()) holders_of_mesh_.erase(mesh);
 }
 
 std::optional<ShareRole> ShareTable::RoleOf(const std::string& owner, const std::string& resource,
@@ -96,8 +106,8 @@ bool ShareTable::HasMesh(const std::string& principal, const std::string& sha256
   return HoldersOf(sha256).contains(principal);
 }
 
-const std::set<std::string>& ShareTable::HoldersOf(const std::string& sha256) const {
-  static const auto* none = new std::set<std::string>();
+const ShareTable::Holders& ShareTable::HoldersOf(const std::string& sha256) const {
+  static const auto* none = new Holders();
   const auto found = holders_of_mesh_.find(sha256);
   return found == holders_of_mesh_.end() ? *none : found->second;
 }

@@ -36,7 +36,11 @@ class ShareTable {
   std::vector<FollowLinkRow> LinksUntil(int64_t now_s) const;
 
   bool HasMesh(const std::string& principal, const std::string& sha256) const;
-  const std::set<std::string>& HoldersOf(const std::string& sha256) const;
+  // Who has sent the mesh, and its bytes.
+  using Holders = std::map<std::string, int64_t>;
+  const Holders& HoldersOf(const std::string& sha256) const;
+  // Of the meshes that principals have sent, by principal.
+  const std::map<std::string, int64_t>& mesh_bytes() const { return mesh_bytes_; }
 
  private:
   using Shared = std::pair<std::string, std::string>;  // owner, resource
@@ -49,7 +53,8 @@ class ShareTable {
   std::map<std::string, int> given_;                           // shares by principal
   std::map<std::string, FollowLinkRow> links_;                 // by digest
   std::map<std::string, std::set<std::string>> links_of_session_;
-  std::map<std::string, std::set<std::string>> holders_of_mesh_;
+  std::map<std::string, Holders> holders_of_mesh_;
+  std::map<std::string, int64_t> mesh_bytes_;
 };
 
 }  // namespace tissueform

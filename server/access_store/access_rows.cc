@@ -50,6 +50,7 @@ std::string SerializeRow(const MeshRight& row) {
   store::v1::MeshRight proto;
   proto.set_principal(row.principal);
   proto.set_sha256(row.sha256);
+  proto.set_bytes(row.bytes);
   return proto.SerializeAsString();
 }
 
@@ -81,7 +82,8 @@ absl::Status ParseRow(absl::string_view bytes, FollowLinkRow* row) {
 absl::Status ParseRow(absl::string_view bytes, MeshRight* row) {
   store::v1::MeshRight proto;
   if (const absl::Status status = ParseInto(bytes, &proto); !status.ok()) return status;
-  *row = {.principal = proto.principal(), .sha256 = proto.sha256()};
+  *row = {
+      .principal = proto.principal(), .sha256 = proto.sha256(), .bytes = proto.bytes()};
   return absl::OkStatus();
 }
 

@@ -45,6 +45,7 @@ struct FollowLinkRow {
 struct MeshRight {
   std::string principal = {};
   std::string sha256 = {};
+  int64_t bytes = 0;  // of the mesh
 
   friend bool operator==(const MeshRight&, const MeshRight&) = default;
 };

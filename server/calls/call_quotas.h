@@ -8,7 +8,6 @@
 #include <string>
 
 #include "absl/status/status.h"
-#include "absl/strings/string_view.h"
 
 #include "core/base/mutex.h"
 #include "server/calls/call_observer.h"
@@ -54,10 +53,5 @@ class CallQuotas {
   std::map<std::string, Account> accounts_ ABSL_GUARDED_BY(mutex_);
   Clock::TimePoint swept_at_ ABSL_GUARDED_BY(mutex_);
 };
-
-// ResourceExhausted with QUOTA_EXCEEDED: `what` is said in the message ("sessions"), `name` is that
-// of the option.
-absl::Status QuotaExceeded(absl::string_view what, absl::string_view name, int64_t limit,
-                           Clock::Duration try_again_after);
 
 }  // namespace tissueform

@@ -66,7 +66,7 @@ grpc::ServerReadReactor<v1::UploadCaseRequest>* CaseService::UploadCase(
     grpc::CallbackServerContext* context, v1::UploadCaseResponse* response) {
   auto* call =
       new CaseUploadStream(CallScope(context, "CaseService.UploadCase", CallKind::kNewWork, gate_),
-                           limits_, store_, pool_, timer_, &uploads_under_way_, response);
+                           limits_, access_, store_, pool_, timer_, &uploads_under_way_, response);
   call->Start();
   return call;
 }

@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 
 #include "server/calls/call_scope.h"
+#include "server/access/access.h"
 #include "server/calls/upload_stream.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
@@ -25,13 +26,14 @@ v1::Case ToProto(const CaseRecord& record);
 // One UploadCase call; Start it.
 class CaseUploadStream final : public UploadStream<v1::UploadCaseRequest> {
  public:
-  // `under_way`: how many cases are being received, by all calls together. It, `store` and
-  // `response`, which belongs to gRPC, must outlive the call.
-  CaseUploadStream(CallScope scope, const ServiceLimits& limits, CaseStore* store, WorkerPool* pool,
-                   DeadlineTimer* timer, std::atomic<int>* under_way,
+  // `under_way`: how many cases are being received, by all calls together. It, `access`,
+  // `store` and `response`, which belongs to gRPC, must outlive the call.
+  CaseUploadStream(CallScope scope, const ServiceLimits& limits, const Access& access,
+                   CaseStore* store, WorkerPool* pool, DeadlineTimer* timer, std::atomic<int>* under_way,
                    v1::UploadCaseResponse* response)
       : UploadStream(std::move(scope), limits.upload_silence, Lane::kStore, pool, timer),
         limits_(limits),
+        access_(access),
         store_(store),
         under_way_(under_way),
         response_(response) {}
@@ -50,6 +52,7 @@ class CaseUploadStream final : public UploadStream<v1::UploadCaseRequest> {
 
   // Constant.
   const ServiceLimits limits_;
+  const Access& access_;
   CaseStore* const store_;
   std::atomic<int>* const under_way_;
   v1::UploadCaseResponse* const response_;

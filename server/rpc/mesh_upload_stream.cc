@@ -57,6 +57,7 @@ absl::StatusOr<MeshUploadStream::After> MeshUploadStream::TakeHeader(
     response_->set_committed_bytes(announcement.total_bytes);
     return After::kEnd;
   }
+  TF_RETURN_IF_ERROR(changes_->access().MayKeep(caller, announcement.total_bytes));
   TF_ASSIGN_OR_RETURN(upload_, uploads_->Open(std::move(announcement)));
   return After::kMore;
 }
@@ -66,7 +67,7 @@ absl::Status MeshUploadStream::Check() {
   TF_ASSIGN_OR_RETURN(const auto stored, upload_->Finish());
   *response_->mutable_mesh() = ToProto(MeshView{RecordOf(*stored), stored});
   response_->set_committed_bytes(upload_->received_bytes());
-  return changes_->GrantMesh(scope().principal(), sha256_);
+  return changes_->GrantMesh(scope().principal(), sha256_, upload_->received_bytes());
 }
 
 }  // namespace tissueform

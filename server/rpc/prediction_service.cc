@@ -95,8 +95,9 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
   }
 
   void Solve() {
-    const absl::Status allowed =
+    absl::Status allowed =
         AllowedSession(access_, &scope_, request_.session(), Need::kDrag).status();
+    if (allowed.ok()) allowed = access_.MayKeep(scope_.principal(), 1);  // before the work
     if (!allowed.ok()) {
       End(allowed);
       return;
@@ -114,6 +115,8 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
   }
 
   absl::Status Keep() {
+    TF_RETURN_IF_ERROR(
+        access_.MayKeep(scope_.principal(), static_cast<int64_t>(keep_.positions.size())));
     const absl::Status kept = store_->Create(keep_.record, keep_.positions);
     // The same request twice at once: the other one was first.
     if (absl::IsAlreadyExists(kept) && !key_.fingerprint.empty()) return TakeEarlier();

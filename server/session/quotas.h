@@ -3,7 +3,11 @@
 
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
 
 namespace tissueform {
 
@@ -18,5 +22,10 @@ struct Quotas {
   int64_t memory_bytes = 0;    // of sessions and what they need; 0: half of the memory budget
   int64_t disk_bytes = int64_t{64} << 30;  // of meshes, cases and predictions
 };
+
+// ResourceExhausted with QUOTA_EXCEEDED: `what` is said in the message ("sessions"), `name` is that
+// of the option.
+absl::Status QuotaExceeded(absl::string_view what, absl::string_view name, int64_t limit,
+                           std::chrono::steady_clock::duration try_again_after);
 
 }  // namespace tissueform

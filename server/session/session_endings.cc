@@ -87,13 +87,14 @@ void SessionEndings::Forget(const std::string& id, StatusCallback done) {
                  });
 }
 
-int SessionEndings::Evict(const std::function<bool()>& enough) {
+int SessionEndings::Evict(const std::function<bool()>& enough,
+                          const std::optional<std::string>& owner) {
   int count = 0;
   while (!enough()) {
     std::shared_ptr<Session> evicted;
     {
       MutexLock lock(sessions_->mutex);
-      const std::string id = sessions_->table.LeastRecentlyUsed(clock_->Now() - kInUse);
+      const std::string id = sessions_->table.LeastRecentlyUsed(clock_->Now() - kInUse, owner);
       if (id.empty()) break;
       KnownSession* known = sessions_->table.Find(id);
       evicted = std::move(known->session);

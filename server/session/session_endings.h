@@ -46,7 +46,8 @@ class SessionEndings {
   void Abandon(const std::shared_ptr<Session>& session) ABSL_LOCKS_EXCLUDED(sessions_->mutex);
   void Delete(const std::string& id, const StatusCallback& done)
       ABSL_LOCKS_EXCLUDED(sessions_->mutex);
-  int Evict(const std::function<bool()>& enough) ABSL_LOCKS_EXCLUDED(sessions_->mutex);
+  int Evict(const std::function<bool()>& enough, const std::optional<std::string>& owner = {})
+      ABSL_LOCKS_EXCLUDED(sessions_->mutex);
   int RemoveIdle() ABSL_LOCKS_EXCLUDED(sessions_->mutex);
   int RemoveUnused(const std::vector<std::string>& ids, Clock::TimePoint since)
       ABSL_LOCKS_EXCLUDED(sessions_->mutex);

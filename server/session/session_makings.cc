@@ -4,10 +4,13 @@
 #include "server/session/session_makings.h"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
+
+#include "server/session/quotas.h"
 
 namespace tissueform {
 
@@ -98,11 +101,13 @@ SessionMakings::Admission SessionMakings::AdmitCreate(const SessionRecord& recor
   } else if (sessions_->table.num_known() >= static_cast<size_t>(limits_.max_stored_sessions)) {
     admission.refusal = TooManySessions(limits_.max_stored_sessions, "keeps",
                                         "; delete one or raise --max-stored-sessions");
+  } else if (admission.refusal = CheckQuota(record.owner); !admission.refusal.ok()) {
+    // said
   } else if (admission.refusal = CheckKept(record.mesh_sha256); admission.refusal.ok()) {
     admission.refusal = CheckRoom();
   }
   if (admission.refusal.ok()) {
-    admission.started = sessions_->table.StartMaking(record.id, key, record.mesh_sha256,
+    admission.started = sessions_->table.StartMaking(record.id, key, record.owner, record.mesh_sha256,
                                                      /*restores=*/false, waiter);
   }
   return admission;
@@ -121,7 +126,7 @@ SessionMakings::Admission SessionMakings::AdmitOpen(const std::string& id,
     Join(making, waiter, &admission);
   } else if (admission.refusal = CheckRoom(); admission.refusal.ok()) {
     admission.started =
-        sessions_->table.StartMaking(id, known->key, known->mesh_sha256, /*restores=*/true, waiter);
+        sessions_->table.StartMaking(id, known->key, known->owner, known->mesh_sha256, /*restores=*/true, waiter);
     admission.started->version = known->version;
   }
   return admission;
@@ -158,6 +163,14 @@ absl::Status SessionMakings::CheckKept(const std::string& mesh_sha256) const {
   if (!catalog_->keeps_meshes()) return absl::OkStatus();
   const bool leaves = sessions_->table.IsLeaving(mesh_sha256);
   return leaves || catalog_->Find(mesh_sha256) == nullptr ? NoMeshAnyMore() : absl::OkStatus();
+}
+
+absl::Status SessionMakings::CheckQuota(const std::string& owner) const {
+  if (most_of_owner_ == 0 || owner.empty() || sessions_->table.CountOf(owner) < most_of_owner_) {
+    return absl::OkStatus();
+  }
+  constexpr std::chrono::minutes kUntilSomeMayBeGone{1};
+  return QuotaExceeded("sessions", "sessions", most_of_owner_, kUntilSomeMayBeGone);
 }
 
 absl::Status SessionMakings::CheckRoom() const {
@@ -225,6 +238,7 @@ bool SessionMakings::FinishCreation(const MakingPtr& making,
       KnownSession known;
       known.session = *result;
       known.key = making->key;
+      known.owner = making->owner;
       known.mesh_sha256 = (*result)->mesh().sha256;
       known.claims = static_cast<int>(waiters.size());
       sessions_->table.Add(making->id, std::move(known));

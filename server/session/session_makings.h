@@ -40,6 +40,9 @@ class SessionMakings {
       ABSL_LOCKS_EXCLUDED(sessions_->mutex);
   void CancelWait(const SessionWaiter::CancelFlag& cancelled) ABSL_LOCKS_EXCLUDED(sessions_->mutex);
 
+  // See SessionRegistry.
+  void set_most_of_owner(int most) { most_of_owner_ = most; }
+
   // Of a session that is to be made beside the one in the store. Errors: NotFound,
   // ResourceExhausted.
   absl::Status AdmitRemaking(const std::string& id) ABSL_LOCKS_EXCLUDED(sessions_->mutex);
@@ -67,6 +70,9 @@ class SessionMakings {
   absl::Status CheckKept(const std::string& mesh_sha256) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(sessions_->mutex);
   // Errors: ResourceExhausted.
+  absl::Status CheckQuota(const std::string& owner) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(sessions_->mutex);
+  // Errors: ResourceExhausted.
   absl::Status CheckRoom() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(sessions_->mutex);
   bool Full() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(sessions_->mutex);
   // Tries to have room for one more session in memory.
@@ -85,6 +91,7 @@ class SessionMakings {
   void FinishRestore(const MakingPtr& making, absl::StatusOr<std::shared_ptr<Session>> result)
       ABSL_LOCKS_EXCLUDED(sessions_->mutex);
 
+  int most_of_owner_ = 0;  // 0: no limit; constant once requests are served
   const ServiceLimits limits_;
   SharedSessionTable* const sessions_;
   MeshCatalog* const catalog_;

@@ -52,6 +52,7 @@ absl::Status SessionRegistry::LearnKnown() {
     for (SessionRecord& record : page.records) {
       KnownSession known;
       known.key = RequestKeyOf(record);
+      known.owner = record.owner;
       known.mesh_sha256 = std::move(record.mesh_sha256);
       known.last_used = clock_->Now();
       sessions_.table.Add(record.id, std::move(known));

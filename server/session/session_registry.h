@@ -64,6 +64,10 @@ class SessionRegistry {
   // Told of every event, from any thread, without a lock held. Call it before anything else.
   void set_observer(Observer observer) { observer_ = std::move(observer); }
 
+  // How many sessions one owner with a name may have; 0: no limit of its own. Call it before
+  // anything else.
+  void set_most_of_owner(int most) { makings_.set_most_of_owner(most); }
+
   // Learns which sessions the store has. Call it before anything else; blocks. Errors: those of
   // SessionStore::List.
   absl::Status LearnKnown();
@@ -76,7 +80,7 @@ class SessionRegistry {
   // Every successful answer is a claim on the session, see Abandon.
   //
   // Errors: those of Session::Create and SessionStore::Create; AlreadyExists (the id is taken);
-  // ResourceExhausted (too many sessions); InvalidArgument (the request id belongs to another
+  // ResourceExhausted (too many sessions, of all or of the owner); InvalidArgument (the request id belongs to another
   // request); NotFound (the mesh was removed meanwhile); Cancelled.
   void Create(SessionRecord record, const std::shared_ptr<const StoredMesh>& mesh,
               CancelFlag cancelled, const SessionCallback& done, const TellSession& tell = {});
@@ -127,9 +131,11 @@ class SessionRegistry {
   // those of SessionStore::Delete.
   void Delete(const std::string& id, const StatusCallback& done) { endings_.Delete(id, done); }
 
-  // Evicts sessions that are not in use, those first that were used longest ago, until `enough` or
-  // none is left. Returns how many.
-  int Evict(const std::function<bool()>& enough) { return endings_.Evict(enough); }
+  // Evicts sessions that are not in use, of one owner where one is given, those first that were
+  // used longest ago, until `enough` or none is left. Returns how many.
+  int Evict(const std::function<bool()>& enough, const std::optional<std::string>& owner = {}) {
+    return endings_.Evict(enough, owner);
+  }
 
   // Ends the sessions that were idle for longer than the TTL, records and all: for stores in
   // memory, whose meshes nobody else keeps. Returns how many.

@@ -60,11 +60,12 @@ std::optional<KnownSession> SessionTable::Take(const std::string& id) {
 }
 
 SessionTable::MakingPtr SessionTable::StartMaking(std::string id, RequestKey key,
-                                                  std::string mesh_sha256, bool restores,
-                                                  SessionWaiter waiter) {
+                                                  std::string owner, std::string mesh_sha256,
+                                                  bool restores, SessionWaiter waiter) {
   makings_.push_back(
       std::make_shared<SessionMaking>(SessionMaking{.id = std::move(id),
                                                     .key = std::move(key),
+                                                    .owner = std::move(owner),
                                                     .mesh_sha256 = std::move(mesh_sha256),
                                                     .restores = restores,
                                                     .waiters = {std::move(waiter)}}));
@@ -89,16 +90,28 @@ std::vector<SessionWaiter> SessionTable::TakeWaiters(const SessionWaiter::Cancel
   return taken;
 }
 
-std::string SessionTable::LeastRecentlyUsed(Clock::TimePoint before) const {
+std::string SessionTable::LeastRecentlyUsed(Clock::TimePoint before,
+                                            const std::optional<std::string>& owner) const {
   std::string oldest;
   for (const auto& [id, known] : known_) {
     if (known.session == nullptr || known.session->making()) continue;
+    if (owner.has_value() && known.owner != *owner) continue;
     if (const Clock::TimePoint used = known.session->last_used(); used < before) {
       before = used;
       oldest = id;
     }
   }
   return oldest;
+}
+
+int SessionTable::CountOf(const std::string& owner) const {
+  const auto known = std::count_if(known_.begin(), known_.end(), [&](const auto& entry) {
+    return entry.second.owner == owner;
+  });
+  const auto made = std::count_if(makings_.begin(), makings_.end(), [&](const MakingPtr& making) {
+    return making->owner == owner && !making->restores;
+  });
+  return static_cast<int>(known + made);
 }
 
 std::vector<std::string> SessionTable::UnusedSince(Clock::TimePoint until) const {

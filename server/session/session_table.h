@@ -50,6 +50,7 @@ struct SessionWaiter {
 struct SessionMaking {
   std::string id;
   RequestKey key;
+  std::string owner;  // empty: nobody with a name
   std::string mesh_sha256;
   bool restores = false;
   int version = 0;  // of what it is made from
@@ -65,6 +66,7 @@ struct SessionMaking {
 struct KnownSession {
   std::shared_ptr<Session> session;  // null: it is in the store only
   RequestKey key;
+  std::string owner = {};  // empty: nobody with a name
   std::string mesh_sha256;
   int version = 0;                              // how often it was updated
   int claims = 1;                               // who has seen its name
@@ -109,16 +111,19 @@ class SessionTable {
     return leaving_meshes_.contains(mesh_sha256);
   }
 
-  MakingPtr StartMaking(std::string id, RequestKey key, std::string mesh_sha256, bool restores,
-                        SessionWaiter waiter);
+  MakingPtr StartMaking(std::string id, RequestKey key, std::string owner, std::string mesh_sha256,
+                        bool restores, SessionWaiter waiter);
   // Those who still wait for it. REQUIRES: under way.
   std::vector<SessionWaiter> EndMaking(const MakingPtr& making);
   // Whoever came with this flag and still waits, taken out.
   std::vector<SessionWaiter> TakeWaiters(const SessionWaiter::CancelFlag& cancelled);
 
-  // Of those in memory the one that was used longest ago, unless that is after `before` or
-  // something is being made for it. Empty when there is none.
-  std::string LeastRecentlyUsed(Clock::TimePoint before) const;
+  // Of those in memory, or of this owner's where one is given, the one that was used longest ago,
+  // unless that is after `before` or something is being made for it. Empty when there is none.
+  std::string LeastRecentlyUsed(Clock::TimePoint before,
+                                const std::optional<std::string>& owner) const;
+  // Of this owner: those that are known, and those that are being made for the first time.
+  int CountOf(const std::string& owner) const;
   // Of all: those used last at `until` or before.
   std::vector<std::string> UnusedSince(Clock::TimePoint until) const;
 

@@ -149,11 +149,11 @@ TEST_F(AccessChangesTest, WhatWasLearntCountsAfterARestart) {
 
 TEST_F(AccessChangesTest, AMeshIsOfWhoHasSentItUntilItGoes) {
   const std::string mesh(64, 'b');
-  ASSERT_THAT(changes_.GrantMesh(bob_, mesh), IsOk());
+  ASSERT_THAT(changes_.GrantMesh(bob_, mesh, 100), IsOk());
   EXPECT_THAT(access_.MayMesh(bob_, mesh, Need::kOwn), IsOk());
   EXPECT_THAT(access_.MayMesh(ann_, mesh, Need::kLook), StatusIs(Code::kNotFound));
   EXPECT_FALSE(access_.OthersHoldMesh(bob_, mesh));
-  ASSERT_THAT(changes_.GrantMesh(ann_, mesh), IsOk());
+  ASSERT_THAT(changes_.GrantMesh(ann_, mesh, 100), IsOk());
   EXPECT_TRUE(access_.OthersHoldMesh(bob_, mesh));
   ASSERT_THAT(changes_.ForsakeMesh(ann_, mesh), IsOk());
   EXPECT_FALSE(access_.OthersHoldMesh(bob_, mesh));

@@ -38,7 +38,7 @@ const FollowLinkRow kLink = {.digest = std::string(64, 'd'),
                              .maker = "ann",
                              .case_sha256 = std::string(64, 'c'),
                              .expires_s = 4711};
-const MeshRight kRight = {.principal = "ann", .sha256 = std::string(64, 'e')};
+const MeshRight kRight = {.principal = "ann", .sha256 = std::string(64, 'e'), .bytes = 12};
 
 struct AccessStoreCase {
   std::string name;
@@ -102,7 +102,7 @@ TEST_P(AccessStoreContractTest, WhatIsErasedGoesByItsKeyAndNothingElse) {
   by_key.role = ShareRole::kViewer;
   ASSERT_THAT(
       ChangeAndWait(store_.get(),
-                    {.shares = {by_key}, .links = {kLink}, .mesh_rights = {{"bob", kRight.sha256}}},
+                    {.shares = {by_key}, .links = {kLink}, .mesh_rights = {{.principal = "bob", .sha256 = kRight.sha256}}},
                     {}),
       IsOk());
   ASSERT_OK_AND_ASSIGN(const AccessRows rows, store_->Load());
