@@ -179,8 +179,12 @@ Eigen::MatrixXd ThirdOrderForces(const PiecewiseLinearElements& elements,
       AddLane(elements, tet, tet - begin, batch, &forces);
     }
   }
-  // A row for every triple, all at once.
-  return CubicsAtDirections(first.cols()).partialPivLu().solve(forces).transpose();
+  // In place: these are the largest of all that is held meanwhile.
+  const Eigen::PartialPivLU<Eigen::MatrixXd> cubics(CubicsAtDirections(first.cols()));
+  forces = cubics.permutationP() * forces;
+  cubics.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(forces);
+  cubics.matrixLU().triangularView<Eigen::Upper>().solveInPlace(forces);
+  return forces.transpose();
 }
 
 }  // namespace tissueform

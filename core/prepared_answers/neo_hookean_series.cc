@@ -75,22 +75,21 @@ struct Passes {
   Index done = 0;
 };
 
-// -K^-1 forces, 0 on all constrained vertices.
+// -K^-1 forces, 0 on all constrained vertices; in the forces' own place.
 absl::StatusOr<MatrixXd> SolveAll(const MeshPreparation& preparation, const ElasticSystem& elastic,
-                                  const MatrixXd& forces, Passes* passes) {
+                                  MatrixXd forces, Passes* passes) {
   const MatrixXd at_rest = MatrixXd::Zero(
       3 * static_cast<Index>(preparation.constraints().constrained().size()), kColumnsPerPass);
-  MatrixXd fields(forces.rows(), forces.cols());
   for (Index first = 0; first < forces.cols(); first += kColumnsPerPass) {
     TF_RETURN_IF_ERROR(passes->cancellation.Check());
     TellProgress(passes->observer, PreparationStage::kAnswers, passes->done, passes->total);
     const Index count = std::min(kColumnsPerPass, forces.cols() - first);
-    TF_ASSIGN_OR_RETURN(fields.middleCols(first, count),
+    TF_ASSIGN_OR_RETURN(forces.middleCols(first, count),
                         elastic.Solve(-forces.middleCols(first, count), at_rest.leftCols(count)));
     passes->done += count;
   }
   TellProgress(passes->observer, PreparationStage::kAnswers, passes->done, passes->total);
-  return fields;
+  return forces;
 }
 
 }  // namespace
@@ -105,13 +104,12 @@ SeriesSizes::SeriesSizes(const MeshPreparation& preparation) {
 
 int64_t NeoHookeanSeriesBytes(const MeshPreparation& preparation) {
   const SeriesSizes sizes(preparation);
-  // Linear and second-order fields, the latter's forces and a pass of them; with a third order both
-  // fields transposed, and of its forces what they are found from, found from that, and lead to.
-  const Index of_second = sizes.numbers + 2 * sizes.pairs + 2 * kColumnsPerPass;
-  const Index of_third =
-      sizes.triples == 0 ? 0 : sizes.numbers + 2 * sizes.pairs + 3 * sizes.triples;
-  return 3 * preparation.mesh().num_vertices() * (of_second + of_third) *
-         static_cast<int64_t>(sizeof(double));
+  // Linear fields, those of second order or their forces, twice; beside them passes, or the fields
+  // and forces of the third order, each as it is found and as it is kept.
+  const Index fields = sizes.numbers + 2 * sizes.pairs;
+  const Index of_third = sizes.triples == 0 ? 0 : sizes.numbers + sizes.pairs + 2 * sizes.triples;
+  return 3 * preparation.mesh().num_vertices() *
+         (fields + std::max(of_third, 2 * kColumnsPerPass)) * static_cast<int64_t>(sizeof(double));
 }
 
 absl::StatusOr<NeoHookeanSeries> MakeNeoHookeanSeries(const MeshPreparation& preparation,

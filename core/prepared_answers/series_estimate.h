@@ -25,10 +25,10 @@ namespace tissueform {
 // With u3 / (1 + q), q = |u3| / |u2| (ThirdOrderDamping), of fourth order: the larger one of
 //   c (|u2| s2)^(3/4) / L^(1/2) q / (1 + q)   and   c' s3 q / (1 + q),
 // s3 of the single triples as s2 is of the pairs, each with a measure of its own. Over ten bodies
-// (three heads, six bars, a tongue; 25 to 150 random poses each) the 99th percentile of errors
-// over this is 1.2 to 2.2 times their median over the few small poses that c and c' are measured
-// by, and 4 times of bars six and eight times as long as thick; of the first alone up to 3.4 and 6.
-// The second alone is exceeded tenfold where a slender bar is twisted.
+// (three heads, five bars, a block, a tongue; 25 to 150 random poses each) the 99th percentile of
+// errors over this is 1.2 to 2.2 times their median over the few small poses that c and c' are
+// measured by, and 4 times of bars six and eight times as long as thick; of the first alone up to
+// 3.4 and 6. The second alone is exceeded tenfold where a slender bar is twisted.
 class SeriesEstimate {
  public:
   // What a pose is in the series.

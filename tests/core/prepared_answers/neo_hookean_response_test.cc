@@ -194,6 +194,25 @@ TEST(NeoHookeanResponseCoverTest, CoversItsRangeAndNoScale) {
   EXPECT_FALSE(response->Answer(poses, &positions).has_value());
 }
 
+// Where single triples say least of what is left out: nearly all of it is of even order.
+TEST(NeoHookeanResponseEstimateTest, HoldsWhereASlenderBarIsTwisted) {
+  const TetMesh mesh = testing::Bar({3, 3, 18}, 1.0);
+  const auto preparation = testing::PrepareMesh(mesh, 1);
+  ASSERT_OK_AND_ASSIGN(const auto response,
+                       CreateNeoHookeanResponse(preparation, testing::AllVertices(mesh), {}));
+  ASSERT_OK_AND_ASSIGN(const auto direct, CreateNeoHookeanDeformer(preparation, {}));
+  std::vector<HandlePose> poses(1);
+  poses[0].pivot_mm = mesh.positions().colwise().mean().transpose();
+  for (const double degrees : {10, 20, 30}) {
+    poses[0].rotation_vector.z() = degrees * kDegree;
+    FloatPositions answer;
+    response->Evaluate(poses, &answer);
+    ASSERT_OK_AND_ASSIGN(const Deformation converged, direct->Deform(poses));
+    EXPECT_LT(LargestDistance(answer, converged.positions), response->ErrorBoundMm(poses))
+        << degrees;
+  }
+}
+
 TEST(NeoHookeanResponseErrorTest, RefusalComesBeforeAnythingIsBuiltAndOptionsAreChecked) {
   const auto preparation = testing::PrepareMesh(JitteredBar(), 1);
   NeoHookeanResponseOptions options;
