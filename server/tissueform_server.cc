@@ -311,8 +311,8 @@ bool TissueformServer::is_exposed() const {
 
 void TissueformServer::ReclaimOf(const std::string& owner, int64_t bytes) {
   const MemoryBudget* account = budget_.AccountOf(owner);
-  registry_.Evict(
-      [&] { return bytes <= account->limit_bytes() - account->reserved_bytes(); }, owner);
+  registry_.Evict([&] { return bytes <= account->limit_bytes() - account->reserved_bytes(); },
+                  owner);
 }
 
 void TissueformServer::Reclaim(int64_t bytes) {

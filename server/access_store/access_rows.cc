@@ -82,8 +82,7 @@ absl::Status ParseRow(absl::string_view bytes, FollowLinkRow* row) {
 absl::Status ParseRow(absl::string_view bytes, MeshRight* row) {
   store::v1::MeshRight proto;
   if (const absl::Status status = ParseInto(bytes, &proto); !status.ok()) return status;
-  *row = {
-      .principal = proto.principal(), .sha256 = proto.sha256(), .bytes = proto.bytes()};
+  *row = {.principal = proto.principal(), .sha256 = proto.sha256(), .bytes = proto.bytes()};
   return absl::OkStatus();
 }
 

@@ -10,8 +10,8 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "server/calls/call_scope.h"
 #include "server/access/access.h"
+#include "server/calls/call_scope.h"
 #include "server/calls/upload_stream.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
@@ -29,8 +29,8 @@ class CaseUploadStream final : public UploadStream<v1::UploadCaseRequest> {
   // `under_way`: how many cases are being received, by all calls together. It, `access`,
   // `store` and `response`, which belongs to gRPC, must outlive the call.
   CaseUploadStream(CallScope scope, const ServiceLimits& limits, const Access& access,
-                   CaseStore* store, WorkerPool* pool, DeadlineTimer* timer, std::atomic<int>* under_way,
-                   v1::UploadCaseResponse* response)
+                   CaseStore* store, WorkerPool* pool, DeadlineTimer* timer,
+                   std::atomic<int>* under_way, v1::UploadCaseResponse* response)
       : UploadStream(std::move(scope), limits.upload_silence, Lane::kStore, pool, timer),
         limits_(limits),
         access_(access),

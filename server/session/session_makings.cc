@@ -107,8 +107,9 @@ SessionMakings::Admission SessionMakings::AdmitCreate(const SessionRecord& recor
     admission.refusal = CheckRoom();
   }
   if (admission.refusal.ok()) {
-    admission.started = sessions_->table.StartMaking(record.id, key, record.owner, record.mesh_sha256,
-                                                     /*restores=*/false, waiter);
+    admission.started =
+        sessions_->table.StartMaking(record.id, key, record.owner, record.mesh_sha256,
+                                     /*restores=*/false, waiter);
   }
   return admission;
 }
@@ -125,8 +126,8 @@ SessionMakings::Admission SessionMakings::AdmitOpen(const std::string& id,
   } else if (const MakingPtr making = sessions_->table.FindMaking(id); making != nullptr) {
     Join(making, waiter, &admission);
   } else if (admission.refusal = CheckRoom(); admission.refusal.ok()) {
-    admission.started =
-        sessions_->table.StartMaking(id, known->key, known->owner, known->mesh_sha256, /*restores=*/true, waiter);
+    admission.started = sessions_->table.StartMaking(id, known->key, known->owner,
+                                                     known->mesh_sha256, /*restores=*/true, waiter);
     admission.started->version = known->version;
   }
   return admission;

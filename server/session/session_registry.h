@@ -80,8 +80,8 @@ class SessionRegistry {
   // Every successful answer is a claim on the session, see Abandon.
   //
   // Errors: those of Session::Create and SessionStore::Create; AlreadyExists (the id is taken);
-  // ResourceExhausted (too many sessions, of all or of the owner); InvalidArgument (the request id belongs to another
-  // request); NotFound (the mesh was removed meanwhile); Cancelled.
+  // ResourceExhausted (too many sessions, of all or of the owner); InvalidArgument (the request id
+  // belongs to another request); NotFound (the mesh was removed meanwhile); Cancelled.
   void Create(SessionRecord record, const std::shared_ptr<const StoredMesh>& mesh,
               CancelFlag cancelled, const SessionCallback& done, const TellSession& tell = {});
 

@@ -59,9 +59,9 @@ std::optional<KnownSession> SessionTable::Take(const std::string& id) {
   return std::move(node.mapped());
 }
 
-SessionTable::MakingPtr SessionTable::StartMaking(std::string id, RequestKey key,
-                                                  std::string owner, std::string mesh_sha256,
-                                                  bool restores, SessionWaiter waiter) {
+SessionTable::MakingPtr SessionTable::StartMaking(std::string id, RequestKey key, std::string owner,
+                                                  std::string mesh_sha256, bool restores,
+                                                  SessionWaiter waiter) {
   makings_.push_back(
       std::make_shared<SessionMaking>(SessionMaking{.id = std::move(id),
                                                     .key = std::move(key),
@@ -105,9 +105,8 @@ std::string SessionTable::LeastRecentlyUsed(Clock::TimePoint before,
 }
 
 int SessionTable::CountOf(const std::string& owner) const {
-  const auto known = std::count_if(known_.begin(), known_.end(), [&](const auto& entry) {
-    return entry.second.owner == owner;
-  });
+  const auto known = std::count_if(known_.begin(), known_.end(),
+                                   [&](const auto& entry) { return entry.second.owner == owner; });
   const auto made = std::count_if(makings_.begin(), makings_.end(), [&](const MakingPtr& making) {
     return making->owner == owner && !making->restores;
   });

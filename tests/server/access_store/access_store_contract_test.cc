@@ -100,11 +100,12 @@ TEST_P(AccessStoreContractTest, WhatIsErasedGoesByItsKeyAndNothingElse) {
               IsOk());
   ShareRow by_key = kShare;
   by_key.role = ShareRole::kViewer;
-  ASSERT_THAT(
-      ChangeAndWait(store_.get(),
-                    {.shares = {by_key}, .links = {kLink}, .mesh_rights = {{.principal = "bob", .sha256 = kRight.sha256}}},
-                    {}),
-      IsOk());
+  ASSERT_THAT(ChangeAndWait(store_.get(),
+                            {.shares = {by_key},
+                             .links = {kLink},
+                             .mesh_rights = {{.principal = "bob", .sha256 = kRight.sha256}}},
+                            {}),
+              IsOk());
   ASSERT_OK_AND_ASSIGN(const AccessRows rows, store_->Load());
   EXPECT_THAT(rows.shares, ElementsAre(other));
   EXPECT_THAT(rows.links, IsEmpty());
