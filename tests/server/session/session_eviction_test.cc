@@ -15,6 +15,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/base/error_reason.h"
 #include "server/session/session_registry.h"
 #include "server/store/in_memory_session_store.h"
 #include "tests/testing/fake_clock.h"
@@ -65,6 +66,17 @@ class SessionEvictionTest : public ::testing::Test {
     registry_->Create(std::move(record), bar_, std::move(cancelled),
                       [promise](Opened session) { promise->set_value(std::move(session)); });
     return promise->get_future();
+  }
+
+  // Of somebody with a name.
+  Opened CreateOf(const std::string& owner, const std::string& request_id = "") {
+    SessionRecord record = BarRecord(*bar_);
+    record.owner = owner;
+    record.request_id = request_id;
+    std::promise<Opened> promise;
+    registry_->Create(std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
+                      [&promise](Opened session) { promise.set_value(std::move(session)); });
+    return promise.get_future().get();
   }
 
   std::future<Opened> Open(const std::string& id, SessionRegistry::CancelFlag cancelled =
@@ -287,6 +299,39 @@ TEST_F(SessionEvictionTest, CommittedPosesAreInTheRecord) {
   ASSERT_OK_AND_ASSIGN(const SessionRegistry::View view, looked.get_future().get());
   ASSERT_EQ(view.record.last_poses.size(), 1U);
   EXPECT_EQ(view.record.last_poses[0].translation_mm, pose.translation_mm);
+}
+
+TEST_F(SessionEvictionTest, OneOwnersSessionsLeaveForItWithoutTouchingThoseOfOthers) {
+  ASSERT_THAT(CreateOf("ann"), IsOk());
+  ASSERT_THAT(CreateOf("bob"), IsOk());
+  ASSERT_THAT(CreateOf("bob"), IsOk());
+  clock_.Advance(std::chrono::hours(1));
+  EXPECT_EQ(registry_->Evict([] { return false; }, "bob"), 2);
+  EXPECT_EQ(registry_->size(), 1);
+  EXPECT_EQ(registry_->Evict([] { return false; }, "nobody"), 0);
+}
+
+TEST_F(SessionEvictionTest, AnOwnerHasNoMoreSessionsThanTheQuotaAndOthersAreNotBothered) {
+  registry_->set_most_of_owner(2);
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first, CreateOf("ann", "first"));
+  ASSERT_THAT(CreateOf("ann"), IsOk());
+  const Opened third = CreateOf("ann");
+  EXPECT_THAT(third, StatusIs(absl::StatusCode::kResourceExhausted));
+  EXPECT_EQ(ReasonOf(third.status()), "QUOTA_EXCEEDED");
+  EXPECT_EQ(ErrorInfoOf(third.status()).metadata.at("quota"), "sessions");
+  EXPECT_EQ(CreateOf("ann", "first").value(), first) << "the same request again is none more";
+  EXPECT_THAT(CreateOf("bob"), IsOk());
+  EXPECT_THAT(CreateOf(""), IsOk());
+  EXPECT_THAT(Delete(first->id()), IsOk());
+  EXPECT_THAT(CreateOf("ann"), IsOk());
+}
+
+TEST_F(SessionEvictionTest, SessionsOfEarlierServersCountForTheirOwner) {
+  ASSERT_THAT(CreateOf("ann"), IsOk());
+  Restart();
+  registry_->set_most_of_owner(1);
+  EXPECT_THAT(CreateOf("ann"), StatusIs(absl::StatusCode::kResourceExhausted));
+  EXPECT_THAT(CreateOf("bob"), IsOk());
 }
 
 }  // namespace
