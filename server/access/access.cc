@@ -270,6 +270,16 @@ absl::Status Access::MayKeep(const Principal& caller, int64_t bytes) const {
                        kUntilDeleted);
 }
 
+bool Access::KnowsSession(const std::string& id) const {
+  MutexLock lock(mutex_);
+  return index_.FindSession(id) != nullptr;
+}
+
+bool Access::KnowsPrediction(const std::string& id) const {
+  MutexLock lock(mutex_);
+  return index_.FindPrediction(id) != nullptr;
+}
+
 std::string Access::OwnerOf(const std::string& session) const {
   MutexLock lock(mutex_);
   const ResourceIndex::Session* found = index_.FindSession(session);

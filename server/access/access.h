@@ -78,6 +78,9 @@ class Access {
   absl::Status MayKeep(const Principal& caller, int64_t bytes) const;
   // 0: as many as there is room for. Call it before anything else.
   void set_most_bytes(int64_t most) { most_bytes_ = most; }
+  // Whether there is such a one: what is asked for without a name may be anything.
+  bool KnowsSession(const std::string& id) const;
+  bool KnowsPrediction(const std::string& id) const;
   // Empty where nobody with a name has it.
   std::string OwnerOf(const std::string& session) const;
 

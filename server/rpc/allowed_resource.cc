@@ -15,7 +15,8 @@ absl::StatusOr<std::string> AllowedSession(const Access& access, CallScope* scop
                                            const std::string& name, Need need) {
   TF_ASSIGN_OR_RETURN(std::string id, ParseSessionName(name));
   TF_RETURN_IF_ERROR(access.MaySession(scope->principal(), id, need));
-  scope->SetResource(name);
+  // What nobody has made is a text of the client's, and goes to no log.
+  if (access.KnowsSession(id)) scope->SetResource(name);
   return id;
 }
 
@@ -23,7 +24,7 @@ absl::StatusOr<std::string> AllowedPrediction(const Access& access, CallScope* s
                                               const std::string& name, Need need) {
   TF_ASSIGN_OR_RETURN(std::string id, ParsePredictionName(name));
   TF_RETURN_IF_ERROR(access.MayPrediction(scope->principal(), id, need));
-  scope->SetResource(name);
+  if (access.KnowsPrediction(id)) scope->SetResource(name);
   return id;
 }
 

@@ -142,7 +142,7 @@ TEST_F(ModelsTest, NeoHookeanFollowsByEstimatesAndConvergesAtRest) {
   const auto stream = Open(v1::DEFORMATION_MODEL_NEO_HOOKEAN, Prepared(1e-3, 0.5));
   EXPECT_LT(stream->started().prepared_terms(), stream->started().prepared_terms_before());
   for (int sequence = 1; sequence <= 3; ++sequence) {
-    const HandlePose pose = Turn(0.1 * sequence);
+    const HandlePose pose = Turn(0.16 * sequence);
     ASSERT_THAT(stream->SendPoses(sequence, TopPose(pose)), IsOk());
     const Positions converged = Solve(DeformationModel::kNeoHookean, pose);
     std::optional<v1::DeformFrame> frame = stream->Receive();

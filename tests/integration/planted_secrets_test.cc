@@ -101,7 +101,10 @@ class PlantedSecretsTest : public ServiceTest {
     return {std::istreambuf_iterator<char>(stream), {}};
   }
 
-  const fs::path folder_ = fs::path(::testing::TempDir()) / "planted_secrets";
+  const fs::path folder_ =
+      fs::path(::testing::TempDir()) /
+      absl::StrCat("planted_secrets_",
+                   ::testing::UnitTest::GetInstance()->current_test_info()->name());
   const std::string audit_ = (folder_ / "audit.jsonl").string();
   const std::string key_ = (folder_ / "key").string();
   std::ostringstream log_;

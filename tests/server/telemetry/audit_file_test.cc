@@ -74,7 +74,9 @@ class AuditFileTest : public ::testing::Test {
     return *report;
   }
 
-  const fs::path folder_ = fs::path(::testing::TempDir()) / "audit_file";
+  const fs::path folder_ =
+      fs::path(::testing::TempDir()) /
+      absl::StrCat("audit_file_", ::testing::UnitTest::GetInstance()->current_test_info()->name());
   const fs::path path_ = folder_ / "audit.jsonl";
   AuditFile::Options options_ = {.path = path_.string()};
 };

@@ -86,7 +86,10 @@ class AuditObserverTest : public ::testing::Test {
     return events;
   }
 
-  const fs::path folder_ = fs::path(::testing::TempDir()) / "audit_observer";
+  const fs::path folder_ =
+      fs::path(::testing::TempDir()) /
+      absl::StrCat("audit_observer_",
+                   ::testing::UnitTest::GetInstance()->current_test_info()->name());
   const std::string path_ = (folder_ / "audit.jsonl").string();
   Principal principal_ = {.name = "planner@example.org"};
   absl::Time now_ = absl::FromUnixSeconds(1'700'000'000);
