@@ -72,9 +72,8 @@ void FillLane(const PiecewiseLinearElements& elements, Eigen::Index tet,
 // Adds what a lane's tet pulls at its corners. `forces`: a column for every coordinate.
 void AddLane(const PiecewiseLinearElements& elements, Eigen::Index tet, Eigen::Index lane,
              const ThirdOrderBatch& batch, Eigen::MatrixXd* forces) {
-  Eigen::VectorXd pulls(forces->rows());
   for (Eigen::Index i = 0; i < 9; ++i) {
-    pulls =
+    const auto pulls =
         OfLane<const Eigen::VectorXd>(batch.loads.data() + i * kTetsAtOnce + lane, forces->rows());
     forces->col(Eigen::Index{3} * elements.cells(tet, static_cast<int>(1 + i / 3)) + i % 3) +=
         pulls;
