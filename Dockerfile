@@ -11,7 +11,7 @@
 # -e TISSUEFORM_SERVER_..., or in a file that is mounted.
 #
 # The gateway for browsers (docs/gateway.md):
-#   docker run --rm -p 127.0.0.1:8080:8080 --entrypoint tissueform-gateway tissueform --server SERVER:50051 --listen 0.0.0.0:8080 --web /usr/share/tissueform/web
+#   docker run --rm -p 127.0.0.1:8080:8080 --entrypoint tissueform-gateway -v /PATH/ca.pem:/ca.pem:ro tissueform --server SERVER:50051 --server-ca /ca.pem --listen 0.0.0.0:8080 --web /usr/share/tissueform/web
 
 FROM debian:12 AS builder
 COPY deploy /src/deploy
