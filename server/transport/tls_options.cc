@@ -52,11 +52,12 @@ absl::Status CheckExposure(const std::string& host, const TlsOptions& options, b
     return absl::OkStatus();
   }
   const char* const missing = options.enabled() ? "logins (--token-issuer, --token-keys)"
-                              : has_tokens      ? "encryption (--tls-cert, --tls-key)"
-                                                : "encryption and logins (--tls-cert, --tls-key, "
-                                                  "--token-issuer, --token-keys)";
+                              : has_tokens
+                                  ? "encryption (--tls-cert, --tls-key)"
+                                  : "encryption and without logins (--tls-cert, --tls-key, "
+                                    "--token-issuer, --token-keys)";
   return absl::FailedPreconditionError(absl::StrCat(
-      "--host ", host, " is reached over the network, and there is no ", missing,
+      "--host ", host, " would be reached over the network without ", missing,
       "; give them, listen on 127.0.0.1, or say --insecure if nobody but you is there"));
 }
 
