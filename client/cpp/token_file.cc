@@ -57,11 +57,11 @@ absl::StatusOr<std::string> TokenFile::Read() const {
     return absl::NotFoundError(
         absl::StrCat(path_.string(), ": the token cannot be read; log in, or name another file"));
   }
-  std::string text(kMaxTokenBytes + 1, '\0');
+  std::string text(kMaxTokenFileBytes + 1, '\0');
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<size_t>(file.gcount()));
   const absl::string_view token = absl::StripAsciiWhitespace(text);
-  if (token.empty() || text.size() > kMaxTokenBytes ||
+  if (token.empty() || text.size() > kMaxTokenFileBytes ||
       !std::all_of(token.begin(), token.end(), IsTokenLetter)) {
     return absl::InvalidArgumentError(absl::StrCat(
         path_.string(), ": holds no token; it is one word of letters, digits and -._~+/="));

@@ -17,13 +17,13 @@
 namespace tissueform {
 
 // The longest token that is read.
-inline constexpr int64_t kMaxTokenBytes = 16 << 10;
+inline constexpr int64_t kMaxTokenFileBytes = 16 << 10;
 
 // A file with a token, renewed by whoever logs in while the process runs. Thread-safe.
 class TokenFile {
  public:
   // Errors: NotFound, FailedPrecondition (others than its owner may read it), InvalidArgument (no
-  // token: empty, over kMaxTokenBytes, other letters than those of tokens), with the path and
+  // token: empty, over kMaxTokenFileBytes, other letters than those of tokens), with the path and
   // nothing of the token.
   static absl::StatusOr<std::shared_ptr<TokenFile>> Open(const std::string& path);
 

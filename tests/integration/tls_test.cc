@@ -130,8 +130,10 @@ TEST_F(TlsTest, RotationUnderLoadFailsNoCall) {
     if (!status.ok()) ++failures;
     EXPECT_THAT(status, IsOk());
   };
+  constexpr int kThreads = 2;
   std::vector<std::thread> load;
-  for (int i = 0; i < 2; ++i) {
+  load.reserve(kThreads);
+  for (int i = 0; i < kThreads; ++i) {
     load.emplace_back([&] {
       while (!ends) {  // a handshake each
         const auto client = ConnectWith({.tls_ca = both}, std::chrono::seconds(30));

@@ -21,7 +21,7 @@ namespace {
 using std::chrono::seconds;
 
 constexpr char kDeviceGrant[] = "urn:ietf:params:oauth:grant-type:device_code";
-constexpr size_t kMaxTokenBytes = size_t{16} << 10;
+constexpr size_t kMaxLoginTokenBytes = size_t{16} << 10;
 constexpr size_t kMaxUserCodeBytes = 64;
 constexpr int64_t kMaxSeconds = 24 * 3600;
 // RFC 8628, 3.2 and 3.5.
@@ -77,8 +77,8 @@ absl::StatusOr<LoginTokens> TokensOf(const nlohmann::json& json) {
   LoginTokens tokens = {.access_token = TextOf(json, "access_token"),
                         .refresh_token = TextOf(json, "refresh_token"),
                         .lifetime = SecondsOf(json, "expires_in", seconds(0))};
-  if (tokens.access_token.empty() || tokens.access_token.size() > kMaxTokenBytes ||
-      tokens.refresh_token.size() > kMaxTokenBytes || !IsGraphic(tokens.access_token) ||
+  if (tokens.access_token.empty() || tokens.access_token.size() > kMaxLoginTokenBytes ||
+      tokens.refresh_token.size() > kMaxLoginTokenBytes || !IsGraphic(tokens.access_token) ||
       !IsGraphic(tokens.refresh_token)) {
     return NoAnswer("holds no token");
   }

@@ -77,7 +77,7 @@ TEST_F(TokenFileTest, ErrorsHoldNothingOfTheToken) {
   Write("se\tcret");
   EXPECT_THAT(TokenFile::Open(path_),
               StatusIs(kInvalid, AllOf(HasSubstr(path_.string()), Not(HasSubstr("cret")))));
-  Write(std::string(kMaxTokenBytes + 1, 'a'));
+  Write(std::string(kMaxTokenFileBytes + 1, 'a'));
   EXPECT_THAT(TokenFile::Open(path_), StatusIs(kInvalid, Not(HasSubstr("aaaa"))));
   EXPECT_THAT(TokenFile::Open(folder_ / "none"), StatusIs(absl::StatusCode::kNotFound));
 }
