@@ -52,7 +52,7 @@ class AccessTest : public ::testing::Test {
 
   const Principal ann_{.name = "ann"};
   const Principal bob_{.name = "bob"};
-  const Principal nobody_;
+  const Principal nobody_ = {};
   int64_t now_s_ = 1000;
   InMemoryAccessStore store_;
   Access access_{[this] { return now_s_; }};

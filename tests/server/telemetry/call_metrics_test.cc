@@ -67,7 +67,7 @@ TEST_F(CallMetricsTest, CountsByRpcAndCode) {
 }
 
 TEST_F(CallMetricsTest, ACallIsOpenUntilItEnds) {
-  const Principal nobody;
+  const Principal nobody = {};
   const ObservedCall call{.method = "DeformService.Deform",
                           .kind = CallKind::kNewWork,
                           .principal = nobody,

@@ -65,7 +65,7 @@ double JobNanoseconds() {
 
 double CallNanoseconds() {
   CallMetrics metrics;
-  const Principal nobody;
+  const Principal nobody = {};
   const ObservedCall call{.method = "DeformService.AcknowledgeWatch",
                           .kind = CallKind::kUpkeep,
                           .principal = nobody,
