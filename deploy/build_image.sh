@@ -30,6 +30,7 @@ finish() {
   local pid
   for pid in "${started[@]}"; do kill "$pid" 2>/dev/null || true; done
   "${tool[@]}" rm --all >/dev/null 2>&1 || true
+  umount "$scratch/storage/overlay" 2>/dev/null || true  # where buildah has mounted it upon itself
   rm -rf --one-file-system "$scratch"
 }
 trap finish EXIT

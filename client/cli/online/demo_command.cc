@@ -68,18 +68,18 @@ struct DemoOptions {
 };
 
 // Set by SIGINT and SIGTERM; the demo then ends by itself, and its server with it.
-std::atomic<bool> interrupted = false;
+std::atomic<bool> demo_interrupted = false;
 static_assert(std::atomic<bool>::is_always_lock_free, "set in a signal handler");
 
 void CatchInterrupts() {
   struct sigaction action {};
-  action.sa_handler = [](int) { interrupted = true; };
+  action.sa_handler = [](int) { demo_interrupted = true; };
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
 }
 
 absl::Status CheckNotInterrupted() {
-  return interrupted ? absl::CancelledError("interrupted") : absl::OkStatus();
+  return demo_interrupted ? absl::CancelledError("demo_interrupted") : absl::OkStatus();
 }
 
 absl::Status MakeOutFolder(const DemoOptions& options) {
@@ -116,7 +116,7 @@ absl::StatusOr<DemoCase> ReadCase(const DemoOptions& options) {
 absl::StatusOr<DragResult> Drag(const PlanProblem& problem, const DragOptions& options,
                                 TissueformClient* client, const std::string& session) {
   TF_ASSIGN_OR_RETURN(DragResult drag,
-                      RunDrag(client, session, NamedPoses(problem), options, interrupted));
+                      RunDrag(client, session, NamedPoses(problem), options, demo_interrupted));
   if (drag.frames.empty()) {
     return absl::InternalError("the server answered no pose");
   }
@@ -211,9 +211,9 @@ absl::Status Serve(const DemoOptions& options, const DemoCase& demo, ServerProce
       "\nthe server keeps running at %s, with its session and predictions, until Ctrl-C. In "
       "another terminal:\n  tissueform prediction list --server %s\n",
       server->address(), server->address());
-  while (!interrupted) {
+  while (!demo_interrupted) {
     // Ctrl-C reaches both, in any order.
-    if (server->WaitForExit(kServeStep).has_value() && !interrupted) {
+    if (server->WaitForExit(kServeStep).has_value() && !demo_interrupted) {
       return absl::UnavailableError("the server has ended");
     }
   }
@@ -223,7 +223,7 @@ absl::Status Serve(const DemoOptions& options, const DemoCase& demo, ServerProce
 absl::Status DragAndPredict(const DemoOptions& options, const DemoCase& demo, ServerProcess* server,
                             TissueformClient* client, const absl::Status& display) {
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<PlanSession> session,
-                      MakePlanSession(client, demo.problem, &interrupted));
+                      MakePlanSession(client, demo.problem, &demo_interrupted));
   const v1::Session& description = session->description();
   absl::PrintF("session ready: %d free vertices, factorised in %.1f ms, %.1f MiB\n",
                description.free_vertex_count(), description.seconds().factorise() * 1e3,

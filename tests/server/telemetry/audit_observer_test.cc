@@ -206,6 +206,7 @@ TEST_F(AuditObserverTest, CheckpointsTellWhereTheLogIsAndTheEndOfARun) {
   log_.reset();
   ASSERT_FALSE(told.empty());
   std::vector<AuditCheckpoint> checkpoints;
+  checkpoints.reserve(told.size());
   for (const std::string& text : told) checkpoints.push_back(*ParseCheckpoint(text));
   EXPECT_EQ(checkpoints.back().number, 5);
   const auto report = VerifyAuditFiles({path_}, SampleKey(), checkpoints);
