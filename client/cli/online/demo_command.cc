@@ -79,7 +79,7 @@ void CatchInterrupts() {
 }
 
 absl::Status CheckNotInterrupted() {
-  return demo_interrupted ? absl::CancelledError("demo_interrupted") : absl::OkStatus();
+  return demo_interrupted ? absl::CancelledError("interrupted") : absl::OkStatus();
 }
 
 absl::Status MakeOutFolder(const DemoOptions& options) {
