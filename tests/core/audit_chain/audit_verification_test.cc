@@ -32,8 +32,9 @@ class AuditVerificationTest : public ::testing::Test {
                      const std::vector<AuditCheckpoint>& checkpoints = {}) const {
     std::vector<std::string> paths;
     for (const std::string& file : files) {
-      const std::string path =
-          absl::StrCat(::testing::TempDir(), "audit_verification_", paths.size());
+      const std::string path = absl::StrCat(
+          ::testing::TempDir(), "audit_",
+          ::testing::UnitTest::GetInstance()->current_test_info()->name(), "_", paths.size());
       std::remove(path.c_str());  // one that takes another's place is synced, which takes long
       paths.push_back(testing::WriteFile(path, file));
     }

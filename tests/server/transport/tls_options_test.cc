@@ -28,7 +28,7 @@ TEST(TlsOptionsTest, OffLoopbackBothAreNeeded) {
     EXPECT_THAT(CheckExposure(host, {}, false),
                 StatusIs(kRefused, AllOf(HasSubstr("--tls-cert"), HasSubstr("--token-issuer"))));
     EXPECT_THAT(CheckExposure(host, tls, false), StatusIs(kRefused, HasSubstr("logins")));
-    EXPECT_THAT(CheckExposure(host, {}, true), StatusIs(kRefused, HasSubstr("no encryption")));
+    EXPECT_THAT(CheckExposure(host, {}, true), StatusIs(kRefused, HasSubstr("without encryption")));
     EXPECT_THAT(CheckExposure(host, tls, true), IsOk());
   }
 }

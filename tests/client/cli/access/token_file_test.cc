@@ -29,7 +29,9 @@ class TokenFileTest : public ::testing::Test {
 
   static fs::perms ModeOf(const fs::path& path) { return fs::status(path).permissions(); }
 
-  const fs::path folder_ = fs::path(::testing::TempDir()) / "token_file_test";
+  const fs::path folder_ = fs::path(::testing::TempDir()) /
+                           (std::string("token_file_") +
+                            ::testing::UnitTest::GetInstance()->current_test_info()->name());
   const std::string path_ = (folder_ / "tissueform" / "token").string();
   const std::string renewal_ = path_ + ".renewal";
   const LoginClient client_ = {
