@@ -28,7 +28,6 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::IsSubsetOf;
-using ::testing::Not;
 
 using PrepareCall = FakeWriterCall<v1::PrepareSessionResponse>;
 
@@ -353,8 +352,8 @@ TEST_F(PrepareSessionTest, TwoCallsOfOneRequestBothSeeItAndGetOneSession) {
   go.set_value();
   const Outcome first = EndOf(one.get());
   const Outcome second = EndOf(two.get());
+  // Both have seen it wait; what came after that may have been overtaken by the end.
   for (const Outcome* outcome : {&first, &second}) {
-    EXPECT_THAT(outcome->stages, Not(IsEmpty()));
     EXPECT_THAT(outcome->stages,
                 IsSubsetOf({kAssembling, kOrdering, kFactorising, kResponses, kKeeping}));
   }
