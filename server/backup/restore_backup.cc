@@ -33,11 +33,16 @@ absl::StatusOr<CheckedDatabase> CheckDatabase(const std::string& backup) {
   if (!fs::is_directory(backup, ignored)) {
     return absl::NotFoundError(absl::StrCat("backup ", backup, ": there is no such folder"));
   }
-  if (!fs::exists(path, ignored)) return Missing(path);
+  const bool has_sums = fs::is_regular_file(BackupSums(backup), ignored);
+  if (!fs::exists(path, ignored)) {
+    if (has_sums) return Missing(path);
+    return absl::NotFoundError(
+        absl::StrCat("backup ", backup, ": it is none; name the folder that `backup` has written"));
+  }
   CheckedDatabase checked;
   TF_ASSIGN_OR_RETURN(checked.digest, DigestOf(path));
   TF_ASSIGN_OR_RETURN(checked.contents, ReadBackupContents(path));
-  if (!fs::is_regular_file(BackupSums(backup), ignored)) return Missing(BackupSums(backup));
+  if (!has_sums) return Missing(BackupSums(backup));
   const std::string wanted = SumsText(checked.digest.sha256, checked.contents.blobs);
   std::string sums;
   TF_RETURN_IF_ERROR(ReadInPieces(BackupSums(backup), [&](absl::string_view piece) {

@@ -38,6 +38,17 @@ bool IsNo(const std::string& value) {
   return lower == "false" || lower == "off" || lower == "no" || lower == "0";
 }
 
+// `told` where the name could be somebody's mistake; a file that was meant for something else, a
+// token or a key, is not told again.
+std::string WrongName(const std::string& name, const std::string& told) {
+  constexpr size_t kLongestName = 40;
+  const bool may_be_a_name =
+      name.size() <= kLongestName && std::all_of(name.begin(), name.end(), [](unsigned char c) {
+        return absl::ascii_islower(c) || absl::ascii_isdigit(c) || c == '-' || c == '_';
+      });
+  return may_be_a_name ? told : "it is no file of options: lines are `name = value`";
+}
+
 // CLI11's own reader of files, which lets a file win over the environment, passes over what it does
 // not know, and counts `flag = false` as a flag that was given.
 class ConfigFile final : public CLI::ConfigBase {
@@ -63,12 +74,14 @@ class ConfigFile final : public CLI::ConfigBase {
  private:
   bool Counts(const CLI::ConfigItem& item) const {
     if (!item.parents.empty()) {
-      throw CLI::ConfigError(
-          absl::StrCat("section [", item.parents.front(), "]: there are none; leave it out"));
+      const std::string& section = item.parents.front();
+      throw CLI::ConfigError(WrongName(
+          section, absl::StrCat("section [", section, "]: there are none; leave it out")));
     }
     const CLI::Option* option = app_->get_option_no_throw("--" + item.name);
     if (option == nullptr || !option->get_configurable()) {
-      throw CLI::ConfigError(absl::StrCat("there is no option \"", item.name, "\""));
+      throw CLI::ConfigError(
+          WrongName(item.name, absl::StrCat("there is no option \"", item.name, "\"")));
     }
     if (!Environment(VariableOf(prefix_, item.name)).empty()) return false;
     return !(IsFlag(*option) && item.inputs.size() == 1 && IsNo(item.inputs.front()));

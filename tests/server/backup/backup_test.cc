@@ -155,6 +155,11 @@ TEST_F(BackupTest, ARowWhoseFileIsLostIsToldAndNothingIsLeft) {
   EXPECT_FALSE(fs::exists(backup_));
 }
 
+TEST_F(BackupTest, AFolderOfSomethingElseIsNoBackup) {
+  EXPECT_THAT(VerifyBackup(::testing::TempDir()),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("it is none")));
+}
+
 TEST_F(BackupTest, ADamagedFileIsToldAndNothingIsLeft) {
   const std::string sha256 = KeepCaseOf(5000);
   fs::resize_file(data_ + "/blobs/" + sha256, 3);
