@@ -120,6 +120,21 @@ void AddAccessLimits(CLI::App& app, AccessOptions* access) {
             });
 }
 
+void AddExportLimits(CLI::App& app, ExportLimits* exports) {
+  AddNumber(app, "--max-waiting-exports", exports->max_waiting, 1, kMaxCount,
+            "predictions that wait for their way to the PACS", Into(&exports->max_waiting));
+  AddNumber(app, "--quota-exports", exports->max_waiting_of_principal, 1, kMaxCount,
+            "of these of one principal", Into(&exports->max_waiting_of_principal));
+  AddNumber(app, "--max-exports", exports->max_kept, 1, kMaxCount, "exports kept, done or not",
+            Into(&exports->max_kept));
+  AddNumber(app, "--export-retention-days", exports->retention_days, 0, kMaxDays,
+            "days after which an export that has not changed is deleted; 0 keeps them for ever",
+            Into(&exports->retention_days));
+  AddNumber(app, "--max-export-watches", exports->max_watches, 1, kMaxCount,
+            "watches of exports (bridges, planners) open at the same time",
+            Into(&exports->max_watches));
+}
+
 }  // namespace
 
 ServerOptions ServerOptions::Defaults() {
@@ -156,6 +171,7 @@ void AddServerOptions(CLI::App& app, ServerOptions* options) {
   AddLimits(app, options);
   AddQuotas(app, &options->quotas);
   AddAccessLimits(app, &options->access);
+  AddExportLimits(app, &options->exports);
   AddNumber(app, "--drain-seconds", options->drain_deadline.count(), 0, 3600,
             "after SIGTERM or SIGINT, how long open calls may go on",
             SecondsInto(&options->drain_deadline));

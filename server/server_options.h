@@ -11,6 +11,7 @@
 
 #include "server/access/access_options.h"
 #include "server/auth/token_options.h"
+#include "server/exports/export_book.h"
 #include "server/session/limits.h"
 #include "server/session/quotas.h"
 #include "server/telemetry/telemetry_options.h"
@@ -39,6 +40,7 @@ struct ServerOptions {
   TokenOptions tokens = {};
   TelemetryOptions telemetry = {};
   AccessOptions access = {};
+  ExportLimits exports = {};
 
   // Half of the machine's memory, one worker a core.
   static ServerOptions Defaults();

@@ -96,7 +96,8 @@ int64_t MemoryQuota(const ServerOptions& options) {
 NamedLimits LimitsOf(const ServerOptions& options) {
   const auto& [host, port, tls, memory_budget_bytes, workers, service, quotas,
                max_calls_per_connection, max_connections, max_connections_per_address,
-               drain_deadline, in_memory, data_dir, log_level, tokens, telemetry, access] = options;
+               drain_deadline, in_memory, data_dir, log_level, tokens, telemetry, access, exports] =
+      options;
   NamedLimits limits = ToNamedLimits(service);
   limits["quota_calls_per_second"] = quotas.calls_per_second;
   limits["quota_waiting_calls"] = quotas.waiting_calls;
@@ -107,6 +108,11 @@ NamedLimits LimitsOf(const ServerOptions& options) {
   limits["max_shares_per_resource"] = access.max_shares_per_resource;
   limits["max_links_per_session"] = access.max_links_per_session;
   limits["max_link_hours"] = access.max_link_lifetime.count();
+  limits["max_waiting_exports"] = exports.max_waiting;
+  limits["quota_exports"] = exports.max_waiting_of_principal;
+  limits["max_exports"] = exports.max_kept;
+  limits["export_retention_days"] = exports.retention_days;
+  limits["max_export_watches"] = exports.max_watches;
   limits["max_message_bytes"] = kMaxReceiveBytes;
   limits["memory_budget_bytes"] = memory_budget_bytes;
   limits["workers"] = workers;
@@ -154,6 +160,8 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
   }
   TF_RETURN_IF_ERROR(server->access_changes_.Learn());
   TF_RETURN_IF_ERROR(TellWhatIsKept(server->stores_.get(), &server->access_changes_));
+  TF_RETURN_IF_ERROR(server->exports_.Learn(
+      [&](const std::string& id) { return server->access_.KnowsPrediction(id); }));
   TF_RETURN_IF_ERROR(server->registry_.LearnKnown());
   server->housekeeping_.Start();
   TF_RETURN_IF_ERROR(server->ServeMetrics());
@@ -169,6 +177,9 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       quotas_(options.quotas),
       access_store_(OpenAccessStore(parts.stores.get())),
       access_changes_(options.access, access_store_.get(), &access_),
+      export_store_(OpenExportStore(parts.stores.get())),
+      exports_(options.exports, export_store_.get()),
+      export_watches_(options.exports.max_watches),
       authenticator_(parts.authenticator == nullptr
                          ? nullptr
                          : std::make_unique<LinkAuthenticator>(&access_, parts.authenticator)),
@@ -183,8 +194,12 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       uploads_(options.limits, &catalog_, &stores_->uploads()),
       pool_(std::make_unique<WorkerPool>(options.workers)),
       registry_(options.limits, &budget_, pool_.get(), &stores_->sessions(), &catalog_),
-      housekeeping_({.retention_days = options.limits.retention_days}, stores_.get(), &registry_,
-                    &catalog_),
+      housekeeping_(
+          {.retention_days = options.limits.retention_days,
+           .export_retention_days = options.exports.retention_days,
+           .remove_exports = [this](int64_t before_s,
+                                    int most) { return exports_.RemoveUnchanged(before_s, most); }},
+          stores_.get(), &registry_, &catalog_),
       streams_(options.limits.max_streams),
       watches_(options.limits, pool_.get()),
       mesh_service_(&gate_, options.limits, &access_changes_, &catalog_, &uploads_, &registry_,
@@ -196,6 +211,8 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       plan_service_(&gate_, &access_, &registry_),
       case_service_(&gate_, options.limits, &access_, &stores_->cases(), pool_.get(), &timer_),
       access_service_(&gate_, &access_changes_, &registry_, &streams_, &watches_),
+      export_service_(&gate_, options.limits, &access_, &stores_->predictions(), &exports_,
+                      &export_watches_, pool_.get(), &timer_),
       server_info_service_(&gate_, LimitsOf(options)) {
   SetBlasThreads(1);  // the pool's workers share the cores already
   registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
@@ -207,6 +224,15 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
   access_changes_.set_on_revoked([this] {
     streams_.AskAgain();
     watches_.AskAgain();
+  });
+  exports_.set_on_changed(
+      [this](const ExportRecord& record) { export_watches_.OnChanged(record); });
+  exports_.set_on_exported([this](const std::string& prediction, bool exported) {
+    access_changes_.SetExported(prediction, exported);
+  });
+  access_changes_.set_on_prediction_removed([this](const std::string& id) {
+    // In memory they are gone; a restart finds no prediction of those that the disk has.
+    if (!exports_.RemoveOf(id).ok()) spdlog::warn("exports of what was removed stay on the disk");
   });
   access_.set_most_bytes(options.quotas.disk_bytes);
   registry_.set_most_of_owner(options.quotas.sessions);
@@ -245,6 +271,10 @@ absl::Status TissueformServer::ServeMetrics() {
                      [this] { return static_cast<double>(streams_.size()); });
   metrics_->AddGauge("tissueform_watches", "Watches open.", {},
                      [this] { return static_cast<double>(watches_.size()); });
+  metrics_->AddGauge("tissueform_exports_waiting", "Predictions on their way to the PACS.", {},
+                     [this] { return static_cast<double>(exports_.CountWaiting()); });
+  metrics_->AddGauge("tissueform_export_watches", "Watches of exports open.", {},
+                     [this] { return static_cast<double>(export_watches_.size()); });
   metrics_->AddGauge("tissueform_draining", "1 while the server drains.", {},
                      [this] { return gate_.draining() ? 1.0 : 0.0; });
   TF_RETURN_IF_ERROR(metrics_->Serve(options_.telemetry.metrics_port));
@@ -293,6 +323,7 @@ absl::Status TissueformServer::Listen() {
   builder.RegisterService(&plan_service_);
   builder.RegisterService(&case_service_);
   builder.RegisterService(&access_service_);
+  builder.RegisterService(&export_service_);
   builder.RegisterService(&server_info_service_);
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) return absl::InternalError("gRPC does not start");
@@ -351,6 +382,7 @@ void TissueformServer::Drain() {
   const auto end = std::chrono::system_clock::now() + options_.drain_deadline;
   streams_.NotifyDraining(end);
   watches_.NotifyDraining(end);
+  export_watches_.NotifyDraining();
   if (!gate_.WaitUntilIdle(deadline)) {
     spdlog::warn("draining: cancelling the calls that are still open");
   }

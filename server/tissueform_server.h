@@ -19,10 +19,14 @@
 #include "server/auth/authenticator.h"
 #include "server/auth/token_authenticator.h"
 #include "server/calls/call_scope.h"
+#include "server/exports/export_book.h"
+#include "server/exports/export_store.h"
 #include "server/rpc/access_service.h"
 #include "server/rpc/case_service.h"
 #include "server/rpc/deform_service.h"
 #include "server/rpc/deform_streams.h"
+#include "server/rpc/export_service.h"
+#include "server/rpc/export_watch.h"
 #include "server/rpc/mesh_service.h"
 #include "server/rpc/plan_service.h"
 #include "server/rpc/prediction_service.h"
@@ -81,6 +85,7 @@ class TissueformServer {
   const SessionRegistry& sessions() const { return registry_; }
   const DeformStreams& streams() const { return streams_; }
   const SessionWatches& watches() const { return watches_; }
+  const ExportWatches& export_watches() const { return export_watches_; }
   // Null without TLS.
   const RotatedFiles* tls_files() const { return tls_files_.get(); }
   // Strangers may reach it, and it is not protected from them: --insecure.
@@ -119,6 +124,9 @@ class TissueformServer {
   std::unique_ptr<AccessStore> access_store_;  // its rows are those of the stores
   Access access_;
   AccessChanges access_changes_;
+  std::unique_ptr<ExportStore> export_store_;  // as access_store_
+  ExportBook exports_;
+  ExportWatches export_watches_;
   std::unique_ptr<LinkAuthenticator> authenticator_;  // null: nobody logs in
   ServiceGate gate_;
   MemoryBudget budget_;
@@ -138,6 +146,7 @@ class TissueformServer {
   PlanService plan_service_;
   CaseService case_service_;
   AccessService access_service_;
+  ExportService export_service_;
   ServerInfoService server_info_service_;
   // gRPC gets its connections from the listener, through the acceptor. The server comes last: what
   // it is given goes to the acceptor of a server that lives.

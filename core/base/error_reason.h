@@ -49,6 +49,8 @@ enum class ErrorReason {
   kCaseDamagedOnItsWay,
   kQuotaExceeded,
   kAuditNotWritten,
+  kExportNotFound,
+  kTooManyExports,
   // Of a code, where nothing more was said.
   kInvalidRequest,
   kNotFound,

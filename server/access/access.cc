@@ -28,6 +28,7 @@ constexpr std::array<std::string_view, 9> kOpenToLinks = {
     "SessionService.GetSession",
 };
 
+bool IsBridge(const Principal& caller) { return caller.roles.contains("bridge"); }
 bool IsLink(const Principal& caller) { return !caller.only_session.empty(); }
 
 absl::Status LinkHasEnded() {
@@ -47,6 +48,11 @@ absl::Status Access::MayCall(const Principal& caller, std::string_view method) {
     return absl::PermissionDeniedError(
         "the token has not the role publisher, which cases are uploaded by; ask who runs the "
         "server for it");
+  }
+  if (method == "ExportService.UpdateExport" && !caller.anonymous() && !IsBridge(caller)) {
+    return absl::PermissionDeniedError(
+        "the token has not the role bridge, which exports are answered by; take the export back "
+        "instead");
   }
   return absl::OkStatus();
 }
@@ -100,16 +106,27 @@ Access::Level Access::PredictionLevel(const Principal& caller, const std::string
   if (table_.RoleOf(prediction->owner, PredictionResource(id), caller.name).has_value()) {
     return Level::kLook;
   }
+  if (IsBridge(caller) && index_.IsExported(id)) return Level::kLook;
   // Only of one owner: an id of a session may have become another's meanwhile.
   const ResourceIndex::Session* session = index_.FindSession(prediction->session);
   if (session == nullptr || session->owner != prediction->owner) return Level::kNothing;
   return std::min(Level::kLook, SessionLevel(caller, prediction->session));
 }
 
+bool Access::IsExportedCase(const CaseKey& key) const {
+  const std::set<std::string>& exported = index_.ExportedOfCase(key.sha256);
+  return std::ranges::any_of(exported, [&](const std::string& id) {
+    // Whoever names a case that is not open to them opens it to no bridge.
+    const Principal planner{.name = index_.FindPrediction(id)->owner};
+    return CaseLevel(planner, key) >= Level::kLook;
+  });
+}
+
 Access::Level Access::CaseLevel(const Principal& caller, const CaseKey& key) const {
   if (key.owner == caller.name) return Level::kOwn;
   const ResourceIndex::Case* found = index_.FindCase(key);
   if (found == nullptr) return Level::kNothing;
+  if (IsBridge(caller) && IsExportedCase(key)) return Level::kLook;
   return std::min(Level::kLook,
                   LevelOfShare(key.owner, CaseResource(key.sha256), found->project, caller.name));
 }
@@ -171,6 +188,19 @@ absl::StatusOr<CaseKey> Access::CaseOfLink(const Principal& link, const std::str
   return NoCase(sha256);
 }
 
+std::optional<std::string> Access::ExportsSeenBy(const Principal& caller) {
+  if (IsBridge(caller)) return std::nullopt;
+  return caller.name;
+}
+
+absl::Status Access::MayExport(const Principal& caller, const std::string& owner,
+                               const absl::Status& not_found, Need need) {
+  const Level level = owner == caller.name ? Level::kOwn
+                      : IsBridge(caller)   ? Level::kLook
+                                           : Level::kNothing;
+  return Judge(level, need, not_found);
+}
+
 absl::Status Access::MayMesh(const Principal& caller, const std::string& sha256, Need need) const {
   MutexLock lock(mutex_);
   return Judge(MeshLevel(caller, sha256), need, NoSuchMesh());
@@ -209,7 +239,7 @@ std::set<std::string> Access::SharedSessions(const Principal& caller) const {
 std::set<std::string> Access::SharedPredictions(const Principal& caller) const {
   std::set<std::string> shared;
   MutexLock lock(mutex_);
-  if (!table_.HasAny(caller.name)) return shared;
+  if (!table_.HasAny(caller.name) && !IsBridge(caller)) return shared;
   for (const auto& [id, prediction] : index_.predictions()) {
     if (PredictionLevel(caller, id) == Level::kLook) shared.insert(id);
   }
@@ -219,7 +249,7 @@ std::set<std::string> Access::SharedPredictions(const Principal& caller) const {
 std::set<CaseKey> Access::SharedCases(const Principal& caller) const {
   std::set<CaseKey> shared;
   MutexLock lock(mutex_);
-  if (!table_.HasAny(caller.name)) return shared;
+  if (!table_.HasAny(caller.name) && !IsBridge(caller)) return shared;
   for (const auto& [key, of_case] : index_.cases()) {
     const absl::StatusOr<CaseKey> found = FindCase(caller, key.sha256, Need::kLook);
     if (found.ok() && found->owner != caller.name) shared.insert(*found);

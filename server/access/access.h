@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -49,7 +50,7 @@ class Access {
   // Errors: NotFound, PermissionDenied; Unauthenticated for a follow link that has ended.
   absl::Status MaySession(const Principal& caller, const std::string& id, Need need) const;
   absl::Status MayPrediction(const Principal& caller, const std::string& id, Need need) const;
-  // Whose case the caller's name of it means: its own, else the first that is shared with it.
+  // Whose case the caller's name of it means: its own, else the first that it may look at.
   absl::StatusOr<CaseKey> MayCase(const Principal& caller, const std::string& sha256,
                                   Need need) const;
   // A mesh is looked at, and sessions are made of it, by who has sent its bytes and who may look at
@@ -60,6 +61,12 @@ class Access {
   bool OthersHoldMesh(const Principal& caller, const std::string& sha256) const;
   // How many sessions of the caller are made from it.
   int CountSessionsOf(const Principal& caller, const std::string& mesh) const;
+
+  // Whose exports the caller sees: its own; unset: all, as bridges do.
+  static std::optional<std::string> ExportsSeenBy(const Principal& caller);
+  // An export that is the owner's. Errors: NotFound, PermissionDenied.
+  static absl::Status MayExport(const Principal& caller, const std::string& owner,
+                                const absl::Status& not_found, Need need);
 
   // What of others' a list shows to the caller.
   std::set<std::string> SharedSessions(const Principal& caller) const;
@@ -98,6 +105,8 @@ class Access {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Level PredictionLevel(const Principal& caller, const std::string& id) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Whether a bridge may look at the case for a prediction of somebody who may.
+  bool IsExportedCase(const CaseKey& key) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Level CaseLevel(const Principal& caller, const CaseKey& key) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Level MeshLevel(const Principal& caller, const std::string& sha256) const

@@ -33,6 +33,12 @@ class AccessChanges {
   // streams asks again for each. Call it before calls are served.
   void set_on_revoked(std::function<void()> on_revoked) { on_revoked_ = std::move(on_revoked); }
 
+  // Told of a prediction that is gone, on the thread that removes it, without a lock held; it may
+  // block. Call it before calls are served.
+  void set_on_prediction_removed(std::function<void(const std::string& id)> told) {
+    on_prediction_removed_ = std::move(told);
+  }
+
   const AccessOptions& options() const { return options_; }
   const Access& access() const { return access_; }
 
@@ -67,6 +73,11 @@ class AccessChanges {
     MutexLock lock(access_.mutex_);
     access_.index_.Add(record);
   }
+  // The prediction is to go to the PACS, so that bridges may look at it; or is so no longer.
+  void SetExported(const std::string& prediction, bool exported) {
+    MutexLock lock(access_.mutex_);
+    access_.index_.SetExported(prediction, exported);
+  }
   void SessionRemoved(const std::string& id);
   void PredictionRemoved(const std::string& id);
   void CaseRemoved(const CaseKey& key);
@@ -90,6 +101,7 @@ class AccessChanges {
   AccessStore* const store_;
   Access& access_;
   std::function<void()> on_revoked_ = [] {};
+  std::function<void(const std::string&)> on_prediction_removed_ = [](const std::string&) {};
 };
 
 }  // namespace tissueform

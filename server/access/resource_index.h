@@ -26,6 +26,7 @@ class ResourceIndex {
     std::string owner = {};
     std::string session = {};  // that it was made in; it may be gone, or be another's by now
     std::string mesh = {};
+    std::string case_sha256 = {};
     int64_t bytes = 0;
   };
   struct Case {
@@ -39,6 +40,13 @@ class ResourceIndex {
   void RemoveSession(const std::string& id);
   void RemovePrediction(const std::string& id);
   void RemoveCase(const CaseKey& key);
+
+  // Bridges may look at what a prediction holds that is to go to the PACS. Nothing where there is
+  // no such prediction.
+  void SetExported(const std::string& prediction, bool exported);
+  bool IsExported(const std::string& prediction) const { return exported_.contains(prediction); }
+  // Those that were planned in the case.
+  const std::set<std::string>& ExportedOfCase(const std::string& sha256) const;
 
   // Null where there is none.
   const Session* FindSession(const std::string& id) const;
@@ -61,17 +69,19 @@ class ResourceIndex {
   const std::set<std::string>& PredictionsOf(const std::string& mesh) const;
 
  private:
-  using NamesOfMesh = std::map<std::string, std::set<std::string>>;
+  using NamesOf = std::map<std::string, std::set<std::string>>;
 
   void Hold(const std::string& owner, int64_t sessions, int64_t bytes);
-  static void Forget(NamesOfMesh* names, const std::string& mesh, const std::string& id);
-  static const std::set<std::string>& Of(const NamesOfMesh& names, const std::string& mesh);
+  static void Forget(NamesOf* names, const std::string& of, const std::string& id);
+  static const std::set<std::string>& Of(const NamesOf& names, const std::string& of);
 
   std::map<std::string, Session> sessions_;
   std::map<std::string, Prediction> predictions_;
   std::map<CaseKey, Case> cases_;
-  NamesOfMesh sessions_of_mesh_;
-  NamesOfMesh predictions_of_mesh_;
+  NamesOf sessions_of_mesh_;
+  NamesOf predictions_of_mesh_;
+  std::set<std::string> exported_;  // predictions
+  NamesOf exported_of_case_;
   std::map<std::string, Holdings> holdings_;  // by owner
 };
 

@@ -13,6 +13,7 @@
 #include "tissueform/v1/access_service.pb.h"
 #include "tissueform/v1/case_service.pb.h"
 #include "tissueform/v1/deform_service.pb.h"
+#include "tissueform/v1/export_service.pb.h"
 #include "tissueform/v1/mesh_service.pb.h"
 #include "tissueform/v1/plan_service.pb.h"
 #include "tissueform/v1/prediction_service.pb.h"
@@ -41,6 +42,7 @@ void LinkServices() {
   google::protobuf::LinkMessageReflection<v1::WhoAmIRequest>();
   google::protobuf::LinkMessageReflection<v1::GetCaseRequest>();
   google::protobuf::LinkMessageReflection<v1::DeformRequest>();
+  google::protobuf::LinkMessageReflection<v1::GetExportRequest>();
   google::protobuf::LinkMessageReflection<v1::GetMeshRequest>();
   google::protobuf::LinkMessageReflection<v1::FitRequest>();
   google::protobuf::LinkMessageReflection<v1::GetPredictionRequest>();

@@ -94,11 +94,17 @@ Housekeeping::Removed Housekeeping::RunOnce() {
       removed.cases = RemoveCases(before_s, claimed.cases);
     }
   }
-  if (removed.sessions + removed.predictions + removed.meshes + removed.uploads + removed.cases >
+  if (options_.export_retention_days > 0) {
+    removed.exports = RemoveExports(now_s - options_.export_retention_days * kDaySeconds);
+  }
+  if (removed.sessions + removed.predictions + removed.meshes + removed.uploads + removed.cases +
+          removed.exports >
       0) {
     spdlog::info(
-        "deleted for their age: {} sessions, {} predictions, {} meshes, {} uploads, {} cases",
-        removed.sessions, removed.predictions, removed.meshes, removed.uploads, removed.cases);
+        "deleted for their age: {} sessions, {} predictions, {} meshes, {} uploads, {} cases, {} "
+        "exports",
+        removed.sessions, removed.predictions, removed.meshes, removed.uploads, removed.cases,
+        removed.exports);
   }
   return removed;
 }
@@ -193,6 +199,13 @@ int Housekeeping::RemoveMeshes(int64_t before_s, const std::set<std::string>& of
   WarnUnlessOk(stores_->meshes().Touch(of_unknown_age, options_.unix_clock()),
                "times of use are not written");
   return removed;
+}
+
+int Housekeeping::RemoveExports(int64_t before_s) {
+  if (!options_.remove_exports) return 0;
+  const absl::StatusOr<int> removed = options_.remove_exports(before_s, kMostOfARound);
+  WarnUnlessOk(removed.status(), "exports that have not changed stay");
+  return removed.value_or(0);
 }
 
 int Housekeeping::RemoveCases(int64_t before_s, const std::set<std::string>& of_predictions) {

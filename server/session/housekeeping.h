@@ -5,9 +5,12 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <set>
 #include <string>
 #include <thread>
+
+#include "absl/status/statusor.h"
 
 #include "core/base/mutex.h"
 #include "server/session/clock.h"
@@ -22,7 +25,7 @@ namespace tissueform {
 //
 // Unused means: a session that nobody opened and no stream holds; a mesh of no session and no
 // prediction; a prediction that was made so long ago and whose session is gone; a case that nobody
-// has sent or read, of no prediction. What was used while
+// has sent or read, of no prediction; an export that has not changed. What was used while
 // the server ran is known by a clock that never goes back. The machine's clock only decides about
 // the rest, and only as far as it went on with that one: set back or forward while the server runs,
 // it deletes nothing early.
@@ -31,7 +34,10 @@ namespace tissueform {
 class Housekeeping {
  public:
   struct Options {
-    int retention_days = 30;  // 0: nothing is deleted for its age
+    int retention_days = 30;         // 0: nothing is deleted for its age
+    int export_retention_days = 30;  // the same of exports
+    // Removes at most so many exports that have not changed since then, and says how many.
+    std::function<absl::StatusOr<int>(int64_t before_s, int most)> remove_exports = {};
     std::chrono::seconds partial_uploads{24 * 3600};
     std::chrono::seconds interval{300};
     UnixClock unix_clock = SystemUnixSeconds;
@@ -43,6 +49,7 @@ class Housekeeping {
     int meshes = 0;
     int uploads = 0;
     int cases = 0;
+    int exports = 0;
   };
 
   // All must outlive it.
@@ -77,6 +84,7 @@ class Housekeeping {
   // Puts those of the predictions that stay into `claimed`; false when they are not all known.
   bool RemovePredictions(int64_t before_s, Claimed* claimed, int* removed);
   int RemoveMeshes(int64_t before_s, const std::set<std::string>& of_predictions);
+  int RemoveExports(int64_t before_s);
   int RemoveCases(int64_t before_s, const std::set<std::string>& of_predictions);
 
   // Constant.

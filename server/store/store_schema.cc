@@ -54,6 +54,10 @@ constexpr char kVersion4[] =
     "CREATE TABLE mesh_rights (key INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, "
     "record BLOB NOT NULL) STRICT;";
 
+constexpr char kVersion5[] =
+    "CREATE TABLE exports (key INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, "
+    "record BLOB NOT NULL) STRICT;";
+
 absl::StatusOr<int64_t> Pragma(Database& database, const char* sql) {
   Database::Query query = database.Prepare(sql);
   TF_ASSIGN_OR_RETURN(const bool row, query.Step());
@@ -70,6 +74,7 @@ absl::Status Change(Database& database, int64_t version, int64_t now_s) {
   }
   if (version < 3) TF_RETURN_IF_ERROR(database.Execute(kVersion3));
   if (version < 4) TF_RETURN_IF_ERROR(database.Execute(kVersion4));
+  if (version < 5) TF_RETURN_IF_ERROR(database.Execute(kVersion5));
   TF_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA application_id=", kApplicationId,
                                                    ";PRAGMA user_version=", kSchemaVersion)));
   TF_FAULT_POINT("schema.changed");
@@ -83,7 +88,7 @@ struct Table {
   int columns;
 };
 
-constexpr std::array<Table, 8> kTables = {{
+constexpr std::array<Table, 9> kTables = {{
     {"SELECT key, id, owner, record FROM sessions ORDER BY key",
      "SELECT key, id, owner, record FROM sessions ORDER BY key DESC",
      "INSERT OR IGNORE INTO sessions (key, id, owner, record) VALUES (?, ?, ?, ?)", 4},
@@ -118,6 +123,9 @@ constexpr std::array<Table, 8> kTables = {{
     {"SELECT key, name, record FROM mesh_rights ORDER BY key",
      "SELECT key, name, record FROM mesh_rights ORDER BY key DESC",
      "INSERT OR IGNORE INTO mesh_rights (key, name, record) VALUES (?, ?, ?)", 3},
+    {"SELECT key, name, record FROM exports ORDER BY key",
+     "SELECT key, name, record FROM exports ORDER BY key DESC",
+     "INSERT OR IGNORE INTO exports (key, name, record) VALUES (?, ?, ?)", 3},
 }};
 
 // True at the end of the table, false at a page that cannot be read.

@@ -24,10 +24,11 @@ namespace tissueform {
 //   cases           sha256, owner, record, last_used_s; the file is the blob sha256
 //   shares, follow_links, mesh_rights
 //                   name, record: who may do what (server/access_store)
+//   exports         name, record: what is to go to the PACS (server/exports)
 //
 // Version 1 had neither times nor predictions, version 2 no cases, version 3 one owner a case, and
-// nobody had a right.
-inline constexpr int64_t kSchemaVersion = 4;
+// nobody had a right; version 4 had no exports.
+inline constexpr int64_t kSchemaVersion = 5;
 
 // The version of a database of ours; 0 for an empty one. Nothing is changed.
 //

@@ -9,6 +9,7 @@
 #include "tissueform/v1/access_service.pb.h"
 #include "tissueform/v1/case_service.pb.h"
 #include "tissueform/v1/deform_service.pb.h"
+#include "tissueform/v1/export_service.pb.h"
 #include "tissueform/v1/mesh_service.pb.h"
 #include "tissueform/v1/plan_service.pb.h"
 #include "tissueform/v1/prediction_service.pb.h"
@@ -21,9 +22,10 @@ std::vector<Rpc> AllRpcs() {
   // A file each: descriptors of files that nobody names are left out by the linker.
   const google::protobuf::Descriptor* const messages[] = {
       v1::WhoAmIRequest::descriptor(),        v1::GetCaseRequest::descriptor(),
-      v1::DeformRequest::descriptor(),        v1::GetMeshRequest::descriptor(),
-      v1::FitRequest::descriptor(),           v1::GetPredictionRequest::descriptor(),
-      v1::GetServerInfoRequest::descriptor(), v1::GetSessionRequest::descriptor()};
+      v1::DeformRequest::descriptor(),        v1::GetExportRequest::descriptor(),
+      v1::GetMeshRequest::descriptor(),       v1::FitRequest::descriptor(),
+      v1::GetPredictionRequest::descriptor(), v1::GetServerInfoRequest::descriptor(),
+      v1::GetSessionRequest::descriptor()};
   std::vector<Rpc> rpcs;
   for (const google::protobuf::Descriptor* message : messages) {
     const google::protobuf::FileDescriptor& file = *message->file();
