@@ -13,6 +13,8 @@ import { type Pose, toMove } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
 import type { Picture } from "../live/drag_session";
 import { type Connection, LiveSession } from "../live/live_session";
+import { type ShownFace, suggestLandmarks } from "../measures/face_measures";
+import { LandmarkBook } from "../measures/landmark_book";
 import { Plan } from "../planning/plan";
 import { Gizmo } from "../scene/gizmo";
 import type { HeadView } from "../scene/head_view";
@@ -42,11 +44,12 @@ const SETTLE_MS = 150;
  * A case on the table: the plan, the session that answers it, the head that shows the answer, and what is laid beside it. The
  * panels show its signals and call it; it knows nothing of them.
  */
-export class Workbench {
+export class Workbench implements ShownFace {
   readonly plan: Plan;
   readonly gizmo: Gizmo;
   readonly answers: Answers;
   readonly live: LiveSession;
+  readonly landmarks: LandmarkBook;
 
   readonly selected = new Signal(0);
   readonly connection = new Signal<Connection>({ kind: "preparing", text: "Opening", share: null });
@@ -81,6 +84,7 @@ export class Workbench {
     readonly models: readonly ModelInfo[],
   ) {
     this.plan = new Plan(file);
+    this.landmarks = new LandmarkBook(file);
     this.rest = followedRest(file);
     this.displacements = new Float32Array(this.rest.length);
     this.colors = new FaceColors(view.head);
@@ -105,6 +109,7 @@ export class Workbench {
   }
 
   async start(): Promise<void> {
+    this.landmarks.suggest(suggestLandmarks(this.file, this.landmarks));
     this.view.setPoses(this.posesByHandle(this.plan.poses()));
     await Promise.all([this.live.start(this.plan.poses()), this.loadPredictions()]);
   }
@@ -174,6 +179,23 @@ export class Workbench {
     const positions = this.view.head.skins[0]?.shape.positions;
     return positions === undefined ? null : [positions[3 * vertex], positions[3 * vertex + 1], positions[3 * vertex + 2]];
   };
+
+  positionsOf(surface: number): Float32Array {
+    return this.view.head.surfaces[surface].shape.positions;
+  }
+
+  /** Of a surface's vertices, in mm; null where it is not known for what is shown. */
+  bandOf(surface: number): Float32Array | null {
+    if (this.uncertainty === null || this.comparison.value !== null) return null;
+    const { shape } = this.view.head.surfaces[surface];
+    const band = new Float32Array(shape.positions.length / 3);
+    shape.spread(this.uncertainty, band);
+    return band;
+  }
+
+  get showsPlan(): boolean {
+    return this.comparison.value === null;
+  }
 
   posesByHandle(poses: readonly Pose[]): Map<string, Pose> {
     return new Map(this.plan.handles.map((handle, index) => [handle.name, poses[index]]));
