@@ -42,6 +42,19 @@ export function cutProfile(shape: Triangles, frame: HeadFrame): ProfileLine[] {
   return join(segments);
 }
 
+/** The triangles that lie within `reachMm` of the plane: what a moving face brings into it, at a fraction of the whole. */
+export function nearMiddle(shape: Triangles, frame: HeadFrame, reachMm: number): Uint32Array {
+  const { left, originMm } = frame;
+  const { positions, triangles } = shape;
+  const kept: number[] = [];
+  for (let t = 0; t < triangles.length; t += 3) {
+    const at = 3 * triangles[t];
+    const off = [0, 1, 2].reduce((sum, k) => sum + left[k] * (positions[at + k] - originMm[k]), 0);
+    if (Math.abs(off) <= reachMm) kept.push(triangles[t], triangles[t + 1], triangles[t + 2]);
+  }
+  return Uint32Array.from(kept);
+}
+
 interface Segment {
   keys: [number, number];
   points: [ProfilePoint, ProfilePoint];

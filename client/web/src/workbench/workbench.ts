@@ -4,6 +4,7 @@
 import { sentenceOf } from "../calls/call_error";
 import type { Gateway } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
+import type { SurfaceKind } from "../case/manifest";
 import type { SolveSummary } from "../generated/tissueform/v1/deform_service_pb";
 import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
 import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
@@ -13,6 +14,7 @@ import { type Pose, toMove } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
 import type { Picture } from "../live/drag_session";
 import { type Connection, LiveSession } from "../live/live_session";
+import type { Anchor } from "../measures/anchor";
 import { type ShownFace, suggestLandmarks } from "../measures/face_measures";
 import { LandmarkBook } from "../measures/landmark_book";
 import { Plan } from "../planning/plan";
@@ -22,6 +24,7 @@ import { Answers } from "./answers";
 import { Comparer, type Comparison } from "./comparison";
 import { FaceColors, type MapLegend, followedRest, subtractInto } from "./face_colors";
 import { Signal } from "./signal";
+import { recallLandmarks, rememberLandmarks } from "./work";
 
 /** What the colours of the skin show. */
 export type MapChoice =
@@ -36,6 +39,14 @@ export interface PictureFacts {
   roundTripMs: number;
   summary: SolveSummary | null;
   isRefining: boolean;
+}
+
+/** A point of a surface that somebody is asked to click. */
+export interface Picking {
+  prompt: string;
+  kinds: readonly SurfaceKind[];
+  /** Null: nothing of these kinds was there. */
+  take(anchor: Anchor | null): void;
 }
 
 const SETTLE_MS = 150;
@@ -62,6 +73,8 @@ export class Workbench implements ShownFace {
   readonly predictions = new Signal<Prediction[]>([]);
   readonly comparison = new Signal<Comparison | null>(null);
   readonly penetrations = new Signal<Penetration[]>([]);
+  /** What the next click upon the picture is for; null: for nothing but looking and taking a segment. */
+  readonly picking = new Signal<Picking | null>(null);
   /** The face or the bone on the stage changed. */
   readonly shown = new Signal(0);
 
@@ -110,6 +123,8 @@ export class Workbench implements ShownFace {
 
   async start(): Promise<void> {
     this.landmarks.suggest(suggestLandmarks(this.file, this.landmarks));
+    this.landmarks.restore(recallLandmarks(this.caseName));
+    this.landmarks.onChange(() => rememberLandmarks(this.caseName, this.landmarks.save()));
     this.view.setPoses(this.posesByHandle(this.plan.poses()));
     await Promise.all([this.live.start(this.plan.poses()), this.loadPredictions()]);
   }
@@ -236,7 +251,7 @@ export class Workbench implements ShownFace {
   /** The hand rests: what takes longer than a picture is done now. */
   private settled(): void {
     this.penetrations.value = this.penetrationTest.find(this.posesByHandle(this.plan.poses()));
-    this.view.setMarks(this.penetrations.value.flatMap((penetration) => penetration.points));
+    this.view.setPoints("penetration", this.penetrations.value.flatMap((penetration) => penetration.points));
     if (this.map.value.kind === "model") {
       this.loadOther().then(
         () => this.redraw(),
