@@ -13,7 +13,7 @@ const LIBRARIES: Record<string, readonly string[]> = {
   three: ["scene", "exports"],
   "@connectrpc": ["calls"],
   oauth4webapi: ["login"],
-  "@bufbuild": ["calls", "case", "measures", "live"],
+  "@bufbuild": ["calls", "case", "measures", "live", "workbench"],
 };
 
 const files = ROOMS.slice(1).flatMap((room) => readdirSync(join(SOURCE, room)).map((name) => `${room}/${name}`));

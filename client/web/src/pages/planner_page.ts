@@ -16,6 +16,7 @@ import { profilePanel } from "../panels/profile_panel";
 import { segmentsPanel } from "../panels/segments_panel";
 import { noticeBox, statusBar } from "../panels/status_bar";
 import { pictureMarks, viewBar } from "../panels/view_bar";
+import { wishPanel } from "../panels/wish_panel";
 import { HeadView } from "../scene/head_view";
 import { Workbench } from "../workbench/workbench";
 import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
@@ -88,6 +89,7 @@ export function plannerPage(
     movementsPanel(bench),
     measuresPanel(bench),
     profilePanel(bench),
+    wishPanel(bench),
     modelPanel(bench),
     mapPanel(bench),
     predictionsPanel(bench),

@@ -24,6 +24,7 @@ import { Answers } from "./answers";
 import { Comparer, type Comparison } from "./comparison";
 import { FaceColors, type MapLegend, followedRest, subtractInto } from "./face_colors";
 import { Signal } from "./signal";
+import { WishFit } from "./wish_fit";
 import { recallLandmarks, rememberLandmarks } from "./work";
 
 /** What the colours of the skin show. */
@@ -61,6 +62,7 @@ export class Workbench implements ShownFace {
   readonly answers: Answers;
   readonly live: LiveSession;
   readonly landmarks: LandmarkBook;
+  readonly wishes: WishFit;
 
   readonly selected = new Signal(0);
   readonly connection = new Signal<Connection>({ kind: "preparing", text: "Opening", share: null });
@@ -103,6 +105,7 @@ export class Workbench implements ShownFace {
     this.colors = new FaceColors(view.head);
     this.answers = new Answers(gateway, file, caseName, this.rest);
     this.comparer = new Comparer(this.plan, this.answers);
+    this.wishes = new WishFit(file, this.plan, (request) => this.answers.fit({ ...request, session: this.live.session, model: this.model.value }));
     const solids = file.surfaces.filter(({ entry }) => entry.kind === "bone" || entry.kind === "segment");
     const label = (handle: string) => file.manifest.handles.find(({ name }) => name === handle)?.label;
     this.penetrationTest = new PenetrationTest(
@@ -146,10 +149,8 @@ export class Workbench implements ShownFace {
 
   /** Rejects where what is compared with could not be had; the map is off then. */
   async chooseMap(choice: MapChoice): Promise<void> {
-    const hadBand = this.map.value.kind === "band";
     this.map.value = choice;
     this.other = null;
-    if (hadBand !== (choice.kind === "band")) void this.live.choose(this.dragChoice());
     try {
       await this.loadOther();
     } catch (thrown) {
@@ -222,7 +223,7 @@ export class Workbench implements ShownFace {
   private dragChoice() {
     const info = this.modelInfo(this.model.value);
     const isPrepared = info?.hasPreparedAnswers ?? false;
-    return { model: this.model.value, isPrepared, ranges: this.map.value.kind === "band" ? this.file.materialRanges : null };
+    return { model: this.model.value, isPrepared, ranges: this.hasBand ? this.file.materialRanges : null };
   }
 
   private async loadPredictions(): Promise<void> {
