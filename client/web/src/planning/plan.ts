@@ -111,11 +111,23 @@ export class Plan {
 
   /** Poses of some handles by name, as a server or the case has them; the others are at rest. */
   setPoses(poses: ReadonlyMap<string, Pose>): void {
-    const moves = this.handles.map((handle, index) => {
+    this.set({ ...this.state, moves: this.movesOf(poses) }, true);
+  }
+
+  /** Shown and not yet kept: `setPoses` keeps them as one step, `revert` goes back to the newest step. */
+  preview(poses: ReadonlyMap<string, Pose>): void {
+    this.set({ ...this.state, moves: this.movesOf(poses) }, false);
+  }
+
+  revert(): void {
+    this.show(this.history.now, true);
+  }
+
+  private movesOf(poses: ReadonlyMap<string, Pose>): Moves {
+    return this.handles.map((handle, index) => {
       const pose = poses.get(handle.name);
       return pose === undefined ? { ...NO_MOVE } : toMove(pose, this.pivot(index), this.file.manifest.headFrame);
     });
-    this.set({ ...this.state, moves }, true);
   }
 
   /** Of one segment, or of all. */

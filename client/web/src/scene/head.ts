@@ -105,6 +105,12 @@ export class Head {
     this.depth.clippingPlanes = planes;
   }
 
+  /** A point of the skin that the cut has taken off. */
+  isCutOff({ object, point }: three.Intersection): boolean {
+    const isSkin = this.skins.some(({ mesh }) => mesh === object);
+    return isSkin && this.skin.clippingPlanes !== null && this.skin.clippingPlanes.length > 0 && this.cutPlane.distanceToPoint(point) < 0;
+  }
+
   /** Three bytes of each vertex of each of `skins`, sRGB; null: the colour of skin. */
   colorSkin(colors: Uint8Array[] | null): void {
     this.skins.forEach(({ mesh }, index) => {
