@@ -2,10 +2,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import * as three from "three";
-import type { CaseFile } from "../case/case_file";
 import type { Pose } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
-import { type Cut, Head } from "./head";
+import { type Cut, type DrawnCase, Head } from "./head";
 import { SEGMENT_COLORS } from "./materials";
 import { Stage, type StageListener } from "./stage";
 import { type ViewName, viewDirection } from "./views";
@@ -21,7 +20,7 @@ export class HeadView {
     new three.PointsMaterial({ color: MARK_COLOR, size: 6, sizeAttenuation: false, depthTest: false, transparent: true, opacity: 0.85 }),
   );
 
-  constructor(container: HTMLElement, file: CaseFile, listener: StageListener) {
+  constructor(container: HTMLElement, file: DrawnCase, listener: StageListener) {
     this.stage = new Stage(container, listener);
     this.head = new Head(file);
     this.marks.renderOrder = 4;
