@@ -4,6 +4,7 @@
 #include "client/cli/export/moving_data.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>

@@ -9,6 +9,8 @@ export interface Answer {
   /** #V by 3, mm, LPS. */
   positions: Float32Array;
   errorBoundMm: number;
+  /** The error is an estimate and no bound. */
+  isEstimate: boolean;
   /** Of each vertex the band of 95 in 100, mm; null where the answers know none. */
   uncertainty: Float32Array | null;
 }
@@ -19,8 +21,7 @@ export type Evaluation = (poses: Pose[]) => Answer | null;
 export async function openAnswers(bytes: Uint8Array<ArrayBuffer>): Promise<Evaluation> {
   const evaluator = await makeEvaluator(bytes);
   return (poses) => {
-    const answer = evaluator.evaluate(poses);
-    if (answer === null) return null;
-    return { positions: answer.positions, errorBoundMm: answer.errorBoundMm, uncertainty: answer.uncertainty ?? null };
+    const { positions, coverage, errorBoundMm, isEstimate } = evaluator.evaluate(poses);
+    return coverage === "beyond" ? null : { positions, errorBoundMm, isEstimate, uncertainty: null };
   };
 }

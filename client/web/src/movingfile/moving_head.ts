@@ -20,6 +20,7 @@ export interface Shown {
   /** How far that may be off in 95 of 100 cases; null where it is not known. */
   bandMm: number | null;
   errorBoundMm: number;
+  isEstimate: boolean;
   legend: MapLegend | null;
 }
 
@@ -105,7 +106,7 @@ export class MovingHead {
   private show(poses: Pose[], answer: Answer | null): void {
     this.answered += 1;
     if (answer === null) {
-      this.onShown({ isBeyond: true, largestMm: 0, bandMm: null, errorBoundMm: 0, legend: null });
+      this.onShown({ isBeyond: true, largestMm: 0, bandMm: null, errorBoundMm: 0, isEstimate: false, legend: null });
       return;
     }
     const { head } = this.view;
@@ -115,7 +116,7 @@ export class MovingHead {
     let legend: MapLegend | null = null;
     if (this.isColored) legend = this.colors.showLengths("Movement of the skin", this.displacements);
     else this.colors.clear();
-    this.onShown({ isBeyond: false, ...this.largest(answer), errorBoundMm: answer.errorBoundMm, legend });
+    this.onShown({ isBeyond: false, ...this.largest(answer), errorBoundMm: answer.errorBoundMm, isEstimate: answer.isEstimate, legend });
   }
 
   private largest({ uncertainty }: Answer): Pick<Shown, "largestMm" | "bandMm"> {

@@ -115,7 +115,7 @@ function numbersPanel(data: MovingData, head: MovingHead): { element: HTMLElemen
     beyond.textContent = "Beyond what this file can answer: the picture shows the last movement that it can.";
     if (shown.isBeyond) return;
     largest.textContent = `Largest movement of the skin: ${withBand(shown)}`;
-    exactness.textContent = describeError(data.model, shown.errorBoundMm);
+    exactness.textContent = describeError(shown);
   });
   return { element, show };
 }
@@ -127,9 +127,9 @@ function withBand({ largestMm, bandMm }: Shown): string {
   return `${number}, ${low} to ${formatNumber(largestMm + bandMm)} in 95 of 100 cases if only the tissue's stiffness is in doubt.`;
 }
 
-function describeError(model: string, errorMm: number): string {
-  const number = formatNumber(Math.max(errorMm, 0.01), 2);
-  return model === "neo_hookean" ? `Estimate: about ${number} mm from the full answer of the model.` : `Within ${number} mm of the full answer of the model.`;
+function describeError({ errorBoundMm, isEstimate }: Shown): string {
+  const number = formatNumber(Math.max(errorBoundMm, 0.01), 2);
+  return isEstimate ? `Estimate: about ${number} mm from the full answer of the model.` : `Within ${number} mm of the full answer of the model.`;
 }
 
 /** Shows the newest of what it is given before the browser's next picture. */
