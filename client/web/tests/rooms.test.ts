@@ -7,7 +7,7 @@ import { fileURLToPath } from "node:url";
 import { expect, test } from "vitest";
 
 /** Each room may import what stands before it. */
-const ROOMS = ["generated", "geometry", "evaluation", "calls", "login", "case", "planning", "measures", "live", "scene", "workbench", "exports", "panels", "pages"];
+const ROOMS = ["generated", "geometry", "evaluation", "calls", "login", "case", "movingdata", "planning", "measures", "live", "scene", "workbench", "exports", "panels", "movingfile", "pages"];
 const SOURCE = fileURLToPath(new URL("../src", import.meta.url));
 const LIBRARIES: Record<string, readonly string[]> = {
   three: ["scene", "exports"],

@@ -2,12 +2,11 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import * as three from "three";
-import type { CaseFile } from "../case/case_file";
 import type { SurfaceKind } from "../case/manifest";
 import type { Pose } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
 import { type Anchor, corners, nearestWeights } from "../measures/anchor";
-import { type Cut, type DrawnSurface, Head } from "./head";
+import { type Cut, type DrawnCase, type DrawnSurface, Head } from "./head";
 import { SEGMENT_COLORS } from "./materials";
 import { Stage, type StageListener } from "./stage";
 import { type ViewName, viewDirection } from "./views";
@@ -22,7 +21,7 @@ export class HeadView {
   readonly head: Head;
   private readonly points = new Map<PointKind, three.Points>();
 
-  constructor(container: HTMLElement, file: CaseFile, listener: StageListener) {
+  constructor(container: HTMLElement, file: DrawnCase, listener: StageListener) {
     this.stage = new Stage(container, listener);
     this.head = new Head(file);
     this.stage.scene.add(this.head.group);
