@@ -39,6 +39,7 @@ int main(int argc, char** argv) {
     tissueform::AddCompanionCommand(app, tissueform::kWatchCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kPredictionCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kCaseCommand, words, work);
+    tissueform::AddCompanionCommand(app, tissueform::kExportCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kShareCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kWhoamiCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kServerInfoCommand, words, work);

@@ -10,6 +10,7 @@
 #include "client/cli/access/whoami_command.h"
 #include "client/cli/cases/case_command.h"
 #include "client/cli/cases/planner_process.h"
+#include "client/cli/export/export_command.h"
 #include "client/cli/load/load_command.h"
 #include "client/cli/online/demo_command.h"
 #include "client/cli/online/drag_command.h"
@@ -32,6 +33,7 @@ int main(int argc, char** argv) {
     tissueform::AddWatchCommand(app, work);
     tissueform::AddPredictionCommand(app, work);
     tissueform::AddCaseCommand(app, work);
+    tissueform::AddExportCommand(app, work);
     tissueform::AddFollowLinkCommands(*app.get_subcommand(tissueform::kSessionCommand.name), work);
     tissueform::AddShareCommand(app, work);
     tissueform::AddWhoamiCommand(app, work);

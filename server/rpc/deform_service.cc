@@ -13,6 +13,7 @@
 #include "proto/conversion/geometry_conversion.h"
 #include "server/rpc/allowed_resource.h"
 #include "server/rpc/deform_stream.h"
+#include "server/rpc/prepared_answers_stream.h"
 #include "server/rpc/single_answer.h"
 #include "server/rpc/watch_stream.h"
 
@@ -98,6 +99,13 @@ grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* DeformService::D
   return new DeformStreamReactor(
       CallScope(context, "DeformService.Deform", CallKind::kStream, gate_), limits_, access_,
       registry_, streams_, watches_, timer_);
+}
+
+grpc::ServerWriteReactor<v1::GetPreparedAnswersResponse>* DeformService::GetPreparedAnswers(
+    grpc::CallbackServerContext* context, const v1::GetPreparedAnswersRequest* request) {
+  return StartPreparedAnswers(
+      CallScope(context, "DeformService.GetPreparedAnswers", CallKind::kNewWork, gate_), context,
+      timer_, limits_, access_, registry_, request);
 }
 
 grpc::ServerWriteReactor<grpc::ByteBuffer>* DeformService::Watch(

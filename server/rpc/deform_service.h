@@ -17,7 +17,9 @@ namespace tissueform {
 // The callback service, but Watch sends bytes: its frames are encoded once for all who watch.
 using DeformServiceBase = v1::DeformService::WithCallbackMethod_DeformOnce<
     v1::DeformService::WithCallbackMethod_Deform<v1::DeformService::WithRawCallbackMethod_Watch<
-        v1::DeformService::WithCallbackMethod_AcknowledgeWatch<v1::DeformService::Service>>>>;
+        v1::DeformService::WithCallbackMethod_AcknowledgeWatch<
+            v1::DeformService::WithCallbackMethod_GetPreparedAnswers<
+                v1::DeformService::Service>>>>>;
 
 // tissueform.v1.DeformService over the sessions of a registry. Stateless; all pointers must outlive
 // it.
@@ -39,6 +41,8 @@ class DeformService final : public DeformServiceBase {
                                        v1::DeformOnceResponse* response) override;
   grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* Deform(
       grpc::CallbackServerContext* context) override;
+  grpc::ServerWriteReactor<v1::GetPreparedAnswersResponse>* GetPreparedAnswers(
+      grpc::CallbackServerContext* context, const v1::GetPreparedAnswersRequest* request) override;
   grpc::ServerWriteReactor<grpc::ByteBuffer>* Watch(grpc::CallbackServerContext* context,
                                                     const grpc::ByteBuffer* request) override;
   grpc::ServerUnaryReactor* AcknowledgeWatch(grpc::CallbackServerContext* context,

@@ -50,7 +50,8 @@ NamedLimits ToNamedLimits(const ServiceLimits& limits) {
                max_case_bytes, max_cases, max_streams, max_watches, max_watches_per_session,
                session_idle_ttl, retention_days, configuration_deadline, upload_silence,
                max_handles, max_cell_arrays, max_name_bytes, max_request_id_bytes, max_title_bytes,
-               max_case_uploads, max_chunk_bytes, max_unacked, max_iterations] = limits;
+               max_case_uploads, max_chunk_bytes, max_prepared_answer_bytes, max_unacked,
+               max_iterations] = limits;
   return {{"max_vertices", max_vertices},
           {"max_tets", max_tets},
           {"max_mesh_bytes", max_mesh_bytes},
@@ -72,6 +73,7 @@ NamedLimits ToNamedLimits(const ServiceLimits& limits) {
           {"max_title_bytes", max_title_bytes},
           {"max_case_uploads", max_case_uploads},
           {"max_chunk_bytes", max_chunk_bytes},
+          {"max_prepared_answer_bytes", max_prepared_answer_bytes},
           {"max_unacked", max_unacked},
           {"max_iterations", max_iterations}};
 }

@@ -34,8 +34,9 @@ struct ServiceLimits {
   int max_title_bytes = 256;  // of cases and predictions
   int max_case_uploads = 16;  // being sent at the same time
   int64_t max_chunk_bytes = 1 << 20;
-  int max_unacked = 64;       // frames of a stream
-  int max_iterations = 1000;  // linear solves of one answer
+  int64_t max_prepared_answer_bytes = int64_t{64} << 20;  // that are sent to one client
+  int max_unacked = 64;                                   // frames of a stream
+  int max_iterations = 1000;                              // linear solves of one answer
 };
 
 }  // namespace tissueform

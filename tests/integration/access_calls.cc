@@ -58,6 +58,14 @@ Answer Drag(const Stubs& stubs, grpc::ClientContext* context, const std::string&
   return answer;
 }
 
+Answer ReadAnswersOf(const Stubs& stubs, grpc::ClientContext* context, const std::string& name) {
+  v1::GetPreparedAnswersRequest request;
+  request.set_session(name);
+  request.mutable_vertices()->mutable_list()->add_vertices(0);
+  request.mutable_prepared()->set_tolerance_mm(0.1);
+  return ReadAll(stubs.deform->GetPreparedAnswers(context, request));
+}
+
 // Until the first message.
 Answer WatchOnce(const Stubs& stubs, grpc::ClientContext* context, const std::string& name) {
   v1::WatchRequest request;
@@ -181,6 +189,7 @@ const std::vector<NamedCall>& NamedCalls() {
       {"PrepareSession", Kind::kSession, AccessWorld::kDrag, false, Prepare},
       {"DeformOnce", Kind::kSession, AccessWorld::kDrag, false, DeformOne},
       {"Deform", Kind::kSession, AccessWorld::kDrag, false, Drag},
+      {"GetPreparedAnswers", Kind::kSession, AccessWorld::kDrag, false, ReadAnswersOf},
       {"Watch", Kind::kSession, AccessWorld::kLook, true, WatchOnce},
       {"Fit", Kind::kSession, AccessWorld::kDrag, false, FitNothing},
       {"ListShares of a session", Kind::kSession, AccessWorld::kOwn, false, Shares},

@@ -56,11 +56,11 @@ MeshPayloadView PayloadOf(const CaseMesh& mesh) {
 
 }  // namespace
 
-absl::StatusOr<PackedCase> PackPlan(const std::string& plan_path, const PlanReadOptions& reading,
+absl::StatusOr<OpenedPlan> OpenPlan(const std::string& plan_path, const PlanReadOptions& reading,
                                     const std::string& title) {
   TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(plan_path, "plan", kMaxPlanBytes));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(plan_path, reading));
-  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
+  TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan));
   TF_ASSIGN_OR_RETURN(std::optional<ViewerFile> viewer, FindViewer(plan.mesh_path));
   CaseFile about;
   about.title = title;
@@ -68,8 +68,15 @@ absl::StatusOr<PackedCase> PackPlan(const std::string& plan_path, const PlanRead
   about.commit = SoftwareCommit();
   about.created = absl::FormatTime("%Y-%m-%dT%H:%M:%SZ", absl::Now(), absl::UTCTimeZone());
   about.plan_sha256 = Sha256Hex({text});
-  PackedCase packed;
-  TF_ASSIGN_OR_RETURN(packed.contents, CaseOfPlan(problem, std::move(about), std::move(viewer)));
+  TF_ASSIGN_OR_RETURN(CaseFile contents,
+                      CaseOfPlan(problem, std::move(about), std::move(viewer)));
+  return OpenedPlan{.problem = std::move(problem), .contents = std::move(contents)};
+}
+
+absl::StatusOr<PackedCase> PackPlan(const std::string& plan_path, const PlanReadOptions& reading,
+                                    const std::string& title) {
+  TF_ASSIGN_OR_RETURN(OpenedPlan opened, OpenPlan(plan_path, reading, title));
+  PackedCase packed = {.contents = std::move(opened.contents), .bytes = {}};
   if (packed.contents.title.empty()) packed.contents.title = TitleOf(packed.contents);
   TF_ASSIGN_OR_RETURN(packed.bytes, SerializeCase(packed.contents));
   return packed;

@@ -10,19 +10,29 @@
 #include "client/cpp/tissueform_client.h"
 #include "core/case_file/case_file.h"
 #include "core/planning/plan_io.h"
+#include "core/problem/plan_problem.h"
 
 namespace tissueform {
+
+struct OpenedPlan {
+  PlanProblem problem;
+  CaseFile contents;
+};
+
+// The plan in a file put upon its mesh, and its case, with what lies beside the mesh for viewers.
+//
+// Errors: those of ReadPlan, ResolvePlan and CaseOfPlan; FailedPrecondition (what lies beside the
+// mesh belongs to another one).
+absl::StatusOr<OpenedPlan> OpenPlan(const std::string& plan_path, const PlanReadOptions& reading,
+                                    const std::string& title);
 
 struct PackedCase {
   CaseFile contents;
   std::string bytes;  // of the file
 };
 
-// The case of the plan in a file, with what lies beside its mesh for viewers. An empty title
-// becomes the segments' names.
-//
-// Errors: those of ReadPlan, ResolvePlan, CaseOfPlan and SerializeCase; FailedPrecondition (what
-// lies beside the mesh belongs to another one).
+// The case of the plan in a file. An empty title becomes the segments' names. Errors: those of
+// OpenPlan and SerializeCase.
 absl::StatusOr<PackedCase> PackPlan(const std::string& plan_path, const PlanReadOptions& reading,
                                     const std::string& title);
 

@@ -17,13 +17,13 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 
-#include "client/cli/online/demo_pictures.h"
 #include "client/cli/online/demo_prediction.h"
 #include "client/cli/online/demo_report.h"
 #include "client/cli/online/drag.h"
 #include "client/cli/online/face_movement.h"
 #include "client/cli/online/handle_words.h"
 #include "client/cli/online/prediction_export.h"
+#include "client/cli/online/prediction_pictures.h"
 #include "client/cli/online/server_process.h"
 #include "client/cli/online/session_wait.h"
 #include "client/cli/shared/companion.h"
@@ -35,6 +35,7 @@
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
 #include "core/constraints/handle_pose.h"
+#include "core/mesh/tet_topology.h"
 #include "core/planning/plan_io.h"
 #include "core/problem/plan_problem.h"
 #include "core/process/child_process.h"
@@ -180,7 +181,8 @@ void DrawPictures(const DemoOptions& options, const PlanProblem& problem,
                   const DemoPrediction& prediction, const absl::Status& display) {
   absl::Status drawn = display;
   if (drawn.ok()) {
-    drawn = DrawBeforeAndAfter({.mesh = *problem.mesh,
+    drawn = DrawBeforeAndAfter({.skin = BoundaryFacets(*problem.mesh),
+                                .rest = problem.mesh->positions(),
                                 .deformed = prediction.deformed,
                                 .move = prediction.move,
                                 .is_face = !prediction.movement.empty()},

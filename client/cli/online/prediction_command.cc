@@ -18,6 +18,7 @@
 
 #include "client/cli/compare/comparison_report.h"
 #include "client/cli/online/prediction_export.h"
+#include "client/cli/online/prediction_pictures.h"
 #include "client/cli/online/resource_text.h"
 #include "client/cli/online/server_connection.h"
 #include "client/cli/online/session_command.h"
@@ -28,7 +29,9 @@
 #include "client/cli/shared/stats_json.h"
 #include "client/cpp/plan_session.h"
 #include "client/cpp/tissueform_client.h"
+#include "client/rendering/virtual_display.h"
 #include "core/base/atomic_file.h"
+#include "core/base/atomic_folder.h"
 #include "core/base/status_macros.h"
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
@@ -47,6 +50,7 @@ struct PredictionOptions {
   std::string other;
   std::string mesh;
   std::string out;
+  std::string pictures;  // a folder
   bool json = false;
   bool skin = false;
   std::string vertices;  // a file
@@ -214,15 +218,35 @@ absl::StatusOr<std::optional<PredictionMesh>> ReadGeometry(const PredictionOptio
   return mesh;
 }
 
+absl::Status CheckExportGoals(const PredictionOptions& options) {
+  if (options.out.empty() && options.pictures.empty()) {
+    return absl::InvalidArgumentError(
+        "name a file (--out), a folder for pictures (--png), or both");
+  }
+  if (!options.pictures.empty()) TF_RETURN_IF_ERROR(CheckFillable(options.pictures));
+  return options.out.empty() ? absl::OkStatus() : CheckWritable(options.out);
+}
+
 absl::Status Export(const PredictionOptions& options) {
-  TF_RETURN_IF_ERROR(CheckWritable(options.out));
+  TF_RETURN_IF_ERROR(CheckExportGoals(options));
+  std::unique_ptr<VirtualDisplay> display;  // before gRPC has threads
+  if (!options.pictures.empty()) {
+    TF_ASSIGN_OR_RETURN(display, VirtualDisplay::Open());
+  }
   TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   PredictionCalls& calls = client->predictions();
   TF_ASSIGN_OR_RETURN(const v1::Prediction prediction, calls.Get(options.FullPrediction()));
   TF_ASSIGN_OR_RETURN(const std::optional<PredictionMesh> mesh, ReadGeometry(options, prediction));
   TF_ASSIGN_OR_RETURN(const Positions positions, calls.ReadPositions(prediction.name()));
-  TF_RETURN_IF_ERROR(
-      ExportPrediction(options.out, prediction, mesh.has_value() ? &*mesh : nullptr, positions));
+  const PredictionMesh* named = mesh.has_value() ? &*mesh : nullptr;
+  if (!options.pictures.empty()) {
+    TF_ASSIGN_OR_RETURN(const CaseFile contents, ShownCase(named, prediction, client.get()));
+    TF_RETURN_IF_ERROR(ExportPictures(options.pictures, prediction, contents, positions));
+    absl::PrintF("%s: %s in %s\n", prediction.name(), absl::StrJoin(BeforeAndAfterPictures(), ", "),
+                 options.pictures);
+  }
+  if (options.out.empty()) return absl::OkStatus();
+  TF_RETURN_IF_ERROR(ExportPrediction(options.out, prediction, named, positions));
   absl::PrintF("%s is written to %s\n", prediction.name(), options.out);
   return absl::OkStatus();
 }
@@ -282,11 +306,14 @@ void AddPredictionCommand(CLI::App& app, CommandWork* work) {
       ->excludes(skin);
   compare->add_flag("--json", options->json, "as JSON");
 
-  CLI::App* save = add("export", "write one to a file", true, Export);
+  CLI::App* save = add("export", "write one to a file, or as pictures", true, Export);
   save->add_option("--out", options->out,
                    "OUT.vtu: the deformed mesh; OUT.stl or OUT.ply: its surface, each with its "
-                   "provenance in OUT.vtu.json and so on; OUT.json: provenance and positions")
-      ->required();
+                   "provenance in OUT.vtu.json and so on; OUT.json: provenance and positions");
+  save->add_option("--png", options->pictures,
+                   "a folder, empty or not there yet: before and after from the front, from the "
+                   "left and between, of its case, or of --plan or --mesh")
+      ->type_name("FOLDER");
   CLI::Option* plan = save->add_option("--plan", options->plan, "the plan it was made from");
   save->add_option("--mesh", options->mesh, "the mesh file it was made from")->excludes(plan);
   AddAllowOutside(save, &options->reading);
@@ -295,7 +322,8 @@ void AddPredictionCommand(CLI::App& app, CommandWork* work) {
       "Examples:\n"
       "  tissueform prediction create plan.json --server localhost:50051\n"
       "  tissueform prediction export ID --plan plan.json --out after.vtu --server "
-      "localhost:50051");
+      "localhost:50051\n"
+      "  tissueform prediction export ID --png pictures --server localhost:50051");
 }
 
 }  // namespace tissueform

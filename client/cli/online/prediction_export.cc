@@ -5,6 +5,7 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/strip.h"
 
+#include "client/cli/online/prediction_pictures.h"
 #include "client/cli/online/resource_text.h"
 #include "client/cli/shared/result_writer.h"
 #include "client/cli/shared/uncertainty_results.h"
@@ -22,10 +24,14 @@
 #include "client/cpp/plan_session.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
+#include "core/case_file/case_reader.h"
+#include "core/case_file/mesh_surfaces.h"
+#include "core/case_file/predicted_case.h"
 #include "core/mesh/tet_topology.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "core/mesh_io/triangle_mesh_io.h"
 #include "proto/conversion/answer_conversion.h"
+#include "proto/conversion/geometry_conversion.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "proto/conversion/model_conversion.h"
 #include "proto/conversion/session_conversion.h"
@@ -89,6 +95,24 @@ std::string RecipeSha256(const PlanProblem& problem) {
   recipe.fixed = whole.fixed;
   recipe.handles = whole.handles;
   return RequestFingerprint(ToProto(recipe));
+}
+
+// The surfaces of a mesh beside which nothing better lies, as a case that is only looked at.
+absl::StatusOr<CaseFile> CaseOfMesh(const PlanProblem& problem) {
+  CaseFile contents;
+  const Positions& rest = problem.mesh->positions();
+  contents.mesh.vertex_count = rest.rows();
+  contents.mesh.payload.assign(reinterpret_cast<const char*>(rest.data()),
+                               static_cast<size_t>(rest.size()) * sizeof(double));
+  std::optional<CaseSurface> skin = SkinOfMesh(*problem.mesh, problem.constraints, {});
+  if (!skin)
+    return absl::InvalidArgumentError("every vertex of the mesh is fixed: no skin to show");
+  contents.surfaces = SegmentsOfMesh(*problem.mesh, problem.constraints);
+  contents.surfaces.push_back(*std::move(skin));
+  for (const HandleRegion& handle : problem.constraints.handles()) {
+    contents.handles.push_back({.name = handle.name, .label = handle.name});
+  }
+  return contents;
 }
 
 absl::Status WriteJson(const std::string& path, const OrderedJson& json) {
@@ -214,6 +238,32 @@ absl::Status ExportPrediction(const std::string& path, const v1::Prediction& pre
   }
   json["file"] = std::filesystem::path(path).filename().string();
   return WriteJson(path + ".json", json);
+}
+
+absl::StatusOr<CaseFile> ShownCase(const PredictionMesh* mesh, const v1::Prediction& prediction,
+                                   TissueformClient* client) {
+  if (mesh != nullptr) return CaseOfMesh(mesh->problem);
+  if (prediction.case_().empty()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        prediction.name(), " names no case that could be drawn; name its plan (--plan)"));
+  }
+  TF_ASSIGN_OR_RETURN(const std::string bytes, client->cases().Read(prediction.case_()));
+  TF_ASSIGN_OR_RETURN(CaseFile contents, ParseCase(bytes));
+  if (contents.mesh.name == prediction.mesh()) return contents;
+  return absl::FailedPreconditionError(absl::StrCat(prediction.case_(), " has another mesh than ",
+                                                    prediction.name(),
+                                                    "; name the plan that made it (--plan)"));
+}
+
+absl::Status ExportPictures(const std::string& folder, const v1::Prediction& prediction,
+                            const CaseFile& contents, const Positions& positions) {
+  std::map<std::string, HandlePose> poses;
+  for (const v1::HandlePose& pose : prediction.poses()) {
+    poses[pose.handle()] = ToNamedPose(pose).pose;
+  }
+  TF_ASSIGN_OR_RETURN(const PredictedCase predicted, PredictCase(contents, positions, poses));
+  TF_ASSIGN_OR_RETURN(const BeforeAndAfter what, BeforeAndAfterOfCase(contents, predicted, poses));
+  return WriteBeforeAndAfter(what, folder);
 }
 
 }  // namespace tissueform

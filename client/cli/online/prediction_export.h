@@ -9,7 +9,9 @@
 #include "absl/status/statusor.h"
 #include "nlohmann/json.hpp"
 
+#include "client/cpp/tissueform_client.h"
 #include "core/base/types.h"
+#include "core/case_file/case_file.h"
 #include "core/planning/plan_io.h"
 #include "core/problem/plan_problem.h"
 #include "tissueform/v1/prediction.pb.h"
@@ -47,5 +49,17 @@ nlohmann::ordered_json ProvenanceJson(const v1::Prediction& prediction);
 // Errors: InvalidArgument for another ending or a missing mesh; those of the writers.
 absl::Status ExportPrediction(const std::string& path, const v1::Prediction& prediction,
                               const PredictionMesh* mesh, const Positions& positions);
+
+// What is shown of a prediction: of `mesh`, where one is named, its own surfaces; else its case,
+// which the server has.
+//
+// Errors: InvalidArgument: it names no case either, or the mesh has no skin; FailedPrecondition:
+// the case is of another mesh; those of CaseCalls::Read and ParseCase.
+absl::StatusOr<CaseFile> ShownCase(const PredictionMesh* mesh, const v1::Prediction& prediction,
+                                   TissueformClient* client);
+
+// Before and after, in `folder` (WriteBeforeAndAfter). `contents` is of the mesh of the prediction.
+absl::Status ExportPictures(const std::string& folder, const v1::Prediction& prediction,
+                            const CaseFile& contents, const Positions& positions);
 
 }  // namespace tissueform

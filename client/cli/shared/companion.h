@@ -45,6 +45,9 @@ inline constexpr CompanionCommand kPredictionCommand = {
     "tissueform-online"};
 inline constexpr CompanionCommand kCaseCommand = {"case", "cases: what the browser planner opens",
                                                   "tissueform-online"};
+inline constexpr CompanionCommand kExportCommand = {
+    "export", "make a file in which a face moves: one page that opens without a server",
+    "tissueform-online"};
 inline constexpr CompanionCommand kShareCommand = {
     "share", "let others look at one's own on a server, or drag it", "tissueform-online"};
 inline constexpr CompanionCommand kWhoamiCommand = {"whoami", "tell whom a server takes one for",

@@ -7,13 +7,13 @@ import { fileURLToPath } from "node:url";
 import { expect, test } from "vitest";
 
 /** Each room may import what stands before it. */
-const ROOMS = ["generated", "geometry", "calls", "login", "case", "planning", "live", "scene", "workbench", "exports", "panels", "pages"];
+const ROOMS = ["generated", "geometry", "evaluation", "calls", "login", "case", "movingdata", "planning", "measures", "live", "scene", "workbench", "exports", "panels", "movingfile", "pages"];
 const SOURCE = fileURLToPath(new URL("../src", import.meta.url));
 const LIBRARIES: Record<string, readonly string[]> = {
   three: ["scene", "exports"],
   "@connectrpc": ["calls"],
   oauth4webapi: ["login"],
-  "@bufbuild": ["calls", "case", "live"],
+  "@bufbuild": ["calls", "case", "measures", "live", "workbench"],
 };
 
 const files = ROOMS.slice(1).flatMap((room) => readdirSync(join(SOURCE, room)).map((name) => `${room}/${name}`));

@@ -23,7 +23,7 @@ TEST(MethodTable, CallsThatEndByThemselvesGoOverGrpcWeb) {
   EXPECT_EQ(KindOf("/grpc.health.v1.Health/Check"), MethodKind::kUnary);
   for (const char* method :
        {"MeshService/GetSurface", "CaseService/ReadCase", "PredictionService/ReadPositions",
-        "PredictionService/ComparePredictions"}) {
+        "PredictionService/ComparePredictions", "DeformService/GetPreparedAnswers"}) {
     EXPECT_EQ(KindOf(absl::StrCat("/tissueform.v1.", method)), MethodKind::kDownload) << method;
   }
 }

@@ -8,6 +8,7 @@ import { AccessService } from "../generated/tissueform/v1/access_service_pb";
 import { CaseService } from "../generated/tissueform/v1/case_service_pb";
 import { DeformService } from "../generated/tissueform/v1/deform_service_pb";
 import { MeshService } from "../generated/tissueform/v1/mesh_service_pb";
+import { PlanService } from "../generated/tissueform/v1/plan_service_pb";
 import { PredictionService } from "../generated/tissueform/v1/prediction_service_pb";
 import { ServerInfoService } from "../generated/tissueform/v1/server_info_pb";
 import { SessionService } from "../generated/tissueform/v1/session_service_pb";
@@ -27,6 +28,7 @@ export class Gateway {
   readonly cases: Client<typeof CaseService>;
   readonly meshes: Client<typeof MeshService>;
   readonly sessions: Client<typeof SessionService>;
+  readonly plans: Client<typeof PlanService>;
   readonly predictions: Client<typeof PredictionService>;
   readonly deform: Client<typeof DeformService>;
   readonly serverInfo: Client<typeof ServerInfoService>;
@@ -47,6 +49,7 @@ export class Gateway {
     this.cases = createClient(CaseService, transport);
     this.meshes = createClient(MeshService, transport);
     this.sessions = createClient(SessionService, transport);
+    this.plans = createClient(PlanService, transport);
     this.predictions = createClient(PredictionService, transport);
     this.deform = createClient(DeformService, transport);
     this.serverInfo = createClient(ServerInfoService, transport);

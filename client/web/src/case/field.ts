@@ -66,6 +66,11 @@ export class Field {
     return this.isPresent ? this.integer(least, most) : other;
   }
 
+  truth(): boolean {
+    if (typeof this.value !== "boolean") this.fail("true or false");
+    return this.value as boolean;
+  }
+
   vector(): [number, number, number] {
     const entries = this.list(3);
     if (entries.length !== 3) this.fail("three numbers");

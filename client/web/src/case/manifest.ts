@@ -129,7 +129,7 @@ function readSurface(field: Field, view: (field: Field) => number, meshes: numbe
   };
 }
 
-function readHandle(field: Field): HandleEntry {
+export function readHandle(field: Field): HandleEntry {
   const name = field.get("name").text();
   if (name === "") field.get("name").fail("a name");
   const pivotMm = field.get("pivot_mm").vector();
@@ -175,7 +175,7 @@ function readLandmark(field: Field, names: string[]): LandmarkEntry {
   };
 }
 
-function readHeadFrame(field: Field): HeadFrame {
+export function readHeadFrame(field: Field): HeadFrame {
   const frame = {
     originMm: field.get("origin_mm").vector(),
     left: field.get("left").vector(),

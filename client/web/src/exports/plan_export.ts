@@ -3,6 +3,7 @@
 
 import * as three from "three";
 import { headAxes, toMove } from "../geometry/pose";
+import { measureFace } from "../measures/face_measures";
 import { landmarkMovement } from "../planning/landmarks";
 import type { DrawnSurface } from "../scene/head";
 import type { Workbench } from "../workbench/workbench";
@@ -65,6 +66,12 @@ export function planDocument(bench: Workbench): string {
       name: landmark.name,
       ...landmarkMovement(landmark, bench.shownPoses, bench.skinPoint, manifest.headFrame),
     })),
+    measurement_landmarks: bench.landmarks.save(),
+    measures: measureFace(bench).flatMap((result) => {
+      if (result.kind !== "value") return [];
+      const { definition, before, after, band } = result;
+      return [{ name: definition.name, title: definition.title, unit: definition.unit, before, after, ...(band === null ? {} : { lowest_after: band.lowest, highest_after: band.highest }) }];
+    }),
     answer: summary == null ? null : { prepared: summary.prepared, converged: summary.converged, error_bound_mm: summary.errorBoundMm, error_estimate_mm: summary.errorEstimateMm },
     predictions: bench.predictions.value.map(({ name, title }) => ({ name, title })),
   };

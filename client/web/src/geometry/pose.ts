@@ -46,6 +46,17 @@ export function headAxes(frame: HeadFrame): Matrix {
   return [...frame.left, ...frame.posterior, ...frame.superior];
 }
 
+/** A shift by so many mm forward, to the patient's left and up, in LPS. */
+export function toLps({ forwardMm, leftMm, upMm }: Pick<SegmentMove, "forwardMm" | "leftMm" | "upMm">, frame: HeadFrame): Vector {
+  return apply(transpose(headAxes(frame)), [leftMm, -forwardMm, upMm]);
+}
+
+/** The inverse of toLps. */
+export function fromLps(shift: Vector, frame: HeadFrame): Pick<SegmentMove, "forwardMm" | "leftMm" | "upMm"> {
+  const [left, posterior, up] = apply(headAxes(frame), shift);
+  return { forwardMm: -posterior, leftMm: left, upMm: up };
+}
+
 /** R = Rz(yaw) Rx(-pitch) Ry(roll), in the head frame's axes. */
 export function rotationOf(pitchDeg: number, rollDeg: number, yawDeg: number): Matrix {
   const z = fromRotationVector([0, 0, yawDeg * RADIANS]);

@@ -8,11 +8,15 @@ import { button, el, onceAPicture } from "../panels/dom";
 import { exportPanel } from "../panels/export_panel";
 import { bindKeys, helpDialog } from "../panels/keyboard";
 import { legendBox, mapPanel, modelPanel } from "../panels/maps_panel";
+import { measuresPanel } from "../panels/measures_panel";
 import { movementsPanel } from "../panels/movements_panel";
+import { bindPicking, pickingBox } from "../panels/picking";
 import { predictionsPanel } from "../panels/predictions_panel";
+import { profilePanel } from "../panels/profile_panel";
 import { segmentsPanel } from "../panels/segments_panel";
 import { noticeBox, statusBar } from "../panels/status_bar";
 import { pictureMarks, viewBar } from "../panels/view_bar";
+import { wishPanel } from "../panels/wish_panel";
 import { HeadView } from "../scene/head_view";
 import { Workbench } from "../workbench/workbench";
 import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
@@ -79,10 +83,13 @@ export function plannerPage(
   const help = helpDialog();
   bindKeys(bench, help);
   bindPicking(bench);
-  picture.append(legendBox(bench), gizmoModes(bench, help), notice.element);
+  picture.append(legendBox(bench), gizmoModes(bench, help), pickingBox(bench), notice.element);
   const panel = el("aside", { attributes: { "aria-label": "Plan" } }, [
     segmentsPanel(bench),
     movementsPanel(bench),
+    measuresPanel(bench),
+    profilePanel(bench),
+    wishPanel(bench),
     modelPanel(bench),
     mapPanel(bench),
     predictionsPanel(bench),
@@ -103,19 +110,4 @@ function gizmoModes(bench: Workbench, help: HTMLDialogElement): HTMLElement {
   set(true);
   const keys = button("Keys", () => help.showModal());
   return el("div", { class: "gizmo-modes", attributes: { role: "group", "aria-label": "Gizmo" } }, [shift, turn, keys]);
-}
-
-const CLICK_PX = 4;
-
-/** A click on a segment, not a turn of the picture, takes it in the hand. */
-function bindPicking(bench: Workbench): void {
-  const { canvas } = bench.view.stage;
-  let from: [number, number] | null = null;
-  canvas.addEventListener("pointerdown", (event) => (from = bench.gizmo.isTouched ? null : [event.offsetX, event.offsetY]));
-  canvas.addEventListener("pointerup", (event) => {
-    if (from === null || Math.hypot(event.offsetX - from[0], event.offsetY - from[1]) > CLICK_PX) return;
-    const handle = bench.view.segmentAt(event.offsetX, event.offsetY);
-    const index = bench.plan.handles.findIndex(({ name }) => name === handle);
-    if (index >= 0) bench.selected.value = index;
-  });
 }

@@ -34,6 +34,14 @@ export function section(title: string, children: Child[], properties: Properties
   return el("section", { ...properties, attributes: { "aria-label": title, ...properties.attributes } }, [heading, ...children]);
 }
 
+/** A part of the side panel that is opened by its heading; `onOpen` is told when it is. */
+export function collapsible(title: string, children: Child[], onOpen: (isOpen: boolean) => void = () => {}): HTMLDetailsElement {
+  const summary = el("summary", {}, [el("h2", { text: title })]);
+  const details = el("details", { class: "part", attributes: { role: "group", "aria-label": title } }, [summary, el("div", {}, children)]);
+  details.addEventListener("toggle", () => onOpen(details.open));
+  return details;
+}
+
 /**
  * Calls `update` once before the browser's next picture, however often the result is called before: what is written at every step
  * of a drag would cost more than the step.

@@ -1,11 +1,15 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import type { CaseFile } from "../case/case_file";
-import type { HandleEntry } from "../case/manifest";
+import type { HandleEntry, Manifest } from "../case/manifest";
 import { History } from "./history";
 import { type MoveKey, NO_MOVE, type Pose, type SegmentMove, between, toMove, toPose } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
+
+/** What a plan needs of a case. */
+export interface PlannedCase {
+  manifest: Pick<Manifest, "handles" | "headFrame">;
+}
 
 /** A move for each handle, in the case's order. */
 export type Moves = readonly SegmentMove[];
@@ -30,7 +34,7 @@ export class Plan {
   private state: State;
   private readonly listeners: PlanListener[] = [];
 
-  constructor(private readonly file: CaseFile) {
+  constructor(private readonly file: PlannedCase) {
     this.handles = file.manifest.handles;
     this.state = { moves: this.handles.map(() => ({ ...NO_MOVE })), pivots: this.handles.map((handle) => handle.pivotMm) };
     this.history = new History(this.state);
@@ -111,11 +115,23 @@ export class Plan {
 
   /** Poses of some handles by name, as a server or the case has them; the others are at rest. */
   setPoses(poses: ReadonlyMap<string, Pose>): void {
-    const moves = this.handles.map((handle, index) => {
+    this.set({ ...this.state, moves: this.movesOf(poses) }, true);
+  }
+
+  /** Shown and not yet kept: `setPoses` keeps them as one step, `revert` goes back to the newest step. */
+  preview(poses: ReadonlyMap<string, Pose>): void {
+    this.set({ ...this.state, moves: this.movesOf(poses) }, false);
+  }
+
+  revert(): void {
+    this.show(this.history.now, true);
+  }
+
+  private movesOf(poses: ReadonlyMap<string, Pose>): Moves {
+    return this.handles.map((handle, index) => {
       const pose = poses.get(handle.name);
       return pose === undefined ? { ...NO_MOVE } : toMove(pose, this.pivot(index), this.file.manifest.headFrame);
     });
-    this.set({ ...this.state, moves }, true);
   }
 
   /** Of one segment, or of all. */
@@ -144,7 +160,7 @@ export class Plan {
 }
 
 /** "the plan's pose" of the case. */
-export function posesOfCase(file: CaseFile): Map<string, Pose> {
+export function posesOfCase(file: PlannedCase): Map<string, Pose> {
   const radians = (degrees: Vector): Vector => [(degrees[0] * Math.PI) / 180, (degrees[1] * Math.PI) / 180, (degrees[2] * Math.PI) / 180];
   return new Map(
     file.manifest.handles.map(({ name, pose }) => [

@@ -2,11 +2,18 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import * as three from "three";
-import type { CaseFile, CaseSurface } from "../case/case_file";
+import type { CaseSurface } from "../case/case_file";
+import type { Manifest } from "../case/manifest";
 import { FollowingSurface, vertexNormals } from "../geometry/following_surface";
 import { type Pose, headAxes } from "../geometry/pose";
 import { type Matrix, type Vector, apply, fromRotationVector, subtract } from "../geometry/rotation";
 import { SKIN_COLOR, boneMaterial, depthMaterial, ghostMaterial, segmentMaterial, skinMaterial, teethMaterial } from "./materials";
+
+/** What is drawn of a case. */
+export interface DrawnCase {
+  manifest: Pick<Manifest, "handles" | "headFrame">;
+  surfaces: CaseSurface[];
+}
 
 /** A surface of the case with what is drawn for it. */
 export interface DrawnSurface {
@@ -41,7 +48,7 @@ export class Head {
   private readonly middles = new Map<string, Vector>();
   private readonly cutPlane = new three.Plane();
 
-  constructor(private readonly file: CaseFile) {
+  constructor(private readonly file: DrawnCase) {
     const axes = headAxes(file.manifest.headFrame);
     this.worldAxes = [...axes.slice(0, 3), ...axes.slice(6, 9), -axes[3], -axes[4], -axes[5]];
     const bounds = boundsOf(file.surfaces);
@@ -57,7 +64,7 @@ export class Head {
     this.colorSkin(null);
   }
 
-  /** Three of each of CaseFile.followed, in mm. */
+  /** Three of each entry of the list that surfaces follow (CaseFile.followed), in mm. */
   setDisplacements(displacements: Float32Array): void {
     for (const { shape, mesh, source } of this.surfaces) {
       if (source.follows === null) continue;
@@ -103,6 +110,12 @@ export class Head {
     }
     this.skin.clippingPlanes = planes;
     this.depth.clippingPlanes = planes;
+  }
+
+  /** A point of the skin that the cut has taken off. */
+  isCutOff({ object, point }: three.Intersection): boolean {
+    const isSkin = this.skins.some(({ mesh }) => mesh === object);
+    return isSkin && this.skin.clippingPlanes !== null && this.skin.clippingPlanes.length > 0 && this.cutPlane.distanceToPoint(point) < 0;
   }
 
   /** Three bytes of each vertex of each of `skins`, sRGB; null: the colour of skin. */

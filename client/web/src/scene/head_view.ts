@@ -2,32 +2,28 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import * as three from "three";
-import type { CaseFile } from "../case/case_file";
+import type { SurfaceKind } from "../case/manifest";
 import type { Pose } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
-import { type Cut, Head } from "./head";
+import { type Anchor, corners, nearestWeights } from "../measures/anchor";
+import { type Cut, type DrawnCase, type DrawnSurface, Head } from "./head";
 import { SEGMENT_COLORS } from "./materials";
 import { Stage, type StageListener } from "./stage";
 import { type ViewName, viewDirection } from "./views";
 
-const MARK_COLOR = 0xff3b30;
+/** Points that are drawn over all else, by what they are. */
+const POINT_COLORS = { penetration: 0xff3b30, landmark: 0x18b6a4, suggestion: 0xf2c230, wish: 0xe0559b, axis: 0x3f8cff } as const;
+export type PointKind = keyof typeof POINT_COLORS;
 
 /** A head on a stage, and how it is looked at: what a planner's page and a follower's page have in common. */
 export class HeadView {
   readonly stage: Stage;
   readonly head: Head;
-  private readonly marks = new three.Points(
-    new three.BufferGeometry(),
-    new three.PointsMaterial({ color: MARK_COLOR, size: 6, sizeAttenuation: false, depthTest: false, transparent: true, opacity: 0.85 }),
-  );
+  private readonly points = new Map<PointKind, three.Points>();
 
-  constructor(container: HTMLElement, file: CaseFile, listener: StageListener) {
+  constructor(container: HTMLElement, file: DrawnCase, listener: StageListener) {
     this.stage = new Stage(container, listener);
     this.head = new Head(file);
-    this.marks.renderOrder = 4;
-    this.marks.frustumCulled = false;
-    this.marks.visible = false;
-    this.head.group.add(this.marks);
     this.stage.scene.add(this.head.group);
     this.look("threeQuarter");
   }
@@ -56,13 +52,13 @@ export class HeadView {
     this.stage.invalidate();
   }
 
-  /** Points in LPS that are to be looked at. */
-  setMarks(points: readonly Vector[]): void {
-    const geometry = new three.BufferGeometry();
-    geometry.setAttribute("position", new three.Float32BufferAttribute(points.flat(), 3));
-    this.marks.geometry.dispose();
-    this.marks.geometry = geometry;
-    this.marks.visible = points.length > 0;
+  /** Points in LPS that are to be looked at, instead of those of this kind before. */
+  setPoints(kind: PointKind, positions: readonly Vector[]): void {
+    const points = this.points.get(kind) ?? this.addPoints(kind);
+    points.geometry.dispose();
+    points.geometry = new three.BufferGeometry();
+    points.geometry.setAttribute("position", new three.Float32BufferAttribute(positions.flat(), 3));
+    points.visible = positions.length > 0;
     this.stage.invalidate();
   }
 
@@ -78,11 +74,39 @@ export class HeadView {
 
   /** The handle of the segment below a point of the canvas, in its pixels; "" for none. */
   segmentAt(x: number, y: number): string {
+    const hit = this.hitAt(x, y, ({ source }) => source.entry.handle !== "");
+    return hit === undefined ? "" : String(hit.object.userData.handle);
+  }
+
+  /** The point of a surface of these kinds that is seen at a point of the canvas, in its pixels; null for none. What lies before it is looked through. */
+  anchorAt(x: number, y: number, kinds: readonly SurfaceKind[]): Anchor | null {
+    const hit = this.hitAt(x, y, ({ source }) => kinds.includes(source.entry.kind));
+    if (hit?.faceIndex == null) return null;
+    const surface = this.head.surfaces.findIndex(({ mesh }) => mesh === hit.object);
+    const { shape, mesh, source } = this.head.surfaces[surface];
+    const at = this.head.group.worldToLocal(hit.point.clone()).applyMatrix4(mesh.matrix.clone().invert());
+    const triangle = hit.faceIndex;
+    const weights = nearestWeights(at.toArray(), corners({ positions: shape.positions, triangles: source.triangles }, triangle));
+    return { surface, triangle, weights };
+  }
+
+  private hitAt(x: number, y: number, wanted: (surface: DrawnSurface) => boolean): three.Intersection | undefined {
     const { clientWidth, clientHeight } = this.stage.canvas;
     const ray = new three.Raycaster();
     ray.setFromCamera(new three.Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.stage.camera);
-    const meshes = this.head.surfaces.filter(({ source }) => source.entry.handle !== "").map(({ mesh }) => mesh);
-    const hit = ray.intersectObjects(meshes, false)[0];
-    return hit === undefined ? "" : String(hit.object.userData.handle);
+    const meshes = this.head.surfaces.filter(wanted).map(({ mesh }) => mesh);
+    // Its bounds are those of the face before it moved.
+    meshes.forEach((mesh) => mesh.geometry.computeBoundingSphere());
+    return ray.intersectObjects(meshes, false).find((hit) => !this.head.isCutOff(hit));
+  }
+
+  private addPoints(kind: PointKind): three.Points {
+    const material = new three.PointsMaterial({ color: POINT_COLORS[kind], size: kind === "penetration" ? 6 : 8, sizeAttenuation: false, depthTest: false, transparent: true, opacity: 0.85 });
+    const points = new three.Points(new three.BufferGeometry(), material);
+    points.renderOrder = 4;
+    points.frustumCulled = false;
+    this.head.group.add(points);
+    this.points.set(kind, points);
+    return points;
   }
 }

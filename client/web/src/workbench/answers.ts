@@ -1,10 +1,12 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+import type { MessageInitShape } from "@bufbuild/protobuf";
 import { toCallError } from "../calls/call_error";
 import { type Gateway, sessionMetadata } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
 import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
+import type { FitRequestSchema, FitResponse } from "../generated/tissueform/v1/plan_service_pb";
 import type { ReadPositionsResponse } from "../generated/tissueform/v1/prediction_service_pb";
 import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
 import type { Pose } from "../geometry/pose";
@@ -44,6 +46,12 @@ export class Answers {
     const request = { session, model, poses: toMessages(this.names, poses), title: clipTitle(title), case: this.caseName, requestId: randomId() };
     const options = { headers: sessionMetadata(session), timeoutMs: ANSWER_DEADLINE_MS };
     return this.call(() => this.gateway.predictions.createPrediction(request, options));
+  }
+
+  /** Which poses give the face that is wanted; the first call for given points prepares answers for them. */
+  fit(request: MessageInitShape<typeof FitRequestSchema>): Promise<FitResponse> {
+    const options = { headers: sessionMetadata(request.session ?? ""), timeoutMs: ANSWER_DEADLINE_MS };
+    return this.call(() => this.gateway.plans.fit(request, options));
   }
 
   /** Of this case, the newest first. */

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Pose } from "../geometry/pose";
+import type { SavedLandmarks } from "../measures/landmark_book";
 import type { Workbench } from "./workbench";
 
 /** What is under the planner's hands, so that it is there again after a login: the poses of one case. */
@@ -20,6 +21,33 @@ export function restoreWork(bench: Pick<Workbench, "caseName" | "plan">, work: u
   if (caseName !== bench.caseName || !Array.isArray(poses)) return;
   const known = poses.filter((entry) => Array.isArray(entry) && isPose(entry[1]));
   if (known.length > 0) bench.plan.setPoses(new Map(known));
+}
+
+const LANDMARKS_KEY = "tissueform-landmarks";
+const MOST_CASES = 32;
+
+/** Landmarks of the cases that this browser has had open, the newest last: triangles of surfaces, nothing of a patient. */
+function allLandmarks(): [string, unknown][] {
+  try {
+    const all: unknown = JSON.parse(localStorage.getItem(LANDMARKS_KEY) ?? "[]");
+    return Array.isArray(all) ? all.filter((entry): entry is [string, unknown] => Array.isArray(entry) && typeof entry[0] === "string") : [];
+  } catch {
+    return [];
+  }
+}
+
+export function recallLandmarks(caseName: string): unknown {
+  return allLandmarks().find(([name]) => name === caseName)?.[1];
+}
+
+/** Where the browser has no room they last as long as the page. */
+export function rememberLandmarks(caseName: string, landmarks: SavedLandmarks): void {
+  const others = allLandmarks().filter(([name]) => name !== caseName);
+  try {
+    localStorage.setItem(LANDMARKS_KEY, JSON.stringify([...others, [caseName, landmarks]].slice(-MOST_CASES)));
+  } catch {
+    return;
+  }
 }
 
 function isPose(value: unknown): value is Pose {

@@ -4,6 +4,7 @@
 import { sentenceOf } from "../calls/call_error";
 import type { Gateway } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
+import type { SurfaceKind } from "../case/manifest";
 import type { SolveSummary } from "../generated/tissueform/v1/deform_service_pb";
 import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
 import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
@@ -13,6 +14,9 @@ import { type Pose, toMove } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
 import type { Picture } from "../live/drag_session";
 import { type Connection, LiveSession } from "../live/live_session";
+import type { Anchor } from "../measures/anchor";
+import { type ShownFace, suggestLandmarks } from "../measures/face_measures";
+import { LandmarkBook } from "../measures/landmark_book";
 import { Plan } from "../planning/plan";
 import { Gizmo } from "../scene/gizmo";
 import type { HeadView } from "../scene/head_view";
@@ -20,6 +24,8 @@ import { Answers } from "./answers";
 import { Comparer, type Comparison } from "./comparison";
 import { FaceColors, type MapLegend, followedRest, subtractInto } from "./face_colors";
 import { Signal } from "./signal";
+import { WishFit } from "./wish_fit";
+import { recallLandmarks, rememberLandmarks } from "./work";
 
 /** What the colours of the skin show. */
 export type MapChoice =
@@ -36,17 +42,27 @@ export interface PictureFacts {
   isRefining: boolean;
 }
 
+/** A point of a surface that somebody is asked to click. */
+export interface Picking {
+  prompt: string;
+  kinds: readonly SurfaceKind[];
+  /** Null: nothing of these kinds was there. */
+  take(anchor: Anchor | null): void;
+}
+
 const SETTLE_MS = 150;
 
 /**
  * A case on the table: the plan, the session that answers it, the head that shows the answer, and what is laid beside it. The
  * panels show its signals and call it; it knows nothing of them.
  */
-export class Workbench {
+export class Workbench implements ShownFace {
   readonly plan: Plan;
   readonly gizmo: Gizmo;
   readonly answers: Answers;
   readonly live: LiveSession;
+  readonly landmarks: LandmarkBook;
+  readonly wishes: WishFit;
 
   readonly selected = new Signal(0);
   readonly connection = new Signal<Connection>({ kind: "preparing", text: "Opening", share: null });
@@ -59,6 +75,8 @@ export class Workbench {
   readonly predictions = new Signal<Prediction[]>([]);
   readonly comparison = new Signal<Comparison | null>(null);
   readonly penetrations = new Signal<Penetration[]>([]);
+  /** What the next click upon the picture is for; null: for nothing but looking and taking a segment. */
+  readonly picking = new Signal<Picking | null>(null);
   /** The face or the bone on the stage changed. */
   readonly shown = new Signal(0);
 
@@ -81,11 +99,13 @@ export class Workbench {
     readonly models: readonly ModelInfo[],
   ) {
     this.plan = new Plan(file);
+    this.landmarks = new LandmarkBook(file);
     this.rest = followedRest(file);
     this.displacements = new Float32Array(this.rest.length);
     this.colors = new FaceColors(view.head);
     this.answers = new Answers(gateway, file, caseName, this.rest);
     this.comparer = new Comparer(this.plan, this.answers);
+    this.wishes = new WishFit(file, this.plan, (request) => this.answers.fit({ ...request, session: this.live.session, model: this.model.value }));
     const solids = file.surfaces.filter(({ entry }) => entry.kind === "bone" || entry.kind === "segment");
     const label = (handle: string) => file.manifest.handles.find(({ name }) => name === handle)?.label;
     this.penetrationTest = new PenetrationTest(
@@ -105,6 +125,9 @@ export class Workbench {
   }
 
   async start(): Promise<void> {
+    this.landmarks.suggest(suggestLandmarks(this.file, this.landmarks));
+    this.landmarks.restore(recallLandmarks(this.caseName));
+    this.landmarks.onChange(() => rememberLandmarks(this.caseName, this.landmarks.save()));
     this.view.setPoses(this.posesByHandle(this.plan.poses()));
     await Promise.all([this.live.start(this.plan.poses()), this.loadPredictions()]);
   }
@@ -126,10 +149,8 @@ export class Workbench {
 
   /** Rejects where what is compared with could not be had; the map is off then. */
   async chooseMap(choice: MapChoice): Promise<void> {
-    const hadBand = this.map.value.kind === "band";
     this.map.value = choice;
     this.other = null;
-    if (hadBand !== (choice.kind === "band")) void this.live.choose(this.dragChoice());
     try {
       await this.loadOther();
     } catch (thrown) {
@@ -175,6 +196,23 @@ export class Workbench {
     return positions === undefined ? null : [positions[3 * vertex], positions[3 * vertex + 1], positions[3 * vertex + 2]];
   };
 
+  positionsOf(surface: number): Float32Array {
+    return this.view.head.surfaces[surface].shape.positions;
+  }
+
+  /** Of a surface's vertices, in mm; null where it is not known for what is shown. */
+  bandOf(surface: number): Float32Array | null {
+    if (this.uncertainty === null || this.comparison.value !== null) return null;
+    const { shape } = this.view.head.surfaces[surface];
+    const band = new Float32Array(shape.positions.length / 3);
+    shape.spread(this.uncertainty, band);
+    return band;
+  }
+
+  get showsPlan(): boolean {
+    return this.comparison.value === null;
+  }
+
   posesByHandle(poses: readonly Pose[]): Map<string, Pose> {
     return new Map(this.plan.handles.map((handle, index) => [handle.name, poses[index]]));
   }
@@ -185,7 +223,7 @@ export class Workbench {
   private dragChoice() {
     const info = this.modelInfo(this.model.value);
     const isPrepared = info?.hasPreparedAnswers ?? false;
-    return { model: this.model.value, isPrepared, ranges: this.map.value.kind === "band" ? this.file.materialRanges : null };
+    return { model: this.model.value, isPrepared, ranges: this.hasBand ? this.file.materialRanges : null };
   }
 
   private async loadPredictions(): Promise<void> {
@@ -214,7 +252,7 @@ export class Workbench {
   /** The hand rests: what takes longer than a picture is done now. */
   private settled(): void {
     this.penetrations.value = this.penetrationTest.find(this.posesByHandle(this.plan.poses()));
-    this.view.setMarks(this.penetrations.value.flatMap((penetration) => penetration.points));
+    this.view.setPoints("penetration", this.penetrations.value.flatMap((penetration) => penetration.points));
     if (this.map.value.kind === "model") {
       this.loadOther().then(
         () => this.redraw(),

@@ -1,0 +1,79 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/export/exported_face.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+
+#include "core/answer_evaluator/answer_bytes.h"
+#include "core/base/software_version.h"
+#include "core/base/status_macros.h"
+#include "core/planning/model_names.h"
+#include "core/prepared_answers/create_response.h"
+
+namespace tissueform {
+namespace {
+
+absl::StatusOr<DeformationModel> ChosenModel(const PlanProblem& problem, const std::string& name) {
+  DeformationModel model = problem.deformer.model;
+  if (!name.empty()) {
+    TF_ASSIGN_OR_RETURN(model, ModelFromName(name));
+  }
+  if (HasPreparedAnswers(model, problem.deformer.gradient_field)) return model;
+  return absl::InvalidArgumentError(
+      absl::StrCat("the model ", ModelName(model),
+                   ", as the plan has it, has no prepared answers, by which a file moves; choose "
+                   "linear_elastic or neo_hookean with --model"));
+}
+
+absl::StatusOr<std::vector<bool>> FreeHandles(const std::vector<CaseHandle>& handles,
+                                              const std::vector<std::string>& segments) {
+  std::vector<bool> is_free(handles.size(), segments.empty());
+  for (const std::string& segment : segments) {
+    const auto found = std::find_if(handles.begin(), handles.end(),
+                                    [&](const CaseHandle& h) { return h.name == segment; });
+    if (found == handles.end()) {
+      const auto add_name = [](std::string* text, const CaseHandle& h) { *text += h.name; };
+      return absl::InvalidArgumentError(
+          absl::StrCat("--segments: the plan has no handle \"", segment, "\"; it has ",
+                       absl::StrJoin(handles, ", ", add_name)));
+    }
+    is_free[static_cast<size_t>(found - handles.begin())] = true;
+  }
+  return is_free;
+}
+
+absl::StatusOr<std::string> PrepareAnswers(const PlanProblem& problem, DeformationModel model,
+                                           const std::vector<int32_t>& vertices) {
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<MeshPreparation> preparation,
+                      MeshPreparation::Create(*problem.mesh, problem.stiffness, problem.constraints,
+                                              problem.deformer.preparation));
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<VertexResponse> response,
+                      CreateResponse(preparation, vertices, {.model = model}));
+  return WriteAnswers(response->Describe());
+}
+
+}  // namespace
+
+absl::StatusOr<MovingData> ExportFace(OpenedPlan opened, const ExportedFaceOptions& options) {
+  auto& [problem, contents] = opened;
+  TF_ASSIGN_OR_RETURN(const DeformationModel model, ChosenModel(problem, options.model));
+  MovingData data;
+  TF_ASSIGN_OR_RETURN(data.handle_is_free, FreeHandles(contents.handles, options.segments));
+  data.title = options.title;
+  data.software = absl::StrCat("tissueform ", SoftwareVersion());
+  data.model = ModelName(model);
+  data.head_frame = contents.head_frame;
+  data.handles = std::move(contents.handles);
+  data.surfaces = std::move(contents.surfaces);
+  const std::vector<int32_t> vertices = FollowedVerticesOf(&data.surfaces);
+  TF_ASSIGN_OR_RETURN(data.answers, PrepareAnswers(problem, model, vertices));
+  return data;
+}
+
+}  // namespace tissueform

@@ -1,0 +1,29 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+#include "client/cli/cases/packed_case.h"
+#include "client/cli/export/moving_data.h"
+
+namespace tissueform {
+
+struct ExportedFaceOptions {
+  std::string title = {};
+  std::string model = {};                  // by its name in plans; empty: the plan's
+  std::vector<std::string> segments = {};  // the handles with sliders; empty: all
+};
+
+// What a file shows of a plan: its surfaces, and prepared answers of the vertices that they follow,
+// made here as a server makes them. Takes what preparing that model takes.
+//
+// Errors: InvalidArgument (a model or a segment that is none; a model without prepared answers);
+// those of MeshPreparation and CreateResponse.
+absl::StatusOr<MovingData> ExportFace(OpenedPlan opened, const ExportedFaceOptions& options);
+
+}  // namespace tissueform

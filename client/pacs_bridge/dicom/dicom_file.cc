@@ -1,0 +1,132 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/dicom/dicom_file.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include "absl/strings/str_cat.h"
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dctk.h>
+
+#include "client/pacs_bridge/dicom/dicom_uid.h"
+#include "client/pacs_bridge/dicom/partial_file.h"
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+constexpr Uint32 kReadAtOnceBytes = 64 << 10;
+
+absl::Status Refused(const std::string& path, absl::string_view why) {
+  return absl::InvalidArgumentError(absl::StrCat(path, ": ", why));
+}
+
+// In both orders of bytes: an item's tag. Those that chance puts among pixels do no harm.
+int64_t CountItems(absl::string_view bytes) {
+  int64_t count = 0;
+  for (const absl::string_view mark : {"\xFE\xFF\x00\xE0", "\xFF\xFE\xE0\x00"}) {
+    const absl::string_view four(mark.data(), 4);
+    for (size_t at = bytes.find(four); at != absl::string_view::npos; at = bytes.find(four, at + 4))
+      ++count;
+  }
+  return count;
+}
+
+// Reads piece by piece: the file may be large and is not kept.
+absl::Status CheckBytes(const std::string& path, const DicomLimits& limits) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) {
+    return absl::NotFoundError(absl::StrCat(path, ": there is no such file"));
+  }
+  if (!std::filesystem::is_regular_file(status)) return Refused(path, "it is no file");
+  const auto size = static_cast<int64_t>(std::filesystem::file_size(path, error));
+  if (error || size > limits.max_file_bytes) {
+    return Refused(path, absl::StrCat("it has ", size, " bytes, more than the ",
+                                      limits.max_file_bytes, " that are read"));
+  }
+  std::ifstream file(path, std::ios::binary);
+  constexpr size_t kOverlap = 3;
+  std::string piece(kOverlap, '\0');
+  int64_t items = 0;
+  while (file) {
+    piece.erase(0, piece.size() - kOverlap);
+    const size_t kept = piece.size();
+    piece.resize(kept + (1 << 20));
+    file.read(piece.data() + kept, 1 << 20);
+    piece.resize(kept + static_cast<size_t>(file.gcount()));
+    items += CountItems(piece);
+    if (items > limits.max_items) {
+      return Refused(path, absl::StrCat("it has more than ", limits.max_items,
+                                        " items; only single images are read"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+void RemovePrivate(DcmItem* item) {
+  for (unsigned long i = item->card(); i > 0; --i) {
+    DcmElement* element = item->getElement(i - 1);
+    if (element->getGTag() % 2 == 1) delete item->remove(i - 1);
+  }
+}
+
+}  // namespace
+
+absl::Status PrepareDcmtk() {
+  static const bool found = [] {
+    OFLog::configure(OFLogger::OFF_LOG_LEVEL);
+    return bool{dcmDataDict.isDictionaryLoaded() == OFTrue};
+  }();
+  if (found) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      "DCMTK's data dictionary is not there: install libdcmtk17, or name dicom.dic in DCMDICTPATH");
+}
+
+absl::StatusOr<std::unique_ptr<DcmFileFormat>> LoadDicomHeader(const std::string& path,
+                                                               const DicomLimits& limits) {
+  TF_RETURN_IF_ERROR(PrepareDcmtk());
+  TF_RETURN_IF_ERROR(CheckBytes(path, limits));
+  auto file = std::make_unique<DcmFileFormat>();
+  const OFFilename name(path.c_str());
+  // The meta header first: what is deflated would be unpacked before any limit is seen.
+  DcmMetaInfo meta;
+  OFString syntax;
+  if (meta.loadFile(name).bad() || meta.findAndGetOFString(DCM_TransferSyntaxUID, syntax).bad()) {
+    return Refused(path, "it is no DICOM file with a meta header");
+  }
+  if (absl::string_view(syntax.c_str()) == kDeflatedLittleEndian) {
+    return Refused(path, "it is deflated, which is not read; store it uncompressed");
+  }
+  const OFCondition read = file->loadFileUntilTag(name, EXS_Unknown, EGL_noChange, kReadAtOnceBytes,
+                                                  ERM_fileOnly, DCM_PixelData);
+  if (read.bad()) return Refused(path, "it is damaged or cut off, or no DICOM file");
+  return file;
+}
+
+absl::Status SaveDicomFile(const std::string& path, DcmDataset* dataset) {
+  TF_RETURN_IF_ERROR(PrepareDcmtk());
+  TF_ASSIGN_OR_RETURN(PartialFile partial, PartialFile::Create(absl::StrCat(path, ".partial")));
+  DcmFileFormat file(dataset, OFFalse);
+  const OFCondition written = file.saveFile(partial.path().c_str(), EXS_LittleEndianExplicit,
+                                            EET_ExplicitLength, EGL_recalcGL);
+  file.getAndRemoveDataset();  // the caller's
+  if (written.bad()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        path, ": cannot be written as DICOM: ", written.text(), "; is the disk full?"));
+  }
+  return partial.Publish(path);
+}
+
+absl::Status CopyHeaderOnly(const std::string& from, const std::string& to,
+                            const DicomLimits& limits) {
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<DcmFileFormat> file, LoadDicomHeader(from, limits));
+  DcmDataset* dataset = file->getDataset();
+  RemovePrivate(dataset);
+  delete dataset->remove(DCM_IconImageSequence);  // pixels too
+  return SaveDicomFile(to, dataset);
+}
+
+}  // namespace tissueform

@@ -1,0 +1,153 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/dicom/dicom_text.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <iconv.h>
+#include <optional>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcspchrs.h>
+#include <dcmtk/dcmdata/dctk.h>
+
+namespace tissueform {
+namespace {
+
+// Beyond this a value is not even taken from the file.
+constexpr Uint32 kMostRawBytes = 1 << 20;
+// Converted, of a name of 100,000 characters, before it is cut.
+constexpr size_t kConvertedBytes = 8192;
+
+bool IsAscii(absl::string_view text) {
+  return std::all_of(text.begin(), text.end(),
+                     [](char c) { return static_cast<unsigned char>(c) < 0x80 && c != '\x1B'; });
+}
+
+std::string OnlyAscii(absl::string_view text) {
+  std::string kept(text);
+  for (char& c : kept) {
+    if (static_cast<unsigned char>(c) >= 0x80 || c == '\x1B') c = '?';
+  }
+  return kept;
+}
+
+// At the last whole character.
+void CutUtf8(size_t bytes, std::string* text) {
+  while (bytes > 0 && (static_cast<unsigned char>((*text)[bytes]) & 0xC0) == 0x80) --bytes;
+  text->resize(bytes);
+}
+
+// Control characters would end lines of a log or a list.
+std::string Tidy(std::string text) {
+  for (char& c : text) {
+    if (absl::ascii_iscntrl(static_cast<unsigned char>(c))) c = ' ';
+  }
+  return std::string(absl::StripAsciiWhitespace(text));
+}
+
+// DCMTK with the GNU C library knows no Japanese sets of ISO 2022, but the library does as a whole:
+// with half-width katakana written as escapes, DICOM's use of them is ISO-2022-JP-3, or -2 for
+// JIS X 0212.
+std::optional<std::string> JapaneseToUtf8(absl::string_view raw, bool supplementary) {
+  std::string escaped;
+  for (const char c : raw) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x80) {
+      escaped.push_back(c);
+    } else {
+      absl::StrAppend(&escaped, "\x1B(I", std::string(1, static_cast<char>(byte & 0x7F)), "\x1B(J");
+    }
+  }
+  const iconv_t converter = iconv_open("UTF-8", supplementary ? "ISO-2022-JP-2" : "ISO-2022-JP-3");
+  if (converter == reinterpret_cast<iconv_t>(-1)) return {};
+  std::string text(4 * escaped.size(), '\0');
+  char* from = escaped.data();
+  size_t from_left = escaped.size();
+  char* to = text.data();
+  size_t to_left = text.size();
+  const bool good = iconv(converter, &from, &from_left, &to, &to_left) != static_cast<size_t>(-1);
+  iconv_close(converter);
+  if (!good) return {};
+  text.resize(text.size() - to_left);
+  return text;
+}
+
+// Of any text: what is longer than 64 KiB is written without its kind, as bytes.
+std::string RawText(DcmElement* element) {
+  Uint8* bytes = nullptr;
+  if (element->ident() == EVR_UN) {
+    if (element->getUint8Array(bytes).bad() || bytes == nullptr) return {};
+    return {reinterpret_cast<const char*>(bytes), element->getLength()};
+  }
+  OFString value;
+  if (element->getOFStringArray(value, OFTrue).bad()) return {};
+  return {value.c_str(), value.size()};
+}
+
+}  // namespace
+
+struct DicomTexts::Converter {
+  DcmSpecificCharacterSet set;
+  bool selected = false;
+  std::string names = {};  // of the sets
+};
+
+DicomTexts::DicomTexts(DcmItem* dataset)
+    : dataset_(dataset), converter_(std::make_unique<Converter>()) {
+  OFString names;
+  if (dataset->findAndGetOFStringArray(DCM_SpecificCharacterSet, names).good()) {
+    converter_->names = names.c_str();
+  }
+  converter_->selected = converter_->set.selectCharacterSet(*dataset).good();
+}
+
+DicomTexts::~DicomTexts() = default;
+
+void DicomTexts::Tell(absl::string_view what) {
+  if (problem_.empty()) problem_ = std::string(what);
+}
+
+std::string DicomTexts::ToUtf8(const DcmTagKey& tag, const std::string& raw, bool is_name) {
+  if (IsAscii(raw)) return raw;
+  OFString converted;
+  if (converter_->selected &&
+      converter_->set.convertString(raw.c_str(), raw.size(), converted, is_name ? "\\^=" : "\\")
+          .good()) {
+    return converted.c_str();
+  }
+  const bool supplementary = absl::StrContains(converter_->names, "ISO 2022 IR 159");
+  if (supplementary || absl::StrContains(converter_->names, "ISO 2022 IR 87") ||
+      absl::StrContains(converter_->names, "ISO 2022 IR 13")) {
+    if (const auto japanese = JapaneseToUtf8(raw, supplementary)) return *japanese;
+  }
+  Tell(absl::StrCat("the attribute ", tag.toString().c_str(), " is not in the character set that ",
+                    "SpecificCharacterSet (0008,0005) names, or that is not known"));
+  return OnlyAscii(raw);
+}
+
+std::string DicomTexts::Get(const DcmTagKey& tag) {
+  DcmElement* element = nullptr;
+  if (dataset_->findAndGetElement(tag, element).bad() || element == nullptr) return {};
+  if (element->getLength() > kMostRawBytes) {
+    Tell(absl::StrCat("the attribute ", tag.toString().c_str(), " has more than ", kMostRawBytes,
+                      " bytes and is not read"));
+    return {};
+  }
+  std::string raw = RawText(element);
+  const bool long_before = raw.size() > kConvertedBytes;
+  if (long_before) raw.resize(kConvertedBytes);
+  std::string text = Tidy(ToUtf8(tag, raw, DcmTag(tag).getEVR() == EVR_PN));
+  if (text.size() > kMostBytes) CutUtf8(kMostBytes, &text);
+  if (long_before || text.size() + 3 >= kMostBytes) {
+    Tell(absl::StrCat("the attribute ", tag.toString().c_str(), " is longer than ", kMostBytes,
+                      " bytes and is cut"));
+  }
+  return text;
+}
+
+}  // namespace tissueform

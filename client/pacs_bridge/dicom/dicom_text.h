@@ -1,0 +1,48 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/strings/string_view.h"
+
+class DcmItem;
+class DcmTagKey;
+
+namespace tissueform {
+
+// The texts of one data set as UTF-8, whatever character set it is written in (ISO 2022 too).
+//
+// The data set outlives it. One thread.
+class DicomTexts {
+ public:
+  // No value is longer; by the standard a name has 64 characters a group.
+  static constexpr size_t kMostBytes = 1024;
+
+  explicit DicomTexts(DcmItem* dataset);
+  ~DicomTexts();
+  DicomTexts(const DicomTexts&) = delete;
+  DicomTexts& operator=(const DicomTexts&) = delete;
+
+  // The whole value (all of several, with "\\" between), without padding and control characters;
+  // empty where there is none. What cannot be converted has "?" for every byte that is not ASCII;
+  // what is longer than kMostBytes is cut at a character. Both are told by `problem`.
+  std::string Get(const DcmTagKey& tag);
+
+  // What was wrong first, in one line without a value; empty: nothing.
+  const std::string& problem() const { return problem_; }
+
+ private:
+  struct Converter;
+
+  std::string ToUtf8(const DcmTagKey& tag, const std::string& raw, bool is_name);
+  void Tell(absl::string_view what);
+
+  DcmItem* const dataset_;
+  const std::unique_ptr<Converter> converter_;
+  std::string problem_;
+};
+
+}  // namespace tissueform

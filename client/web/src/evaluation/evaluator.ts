@@ -1,0 +1,25 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { AnswersError, MOST_ANSWER_BYTES, readAnswers } from "./answer_bytes";
+import { AnswerEvaluator } from "./answer_evaluator";
+
+export interface EvaluatorOptions {
+  /** The bytes' SHA-256 as 64 hexadecimal digits; not compared where it is left out. */
+  sha256?: string;
+  mostBytes?: number;
+}
+
+/** Rejects with an AnswersError: a wrong hash, bytes that are cut off, damaged or too large. */
+export async function makeEvaluator(bytes: Uint8Array, options: EvaluatorOptions = {}): Promise<AnswerEvaluator> {
+  const { sha256, mostBytes = MOST_ANSWER_BYTES } = options;
+  if (bytes.length <= mostBytes && sha256 !== undefined && (await sha256Of(bytes)) !== sha256.toLowerCase()) {
+    throw new AnswersError("prepared answers have another SHA-256 than was told; fetch them again");
+  }
+  return new AnswerEvaluator(readAnswers(bytes, mostBytes));
+}
+
+async function sha256Of(bytes: Uint8Array): Promise<string> {
+  const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes as Uint8Array<ArrayBuffer>));
+  return Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
+}

@@ -1,0 +1,42 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { formatNumber } from "../planning/numbers";
+import type { Norm } from "./definitions";
+import type { Band, MeasureResult } from "./evaluation";
+
+// Measures in words, the same in the panel and in the report.
+
+/** "5.4 to 6.5"; "" where none is known. */
+export function bandText(band: Band | null): string {
+  return band === null ? "" : `${formatNumber(band.lowest)} to ${formatNumber(band.highest)}`;
+}
+
+/** A number that is at least 0, with how far it may be off: "6.0, 5.4 to 6.5". */
+export function lengthWithBand(value: number, bandMm: number | null): string {
+  if (bandMm === null) return formatNumber(value);
+  return `${formatNumber(value)}, ${bandText({ lowest: Math.max(0, value - bandMm), highest: value + bandMm })}`;
+}
+
+/** "102 ± 8, Legan and Burstone 1980" */
+export function normText(norm: Norm | null): string {
+  if (norm === null) return "";
+  return `norm ${formatNumber(norm.mean, 0)}${norm.deviation === null ? "" : ` ± ${formatNumber(norm.deviation, 0)}`}, ${norm.source}`;
+}
+
+export function unitText({ definition }: MeasureResult): string {
+  return definition.unit === "mm" ? "mm" : "°";
+}
+
+/** Why there is no number; "" where there is one. `label` of a landmark's name. */
+export function whyNot(result: MeasureResult, label: (name: string) => string): string {
+  if (result.kind === "missing") return `needs ${result.landmarks.map(label).join(", ")}`;
+  return result.kind === "impossible" ? result.text : "";
+}
+
+/** Before, after, difference; empty where there is none. */
+export function valueTexts(result: MeasureResult): [string, string, string] {
+  if (result.kind !== "value") return ["", "", ""];
+  const { before, after } = result;
+  return [formatNumber(before), formatNumber(after), formatNumber(after - before)];
+}

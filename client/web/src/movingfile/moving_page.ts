@@ -1,0 +1,163 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { VIRIDIS } from "../geometry/color_map";
+import type { MoveKey } from "../geometry/pose";
+import { button, el, newId, onceAPicture, section, slider } from "../panels/dom";
+import { pictureMarks, viewBar } from "../panels/view_bar";
+import { formatNumber, formatWithUnit } from "../planning/numbers";
+import { MOVE_KEYS } from "../planning/plan";
+import { cssColor, segmentColor } from "../scene/materials";
+import type { MovingData } from "../movingdata/moving_data";
+import type { Engine } from "./engine";
+import { MovingHead, type Shown } from "./moving_head";
+
+const LABELS: Record<MoveKey, string> = {
+  forwardMm: "Forward",
+  leftMm: "Left",
+  upMm: "Up",
+  pitchDeg: "Pitch",
+  rollDeg: "Roll",
+  yawDeg: "Yaw",
+};
+
+const MODELS: Record<string, string> = {
+  gradient_field: "gradient field",
+  linear_elastic: "linear elastic",
+  neo_hookean: "neo-Hookean",
+};
+
+const STEP = 0.1;
+
+/** What is seen once the data are open. */
+export async function movingPage(data: MovingData, engine: Engine): Promise<{ element: HTMLElement; head: MovingHead }> {
+  const picture = el("div", { class: "picture", attributes: { role: "region", "aria-label": "Picture of the head" } });
+  let update = () => {};
+  const head = await MovingHead.make(picture, data, engine, { onDrawn: () => update(), onContext: () => {} });
+  const marks = pictureMarks(head.view);
+  update = onceAPicture(marks.update);
+  const legend = legendBox();
+  picture.append(marks.element, legend.element);
+  head.view.stage.canvas.setAttribute("aria-label", "Head in three dimensions: drag to turn it, turn the wheel to come nearer");
+  if (!head.view.stage.hasRenderer) {
+    picture.append(el("p", { class: "no-picture", text: "This browser shows no 3D pictures (WebGL is off or missing). The numbers work all the same.", attributes: { role: "alert" } }));
+  }
+  const numbers = numbersPanel(data, head);
+  head.onShown = (shown) => {
+    numbers.show(shown);
+    legend.show(shown.legend);
+  };
+  const segments = data.handles.flatMap((handle, index) => (handle.isFree ? [segmentSection(head, index)] : []));
+  const panel = el("aside", { attributes: { "aria-label": "Movements" } }, [beforeAfter(head), ...segments, numbers.element]);
+  const title = data.title === "" ? null : el("h1", { text: data.title });
+  return { element: el("div", { class: "moving" }, [title, el("main", {}, [picture, viewBar(head.view)]), panel]), head };
+}
+
+/** From the face of today to the planned one. */
+function beforeAfter(head: MovingHead): HTMLElement {
+  const between = slider("From before to planned", { least: 0, most: 1, step: 0.01, value: 1 }, (share) => head.showShare(share));
+  const go = (share: number) => {
+    between.value = String(share);
+    head.showShare(share);
+  };
+  const colored = el("input", { attributes: { type: "checkbox" }, on: { change: () => head.setColored(colored.checked) } });
+  return section("Before and after", [
+    el("div", { class: "buttons" }, [button("Before", () => go(0)), button("Planned", () => go(1))]),
+    between,
+    el("label", { class: "check" }, [colored, "Colours show the movement of the skin"]),
+  ]);
+}
+
+function segmentSection(head: MovingHead, index: number): HTMLElement {
+  const { label } = head.data.handles[index];
+  const swatch = el("span", { class: "swatch" });
+  swatch.style.background = cssColor(segmentColor(index));
+  const part = section(label, [...MOVE_KEYS.map((key) => moveRow(head, index, key)), el("div", { class: "buttons" }, [button("Back to rest", () => head.plan.reset(index))])]);
+  part.querySelector("h2")?.prepend(swatch);
+  return part;
+}
+
+function moveRow({ plan }: MovingHead, index: number, key: MoveKey): HTMLElement {
+  const limit = plan.limit(index, key);
+  const unit = key.endsWith("Mm") ? "mm" : "°";
+  const id = newId("move");
+  const control = slider(LABELS[key], { least: -limit, most: limit, step: STEP, value: 0 }, (value) => plan.change(index, { [key]: value }, true));
+  control.id = id;
+  control.removeAttribute("aria-label");
+  const number = el("output", { attributes: { for: id } });
+  const show = () => {
+    const value = plan.moves[index][key];
+    control.value = String(value);
+    number.textContent = formatWithUnit(value, unit);
+    number.classList.toggle("warning", Math.abs(value) >= limit - 1e-9);
+    number.title = Math.abs(value) >= limit - 1e-9 ? "As far as this file goes" : "";
+    control.setAttribute("aria-valuetext", number.textContent);
+  };
+  plan.onChange(onceAPicture(show));
+  show();
+  return el("div", { class: "move" }, [el("label", { text: LABELS[key], attributes: { for: id } }), control, number]);
+}
+
+function numbersPanel(data: MovingData, head: MovingHead): { element: HTMLElement; show(shown: Shown): void } {
+  const beyond = el("p", { class: "warning", attributes: { role: "status" } });
+  const largest = el("p");
+  const exactness = el("p", { class: "quiet" });
+  const slow = head.isInWorker ? null : el("p", { class: "quiet", text: "This browser gives the file no thread of its own: it moves more slowly." });
+  const element = section("Prediction", [
+    beyond,
+    largest,
+    exactness,
+    el("p", { class: "quiet", text: `Model: ${MODELS[data.model] ?? data.model}. Made by ${data.software}.` }),
+    slow,
+  ]);
+  const show = onceAPictureWith((shown: Shown) => {
+    beyond.hidden = !shown.isBeyond;
+    beyond.textContent = "Beyond what this file can answer: the picture shows the last movement that it can.";
+    if (shown.isBeyond) return;
+    largest.textContent = `Largest movement of the skin: ${withBand(shown)}`;
+    exactness.textContent = describeError(shown);
+  });
+  return { element, show };
+}
+
+function withBand({ largestMm, bandMm }: Shown): string {
+  const number = `${formatNumber(largestMm)} mm`;
+  if (bandMm === null) return `${number}. The band of uncertainty of this model is not known.`;
+  const low = formatNumber(Math.max(0, largestMm - bandMm));
+  return `${number}, ${low} to ${formatNumber(largestMm + bandMm)} in 95 of 100 cases if only the tissue's stiffness is in doubt.`;
+}
+
+function describeError({ errorBoundMm, isEstimate }: Shown): string {
+  const number = formatNumber(Math.max(errorBoundMm, 0.01), 2);
+  return isEstimate ? `Estimate: about ${number} mm from the full answer of the model.` : `Within ${number} mm of the full answer of the model.`;
+}
+
+/** Shows the newest of what it is given before the browser's next picture. */
+function onceAPictureWith<T>(show: (value: T) => void): (value: T) => void {
+  let newest: T | null = null;
+  const update = onceAPicture(() => {
+    if (newest !== null) show(newest);
+  });
+  return (value) => {
+    newest = value;
+    update();
+  };
+}
+
+function legendBox(): { element: HTMLElement; show(legend: Shown["legend"]): void } {
+  const bar = el("div", { class: "colors", attributes: { role: "img", "aria-label": "Colours from none to most" } });
+  bar.style.background = `linear-gradient(to right, ${VIRIDIS.anchors.map((color) => `rgb(${color.join(" ")})`).join(", ")})`;
+  const title = el("strong");
+  const ticks = el("div", { class: "ticks" });
+  const element = el("div", { class: "legend", attributes: { role: "group", "aria-label": "Legend of the map" } }, [title, bar, ticks]);
+  element.hidden = true;
+  return {
+    element,
+    show(legend) {
+      element.hidden = legend === null;
+      if (legend === null) return;
+      title.textContent = `${legend.title}, mm`;
+      ticks.replaceChildren(...[0, 0.5, 1].map((share) => el("span", { text: formatNumber(share * legend.mostMm, legend.mostMm < 1 ? 2 : 1) })));
+    },
+  };
+}

@@ -1,0 +1,49 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import type { Workbench } from "../workbench/workbench";
+import { button, el } from "./dom";
+
+const CLICK_PX = 4;
+
+/**
+ * A click, not a turn of the picture, goes to who asked for a point (`Workbench.picking`); where nobody has, it takes the segment
+ * in the hand. By keys: Enter takes what is in the picture's middle, Escape leaves it.
+ */
+export function bindPicking(bench: Workbench): void {
+  const { canvas } = bench.view.stage;
+  const take = (x: number, y: number) => {
+    const picking = bench.picking.value;
+    picking?.take(bench.view.anchorAt(x, y, picking.kinds));
+  };
+  let from: [number, number] | null = null;
+  canvas.addEventListener("pointerdown", (event) => (from = bench.gizmo.isTouched ? null : [event.offsetX, event.offsetY]));
+  canvas.addEventListener("pointerup", (event) => {
+    if (from === null || Math.hypot(event.offsetX - from[0], event.offsetY - from[1]) > CLICK_PX) return;
+    if (bench.picking.value !== null) return take(event.offsetX, event.offsetY);
+    const handle = bench.view.segmentAt(event.offsetX, event.offsetY);
+    const index = bench.plan.handles.findIndex(({ name }) => name === handle);
+    if (index >= 0) bench.selected.value = index;
+  });
+  canvas.addEventListener("keydown", (event) => {
+    if (event.key === "Enter") take(canvas.clientWidth / 2, canvas.clientHeight / 2);
+  });
+  document.addEventListener("keydown", (event) => {
+    if (event.key === "Escape") bench.picking.value = null;
+  });
+}
+
+/** What is to be clicked, over the picture, with the mark of its middle. */
+export function pickingBox(bench: Workbench): HTMLElement {
+  const text = el("span");
+  const box = el("div", { class: "picking", attributes: { role: "status" } }, [
+    el("span", { class: "middle", attributes: { "aria-hidden": "true" } }),
+    el("p", {}, [text, " ", el("small", { text: "With keys: turn the picture until the point is in its middle, then Enter." }), button("Cancel", () => (bench.picking.value = null))]),
+  ]);
+  bench.picking.watch((picking) => {
+    box.hidden = picking === null;
+    text.textContent = picking?.prompt ?? "";
+    if (picking !== null) bench.view.stage.canvas.focus();
+  });
+  return box;
+}

@@ -1,0 +1,144 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/dicom/instance_header.h"
+
+#include <filesystem>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/pacs_bridge/dicom/dicom_text.h"
+#include "client/pacs_bridge/dicom/dicom_uid.h"
+#include "tests/testing/ct_series.h"
+#include "tests/testing/status_matchers.h"
+#include "tests/testing/test_authority.h"
+
+namespace tissueform {
+namespace {
+
+using testing::CtSeries;
+using testing::CtSeriesOptions;
+using testing::EmptyTestFolder;
+using ::testing::HasSubstr;
+using testing::IsOk;
+using ::testing::Not;
+using testing::StatusIs;
+using testing::WriteCtSeries;
+
+InstanceHeader HeaderOf(const std::string& name, const CtSeriesOptions& options) {
+  const CtSeries series = WriteCtSeries(EmptyTestFolder("header_" + name), options);
+  const auto header = ReadInstanceHeader(series.files.back());
+  EXPECT_THAT(header.status(), IsOk());
+  return header.value_or(InstanceHeader{});
+}
+
+TEST(InstanceHeader, SaysWhatTheSliceSays) {
+  CtSeriesOptions options;
+  options.slices = 3;
+  options.axes << 0, 0, 1, 1, 0, 0, 0, -1, 0;  // sagittal
+  const CtSeries series = WriteCtSeries(EmptyTestFolder("header_says"), options);
+  const auto header = ReadInstanceHeader(series.files[2]);
+  ASSERT_THAT(header.status(), IsOk());
+  EXPECT_EQ(header->study_uid, series.study_uid);
+  EXPECT_EQ(header->series_uid, series.series_uid);
+  EXPECT_EQ(header->instance_uid, series.instance_uids[2]);
+  EXPECT_EQ(header->frame_uid, series.frame_uid);
+  EXPECT_EQ(header->class_uid, kCtImageClass);
+  EXPECT_EQ(header->transfer_syntax_uid, kExplicitLittleEndian);
+  EXPECT_EQ(header->patient_name, "Planted^Patricia^Q");
+  EXPECT_EQ(header->birth_date, "19610203");
+  EXPECT_EQ(header->image_type, "ORIGINAL\\PRIMARY\\AXIAL");
+  EXPECT_EQ(header->convolution_kernel, "H60s");
+  EXPECT_EQ(header->instance_number, 3);
+  EXPECT_EQ(header->rows, 48);
+  EXPECT_EQ(header->columns, 64);
+  ASSERT_TRUE(header->position && header->axes && header->pixel_spacing_mm);
+  EXPECT_NEAR((*header->position - (options.origin_mm + Eigen::Vector3d(6, 0, 0))).norm(), 0, 1e-9);
+  EXPECT_NEAR((*header->axes - options.axes.leftCols<2>()).norm(), 0, 1e-9);
+  EXPECT_EQ(header->rescale_intercept, -1024);
+  EXPECT_FALSE(header->gantry_tilt_deg);
+  EXPECT_EQ(header->text_problem, "");
+}
+
+struct NamedSet {
+  std::string called;
+  std::string set;
+  std::string raw;
+  std::string utf8;
+};
+
+class CharacterSetTest : public ::testing::TestWithParam<NamedSet> {};
+
+TEST_P(CharacterSetTest, NamesComeAsUtf8) {
+  CtSeriesOptions options;
+  options.slices = 1;
+  options.character_set = GetParam().set;
+  options.patient_name = GetParam().raw;
+  const InstanceHeader header = HeaderOf(GetParam().called, options);
+  EXPECT_EQ(header.patient_name, GetParam().utf8);
+  EXPECT_EQ(header.text_problem, "");
+}
+
+// The examples of PS3.5 H.3 and I.2.
+INSTANTIATE_TEST_SUITE_P(
+    All, CharacterSetTest,
+    ::testing::Values(
+        NamedSet{"Latin1", "ISO_IR 100", "M\xFCller^J\xF6rg", "Müller^Jörg"},
+        NamedSet{"Utf8", "ISO_IR 192", "Müller^Jörg", "Müller^Jörg"},
+        NamedSet{
+            "Japanese", "\\ISO 2022 IR 87",
+            "Yamada^Tarou=\x1B$B;3ED\x1B(B^\x1B$BB@O:\x1B(B=\x1B$B$d$^$@\x1B(B^\x1B$B$?$m$&\x1B(B",
+            "Yamada^Tarou=山田^太郎=やまだ^たろう"},
+        NamedSet{"HalfWidthKatakana", "ISO 2022 IR 13\\ISO 2022 IR 87",
+                 "\xD4\xCF\xC0\xDE^\xC0\xDB\xB3=\x1B$B;3ED\x1B(J^\x1B$BB@O:\x1B(J",
+                 "ﾔﾏﾀﾞ^ﾀﾛｳ=山田^太郎"},
+        NamedSet{"Korean", "\\ISO 2022 IR 149",
+                 "Hong^Gildong=\x1B$)C\xFB\xF3^\x1B$)C\xD1\xCE\xD4\xD7=\x1B$)C\xC8\xAB^\x1B$)"
+                 "C\xB1\xE6\xB5\xBF",
+                 "Hong^Gildong=洪^吉洞=홍^길동"}),
+    [](const auto& example) { return example.param.called; });
+
+TEST(InstanceHeader, ACharacterSetThatNobodyKnowsIsToldAndNotGuessed) {
+  CtSeriesOptions options;
+  options.slices = 1;
+  options.character_set = "ISO_IR 4711";
+  options.patient_name = "M\xFCller";
+  const InstanceHeader header = HeaderOf("unknown_set", options);
+  EXPECT_EQ(header.patient_name, "M?ller");
+  EXPECT_THAT(header.text_problem, HasSubstr("(0010,0010) is not in the character set"));
+}
+
+TEST(InstanceHeader, AnAsciiNameNeedsNoCharacterSet) {
+  CtSeriesOptions options;
+  options.slices = 1;
+  options.character_set = "NO SUCH SET";
+  EXPECT_EQ(HeaderOf("ascii", options).patient_name, "Planted^Patricia^Q");
+}
+
+TEST(InstanceHeader, ANameOfAHundredThousandCharactersIsCutAndTold) {
+  CtSeriesOptions options;
+  options.slices = 1;
+  options.character_set = "ISO_IR 192";
+  for (int i = 0; i < 50'000; ++i) options.patient_name += "é";
+  const InstanceHeader header = HeaderOf("long", options);
+  EXPECT_LE(header.patient_name.size(), DicomTexts::kMostBytes);
+  EXPECT_GE(header.patient_name.size(), DicomTexts::kMostBytes - 1);
+  EXPECT_THAT(header.patient_name, ::testing::EndsWith("é"));
+  EXPECT_THAT(header.text_problem, HasSubstr("(0010,0010) is longer than 1024 bytes and is cut"));
+}
+
+TEST(InstanceHeader, AUidThatIsNoneIsRefusedWithoutRepeatingIt) {
+  CtSeriesOptions options;
+  options.slices = 1;
+  options.study_uid = "../../etc/planted";
+  const CtSeries series = WriteCtSeries(EmptyTestFolder("header_uid"), options);
+  const absl::Status status = ReadInstanceHeader(series.files[0]).status();
+  EXPECT_THAT(status,
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("(0020,000d) is no UID")));
+  EXPECT_THAT(std::string(status.message()), Not(HasSubstr("planted")));
+}
+
+}  // namespace
+}  // namespace tissueform
