@@ -71,6 +71,7 @@ TissueformClient::TissueformClient(const std::shared_ptr<grpc::Channel>& channel
       server_info_(v1::ServerInfoService::NewStub(channel)),
       predictions_(channel, options.call_deadline),
       cases_(channel, options.call_deadline),
+      exports_(channel, options.call_deadline),
       access_(channel, options.call_deadline) {}
 
 void TissueformClient::SetDeadline(grpc::ClientContext* context) const {

@@ -17,6 +17,7 @@
 #include "client/cpp/case_calls.h"
 #include "client/cpp/connection_options.h"
 #include "client/cpp/deform_stream.h"
+#include "client/cpp/export_calls.h"
 #include "client/cpp/mesh_upload.h"
 #include "client/cpp/prediction_calls.h"
 #include "client/cpp/prepare_session.h"
@@ -111,6 +112,9 @@ class TissueformClient {
   // What planners open.
   CaseCalls& cases() { return cases_; }
 
+  // What is to go to the PACS.
+  ExportCalls& exports() { return exports_; }
+
   // Who may do what.
   AccessCalls& access() { return access_; }
 
@@ -128,6 +132,7 @@ class TissueformClient {
   const std::unique_ptr<v1::ServerInfoService::Stub> server_info_;
   PredictionCalls predictions_;
   CaseCalls cases_;
+  ExportCalls exports_;
   AccessCalls access_;
 };
 

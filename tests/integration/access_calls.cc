@@ -154,6 +154,7 @@ absl::StatusOr<Authenticated> NamedCallers::Authenticate(const Credentials& cred
   Principal principal{.name = std::string(name), .projects = {"p"}};
   if (absl::ascii_isupper(static_cast<unsigned char>(name[0]))) principal.roles = {"publisher"};
   if (name == "ADMIN") principal.roles.insert("admin");
+  if (name == "BRIDGE") principal.roles.insert("bridge");
   return Authenticated{.principal = std::make_shared<const Principal>(std::move(principal))};
 }
 
@@ -173,6 +174,7 @@ Stubs::Stubs(const std::shared_ptr<grpc::Channel>& channel)
     : access(v1::AccessService::NewStub(channel)),
       cases(v1::CaseService::NewStub(channel)),
       deform(v1::DeformService::NewStub(channel)),
+      exports(v1::ExportService::NewStub(channel)),
       meshes(v1::MeshService::NewStub(channel)),
       plans(v1::PlanService::NewStub(channel)),
       predictions(v1::PredictionService::NewStub(channel)),
@@ -202,6 +204,8 @@ const std::vector<NamedCall>& NamedCalls() {
       {"ReadCase", Kind::kCase, AccessWorld::kLook, true,
        TF_READ(cases, ReadCase, v1::ReadCaseRequest)},
       {"ListShares of a case", Kind::kCase, AccessWorld::kOwn, false, Shares},
+      {"GetExport", Kind::kExport, AccessWorld::kLook, false,
+       TF_UNARY(exports, GetExport, v1::GetExportRequest, v1::Export)},
       {"GetMesh", Kind::kMesh, AccessWorld::kLook, true,
        TF_UNARY(meshes, GetMesh, v1::GetMeshRequest, v1::Mesh)},
       {"GetSurface", Kind::kMesh, AccessWorld::kLook, true,
@@ -305,6 +309,13 @@ Answer ListNames(const Stubs& stubs, const AccessWorld::Caller& caller, AccessWo
             return stubs.cases->ListCases(context, request, response);
           },
           [](const auto& response) { return response.cases(); }, names);
+    case Kind::kExport:
+      return ListPages<v1::ListExportsRequest, v1::ListExportsResponse>(
+          caller,
+          [&](ClientContext* context, const auto& request, auto* response) {
+            return stubs.exports->ListExports(context, request, response);
+          },
+          [](const auto& response) { return response.exports(); }, names);
     case Kind::kMesh:
       break;
   }

@@ -18,6 +18,7 @@
 #include "tissueform/v1/access_service.grpc.pb.h"
 #include "tissueform/v1/case_service.grpc.pb.h"
 #include "tissueform/v1/deform_service.grpc.pb.h"
+#include "tissueform/v1/export_service.grpc.pb.h"
 #include "tissueform/v1/mesh_service.grpc.pb.h"
 #include "tissueform/v1/plan_service.grpc.pb.h"
 #include "tissueform/v1/prediction_service.grpc.pb.h"
@@ -27,7 +28,7 @@
 namespace tissueform::testing {
 
 // "Bearer NAME" is NAME, in the project "p"; names in capitals are publishers, too, and "ADMIN" is
-// an admin.
+// an admin, "BRIDGE" a bridge.
 class NamedCallers final : public Authenticator {
  public:
   absl::StatusOr<Authenticated> Authenticate(const Credentials& credentials) override;
@@ -44,6 +45,7 @@ struct Stubs {
   std::unique_ptr<v1::AccessService::Stub> access;
   std::unique_ptr<v1::CaseService::Stub> cases;
   std::unique_ptr<v1::DeformService::Stub> deform;
+  std::unique_ptr<v1::ExportService::Stub> exports;
   std::unique_ptr<v1::MeshService::Stub> meshes;
   std::unique_ptr<v1::PlanService::Stub> plans;
   std::unique_ptr<v1::PredictionService::Stub> predictions;

@@ -77,12 +77,12 @@ class AccessPropertyTest : public ServiceTest {
     return *std::next(items.begin(), static_cast<std::ptrdiff_t>(Below(items.size())));
   }
 
-  // "ANN" and "BOB" publish; "vic" and "bob-2" do not.
+  // "ANN", "BOB" and "BRIDGE" publish; "vic" and "bob-2" do not.
   Caller AnyCaller() {
     if (OneIn(5) && !links_.empty()) {
       return {.name = "link", .link = OneIn(8) ? "tfl_" + std::string(43, 'x') : Any(links_)};
     }
-    return {.name = Any(std::vector<std::string>{"ANN", "ANN", "BOB", "BOB", "vic"}), .link = ""};
+    return {.name = Any(std::vector<std::string>{"ANN", "ANN", "BOB", "BOB", "vic", "BRIDGE"}), .link = ""};
   }
   Caller AnyPrincipal() {
     Caller caller = AnyCaller();
@@ -93,12 +93,14 @@ class AccessPropertyTest : public ServiceTest {
     std::string digits;
     const size_t count = kind == Kind::kSession || kind == Kind::kPrediction ? 32 : 64;
     for (size_t i = 0; i < count; ++i) digits += "0123456789abcdef"[Below(16)];
+    if (kind == Kind::kExport) return PrefixOf(kind) + digits.substr(0, 12) + "-" + digits.substr(32);
     return PrefixOf(kind) + digits;
   }
   static std::string PrefixOf(Kind kind) {
     return std::map<Kind, std::string>{{Kind::kSession, "sessions/"},
                                        {Kind::kPrediction, "predictions/"},
                                        {Kind::kCase, "cases/"},
+                                       {Kind::kExport, "exports/"},
                                        {Kind::kMesh, "meshes/"}}
         .at(kind);
   }
@@ -107,6 +109,7 @@ class AccessPropertyTest : public ServiceTest {
     std::vector<std::string> names;
     if (kind == Kind::kSession) names = session_names_;
     if (kind == Kind::kPrediction) names = prediction_names_;
+    if (kind == Kind::kExport) names = export_names_;
     if (kind == Kind::kCase) {
       for (const std::string& bytes : cases_) names.push_back(NameOfCase(bytes));
     }
@@ -184,7 +187,8 @@ class AccessPropertyTest : public ServiceTest {
 
   void ListSomething() {
     const Kind kind =
-        Any(std::vector<Kind>{Kind::kSession, Kind::kPrediction, Kind::kCase, Kind::kMesh});
+        Any(std::vector<Kind>{Kind::kSession, Kind::kPrediction, Kind::kCase, Kind::kMesh,
+                              Kind::kExport});
     const Caller caller = AnyCaller();
     std::vector<std::string> names;
     const Answer answer = ListNames(*stubs_, caller, kind, &names);
@@ -278,6 +282,7 @@ class AccessPropertyTest : public ServiceTest {
     v1::CreatePredictionRequest request;
     request.set_session(AnyName(Kind::kSession));
     request.add_poses()->set_handle("top");
+    if (!OneIn(4)) request.set_case_(AnyName(Kind::kCase));
     v1::Prediction prediction;
     const grpc::Status status =
         stubs_->predictions->CreatePrediction(ContextOf(caller).get(), request, &prediction);
@@ -287,7 +292,8 @@ class AccessPropertyTest : public ServiceTest {
           expected);
     if (!status.ok()) return;
     world_.predictions[prediction.name()] = {caller.name, request.session(),
-                                             world_.sessions.at(request.session()).mesh};
+                                             world_.sessions.at(request.session()).mesh,
+                                             request.case_()};
     Remember(&prediction_names_, prediction.name());
   }
 
@@ -320,6 +326,69 @@ class AccessPropertyTest : public ServiceTest {
           return stubs_->predictions->DeletePrediction(context, request, to);
         });
     if (code == Code::OK) world_.DeletePrediction(name);
+  }
+  void CreateExport() {
+    const Caller caller = AnyCaller();
+    v1::CreateExportRequest request;
+    request.set_prediction(AnyName(Kind::kPrediction));
+    v1::Export made;
+    const grpc::Status status =
+        stubs_->exports->CreateExport(ContextOf(caller).get(), request, &made);
+    Code expected =
+        Expected(caller, Kind::kPrediction, request.prediction(), AccessWorld::kOwn, false);
+    if (expected == Code::OK && world_.predictions.at(request.prediction()).case_name.empty()) {
+      expected = Code::FAILED_PRECONDITION;
+    }
+    Check("CreateExport", caller, request.prediction(), {status, made.SerializeAsString()},
+          expected);
+    if (!status.ok()) return;
+    world_.exports[made.name()] = request.prediction();
+    Remember(&export_names_, made.name());
+  }
+  void UpdateExport() {
+    const Caller caller = AnyCaller();
+    v1::UpdateExportRequest request;
+    request.set_name(AnyName(Kind::kExport));
+    request.set_state(OneIn(2) ? v1::EXPORT_STATE_STORED : v1::EXPORT_STATE_STORING);
+    v1::Export changed;
+    const grpc::Status status =
+        stubs_->exports->UpdateExport(ContextOf(caller).get(), request, &changed);
+    Code expected = Expected(caller, Kind::kExport, request.name(), AccessWorld::kLook, false);
+    if (caller.link.empty() && !AccessWorld::IsBridge(caller)) expected = Code::PERMISSION_DENIED;
+    Check("UpdateExport", caller, request.name(), {status, changed.SerializeAsString()}, expected,
+          {Code::INVALID_ARGUMENT});
+  }
+  // What there is at the beginning.
+  void WatchExports() {
+    const Caller caller = AnyCaller();
+    const auto context = ContextOf(caller);
+    const auto watch = stubs_->exports->WatchExports(context.get(), {});
+    Answer answer;
+    v1::WatchExportsResponse message;
+    bool began = false;
+    while (watch->Read(&message)) {
+      began = true;
+      if (!message.has_export_()) break;
+      EXPECT_NE(world_.Of(caller, Kind::kExport, message.export_().name()), AccessWorld::kNothing)
+          << message.export_().name() << " to " << caller.name;
+    }
+    if (began) context->TryCancel();
+    answer.status = watch->Finish();
+    if (began) answer.status = grpc::Status::OK;
+    Code expected = Code::OK;
+    if (!caller.link.empty()) {
+      expected = world_.IsGood(caller.link) ? Code::PERMISSION_DENIED : Code::UNAUTHENTICATED;
+    }
+    Check("WatchExports", caller, "exports/", answer, expected, {Code::RESOURCE_EXHAUSTED});
+  }
+  void DeleteExport() {
+    const Caller caller = AnyCaller();
+    const std::string name = AnyName(Kind::kExport);
+    const Code code = Delete<v1::DeleteExportRequest>(
+        "DeleteExport", caller, Kind::kExport, name, [&](auto* context, auto& request, auto* to) {
+          return stubs_->exports->DeleteExport(context, request, to);
+        });
+    if (code == Code::OK) world_.exports.erase(name);
   }
   void DeleteCase() {
     const Caller caller = AnyCaller();
@@ -469,7 +538,7 @@ class AccessPropertyTest : public ServiceTest {
   }
 
   void Act() {
-    const size_t choice = Below(100);
+    const size_t choice = Below(107);
     if (choice < 42) return LookAtSomething();
     if (choice < 50) return ListSomething();
     if (choice < 57) return UploadMesh();
@@ -486,7 +555,11 @@ class AccessPropertyTest : public ServiceTest {
     if (choice < 96) return CreateLink();
     if (choice < 97) return DeleteLinks();
     if (choice < 98) return AcknowledgeNothing();
-    AskAboutOneself();
+    if (choice < 100) return AskAboutOneself();
+    if (choice < 103) return CreateExport();
+    if (choice < 105) return UpdateExport();
+    if (choice < 106) return WatchExports();
+    DeleteExport();
   }
 
   NamedCallers callers_;
@@ -500,6 +573,7 @@ class AccessPropertyTest : public ServiceTest {
   std::vector<std::string> session_names_;
   std::vector<std::string> prediction_names_;
   std::vector<std::string> links_;
+  std::vector<std::string> export_names_;
   int calls_ = 0;
 };
 

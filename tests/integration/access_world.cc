@@ -40,6 +40,7 @@ AccessWorld::Level AccessWorld::OfPrediction(const Caller& caller, const std::st
   const Prediction& prediction = found->second;
   if (prediction.owner == caller.name) return kOwn;
   if (Shared(prediction.owner, name, "", caller.name) != kNothing) return kLook;
+  if (IsBridge(caller) && IsExported(name)) return kLook;
   const auto session = sessions.find(prediction.session);
   if (session == sessions.end() || session->second.owner != prediction.owner) return kNothing;
   return OfSession(caller, prediction.session) == kNothing ? kNothing : kLook;
@@ -62,7 +63,23 @@ AccessWorld::Level AccessWorld::OfCase(const Caller& caller, const std::string& 
       return kLook;
     }
   }
+  if (!IsBridge(caller)) return kNothing;
+  for (const auto& [id, prediction] : exports) {
+    const Prediction& of = predictions.at(prediction);
+    if (of.case_name == name && OfCase({of.owner, ""}, name) != kNothing) return kLook;
+  }
   return kNothing;
+}
+
+bool AccessWorld::IsExported(const std::string& prediction) const {
+  return std::ranges::any_of(exports, [&](const auto& of) { return of.second == prediction; });
+}
+
+AccessWorld::Level AccessWorld::OfExport(const Caller& caller, const std::string& name) const {
+  const auto found = exports.find(name);
+  if (found == exports.end() || !caller.link.empty()) return kNothing;
+  if (predictions.at(found->second).owner == caller.name) return kOwn;
+  return IsBridge(caller) ? kLook : kNothing;
 }
 
 AccessWorld::Level AccessWorld::OfMesh(const Caller& caller, const std::string& name) const {
@@ -85,6 +102,8 @@ AccessWorld::Level AccessWorld::Of(const Caller& caller, Kind kind, const std::s
       return OfPrediction(caller, name);
     case Kind::kCase:
       return OfCase(caller, name);
+    case Kind::kExport:
+      return OfExport(caller, name);
     case Kind::kMesh:
       break;
   }
@@ -101,6 +120,9 @@ std::set<std::string> AccessWorld::Listed(const Caller& caller, Kind kind) const
   }
   for (const auto& [key, project] : cases) {
     if (kind == Kind::kCase && OfCase(caller, key.first) != kNothing) names.insert(key.first);
+  }
+  for (const auto& [name, prediction] : exports) {
+    if (kind == Kind::kExport && OfExport(caller, name) != kNothing) names.insert(name);
   }
   for (const std::string& name : meshes) {
     if (kind == Kind::kMesh && OfMesh(caller, name) != kNothing) names.insert(name);
@@ -122,6 +144,7 @@ void AccessWorld::DeleteSession(const std::string& name) {
 
 void AccessWorld::DeletePrediction(const std::string& name) {
   DropShares(predictions.at(name).owner, name);
+  std::erase_if(exports, [&](const auto& of) { return of.second == name; });
   predictions.erase(name);
 }
 

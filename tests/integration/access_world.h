@@ -15,7 +15,7 @@ namespace tissueform::testing {
 // with. It shares no code with the server.
 struct AccessWorld {
   enum Level { kNothing, kLook, kDrag, kOwn };
-  enum class Kind { kSession, kPrediction, kCase, kMesh };
+  enum class Kind { kSession, kPrediction, kCase, kMesh, kExport };
 
   struct Session {
     std::string owner;
@@ -26,6 +26,7 @@ struct AccessWorld {
     std::string owner;
     std::string session;
     std::string mesh;
+    std::string case_name = {};  // may be empty, and anybody's
   };
   struct Link {
     std::string session;
@@ -49,6 +50,9 @@ struct AccessWorld {
   std::map<std::tuple<std::string, std::string, std::string>, Level>
       shares;                         // owner, resource, principal
   std::map<std::string, Link> links;  // by token
+  std::map<std::string, std::string> exports;  // of which prediction
+
+  static bool IsBridge(const Caller& caller) { return caller.link.empty() && caller.name == "BRIDGE"; }
 
   bool IsGood(const std::string& link) const;
   Level Of(const Caller& caller, Kind kind, const std::string& name) const;
@@ -68,6 +72,8 @@ struct AccessWorld {
   Level OfSession(const Caller& caller, const std::string& name) const;
   Level OfPrediction(const Caller& caller, const std::string& name) const;
   Level OfCase(const Caller& caller, const std::string& name) const;
+  Level OfExport(const Caller& caller, const std::string& name) const;
+  bool IsExported(const std::string& prediction) const;
   Level OfMesh(const Caller& caller, const std::string& name) const;
   void DropShares(const std::string& owner, const std::string& resource);
 };

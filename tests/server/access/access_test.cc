@@ -38,6 +38,7 @@ class AccessTest : public ::testing::Test {
     prediction.owner = ann_.name;
     prediction.session = "s";
     prediction.mesh_sha256 = kMesh;
+    prediction.case_sha256 = kCase;
     changes_.Added(prediction);
     changes_.Added(CaseRecord{.sha256 = kCase, .owner = ann_.name, .project = "p"});
   }
@@ -58,6 +59,62 @@ class AccessTest : public ::testing::Test {
   Access access_{[this] { return now_s_; }};
   AccessChanges changes_{{}, &store_, &access_};
 };
+
+TEST_F(AccessTest, ABridgeLooksAtWhatAnExportHoldsAndAtNothingElse) {
+  const Principal bridge{.name = "bridge", .roles = {"bridge"}};
+  const auto looks = [&](const Principal& caller) {
+    return access_.MayPrediction(caller, "q", Need::kLook).ok() &&
+           access_.MayCase(caller, kCase, Need::kLook).ok() &&
+           access_.MayMesh(caller, kMesh, Need::kLook).ok();
+  };
+  EXPECT_THAT(access_.MayPrediction(bridge, "q", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.MayCase(bridge, kCase, Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.MayMesh(bridge, kMesh, Need::kLook), StatusIs(Code::kNotFound));
+  changes_.SetExported("q", true);
+  EXPECT_TRUE(looks(bridge));
+  EXPECT_FALSE(looks(bob_));
+  EXPECT_THAT(access_.MayPrediction(bridge, "q", Need::kOwn), StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(access_.MaySession(bridge, "s", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.SharedPredictions(bridge), ElementsAre("q"));
+  ASSERT_EQ(access_.SharedCases(bridge).size(), 1U);
+  changes_.SetExported("q", false);
+  EXPECT_FALSE(looks(bridge));
+  EXPECT_THAT(access_.SharedPredictions(bridge), IsEmpty());
+  changes_.SetExported("q", true);
+  changes_.PredictionRemoved("q");
+  EXPECT_THAT(access_.MayCase(bridge, kCase, Need::kLook), StatusIs(Code::kNotFound));
+}
+
+// Whose prediction it is must be let look at the case.
+TEST_F(AccessTest, WhoNamesAnothersCaseDoesNotOpenItToABridge) {
+  const Principal bridge{.name = "bridge", .roles = {"bridge"}};
+  PredictionRecord foreign;
+  foreign.id = "b";
+  foreign.owner = bob_.name;
+  foreign.case_sha256 = kCase;
+  changes_.Added(foreign);
+  changes_.SetExported("b", true);
+  EXPECT_THAT(access_.MayPrediction(bridge, "b", Need::kLook), IsOk());
+  EXPECT_THAT(access_.MayCase(bridge, kCase, Need::kLook), StatusIs(Code::kNotFound));
+  ASSERT_THAT(Share("cases/" + kCase, "bob"), IsOk());
+  EXPECT_THAT(access_.MayCase(bridge, kCase, Need::kLook), IsOk());
+}
+
+TEST_F(AccessTest, ExportsAreAnsweredByBridgesAlone) {
+  const Principal bridge{.name = "bridge", .roles = {"bridge"}};
+  EXPECT_THAT(Access::MayCall(bridge, "ExportService.UpdateExport"), IsOk());
+  EXPECT_THAT(Access::MayCall(nobody_, "ExportService.UpdateExport"), IsOk());
+  EXPECT_THAT(Access::MayCall(ann_, "ExportService.UpdateExport"),
+              StatusIs(Code::kPermissionDenied));
+  EXPECT_EQ(Access::ExportsSeenBy(bridge), std::nullopt);
+  EXPECT_EQ(Access::ExportsSeenBy(ann_), "ann");
+  const absl::Status none = absl::NotFoundError("none");
+  EXPECT_THAT(Access::MayExport(ann_, "ann", none, Need::kOwn), IsOk());
+  EXPECT_THAT(Access::MayExport(bridge, "ann", none, Need::kLook), IsOk());
+  EXPECT_THAT(Access::MayExport(bridge, "ann", none, Need::kOwn),
+              StatusIs(Code::kPermissionDenied));
+  EXPECT_EQ(Access::MayExport(bob_, "ann", none, Need::kLook), none);
+}
 
 TEST_F(AccessTest, OnesOwnIsOnesOwn) {
   EXPECT_THAT(access_.MaySession(ann_, "s", Need::kOwn), IsOk());

@@ -1,6 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include "server/store/commit_thread.h"
 #include "server/store/durable_store.h"
 
 #include <atomic>
@@ -351,7 +352,7 @@ TEST_F(DurableStoreTest, AStoreOfANewerServerOrAnotherProgramIsRefused) {
   Fill(1);
   Sql("PRAGMA user_version=99");
   EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("newer server")));
-  Sql("PRAGMA user_version=4; PRAGMA application_id=7");
+  Sql("PRAGMA user_version=5; PRAGMA application_id=7");
   EXPECT_THAT(Open(),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("not one of tissueform")));
   Sql("PRAGMA application_id=" + absl::StrCat(0x54697346));
@@ -430,6 +431,28 @@ TEST_F(DurableStoreTest, AFolderFromBeforeThereWereRightsKeepsAllAndTakesACaseOf
   ASSERT_THAT(Open(), IsOk());
   EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
   EXPECT_THAT(store_->cases().Find(others.key()), IsOk());
+}
+
+TEST_F(DurableStoreTest, AFolderFromBeforeThereWereExportsKeepsAllAndTakesExports) {
+  constexpr int kStepsOfVersion4 = 17;
+  std::filesystem::copy(testing::SourcePath("tests/data/store/version4"), path_,
+                        std::filesystem::copy_options::recursive);
+  std::filesystem::permissions(path_, std::filesystem::perms::owner_all);
+  StoreModel model;
+  for (int number = 0; number < kStepsOfVersion4; ++number) {
+    ApplyStep(number, /*bursts=*/true, &model);
+  }
+  model.uploads.clear();  // not copied
+  ASSERT_FALSE(model.predictions.empty());
+  ASSERT_THAT(Open(), IsOk());
+  EXPECT_THAT(store_->damaged(), IsEmpty());
+  EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
+  ASSERT_THAT(store_->commit_thread()->Run({.work = [](Database& database) {
+    return database.Execute("INSERT INTO exports (name, record) VALUES ('a', x'00')");
+  }}),
+              IsOk());
+  ASSERT_THAT(Open(), IsOk());
+  EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
 }
 
 TEST_F(DurableStoreTest, ASecondServerIsRefused) {
