@@ -13,6 +13,7 @@ import { type Pose, toMove } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
 import type { Picture } from "../live/drag_session";
 import { type Connection, LiveSession } from "../live/live_session";
+import { LocalAnswers, type LocalState } from "../live/local_answers";
 import { Plan } from "../planning/plan";
 import { Gizmo } from "../scene/gizmo";
 import type { HeadView } from "../scene/head_view";
@@ -47,12 +48,14 @@ export class Workbench {
   readonly gizmo: Gizmo;
   readonly answers: Answers;
   readonly live: LiveSession;
+  readonly local: LocalAnswers;
 
   readonly selected = new Signal(0);
   readonly connection = new Signal<Connection>({ kind: "preparing", text: "Opening", share: null });
   readonly followers = new Signal(0);
   readonly notice = new Signal("");
   readonly picture = new Signal<PictureFacts | null>(null);
+  readonly localState = new Signal<LocalState>({ kind: "none" });
   readonly model = new Signal<DeformationModel>(0);
   readonly map = new Signal<MapChoice>({ kind: "none" });
   readonly legend = new Signal<MapLegend | null>(null);
@@ -93,12 +96,18 @@ export class Workbench {
     );
     this.gizmo = new Gizmo(view.stage, view.head, (pose, isFinal) => this.pull(pose, isFinal));
     this.model.value = models.find((model) => model.name === file.manifest.model)?.model ?? file.sessionRequest.model;
+    this.local = new LocalAnswers(gateway, {
+      onState: (state) => (this.localState.value = state),
+      onEvaluation: ({ positions }) => this.showLocal(positions),
+    });
     this.live = new LiveSession(gateway, file, caseName, {
       onConnection: (connection) => (this.connection.value = connection),
       onPicture: (picture, used) => this.show(picture, used),
       onCommittedPoses: (poses) => this.plan.setPoses(poses),
       onFollowers: (count) => (this.followers.value = count),
       onNotice: (text) => (this.notice.value = text),
+      onStarted: (configuration) => void this.local.follow(configuration),
+      onUpdated: () => this.local.renew(),
     }, this.dragChoice());
     this.plan.onChange((_, { isFinal }) => this.planChanged(isFinal));
     this.selected.watch(() => this.placeGizmo());
@@ -120,6 +129,7 @@ export class Workbench {
 
   async chooseModel(model: DeformationModel): Promise<void> {
     this.model.value = model;
+    this.local.drop();
     if (this.map.value.kind === "band" && !this.hasBand) this.map.value = { kind: "none" };
     await this.live.choose(this.dragChoice());
   }
@@ -206,6 +216,7 @@ export class Workbench {
     this.live.sendPoses(poses, isFinal);
     this.waitingFrom ??= performance.now();
     if (this.comparison.value === null) this.setPoses(poses);
+    this.local.ask(poses);
     if (!this.gizmo.isDragging) this.placeGizmo();
     clearTimeout(this.settling);
     this.settling = setTimeout(() => this.settled(), SETTLE_MS);
@@ -230,12 +241,24 @@ export class Workbench {
 
   private show(picture: Picture, used: () => void): void {
     if (picture.positions.length !== this.rest.length) throw new Error("a picture came that has other vertices than the case");
-    subtractInto(picture.positions, this.rest, this.displacements);
     this.waitingFrom = null;
-    if (picture.frame.refinement === 0) this.uncertainty = picture.uncertainty;
     this.picture.value = { roundTripMs: picture.roundTripMs, summary: picture.frame.summary ?? null, isRefining: picture.frame.refining };
+    // The face never goes back to poses that the hand has left, once the page itself has shown newer ones.
+    if (picture.posesBehind > this.local.posesSinceTold) {
+      used();
+      return;
+    }
+    subtractInto(picture.positions, this.rest, this.displacements);
+    if (picture.frame.refinement === 0) this.uncertainty = picture.uncertainty;
     if (this.comparison.value !== null) used();
     else this.lay(this.displacements, used);
+  }
+
+  /** The page's own answer, in the picture that shows the bone there. */
+  private showLocal(positions: Float32Array): void {
+    if (positions.length !== this.rest.length) return this.local.drop();
+    subtractInto(positions, this.rest, this.displacements);
+    if (this.comparison.value === null) this.lay(this.displacements);
   }
 
   private lay(displacements: Float32Array, used?: () => void): void {
