@@ -14,6 +14,7 @@ import { type Pose, toMove } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
 import type { Picture } from "../live/drag_session";
 import { type Connection, LiveSession } from "../live/live_session";
+import { LocalAnswers, type LocalState } from "../live/local_answers";
 import type { Anchor } from "../measures/anchor";
 import { type ShownFace, suggestLandmarks } from "../measures/face_measures";
 import { LandmarkBook } from "../measures/landmark_book";
@@ -63,12 +64,14 @@ export class Workbench implements ShownFace {
   readonly live: LiveSession;
   readonly landmarks: LandmarkBook;
   readonly wishes: WishFit;
+  readonly local: LocalAnswers;
 
   readonly selected = new Signal(0);
   readonly connection = new Signal<Connection>({ kind: "preparing", text: "Opening", share: null });
   readonly followers = new Signal(0);
   readonly notice = new Signal("");
   readonly picture = new Signal<PictureFacts | null>(null);
+  readonly localState = new Signal<LocalState>({ kind: "none" });
   readonly model = new Signal<DeformationModel>(0);
   readonly map = new Signal<MapChoice>({ kind: "none" });
   readonly legend = new Signal<MapLegend | null>(null);
@@ -113,12 +116,18 @@ export class Workbench implements ShownFace {
     );
     this.gizmo = new Gizmo(view.stage, view.head, (pose, isFinal) => this.pull(pose, isFinal));
     this.model.value = models.find((model) => model.name === file.manifest.model)?.model ?? file.sessionRequest.model;
+    this.local = new LocalAnswers(gateway, {
+      onState: (state) => (this.localState.value = state),
+      onEvaluation: ({ positions }) => this.showLocal(positions),
+    });
     this.live = new LiveSession(gateway, file, caseName, {
       onConnection: (connection) => (this.connection.value = connection),
       onPicture: (picture, used) => this.show(picture, used),
       onCommittedPoses: (poses) => this.plan.setPoses(poses),
       onFollowers: (count) => (this.followers.value = count),
       onNotice: (text) => (this.notice.value = text),
+      onStarted: (configuration) => void this.local.follow(configuration),
+      onUpdated: () => this.local.renew(),
     }, this.dragChoice());
     this.plan.onChange((_, { isFinal }) => this.planChanged(isFinal));
     this.selected.watch(() => this.placeGizmo());
@@ -143,6 +152,7 @@ export class Workbench implements ShownFace {
 
   async chooseModel(model: DeformationModel): Promise<void> {
     this.model.value = model;
+    this.local.drop();
     if (this.map.value.kind === "band" && !this.hasBand) this.map.value = { kind: "none" };
     await this.live.choose(this.dragChoice());
   }
@@ -244,6 +254,7 @@ export class Workbench implements ShownFace {
     this.live.sendPoses(poses, isFinal);
     this.waitingFrom ??= performance.now();
     if (this.comparison.value === null) this.setPoses(poses);
+    this.local.ask(poses);
     if (!this.gizmo.isDragging) this.placeGizmo();
     clearTimeout(this.settling);
     this.settling = setTimeout(() => this.settled(), SETTLE_MS);
@@ -268,12 +279,24 @@ export class Workbench implements ShownFace {
 
   private show(picture: Picture, used: () => void): void {
     if (picture.positions.length !== this.rest.length) throw new Error("a picture came that has other vertices than the case");
-    subtractInto(picture.positions, this.rest, this.displacements);
     this.waitingFrom = null;
-    if (picture.frame.refinement === 0) this.uncertainty = picture.uncertainty;
     this.picture.value = { roundTripMs: picture.roundTripMs, summary: picture.frame.summary ?? null, isRefining: picture.frame.refining };
+    // The face never goes back to poses that the hand has left, once the page itself has shown newer ones.
+    if (picture.posesBehind > this.local.posesSinceTold) {
+      used();
+      return;
+    }
+    subtractInto(picture.positions, this.rest, this.displacements);
+    if (picture.frame.refinement === 0) this.uncertainty = picture.uncertainty;
     if (this.comparison.value !== null) used();
     else this.lay(this.displacements, used);
+  }
+
+  /** The page's own answer, in the picture that shows the bone there. */
+  private showLocal(positions: Float32Array): void {
+    if (positions.length !== this.rest.length) return this.local.drop();
+    subtractInto(positions, this.rest, this.displacements);
+    if (this.comparison.value === null) this.lay(this.displacements);
   }
 
   private lay(displacements: Float32Array, used?: () => void): void {
