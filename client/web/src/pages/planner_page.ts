@@ -6,6 +6,7 @@ import type { CaseFile } from "../case/case_file";
 import { FollowLinks } from "../live/follow_links";
 import { button, el, onceAPicture } from "../panels/dom";
 import { exportPanel } from "../panels/export_panel";
+import { jawPanel } from "../panels/jaw_panel";
 import { bindKeys, helpDialog } from "../panels/keyboard";
 import { legendBox, mapPanel, modelPanel } from "../panels/maps_panel";
 import { measuresPanel } from "../panels/measures_panel";
@@ -90,6 +91,7 @@ export function plannerPage(
     measuresPanel(bench),
     profilePanel(bench),
     wishPanel(bench),
+    jawPanel(bench),
     modelPanel(bench),
     mapPanel(bench),
     predictionsPanel(bench),
