@@ -14,6 +14,7 @@ import { movementsPanel } from "../panels/movements_panel";
 import { bindPicking, pickingBox } from "../panels/picking";
 import { predictionsPanel } from "../panels/predictions_panel";
 import { profilePanel } from "../panels/profile_panel";
+import { reportPanel } from "../panels/report_panel";
 import { segmentsPanel } from "../panels/segments_panel";
 import { noticeBox, statusBar } from "../panels/status_bar";
 import { pictureMarks, viewBar } from "../panels/view_bar";
@@ -96,6 +97,7 @@ export function plannerPage(
     mapPanel(bench),
     predictionsPanel(bench),
     exportPanel(bench),
+    reportPanel(bench),
   ]);
   const element = el("div", { class: "planner" }, [status.element, el("main", {}, [picture, viewBar(view)]), panel, help]);
   return { element, bench };

@@ -49,7 +49,7 @@ function openingPart(bench: Workbench): HTMLElement {
     el("label", { class: "inline" }, ["Opening", control]),
     told,
     el("p", { class: "quiet", text: `A hinge through ${how} (blue points). The condyles do not glide; the opening is no part of the plan.` }),
-    button("Close", () => bench.open(0)),
+    el("div", { class: "buttons" }, [button("Close", () => bench.open(0))]),
   ]);
 }
 
@@ -91,7 +91,7 @@ function bitePart(bench: Workbench): { element: HTMLElement; off(): void } {
     timer = setTimeout(find, SETTLE_MS);
   });
   const legend = `Yellow: the teeth touch; dark: ${MOST_GAP_MM} mm apart or more.`;
-  return { element: el("div", { class: "landmark-part" }, [toggle, told, el("p", { class: "quiet", text: legend })]), off: () => isOn() && set(false) };
+  return { element: el("div", { class: "landmark-part" }, [el("div", { class: "buttons" }, [toggle]), told, el("p", { class: "quiet", text: legend })]), off: () => isOn() && set(false) };
 }
 
 function toTeeth({ source }: DrawnSurface): Teeth {
