@@ -7,7 +7,9 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "core/base/status_macros.h"
+#include "core/mesh_payload/sha256.h"
 #include "server/store/durable_file.h"
 #include "server/store/fault_points.h"
 
@@ -109,6 +111,8 @@ absl::Status BridgeQueue::Read(absl::FunctionRef<absl::Status(Database&)> read) 
   MutexLock lock(mutex_);
   return read(*database_);
 }
+
+std::string NewQueueKey() { return Sha256Hex({NewDicomUid()}).substr(0, 32); }
 
 std::string TextOf(const Database::Query& query, int column) {
   return std::string(query.Text(column));

@@ -62,6 +62,9 @@ class BridgeQueue {
   const std::unique_ptr<Database> database_ ABSL_PT_GUARDED_BY(mutex_);
 };
 
+// A new key of a series or an export: 128 random bits in 32 hexadecimal digits, which say nothing.
+std::string NewQueueKey();
+
 // A column of the row, as the record's field; text is copied.
 std::string TextOf(const Database::Query& query, int column);
 

@@ -47,7 +47,7 @@ const char* BridgeExportStateName(BridgeExportState state) {
 }
 
 absl::StatusOr<QueuedExport> ExportRows::Add(const QueuedExport& asked) {
-  TF_RETURN_IF_ERROR(queue_->Change([&](Database& database) {
+  const absl::Status done = queue_->Change([&](Database& database) {
     return database
         .Prepare("INSERT OR IGNORE INTO exports VALUES (?, ?, ?, ?, ?, ?, '', 0, '', ?, 0)")
         .Bind(asked.name)
@@ -58,7 +58,8 @@ absl::StatusOr<QueuedExport> ExportRows::Add(const QueuedExport& asked) {
         .Bind(asked.note)
         .Bind(asked.first_s)
         .Run();
-  }));
+  });
+  TF_RETURN_IF_ERROR(done);
   return Get(asked.name);
 }
 
@@ -98,33 +99,35 @@ absl::Status ExportRows::Confirm(const std::string& name, const std::string& dig
 
 absl::StatusOr<QueuedExport> ExportRows::Get(const std::string& name) {
   QueuedExport found;
-  TF_RETURN_IF_ERROR(queue_->Read([&](Database& database) -> absl::Status {
+  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
     Database::Query row = database.Prepare("SELECT * FROM exports WHERE name = ?");
     row.Bind(name);
     TF_ASSIGN_OR_RETURN(const bool any, row.Step());
     if (!any) return NoExport();
     TF_ASSIGN_OR_RETURN(found, ExportOf(row));
     return absl::OkStatus();
-  }));
+  });
+  TF_RETURN_IF_ERROR(done);
   return found;
 }
 
 absl::StatusOr<std::vector<QueuedExport>> ExportRows::List() {
   std::vector<QueuedExport> all;
-  TF_RETURN_IF_ERROR(queue_->Read([&](Database& database) -> absl::Status {
+  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
     Database::Query row = database.Prepare("SELECT * FROM exports ORDER BY first_s, name");
     for (;;) {
       TF_ASSIGN_OR_RETURN(const bool any, row.Step());
       if (!any) return absl::OkStatus();
       TF_ASSIGN_OR_RETURN(all.emplace_back(), ExportOf(row));
     }
-  }));
+  });
+  TF_RETURN_IF_ERROR(done);
   return all;
 }
 
 absl::StatusOr<std::vector<QueuedObject>> ExportRows::EnsureObjects(
     const std::string& name, const std::vector<std::string>& keys, std::string (*make_uid)()) {
-  TF_RETURN_IF_ERROR(queue_->Change([&](Database& database) -> absl::Status {
+  const absl::Status done = queue_->Change([&](Database& database) -> absl::Status {
     for (const std::string& key : keys) {
       const std::string uid = make_uid();
       TF_RETURN_IF_ERROR(database.Prepare("INSERT OR IGNORE INTO objects VALUES (?, ?, ?, '', 0)")
@@ -134,13 +137,14 @@ absl::StatusOr<std::vector<QueuedObject>> ExportRows::EnsureObjects(
                              .Run());
     }
     return absl::OkStatus();
-  }));
+  });
+  TF_RETURN_IF_ERROR(done);
   return ListObjects(name);
 }
 
 absl::StatusOr<std::vector<QueuedObject>> ExportRows::ListObjects(const std::string& name) {
   std::vector<QueuedObject> objects;
-  TF_RETURN_IF_ERROR(queue_->Read([&](Database& database) -> absl::Status {
+  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
     Database::Query row =
         database.Prepare("SELECT key, uid, file, sent FROM objects WHERE export = ? ORDER BY key");
     row.Bind(name);
@@ -149,7 +153,8 @@ absl::StatusOr<std::vector<QueuedObject>> ExportRows::ListObjects(const std::str
       if (!any) return absl::OkStatus();
       objects.push_back({TextOf(row, 0), TextOf(row, 1), TextOf(row, 2), row.Integer(3) != 0});
     }
-  }));
+  });
+  TF_RETURN_IF_ERROR(done);
   return objects;
 }
 

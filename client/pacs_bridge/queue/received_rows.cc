@@ -81,11 +81,13 @@ absl::Status InsertSeries(Database& database, const QueuedSeries& series, const 
       .Run();
 }
 
-// True when it was not there.
+// True when it, or its file, was not there.
 absl::StatusOr<bool> InsertImage(Database& database, const std::string& series,
                                  const QueuedImage& image) {
   const int64_t before = database.total_changes();
-  TF_RETURN_IF_ERROR(database.Prepare("INSERT OR IGNORE INTO images VALUES (?, ?, ?, ?)")
+  TF_RETURN_IF_ERROR(database
+                         .Prepare("INSERT INTO images VALUES (?, ?, ?, ?) ON CONFLICT (series, uid) "
+                                  "DO UPDATE SET file = excluded.file WHERE images.file = ''")
                          .Bind(series)
                          .Bind(image.uid)
                          .Bind(image.class_uid)
@@ -126,7 +128,7 @@ absl::StatusOr<QueuedSeries> ReceivedRows::Add(const QueuedStudy& study, const Q
                                                const std::string& new_key,
                                                const std::vector<QueuedImage>& images) {
   QueuedSeries kept;
-  TF_RETURN_IF_ERROR(queue_->Change([&](Database& database) -> absl::Status {
+  const absl::Status done = queue_->Change([&](Database& database) -> absl::Status {
     TF_RETURN_IF_ERROR(InsertStudy(database, study));
     TF_RETURN_IF_ERROR(InsertSeries(database, series, new_key));
     TF_ASSIGN_OR_RETURN(std::optional<QueuedSeries> found,
@@ -142,15 +144,17 @@ absl::StatusOr<QueuedSeries> ReceivedRows::Add(const QueuedStudy& study, const Q
     }
     if (any_new) {
       TF_RETURN_IF_ERROR(
-          database.Prepare("UPDATE series SET state = 'receiving' WHERE key = ? AND state IN "
-                           "('incomplete', 'complete')")
+          database
+              .Prepare("UPDATE series SET has_files = 1, state = CASE WHEN state IN "
+                       "('incomplete', 'complete') THEN 'receiving' ELSE state END WHERE key = ?")
               .Bind(found->key)
               .Run());
     }
     TF_ASSIGN_OR_RETURN(found, FindSeries(database, kByUid, series.uid));
     kept = *std::move(found);
     return absl::OkStatus();
-  }));
+  });
+  TF_RETURN_IF_ERROR(done);
   return kept;
 }
 
@@ -195,10 +199,11 @@ absl::Status ReceivedRows::UpdatePatient(const std::string& study_uid,
 
 absl::StatusOr<QueuedSeries> ReceivedRows::SelectOne(const char* sql, const std::string& value) {
   std::optional<QueuedSeries> found;
-  TF_RETURN_IF_ERROR(queue_->Read([&](Database& database) -> absl::Status {
+  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
     TF_ASSIGN_OR_RETURN(found, FindSeries(database, sql, value));
     return absl::OkStatus();
-  }));
+  });
+  TF_RETURN_IF_ERROR(done);
   if (!found.has_value()) return absl::NotFoundError("no such series in the queue");
   return *std::move(found);
 }
@@ -206,7 +211,7 @@ absl::StatusOr<QueuedSeries> ReceivedRows::SelectOne(const char* sql, const std:
 absl::StatusOr<std::vector<QueuedSeries>> ReceivedRows::Select(const char* sql,
                                                                const std::string& value) {
   std::vector<QueuedSeries> all;
-  TF_RETURN_IF_ERROR(queue_->Read([&](Database& database) -> absl::Status {
+  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
     Database::Query query = database.Prepare(sql);
     query.Bind(value);
     for (;;) {
@@ -214,7 +219,8 @@ absl::StatusOr<std::vector<QueuedSeries>> ReceivedRows::Select(const char* sql,
       if (!row) return absl::OkStatus();
       TF_ASSIGN_OR_RETURN(all.emplace_back(), SeriesOf(query));
     }
-  }));
+  });
+  TF_RETURN_IF_ERROR(done);
   return all;
 }
 
@@ -238,7 +244,7 @@ absl::StatusOr<std::vector<QueuedSeries>> ReceivedRows::ListStudy(const std::str
 
 absl::StatusOr<QueuedStudy> ReceivedRows::GetStudy(const std::string& uid) {
   QueuedStudy study;
-  TF_RETURN_IF_ERROR(queue_->Read([&](Database& database) -> absl::Status {
+  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
     Database::Query row = database.Prepare(
         "SELECT uid, patient_id, issuer, name, birth_date, character_set_known, study_date, "
         "description FROM studies WHERE uid = ?");
@@ -254,13 +260,14 @@ absl::StatusOr<QueuedStudy> ReceivedRows::GetStudy(const std::string& uid) {
              .date = TextOf(row, 6),
              .description = TextOf(row, 7)};
     return absl::OkStatus();
-  }));
+  });
+  TF_RETURN_IF_ERROR(done);
   return study;
 }
 
 absl::StatusOr<std::vector<QueuedImage>> ReceivedRows::ListImages(const std::string& series) {
   std::vector<QueuedImage> images;
-  TF_RETURN_IF_ERROR(queue_->Read([&](Database& database) -> absl::Status {
+  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
     Database::Query row = database.Prepare(
         "SELECT series, uid, class_uid, file FROM images WHERE series = ? ORDER BY uid");
     row.Bind(series);
@@ -269,7 +276,8 @@ absl::StatusOr<std::vector<QueuedImage>> ReceivedRows::ListImages(const std::str
       if (!found) return absl::OkStatus();
       images.push_back({TextOf(row, 0), TextOf(row, 1), TextOf(row, 2), TextOf(row, 3)});
     }
-  }));
+  });
+  TF_RETURN_IF_ERROR(done);
   return images;
 }
 

@@ -157,8 +157,8 @@ absl::Status PlanWork::Build(QueuedSeries* series) {
     TF_ASSIGN_OR_RETURN(const std::vector<QueuedImage> images, rows_.ListImages(series->key));
     const std::string ct = folder + "/ct";
     const absl::Cleanup remove_links = [&ct] {
-      std::error_code ignored;
-      fs::remove_all(ct, ignored);
+      std::error_code failed;
+      fs::remove_all(ct, failed);
     };
     TF_RETURN_IF_ERROR(LinkImages(images, ct));
     TF_FAULT_POINT("plan.linked");
