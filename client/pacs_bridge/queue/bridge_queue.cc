@@ -24,7 +24,7 @@ constexpr int64_t kQueueVersion = 1;
 // files are gone: what is written later refers to them.
 constexpr char kQueueTables[] =
     "CREATE TABLE studies (uid TEXT PRIMARY KEY, patient_id TEXT NOT NULL, issuer TEXT NOT NULL, "
-    "name TEXT NOT NULL, birth_date TEXT NOT NULL, character_set_known INTEGER NOT NULL, "
+    "name TEXT NOT NULL, birth_date TEXT NOT NULL, readable INTEGER NOT NULL, "
     "study_date TEXT NOT NULL, description TEXT NOT NULL) STRICT;"
     "CREATE TABLE series (key TEXT PRIMARY KEY, study_uid TEXT NOT NULL REFERENCES studies(uid), "
     "uid TEXT NOT NULL UNIQUE, frame_uid TEXT NOT NULL, modality TEXT NOT NULL, "

@@ -59,7 +59,7 @@ absl::Status InsertStudy(Database& database, const QueuedStudy& study) {
       .Bind(study.patient.issuer)
       .Bind(study.patient.name)
       .Bind(study.patient.birth_date)
-      .Bind(int64_t{study.patient.character_set_known})
+      .Bind(int64_t{study.patient.readable})
       .Bind(study.date)
       .Bind(study.description)
       .Run();
@@ -114,9 +114,18 @@ constexpr char kAll[] = TF_SERIES_COLUMNS "WHERE ? = '' ORDER BY first_s, key";
 
 }  // namespace
 
+PatientIdentity IdentityOf(const InstanceHeader& image) {
+  const auto cut = [](const std::string& text) { return text.substr(0, kMostIdentityBytes); };
+  return {.id = cut(image.patient_id),
+          .issuer = cut(image.issuer_of_patient_id),
+          .name = cut(image.patient_name),
+          .birth_date = cut(image.birth_date),
+          .readable = image.text_problem.empty()};
+}
+
 std::string DigestOf(const PatientIdentity& patient) {
   const std::string lengths = absl::StrCat(patient.id.size(), " ", patient.issuer.size(), " ",
-                                           patient.name.size(), " ", patient.character_set_known);
+                                           patient.name.size(), " ", patient.readable);
   return Sha256Hex({lengths, patient.id, patient.issuer, patient.name, patient.birth_date});
 }
 
@@ -186,12 +195,12 @@ absl::Status ReceivedRows::UpdatePatient(const std::string& study_uid,
   return queue_->Change([&](Database& database) {
     return database
         .Prepare("UPDATE studies SET patient_id = ?, issuer = ?, name = ?, birth_date = ?, "
-                 "character_set_known = ? WHERE uid = ?")
+                 "readable = ? WHERE uid = ?")
         .Bind(patient.id)
         .Bind(patient.issuer)
         .Bind(patient.name)
         .Bind(patient.birth_date)
-        .Bind(int64_t{patient.character_set_known})
+        .Bind(int64_t{patient.readable})
         .Bind(study_uid)
         .Run();
   });
@@ -246,7 +255,7 @@ absl::StatusOr<QueuedStudy> ReceivedRows::GetStudy(const std::string& uid) {
   QueuedStudy study;
   const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
     Database::Query row = database.Prepare(
-        "SELECT uid, patient_id, issuer, name, birth_date, character_set_known, study_date, "
+        "SELECT uid, patient_id, issuer, name, birth_date, readable, study_date, "
         "description FROM studies WHERE uid = ?");
     row.Bind(uid);
     TF_ASSIGN_OR_RETURN(const bool found, row.Step());
@@ -256,7 +265,7 @@ absl::StatusOr<QueuedStudy> ReceivedRows::GetStudy(const std::string& uid) {
                          .issuer = TextOf(row, 2),
                          .name = TextOf(row, 3),
                          .birth_date = TextOf(row, 4),
-                         .character_set_known = row.Integer(5) != 0},
+                         .readable = row.Integer(5) != 0},
              .date = TextOf(row, 6),
              .description = TextOf(row, 7)};
     return absl::OkStatus();

@@ -10,6 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "client/pacs_bridge/dicom/instance_header.h"
 #include "client/pacs_bridge/queue/bridge_queue.h"
 
 namespace tissueform {
@@ -21,11 +22,13 @@ struct PatientIdentity {
   std::string issuer = {};
   std::string name = {};
   std::string birth_date = {};
-  // False: the images name a character set that nobody here knows, so the name may read wrong.
-  bool character_set_known = true;
+  // False: a text could not be read as it was meant (an unknown character set, too long).
+  bool readable = true;
 
   friend bool operator==(const PatientIdentity&, const PatientIdentity&) = default;
 };
+// What an image says of its patient.
+PatientIdentity IdentityOf(const InstanceHeader& image);
 // A digest of it, by which a later look sees that something has changed.
 std::string DigestOf(const PatientIdentity& patient);
 

@@ -20,15 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-PatientIdentity IdentityOf(const InstanceHeader& image) {
-  const auto cut = [](const std::string& text) { return text.substr(0, kMostIdentityBytes); };
-  return {.id = cut(image.patient_id),
-          .issuer = cut(image.issuer_of_patient_id),
-          .name = cut(image.patient_name),
-          .birth_date = cut(image.birth_date),
-          .character_set_known = image.text_problem.empty()};
-}
-
 bool HasPlan(SeriesState state) {
   return state == SeriesState::kChosen || state == SeriesState::kBuilt ||
          state == SeriesState::kPacked || state == SeriesState::kPublished;
