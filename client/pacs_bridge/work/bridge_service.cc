@@ -161,6 +161,10 @@ void BridgeService::WorkOnExports() {
   const absl::StatusOr<std::vector<QueuedExport>> all = rows.List();
   if (!all.ok()) return Tell(all.status(), "the queue cannot be read");
   for (QueuedExport queued : *all) {
+    if (queued.state == BridgeExportState::kAsked && drawn_.insert(queued.key).second) {
+      const absl::Status status = parts_.exports->Draw(queued);
+      if (!status.ok()) Tell(status, absl::StrCat(queued.name, " has no pictures"));
+    }
     while (HasExportStep(queued) && !stopping() && export_retries_.Due(queued.key)) {
       const std::string before = BridgeExportStateName(queued.state);
       const absl::Status status = parts_.exports->Step(&queued);

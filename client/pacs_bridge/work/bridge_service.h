@@ -7,6 +7,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -67,6 +68,7 @@ class BridgeService {
   RetryTimes plan_retries_;
   RetryTimes export_retries_;
   std::chrono::steady_clock::time_point next_deletion_ = {};
+  std::set<std::string> drawn_;  // keys of exports whose pictures were drawn, or could not be
 
   Mutex mutex_;
   ConditionVariable changed_;

@@ -4,24 +4,19 @@
 #include "client/pacs_bridge/work/case_server.h"
 
 #include <chrono>
+#include <optional>
 #include <thread>
 #include <utility>
 
-#include "absl/strings/str_cat.h"
-#include "grpcpp/client_context.h"
-
-#include "client/cpp/client_call.h"
 #include "client/cpp/server_channel.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/mutex.h"
 #include "core/base/status_macros.h"
 #include "core/case_file/case_reader.h"
-#include "tissueform/v1/export_service.grpc.pb.h"
 
 namespace tissueform {
 namespace {
 
-constexpr std::chrono::seconds kExportCallTime{20};
 // Nothing for so long (the server says something every 20 s) means that it is gone.
 constexpr std::chrono::seconds kWatchSilence{70};
 
@@ -33,8 +28,8 @@ MeshPayloadView PayloadOfCase(const CaseMesh& mesh) {
 // Cancels a watch that was ended, or that says nothing any longer, from a thread of its own.
 class WatchEnd {
  public:
-  WatchEnd(grpc::ClientContext* context, const Cancellation& cancelled)
-      : context_(context), cancelled_(cancelled), thread_([this] { Run(); }) {}
+  WatchEnd(ExportWatchStream* watch, const Cancellation& cancelled)
+      : watch_(watch), cancelled_(cancelled), thread_([this] { Run(); }) {}
   ~WatchEnd() {
     {
       MutexLock lock(mutex_);
@@ -57,12 +52,12 @@ class WatchEnd {
   void Run() ABSL_LOCKS_EXCLUDED(mutex_) {
     MutexLock lock(mutex_);
     while (!done_) {
-      if (cancelled_.requested() || Clock::now() - heard_ > kWatchSilence) context_->TryCancel();
+      if (cancelled_.requested() || Clock::now() - heard_ > kWatchSilence) watch_->Cancel();
       changed_.WaitUntil(mutex_, Clock::now() + std::chrono::seconds(1));
     }
   }
 
-  grpc::ClientContext* const context_;
+  ExportWatchStream* const watch_;
   const Cancellation& cancelled_;
 
   Mutex mutex_;
@@ -75,13 +70,8 @@ class WatchEnd {
 
 class ConnectedCaseServer final : public CaseServer {
  public:
-  ConnectedCaseServer(std::string address, ConnectionOptions options,
-                      std::shared_ptr<TokenFile> token,
-                      const std::shared_ptr<grpc::Channel>& channel)
-      : address_(std::move(address)),
-        options_(std::move(options)),
-        token_(std::move(token)),
-        exports_(v1::ExportService::NewStub(channel)) {}
+  ConnectedCaseServer(std::string address, ConnectionOptions options)
+      : address_(std::move(address)), options_(std::move(options)) {}
 
   absl::StatusOr<std::string> Publish(const std::string& case_bytes,
                                       const std::string& title) override {
@@ -106,39 +96,31 @@ class ConnectedCaseServer final : public CaseServer {
   }
 
   absl::StatusOr<v1::Export> GetExport(const std::string& name) override {
-    grpc::ClientContext context;
-    context.set_deadline(std::chrono::system_clock::now() + kExportCallTime);
-    v1::GetExportRequest request;
-    request.set_name(name);
-    v1::Export found;
-    TF_RETURN_IF_ERROR(FromGrpcStatus(exports_->GetExport(&context, request, &found)));
-    return found;
+    TF_ASSIGN_OR_RETURN(TissueformClient* const client, Client());
+    return client->exports().Get(name);
   }
 
   absl::Status UpdateExport(const std::string& name, v1::ExportState state,
                             const std::string& detail, int stored_objects) override {
-    grpc::ClientContext context;
-    context.set_deadline(std::chrono::system_clock::now() + kExportCallTime);
+    TF_ASSIGN_OR_RETURN(TissueformClient* const client, Client());
     v1::UpdateExportRequest request;
     request.set_name(name);
     request.set_state(state);
     request.set_detail(detail);
     request.set_stored_objects(stored_objects);
-    v1::Export changed;
-    return FromGrpcStatus(exports_->UpdateExport(&context, request, &changed));
+    return client->exports().Update(request).status();
   }
 
   absl::Status WatchExports(const std::function<void(const v1::Export&)>& tell,
                             const Cancellation& cancelled) override {
-    grpc::ClientContext context;
-    WatchEnd end(&context, cancelled);
-    const auto reader = exports_->WatchExports(&context, v1::WatchExportsRequest());
-    v1::WatchExportsResponse heard;
-    while (reader->Read(&heard)) {
+    TF_ASSIGN_OR_RETURN(TissueformClient* const client, Client());
+    const std::unique_ptr<ExportWatchStream> watch = client->exports().Watch();
+    WatchEnd end(watch.get(), cancelled);
+    while (const std::optional<v1::WatchExportsResponse> heard = watch->Receive()) {
       end.Heard();
-      if (heard.has_export_()) tell(heard.export_());
+      if (heard->has_export_()) tell(heard->export_());
     }
-    return FromGrpcStatus(reader->Finish());
+    return watch->Finish();
   }
 
  private:
@@ -156,10 +138,6 @@ class ConnectedCaseServer final : public CaseServer {
   // Constant.
   const std::string address_;
   const ConnectionOptions options_;
-  const std::shared_ptr<TokenFile> token_;
-
-  // Self-synchronised.
-  const std::unique_ptr<v1::ExportService::Stub> exports_;
 
   Mutex mutex_;
   std::unique_ptr<TissueformClient> client_ ABSL_GUARDED_BY(mutex_);
@@ -169,12 +147,11 @@ class ConnectedCaseServer final : public CaseServer {
 
 absl::StatusOr<std::unique_ptr<CaseServer>> ConnectToCaseServer(const std::string& address,
                                                                 const ConnectionOptions& options) {
-  TF_ASSIGN_OR_RETURN(std::shared_ptr<TokenFile> token, OpenTokenOf(options));
-  TF_ASSIGN_OR_RETURN(
-      const std::shared_ptr<grpc::Channel> channel,
-      MakeServerChannel(address, options, token, grpc::ChannelArguments()));
-  return std::unique_ptr<CaseServer>(
-      std::make_unique<ConnectedCaseServer>(address, options, std::move(token), channel));
+  // What is wrong with the options is said now; the server may come later.
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<TokenFile> token, OpenTokenOf(options));
+  TF_RETURN_IF_ERROR(
+      MakeServerChannel(address, options, token, grpc::ChannelArguments()).status());
+  return std::unique_ptr<CaseServer>(std::make_unique<ConnectedCaseServer>(address, options));
 }
 
 }  // namespace tissueform

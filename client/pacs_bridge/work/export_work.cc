@@ -196,23 +196,43 @@ absl::Status ExportWork::Fetch(QueuedExport* queued) {
   return absl::OkStatus();
 }
 
-absl::Status ExportWork::Write(QueuedExport* queued) {
-  TF_ASSIGN_OR_RETURN(const QueuedSeries series, received_.GetByCase(queued->case_name));
-  const std::string folder = queue_->object_folder(queued->key);
+absl::StatusOr<ExportMaterial> ExportWork::Gather(const QueuedExport& queued) {
+  TF_ASSIGN_OR_RETURN(const QueuedSeries series, received_.GetByCase(queued.case_name));
+  const std::string folder = queue_->object_folder(queued.key);
+  TF_RETURN_IF_ERROR(MakeFolder(folder));
   ExportMaterial material;
   material.header = folder + "/header.dcm";
   material.case_path = CasePathOf(*queue_, series.key);
   std::error_code failed;
   if (!fs::exists(material.case_path, failed)) {
-    TF_ASSIGN_OR_RETURN(const std::string bytes, server_->ReadCase(queued->case_name));
     material.case_path = folder + "/case.tfcase";
+    TF_ASSIGN_OR_RETURN(const std::string bytes, server_->ReadCase(queued.case_name));
     TF_RETURN_IF_ERROR(WriteDurably(material.case_path, {bytes}));
   }
   TF_ASSIGN_OR_RETURN(material.case_file, ReadCase(material.case_path));
-  TF_ASSIGN_OR_RETURN(material.prediction, server_->ReadPrediction(queued->prediction));
-  TF_ASSIGN_OR_RETURN(material.asked, server_->GetExport(queued->name));
+  TF_ASSIGN_OR_RETURN(material.prediction, server_->ReadPrediction(queued.prediction));
+  TF_ASSIGN_OR_RETURN(material.asked, server_->GetExport(queued.name));
   TF_ASSIGN_OR_RETURN(material.sources, received_.ListImages(series.key));
+  material.series_uid = series.uid;
+  material.pictures = folder + "/pictures";
   material.folder = folder + "/written";
+  return material;
+}
+
+absl::Status ExportWork::Draw(const QueuedExport& queued) {
+  std::error_code failed;
+  const std::string pictures = queue_->object_folder(queued.key) + "/pictures";
+  if (fs::exists(pictures, failed)) return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(const ExportMaterial material, Gather(queued));
+  return writer_->Draw(material, pictures);
+}
+
+absl::Status ExportWork::Write(QueuedExport* queued) {
+  TF_ASSIGN_OR_RETURN(ExportMaterial material, Gather(*queued));
+  std::error_code failed;
+  if (!fs::exists(material.pictures, failed)) {
+    TF_RETURN_IF_ERROR(writer_->Draw(material, material.pictures));
+  }
   TF_ASSIGN_OR_RETURN(const std::vector<std::string> keys, writer_->KeysOf(material));
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedObject> objects,
                       rows_.EnsureObjects(queued->name, keys, NewDicomUid));

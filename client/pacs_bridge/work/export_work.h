@@ -49,6 +49,10 @@ class ExportWork {
   // another bridge's: nothing happens. Errors: those of the queue.
   absl::Status Take(const v1::Export& told);
 
+  // Draws the pictures for one that is asked for, for who is to confirm it; nothing happens where
+  // they are there. Errors: those of the server and of drawing; they keep nobody from confirming.
+  absl::Status Draw(const QueuedExport& queued);
+
   // The next step of an export, whose new state is written to the queue and into it. An error that
   // is no transient one makes it kFailed. Also tells the server of one that waits or has failed.
   //
@@ -59,6 +63,7 @@ class ExportWork {
   absl::Status RunStep(QueuedExport* queued);
   absl::Status Fetch(QueuedExport* queued);
   absl::Status FetchHeader(const QueuedSeries& series, const std::string& path);
+  absl::StatusOr<ExportMaterial> Gather(const QueuedExport& queued);
   absl::Status Write(QueuedExport* queued);
   absl::Status Send(QueuedExport* queued);
   absl::Status SendMissing(const QueuedExport& queued, std::vector<QueuedObject>* objects);

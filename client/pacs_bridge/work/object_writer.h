@@ -19,13 +19,15 @@ namespace tissueform {
 // What an export is written from.
 struct ExportMaterial {
   std::string header = {};  // file: of one of the source images, without pixels
+  std::string series_uid = {};  // of the source series
   std::vector<QueuedImage> sources = {};
   std::string case_path = {};
   CaseFile case_file = {};
   ServedPrediction prediction = {};
   v1::Export asked = {};                        // with its measures
   std::map<std::string, std::string> uids = {};  // by key: of objects and of their series
-  std::string folder = {};                      // empty; for the files
+  std::string pictures = {};                     // folder of what Draw has drawn
+  std::string folder = {};                       // empty; for the files
 };
 
 // An object that was written.
@@ -42,6 +44,10 @@ class ObjectWriter {
   // The keys for which there must be UIDs before anything is written: of objects, and of what they
   // are in ("series:..."), which are never sent themselves.
   virtual absl::StatusOr<std::vector<std::string>> KeysOf(const ExportMaterial& material) = 0;
+
+  // Draws the prediction for whoever is to confirm it, PNG files in `folder`, which is not there.
+  // Of the material case and prediction are needed.
+  virtual absl::Status Draw(const ExportMaterial& material, const std::string& folder) = 0;
 
   // Errors: InvalidArgument (case and prediction do not fit), those of the disk.
   virtual absl::StatusOr<std::vector<ExportFile>> Write(const ExportMaterial& material) = 0;

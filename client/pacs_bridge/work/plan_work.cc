@@ -7,15 +7,14 @@
 #include <ctime>
 #include <fcntl.h>
 #include <filesystem>
-#include <fstream>
 #include <memory>
-#include <optional>
 #include <system_error>
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 
 #include "client/cpp/backoff.h"
+#include "client/pacs_bridge/work/tissueform_command.h"
 #include "core/base/atomic_folder.h"
 #include "core/base/error_reason.h"
 #include "core/base/parallel_for.h"
@@ -23,7 +22,6 @@
 #include "core/case_file/case_file.h"
 #include "core/mesh_payload/sha256.h"
 #include "core/plan_building/plan_build_call.h"
-#include "core/process/guarded_program.h"
 #include "server/store/durable_file.h"
 #include "server/store/fault_points.h"
 
@@ -34,7 +32,6 @@ namespace fs = std::filesystem;
 
 // For `case pack`, which takes seconds.
 constexpr std::chrono::minutes kPackTime{10};
-constexpr std::chrono::seconds kPackGrace{2};
 constexpr int64_t kMostPackAttempts = 20;
 constexpr size_t kMostErrorBytes = 512;
 constexpr size_t kCaseTitleDigits = 8;
@@ -55,17 +52,6 @@ absl::Status LinkImages(const std::vector<QueuedImage>& images, const std::strin
   return absl::OkStatus();
 }
 
-// The first line that a child has left, without control characters.
-std::string FirstLine(const std::string& path) {
-  std::ifstream file(path);
-  std::string line;
-  std::getline(file, line);
-  for (char& c : line) {
-    if (static_cast<unsigned char>(c) < 0x20) c = ' ';
-  }
-  return line.substr(0, kMostErrorBytes);
-}
-
 absl::StatusOr<std::string> ReadCaseFile(const std::string& path) {
   std::string bytes;
   TF_RETURN_IF_ERROR(ReadInPieces(path, [&bytes](absl::string_view piece) {
@@ -76,22 +62,6 @@ absl::StatusOr<std::string> ReadCaseFile(const std::string& path) {
     return absl::OkStatus();
   }));
   return bytes;
-}
-
-absl::Status RunCasePack(const std::string& plan, const std::string& out, const std::string& title,
-                         const std::string& errors) {
-  TF_ASSIGN_OR_RETURN(const std::string program, FindProgram("tissueform"));
-  ChildOptions options;
-  options.program = program;
-  options.arguments = {"case", "pack", plan, "--out", out, "--title", title, "--overwrite"};
-  options.errors = ChildStream::File(errors);
-  TF_ASSIGN_OR_RETURN(const auto child, GuardedProgram::Start(std::move(options), kPackGrace));
-  const std::optional<ChildEnd> end = child->WaitFor(kPackTime);
-  if (!end.has_value()) {
-    return absl::InternalError("packing the case took too long and was ended");
-  }
-  if (end->exit_code == 0) return absl::OkStatus();
-  return absl::InternalError(absl::StrCat("packing the case failed: ", FirstLine(errors)));
 }
 
 // Building takes long and comes out the same again, unless there was no room; packing fails for
@@ -196,8 +166,9 @@ absl::Status PlanWork::Build(QueuedSeries* series) {
 absl::Status PlanWork::Pack(QueuedSeries* series) {
   const std::string folder = queue_->plan_folder(series->key);
   const std::string fresh = folder + "/case.new";
-  TF_RETURN_IF_ERROR(RunCasePack(folder + "/plan/plan.json", fresh, TitleOfSeries(series->key),
-                                 folder + "/pack.log"));
+  TF_RETURN_IF_ERROR(RunTissueform({"case", "pack", folder + "/plan/plan.json", "--out", fresh,
+                                    "--title", TitleOfSeries(series->key), "--overwrite"},
+                                   "packing the case", folder + "/pack.log", kPackTime));
   TF_FAULT_POINT("plan.packed");
   TF_ASSIGN_OR_RETURN(OpenFile file, OpenFile::Open(fresh, O_RDWR));
   TF_RETURN_IF_ERROR(file.Sync());
