@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 
 #include "client/pacs_bridge/dicom/dicom_file.h"
@@ -19,6 +20,13 @@ namespace tissueform {
 namespace {
 
 namespace fs = std::filesystem;
+
+// Goes to logs and tables, so it must be what it should be.
+bool IsModality(const std::string& text) {
+  return !text.empty() && text.size() <= 16 && std::all_of(text.begin(), text.end(), [](unsigned char c) {
+    return absl::ascii_isupper(c) || absl::ascii_isdigit(c);
+  });
+}
 
 bool HasPlan(SeriesState state) {
   return state == SeriesState::kChosen || state == SeriesState::kBuilt ||
@@ -78,7 +86,7 @@ absl::Status SeriesIntake::PutSeries(const std::vector<const Arrival*>& arrivals
   series.study_uid = first.study_uid;
   series.uid = first.series_uid;
   series.frame_uid = first.frame_uid;
-  series.modality = first.modality;
+  series.modality = IsModality(first.modality) ? first.modality : "?";
   series.first_s = std::time(nullptr);
   bool one_patient = true;
   std::vector<QueuedImage> images;
@@ -166,6 +174,7 @@ absl::StatusOr<std::vector<std::string>> SeriesIntake::Settle() {
     if (state == SeriesState::kReceiving) busy.insert(series.study_uid);
     if (state == SeriesState::kComplete) studies.insert(series.study_uid);
   }
+  if (options_.rules.empty()) return changed;
   for (const std::string& study : studies) {
     if (busy.contains(study)) continue;
     TF_ASSIGN_OR_RETURN(const std::vector<std::string> keys, ChooseOfStudy(study));

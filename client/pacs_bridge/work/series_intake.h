@@ -22,7 +22,7 @@
 namespace tissueform {
 
 struct SeriesIntakeOptions {
-  std::vector<SeriesRule> rules = {};
+  std::vector<SeriesRule> rules = {};  // none: nothing is chosen
   // A series is complete, or has stopped midway, when nothing came for so long.
   std::chrono::milliseconds quiet{30'000};
   // How many images the PACS has of a series; empty, or an error: nobody knows. Called on the
