@@ -65,7 +65,7 @@ void AddReceiver(CLI::App& app, BridgeOptions* options) {
       ->type_name("AE");
   app.add_option("--allow-from", receiver->addresses,
                  "IPv4 address or network (10.1.2.0/24) from which images are taken")
-      ->capture_default_str()
+      ->default_str("127.0.0.1")
       ->type_name("ADDRESS");
   AddNumber(app, "--max-associations", receiver->max_associations, 1, 1024,
             [receiver](int64_t value) { receiver->max_associations = static_cast<int>(value); },
