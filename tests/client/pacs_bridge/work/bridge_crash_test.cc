@@ -99,8 +99,8 @@ TEST_F(BridgeCrashTest, EveryPlaceOfDeathLeavesOneOfEachObject) {
 TEST_F(BridgeCrashTest, DeathAfterDeathComesToTheEnd) {
   Begin("bridge_crash_often");
   ChildEnd end{.signal = SIGKILL};
-  // A process that dies at its sixth place each time still comes on, step by step.
-  for (int i = 0; i < 100 && end.signal == SIGKILL; ++i) end = Run(6);
+  // A process that dies at its sixteenth place each time still comes on, step by step.
+  for (int i = 0; i < 100 && end.signal == SIGKILL; ++i) end = Run(16);
   EXPECT_EQ(end.exit_code, 0);
   ExpectOneOfEach();
 }
