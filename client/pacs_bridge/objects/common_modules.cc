@@ -101,6 +101,15 @@ void WriteReferencedSeries(const PredictionObjectsInput& input, ItemWriter* writ
   writer->Take(series);
 }
 
+// What an object must have, though a scanner may have left it out.
+void WriteMissingEmpty(DcmItem* object, ItemWriter* writer) {
+  for (const DcmTagKey& tag :
+       {DCM_PatientName, DCM_PatientID, DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyDate,
+        DCM_StudyTime, DCM_StudyID, DCM_AccessionNumber, DCM_ReferringPhysicianName}) {
+    if (!object->tagExists(tag)) writer->Text(tag, "");
+  }
+}
+
 // Whose the terms of OwnTerm are.
 void WriteCodingScheme(ItemWriter* writer) {
   ItemWriter scheme = writer->NewItem(DCM_CodingSchemeIdentificationSequence);
@@ -134,6 +143,7 @@ absl::Status WriteCommonModules(DcmDataset* source, const PredictionObjectsInput
                                 const ObjectIdentity& identity, DcmDataset* object) {
   TF_RETURN_IF_ERROR(CopyPatientAndStudy(source, object));
   ItemWriter writer(object);
+  WriteMissingEmpty(object, &writer);
   WriteSeries(input, identity, TimesOf(source, input.made), &writer);
   if (identity.in_frame) {
     writer.Text(DCM_FrameOfReferenceUID, ValueOf(source, DCM_FrameOfReferenceUID));
