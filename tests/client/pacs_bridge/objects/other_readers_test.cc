@@ -7,7 +7,6 @@
 #include <fstream>
 
 #include "gmock/gmock.h"
-
 #include "nlohmann/json.hpp"
 
 #include "client/pacs_bridge/objects/capture_object.h"
@@ -33,16 +32,15 @@ class OtherReadersTest : public ObjectsFixture {
   // Writes what read_objects.py is given.
   void WriteManifest(const PredictionObjectsInput& input) const {
     std::filesystem::create_directory(folder_ / "stl");
-    nlohmann::json json = {{"source", input.source_header},
-                           {"uids", input.uids},
-                           {"stl", (folder_ / "stl").string()}};
+    nlohmann::json json = {
+        {"source", input.source_header}, {"uids", input.uids}, {"stl", (folder_ / "stl").string()}};
     for (const auto& [key, object] : Write(input)) json["objects"][key] = object.path;
     std::ofstream(folder_ / "manifest.json") << json;
   }
   int ReadByPydicom() const {
-    return Run(absl::StrCat("/usr/bin/python3 ", SourcePath("tests/client/pacs_bridge/objects/read_objects.py"),
-                            " ", (folder_ / "manifest.json").string(), " ",
-                            SourcePath("docs/pacs.md")));
+    return Run(absl::StrCat("/usr/bin/python3 ",
+                            SourcePath("tests/client/pacs_bridge/objects/read_objects.py"), " ",
+                            (folder_ / "manifest.json").string(), " ", SourcePath("docs/pacs.md")));
   }
   // Of Debian, whatever comes first on the path.
   bool HasModule(const std::string& module) const {
@@ -109,10 +107,11 @@ TEST_F(OtherReadersTest, MeshioReadsTheStlThatPydicomTakesOut) {
   WriteManifest(input);
   ASSERT_EQ(ReadByPydicom(), 0) << Said();
   const Eigen::RowVector3f low = input.contents.surfaces[0].positions.colwise().minCoeff();
-  ASSERT_EQ(Run(absl::StrCat("/usr/bin/python3 -c 'import meshio; m = meshio.read(\"",
-                             (folder_ / "stl" / "stl_skin-before.stl").string(),
-                             "\"); print(len(m.cells_dict[\"triangle\"]), *m.points.min(axis=0))'")),
-            0)
+  ASSERT_EQ(
+      Run(absl::StrCat("/usr/bin/python3 -c 'import meshio; m = meshio.read(\"",
+                       (folder_ / "stl" / "stl_skin-before.stl").string(),
+                       "\"); print(len(m.cells_dict[\"triangle\"]), *m.points.min(axis=0))'")),
+      0)
       << Said();
   EXPECT_THAT(Said(), HasSubstr(absl::StrCat(input.contents.surfaces[0].triangles.rows(), " ")));
   double x = 0;

@@ -97,8 +97,7 @@ class PlacesTest : public ObjectsFixture, public ::testing::WithParamInterface<S
   static Vector3d MiddleOf(DcmDataset* dataset) {
     const Uint8* bytes = nullptr;
     unsigned long count = 0;
-    EXPECT_TRUE(
-        dataset->findAndGetUint8Array(DCM_EncapsulatedDocument, bytes, &count).good());
+    EXPECT_TRUE(dataset->findAndGetUint8Array(DCM_EncapsulatedDocument, bytes, &count).good());
     Vector3d sum = Vector3d::Zero();
     double volume = 0;
     for (unsigned long at = 84; at + 50 <= count; at += 50) {
@@ -141,8 +140,7 @@ INSTANTIATE_TEST_SUITE_P(Series, PlacesTest,
                          ::testing::Values(SeriesCase{"Orthogonal", Matrix3d::Identity()},
                                            SeriesCase{"Oblique", Oblique()},
                                            SeriesCase{"Tilted", Tilted(18.5)},
-                                           SeriesCase{"TiltedAndOblique",
-                                                      Oblique() * Tilted(-12)}),
+                                           SeriesCase{"TiltedAndOblique", Oblique() * Tilted(-12)}),
                          [](const auto& series) { return std::string(series.param.word); });
 
 }  // namespace

@@ -7,9 +7,8 @@
 #include <limits>
 #include <set>
 
-#include "gmock/gmock.h"
-
 #include "absl/strings/match.h"
+#include "gmock/gmock.h"
 
 #include "client/pacs_bridge/dicom/dicom_file.h"
 #include "client/pacs_bridge/objects/stl_object.h"
@@ -78,8 +77,8 @@ TEST_F(PredictionObjectsTest, EveryKeyIsWrittenOnceWithItsUids) {
     EXPECT_EQ(Value(file->getMetaInfo(), DCM_TransferSyntaxUID), kExplicitLittleEndian);
     EXPECT_THAT(Value(dataset, DCM_SeriesDescription), HasSubstr(kResearchNotice));
   }
-  EXPECT_THAT(keys, ElementsAre("stl:skin", "stl:skin-before", "stl:segment:top", "capture",
-                                "report"));
+  EXPECT_THAT(keys,
+              ElementsAre("stl:skin", "stl:skin-before", "stl:segment:top", "capture", "report"));
   EXPECT_EQ(keys, ObjectKeys(input.contents));
   EXPECT_EQ(series.size(), 3U);
 }
@@ -88,8 +87,7 @@ TEST_F(PredictionObjectsTest, FilesAreTheirOwnersAlone) {
   for (const WrittenObject& object : WriteAll(MakeInput())) {
     EXPECT_EQ(std::filesystem::status(object.path).permissions(),
               std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
-    EXPECT_EQ(std::filesystem::path(object.path).filename().string(),
-              object.instance_uid + ".dcm");
+    EXPECT_EQ(std::filesystem::path(object.path).filename().string(), object.instance_uid + ".dcm");
   }
 }
 
@@ -113,8 +111,7 @@ TEST_F(PredictionObjectsTest, ModelsSayWhatTheyAre) {
     EXPECT_EQ(Value(dataset, DCM_RecognizableVisualFeatures), "YES");
     EXPECT_THAT(Value(dataset, DCM_DocumentTitle), HasSubstr(kResearchNotice));
     DcmItem* unit = nullptr;
-    ASSERT_TRUE(
-        dataset->findAndGetSequenceItem(DCM_MeasurementUnitsCodeSequence, unit).good());
+    ASSERT_TRUE(dataset->findAndGetSequenceItem(DCM_MeasurementUnitsCodeSequence, unit).good());
     EXPECT_EQ(Value(unit, DCM_CodeValue), "mm");
     EXPECT_EQ(Value(unit, DCM_CodingSchemeDesignator), "UCUM");
     DcmItem* icon = nullptr;
@@ -127,9 +124,9 @@ TEST_F(PredictionObjectsTest, ASegmentThatStaysIsNotModified) {
   PredictionObjectsInput input = MakeInput();
   input.prediction.clear_poses();
   *input.prediction.add_poses() = ToProto(NamedPose{"top", {}});
-  EXPECT_EQ(Value(Load(Write(input).at("stl:segment:top").path)->getDataset(),
-                  DCM_ModelModification),
-            "NO");
+  EXPECT_EQ(
+      Value(Load(Write(input).at("stl:segment:top").path)->getDataset(), DCM_ModelModification),
+      "NO");
 }
 
 TEST_F(PredictionObjectsTest, TheStlHasTheSurfacesTrianglesInPlace) {
@@ -202,12 +199,12 @@ TEST_P(PatientTest, PatientAndStudyAreTheSources) {
 
 INSTANTIATE_TEST_SUITE_P(
     Patients, PatientTest,
-    ::testing::Values(
-        PatientCase{"Ascii", "", "Planted^Patricia^Q"},
-        PatientCase{"Latin1", "ISO_IR 100", "M\xfcller^J\xf6rg"},
-        PatientCase{"Utf8", "ISO_IR 192", "Wang^XiaoDong=\xe7\x8e\x8b^\xe5\xb0\x8f\xe4\xb8\x9c"},
-        PatientCase{"Iso2022", "\\ISO 2022 IR 87",
-                    "Yamada^Tarou=\x1b$B;3ED\x1b(B^\x1b$BB@O:\x1b(B"}),
+    ::testing::Values(PatientCase{"Ascii", "", "Planted^Patricia^Q"},
+                      PatientCase{"Latin1", "ISO_IR 100", "M\xfcller^J\xf6rg"},
+                      PatientCase{"Utf8", "ISO_IR 192",
+                                  "Wang^XiaoDong=\xe7\x8e\x8b^\xe5\xb0\x8f\xe4\xb8\x9c"},
+                      PatientCase{"Iso2022", "\\ISO 2022 IR 87",
+                                  "Yamada^Tarou=\x1b$B;3ED\x1b(B^\x1b$BB@O:\x1b(B"}),
     [](const auto& patient) { return std::string(patient.param.word); });
 
 TEST_F(PredictionObjectsTest, WhatEveryoneElseMayReadNamesNoPatient) {
@@ -225,8 +222,7 @@ TEST_F(PredictionObjectsTest, ANameThatNoObjectCanHoldIsRefusedWithoutIt) {
   // Only the implicit syntax has room for it.
   source->getDataset()->putAndInsertString(DCM_PatientName, std::string(100'000, 'P').c_str());
   input.source_header = folder_ / "long.dcm";
-  ASSERT_TRUE(
-      source->saveFile(input.source_header.c_str(), EXS_LittleEndianImplicit).good());
+  ASSERT_TRUE(source->saveFile(input.source_header.c_str(), EXS_LittleEndianImplicit).good());
   const absl::Status refused = Refusal(input);
   EXPECT_THAT(refused.message(), AllOf(HasSubstr("(0010,0010)"), HasSubstr("100000 bytes")));
   EXPECT_THAT(refused.message(), Not(HasSubstr("PPPP")));
