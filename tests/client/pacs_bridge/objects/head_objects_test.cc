@@ -12,6 +12,7 @@
 #include "core/base/stopwatch.h"
 #include "core/case_file/case_reader.h"
 #include "tests/client/pacs_bridge/objects/objects_fixture.h"
+#include "tests/testing/meshes.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/scoped_environment.h"
 
