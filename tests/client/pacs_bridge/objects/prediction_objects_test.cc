@@ -275,6 +275,15 @@ TEST_F(PredictionObjectsTest, BadInputIsRefusedByName) {
   bad.pictures.push_back(MakePicture(4, 32));
   EXPECT_THAT(Refusal(bad).message(), HasSubstr("another size"));
   bad = good;
+  bad.pictures = {MakePicture(5, 2049, 1)};
+  EXPECT_THAT(Refusal(bad).message(), HasSubstr("more than 2048 pixels"));
+  bad = good;
+  std::filesystem::resize_file(MakePicture(6), 200);
+  bad.pictures[2] = folder_ / "picture6.png";
+  EXPECT_THAT(Refusal(bad).message(), HasSubstr("damaged or cut off"));
+  bad.pictures[2] = folder_ / "nowhere.png";
+  EXPECT_THAT(Refusal(bad).message(), HasSubstr("no such picture"));
+  bad = good;
   bad.pictures.back() = bad.source_header;
   EXPECT_THAT(Refusal(bad).message(), HasSubstr("no PNG"));
   bad = good;
