@@ -37,7 +37,7 @@ absl::TimeZone ZoneOf(DcmItem* source) {
   return absl::FixedTimeZone((number / 100 * 60 + number % 100) * 60);
 }
 
-absl::Status CheckLengths(DcmItem* item) {
+absl::Status CheckTextLengths(DcmItem* item) {
   DcmStack stack;
   while (item->nextObject(stack, OFTrue).good()) {
     DcmObject* object = stack.top();
@@ -136,7 +136,7 @@ absl::Status CheckSource(DcmDataset* source) {
   }
   DcmDataset copy;
   TF_RETURN_IF_ERROR(CopyPatientAndStudy(source, &copy));
-  return CheckLengths(&copy);
+  return CheckTextLengths(&copy);
 }
 
 absl::Status WriteCommonModules(DcmDataset* source, const PredictionObjectsInput& input,
