@@ -40,6 +40,7 @@ th, td { text-align: left; padding: 10px 12px; vertical-align: top; border-botto
   overflow-wrap: anywhere; min-width: 90px; }
 thead th { color: var(--quiet); font-size: 12px; font-weight: 600; }
 tbody th { font-weight: 600; }
+td:nth-child(2), td:nth-child(4) { white-space: nowrap; }
 tbody tr:last-child > * { border-bottom: 0; }
 a { color: var(--accent); }
 button { font: inherit; font-weight: 600; padding: 10px 16px; border: 0; border-radius: var(--radius);
