@@ -3,48 +3,14 @@
 
 #include "client/pacs_bridge/queue/export_rows.h"
 
-#include <array>
-
-#include "absl/strings/str_cat.h"
-
 #include "core/base/status_macros.h"
 
 namespace tissueform {
 namespace {
 
-constexpr std::array<const char*, 7> kExportStates = {"asked", "confirmed", "fetched", "written",
-                                                      "sent",  "told",      "failed"};
-
-absl::StatusOr<QueuedExport> ExportOf(const Database::Query& row) {
-  QueuedExport found;
-  int column = 0;
-  for (std::string* text : {&found.name, &found.key, &found.prediction, &found.case_name}) {
-    *text = TextOf(row, column++);
-  }
-  const absl::string_view state = row.Text(column++);
-  size_t number = 0;
-  while (number < kExportStates.size() && state != kExportStates[number]) ++number;
-  if (number == kExportStates.size()) {
-    return absl::DataLossError(
-        "the queue has an export in a state that this program does not know");
-  }
-  found.state = static_cast<BridgeExportState>(number);
-  found.note = TextOf(row, column++);
-  found.confirmed = TextOf(row, column++);
-  found.attempts = row.Integer(column++);
-  found.last_error = TextOf(row, column++);
-  found.first_s = row.Integer(column++);
-  found.done_s = row.Integer(column++);
-  return found;
-}
-
 absl::Status NoExport() { return absl::NotFoundError("no such export in the queue"); }
 
 }  // namespace
-
-const char* BridgeExportStateName(BridgeExportState state) {
-  return kExportStates[static_cast<size_t>(state)];
-}
 
 absl::StatusOr<QueuedExport> ExportRows::Add(const QueuedExport& asked) {
   const absl::Status done = queue_->Change([&](Database& database) {

@@ -3,53 +3,19 @@
 
 #include "client/pacs_bridge/queue/received_rows.h"
 
-#include <array>
 #include <optional>
 
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
 
 namespace tissueform {
 namespace {
-
-constexpr std::array<const char*, 9> kSeriesStates = {"receiving",   "incomplete", "complete",
-                                                      "passed_over", "chosen",     "built",
-                                                      "packed",      "published",  "failed"};
 
 #define TF_SERIES_COLUMNS                                                                         \
   "SELECT key, study_uid, uid, frame_uid, modality, state, reason, recipe, case_name, attempts, " \
   "last_error, first_s, done_s, has_files, has_header, (SELECT COUNT(*) FROM images WHERE "       \
   "images.series = series.key) FROM series "
-
-absl::StatusOr<SeriesState> StateOf(absl::string_view name) {
-  for (size_t i = 0; i < kSeriesStates.size(); ++i) {
-    if (name == kSeriesStates[i]) return static_cast<SeriesState>(i);
-  }
-  return absl::DataLossError("the queue has a series in a state that this program does not know");
-}
-
-absl::StatusOr<QueuedSeries> SeriesOf(const Database::Query& row) {
-  QueuedSeries series;
-  int column = 0;
-  for (std::string* text :
-       {&series.key, &series.study_uid, &series.uid, &series.frame_uid, &series.modality}) {
-    *text = TextOf(row, column++);
-  }
-  TF_ASSIGN_OR_RETURN(series.state, StateOf(row.Text(column++)));
-  for (std::string* text : {&series.reason, &series.recipe, &series.case_name}) {
-    *text = TextOf(row, column++);
-  }
-  series.attempts = row.Integer(column++);
-  series.last_error = TextOf(row, column++);
-  series.first_s = row.Integer(column++);
-  series.done_s = row.Integer(column++);
-  series.has_files = row.Integer(column++) != 0;
-  series.has_header = row.Integer(column++) != 0;
-  series.images = row.Integer(column++);
-  return series;
-}
 
 absl::Status InsertStudy(Database& database, const QueuedStudy& study) {
   return database.Prepare("INSERT OR IGNORE INTO studies VALUES (?, ?, ?, ?, ?, ?, ?, ?)")
@@ -113,23 +79,6 @@ constexpr char kOfStudy[] = TF_SERIES_COLUMNS "WHERE study_uid = ? ORDER BY firs
 constexpr char kAll[] = TF_SERIES_COLUMNS "WHERE ? = '' ORDER BY first_s, key";
 
 }  // namespace
-
-PatientIdentity IdentityOf(const InstanceHeader& image) {
-  const auto cut = [](const std::string& text) { return text.substr(0, kMostIdentityBytes); };
-  return {.id = cut(image.patient_id),
-          .issuer = cut(image.issuer_of_patient_id),
-          .name = cut(image.patient_name),
-          .birth_date = cut(image.birth_date),
-          .readable = image.text_problem.empty()};
-}
-
-std::string DigestOf(const PatientIdentity& patient) {
-  const std::string lengths = absl::StrCat(patient.id.size(), " ", patient.issuer.size(), " ",
-                                           patient.name.size(), " ", patient.readable);
-  return Sha256Hex({lengths, patient.id, patient.issuer, patient.name, patient.birth_date});
-}
-
-const char* SeriesStateName(SeriesState state) { return kSeriesStates[static_cast<size_t>(state)]; }
 
 absl::StatusOr<QueuedSeries> ReceivedRows::Add(const QueuedStudy& study, const QueuedSeries& series,
                                                const std::string& new_key,

@@ -6,15 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <set>
 
-#include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
-#include "absl/strings/numbers.h"
-#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "absl/strings/string_view.h"
 #include <Eigen/Geometry>
 
 namespace tissueform {
@@ -30,9 +25,6 @@ constexpr double kSameDirection = 1e-4;
 const double kAxialCosine = std::cos(31.0 * M_PI / 180.0);
 // A place is missing where the next image is farther than so many spacings.
 constexpr double kGapSpacings = 1.5;
-// From which number on Siemens' kernels are sharp (B60s, H60s, Hr59 are; B30f, J40s are not).
-constexpr int kSharpNumber = 50;
-
 Vector3d NormalOf(const InstanceHeader& image) {
   const Vector3d row = image.axes->col(0);
   const Vector3d column = image.axes->col(1);
@@ -98,18 +90,6 @@ bool IsLocaliser(const InstanceHeader& image) {
          absl::StrContains(image.image_type, "SCOUT");
 }
 
-// The digits after the leading letters: 60 of "Hr60s"; -1: none.
-int NumberIn(absl::string_view name) {
-  size_t begin = 0;
-  while (begin < name.size() && absl::ascii_isalpha(static_cast<unsigned char>(name[begin])))
-    ++begin;
-  size_t end = begin;
-  while (end < name.size() && absl::ascii_isdigit(static_cast<unsigned char>(name[end]))) ++end;
-  int number = -1;
-  if (begin == 0 || end - begin != 2) return -1;
-  return absl::SimpleAtoi(name.substr(begin, end - begin), &number) ? number : -1;
-}
-
 const char* PlaneName(SlicePlane plane) {
   constexpr std::array<const char*, 5> kNames = {"axial", "coronal", "sagittal", "oblique",
                                                  "placeless"};
@@ -117,22 +97,6 @@ const char* PlaneName(SlicePlane plane) {
 }
 
 }  // namespace
-
-KernelKind KernelKindOf(const std::string& kernel) {
-  const std::string upper = absl::AsciiStrToUpper(kernel);
-  for (const char* word : {"BONE", "EDGE", "SHARP", "LUNG", "DETAIL"}) {
-    if (absl::StrContains(upper, word)) return KernelKind::kBone;
-  }
-  for (const char* word : {"SOFT", "STANDARD", "STND", "SMOOTH", "BRAIN"}) {
-    if (absl::StrContains(upper, word)) return KernelKind::kSoft;
-  }
-  const int number = NumberIn(upper);
-  if (absl::StartsWith(upper, "FC") && number >= 0) {  // Canon, Toshiba
-    return (number >= 30 && number < 40) || number >= 50 ? KernelKind::kBone : KernelKind::kSoft;
-  }
-  if (number < 0) return KernelKind::kUnknown;
-  return number >= kSharpNumber ? KernelKind::kBone : KernelKind::kSoft;
-}
 
 SeriesFacts FactsOfSeries(const std::string& key, const std::vector<InstanceHeader>& images) {
   const InstanceHeader& first = images.front();

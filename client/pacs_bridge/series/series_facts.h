@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "client/pacs_bridge/dicom/instance_header.h"
+#include "client/pacs_bridge/series/kernel_kind.h"
 
 namespace tissueform {
 
 enum class SlicePlane { kAxial, kCoronal, kSagittal, kOblique, kNone };
-enum class KernelKind { kSoft, kBone, kUnknown };
 
 // What a series is, by its images' headers: what rules decide by. Numbers are of the slices that
 // lie at different places.
@@ -40,10 +40,6 @@ struct SeriesFacts {
 
 // REQUIRES: headers of one series, at least one.
 SeriesFacts FactsOfSeries(const std::string& key, const std::vector<InstanceHeader>& images);
-
-// By the names that manufacturers give their kernels: "H60s" (sharp from 50 on), "BONEPLUS",
-// "FC81"; a name that says neither is unknown.
-KernelKind KernelKindOf(const std::string& kernel);
 
 // "231 axial slices, 0.60 mm apart, over 138 mm, soft kernel", for people; nothing of a patient.
 std::string DescribeFacts(const SeriesFacts& facts);

@@ -11,14 +11,10 @@
 #include <thread>
 #include <utility>
 
-#include "absl/strings/ascii.h"
-#include "absl/strings/escaping.h"
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_split.h"
-#include "absl/strings/strip.h"
 
 #include "client/pacs_bridge/queue/export_rows.h"
+#include "client/pacs_bridge/worklist/worklist_access.h"
 #include "client/pacs_bridge/worklist/worklist_page.h"
 #include "core/base/status_macros.h"
 
@@ -27,55 +23,11 @@ namespace {
 
 constexpr size_t kMostRequestBytes = 16 << 10;
 constexpr size_t kServingThreads = 4;
-constexpr size_t kLeastPasswordCharacters = 16;
-constexpr size_t kMostPasswordBytes = 4096;
 constexpr int kIdleSeconds = 10;
 constexpr uintmax_t kMostPictureBytes = 16 << 20;
 
 constexpr char kHtml[] = "text/html; charset=utf-8";
 constexpr char kText[] = "text/plain; charset=utf-8";
-
-// Takes as long for every text of one length.
-bool IsSameSecret(const std::string& given, const std::string& secret) {
-  unsigned difference = given.size() == secret.size() ? 0 : 1;
-  for (size_t i = 0; i < given.size(); ++i) {
-    difference |= static_cast<unsigned char>(given[i]) ^
-                  static_cast<unsigned char>(secret[i % secret.size()]);
-  }
-  return difference == 0;
-}
-
-bool IsLoopback(const std::string& address) {
-  return absl::StartsWith(address, "127.") || address == "::1" || address == "localhost";
-}
-
-absl::StatusOr<std::string> ReadPassword(const std::string& path) {
-  namespace fs = std::filesystem;
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (!fs::is_regular_file(status)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(path, " cannot be read; write the work list's password to it"));
-  }
-  if ((status.permissions() & (fs::perms::group_all | fs::perms::others_all)) != fs::perms::none) {
-    return absl::InvalidArgumentError(absl::StrCat(path, " may be read by others; chmod 600 it"));
-  }
-  std::ifstream file(path);
-  std::string password(kMostPasswordBytes, '\0');
-  file.read(password.data(), static_cast<std::streamsize>(password.size()));
-  password.resize(static_cast<size_t>(file.gcount()));
-  absl::StripAsciiWhitespace(&password);
-  if (password.size() >= kLeastPasswordCharacters) return password;
-  return absl::InvalidArgumentError(absl::StrCat(path, " holds fewer than ",
-                                                 kLeastPasswordCharacters,
-                                                 " characters; write a longer password to it"));
-}
-
-// "planner.example.org" of "planner.example.org:8043"; IPv6 stays in its brackets.
-std::string HostWithoutPort(const std::string& host) {
-  if (absl::StartsWith(host, "[")) return host.substr(0, host.find(']') + 1);
-  return host.substr(0, host.find(':'));
-}
 
 class HttpWorkListServer final : public WorkListServer {
  public:
@@ -88,7 +40,7 @@ class HttpWorkListServer final : public WorkListServer {
         confirmed_(std::move(confirmed)) {
     hosts_ = {"127.0.0.1", "localhost", "[::1]"};
     hosts_.insert(options_.allowed_hosts.begin(), options_.allowed_hosts.end());
-    if (!IsLoopback(options_.address)) hosts_.insert(options_.address);
+    if (!IsLoopbackAddress(options_.address)) hosts_.insert(options_.address);
     SetLimits();
     SetRoutes();
   }
@@ -176,21 +128,11 @@ class HttpWorkListServer final : public WorkListServer {
       Refuse(response, 421, "this is not the host that was asked for; see --worklist-host");
       return false;
     }
-    if (password_.empty() || HasPassword(request)) return true;
+    if (password_.empty() || IsBasicPassword(request.get_header_value("Authorization"), password_))
+      return true;
     response->set_header("WWW-Authenticate", "Basic realm=\"Tissueform work list\"");
     Refuse(response, 401, "the work list wants its password");
     return false;
-  }
-
-  bool HasPassword(const Request& request) const {
-    const std::string header = request.get_header_value("Authorization");
-    absl::string_view encoded = header;
-    std::string decoded;
-    if (!absl::ConsumePrefix(&encoded, "Basic ") || !absl::Base64Unescape(encoded, &decoded)) {
-      return false;
-    }
-    const size_t colon = decoded.find(':');
-    return colon != std::string::npos && IsSameSecret(decoded.substr(colon + 1), password_);
   }
 
   // Of a browser that says where a form comes from: from here.
@@ -273,8 +215,8 @@ absl::StatusOr<std::unique_ptr<WorkListServer>> WorkListServer::Start(
     const WorkListOptions& options, BridgeQueue* queue, std::function<void()> confirmed) {
   std::string password;
   if (!options.token_file.empty()) {
-    TF_ASSIGN_OR_RETURN(password, ReadPassword(options.token_file));
-  } else if (!IsLoopback(options.address)) {
+    TF_ASSIGN_OR_RETURN(password, ReadWorkListPassword(options.token_file));
+  } else if (!IsLoopbackAddress(options.address)) {
     return absl::InvalidArgumentError(
         absl::StrCat("the work list shows names of patients: at ", options.address,
                      " it needs --worklist-token-file, or listen on 127.0.0.1"));

@@ -13,7 +13,7 @@
 
 #include "client/pacs_bridge/queue/export_rows.h"
 #include "client/pacs_bridge/queue/received_rows.h"
-#include "client/pacs_bridge/worklist/worklist_page.h"
+#include "client/pacs_bridge/worklist/shown_text.h"
 #include "client/pacs_bridge/worklist/worklist_server.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"

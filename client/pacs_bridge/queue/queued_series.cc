@@ -1,0 +1,50 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/queue/queued_series.h"
+
+#include <array>
+
+#include "client/pacs_bridge/queue/bridge_queue.h"
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+constexpr std::array<const char*, 9> kSeriesStates = {"receiving",   "incomplete", "complete",
+                                                      "passed_over", "chosen",     "built",
+                                                      "packed",      "published",  "failed"};
+
+absl::StatusOr<SeriesState> StateOf(absl::string_view name) {
+  for (size_t i = 0; i < kSeriesStates.size(); ++i) {
+    if (name == kSeriesStates[i]) return static_cast<SeriesState>(i);
+  }
+  return absl::DataLossError("the queue has a series in a state that this program does not know");
+}
+
+}  // namespace
+
+const char* SeriesStateName(SeriesState state) { return kSeriesStates[static_cast<size_t>(state)]; }
+
+absl::StatusOr<QueuedSeries> SeriesOf(const Database::Query& row) {
+  QueuedSeries series;
+  int column = 0;
+  for (std::string* text :
+       {&series.key, &series.study_uid, &series.uid, &series.frame_uid, &series.modality}) {
+    *text = TextOf(row, column++);
+  }
+  TF_ASSIGN_OR_RETURN(series.state, StateOf(row.Text(column++)));
+  for (std::string* text : {&series.reason, &series.recipe, &series.case_name}) {
+    *text = TextOf(row, column++);
+  }
+  series.attempts = row.Integer(column++);
+  series.last_error = TextOf(row, column++);
+  series.first_s = row.Integer(column++);
+  series.done_s = row.Integer(column++);
+  series.has_files = row.Integer(column++) != 0;
+  series.has_header = row.Integer(column++) != 0;
+  series.images = row.Integer(column++);
+  return series;
+}
+
+}  // namespace tissueform

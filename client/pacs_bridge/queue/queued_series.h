@@ -1,0 +1,66 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "absl/status/statusor.h"
+
+#include "client/pacs_bridge/queue/patient_identity.h"
+#include "server/store/database.h"
+
+namespace tissueform {
+
+struct QueuedStudy {
+  std::string uid = {};
+  PatientIdentity patient = {};
+  std::string date = {};
+  std::string description = {};
+};
+
+// How far a series has come; one step after the other, each of which may be repeated.
+enum class SeriesState {
+  kReceiving,
+  kIncomplete,  // it stopped midway: nothing is made of it unless more comes
+  kComplete,
+  kPassedOver,  // another one was chosen, or no rule takes it: `reason`
+  kChosen,
+  kBuilt,   // its plan folder is there
+  kPacked,  // the case lies in the plan folder, and its name is known
+  kPublished,
+  kFailed,
+};
+const char* SeriesStateName(SeriesState state);
+
+struct QueuedSeries {
+  std::string key = {};  // random, 32 hexadecimal digits: names folders, logs and status
+  std::string study_uid = {};
+  std::string uid = {};
+  std::string frame_uid = {};
+  std::string modality = {};
+  SeriesState state = SeriesState::kReceiving;
+  std::string reason = {};     // why chosen, passed over or failed; nothing of a patient
+  std::string recipe = {};     // file, of a chosen one
+  std::string case_name = {};  // "cases/{sha256}" when it is packed
+  int64_t attempts = 0;        // of the step that is next
+  std::string last_error = {};
+  int64_t first_s = 0;  // wall clock, to be told and for retention
+  int64_t done_s = 0;   // published, passed over or failed
+  bool has_files = true;
+  bool has_header = false;
+  int64_t images = 0;  // filled by reading; writing passes over it
+};
+
+struct QueuedImage {
+  std::string series = {};  // key
+  std::string uid = {};
+  std::string class_uid = {};
+  std::string file = {};
+};
+
+// Of a row with the columns that ReceivedRows selects. Errors: DataLoss: a state that is none.
+absl::StatusOr<QueuedSeries> SeriesOf(const Database::Query& row);
+
+}  // namespace tissueform
