@@ -3,9 +3,7 @@
 
 #pragma once
 
-#include <map>
 #include <memory>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -13,28 +11,11 @@
 
 #include "client/pacs_bridge/bridge_options.h"
 #include "client/pacs_bridge/network/instance_folder.h"
-#include "client/pacs_bridge/network/instance_sink.h"
 #include "client/pacs_bridge/work/export_work.h"
+#include "client/pacs_bridge/work/intake_sink.h"
 #include "client/pacs_bridge/work/series_intake.h"
 
 namespace tissueform {
-
-// Shows what is received to the intake. What comes again with other bytes is refused: nobody can
-// say which of two images of one name is right. Thread-safe.
-class IntakeSink final : public InstanceSink {
- public:
-  explicit IntakeSink(SeriesIntake* intake) : intake_(intake) {}
-
-  absl::Status Keep(const ReceivedInstance& instance) override;
-  void AssociationEnded(const EndedAssociation& ended) override;
-
- private:
-  SeriesIntake* const intake_;
-
-  Mutex mutex_;
-  // Series that associations which are open have brought.
-  std::map<int64_t, std::set<std::string>> series_ ABSL_GUARDED_BY(mutex_);
-};
 
 // What the commands of a bridge work with, joined by its options in one place.
 class BridgeParts {

@@ -14,6 +14,7 @@
 #include "client/cpp/backoff.h"
 #include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "client/pacs_bridge/dicom/instance_header.h"
+#include "client/pacs_bridge/work/patient_header.h"
 #include "client/pacs_bridge/work/plan_work.h"
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
@@ -45,18 +46,6 @@ std::string DetailOf(const std::string& text) {
 bool MayCome(const absl::Status& status) {
   return IsTransient(status) || absl::IsDeadlineExceeded(status) ||
          HasReason(status, ErrorReason::kDiskFull);
-}
-
-// What is another one, without saying what it is.
-std::string WhatDiffers(const PatientIdentity& seen, const PatientIdentity& now) {
-  if (seen.id != now.id || seen.issuer != now.issuer) {
-    return "the PACS names another patient ID than the images that were received (a merged or "
-           "corrected patient?)";
-  }
-  if (seen.name != now.name || seen.birth_date != now.birth_date) {
-    return "the PACS names another name or birth date than the images that were received";
-  }
-  return "";
 }
 
 int CountSent(const std::vector<QueuedObject>& objects) {
@@ -139,26 +128,6 @@ absl::Status ExportWork::Step(QueuedExport* queued) {
   return status;
 }
 
-absl::Status ExportWork::FetchHeader(const QueuedSeries& series, const std::string& path) {
-  std::error_code ignored;
-  fs::remove(path, ignored);
-  const absl::Status fetched = pacs_->FetchHeader(series.study_uid, series.uid, path);
-  if (fetched.ok()) return absl::OkStatus();
-  if (absl::IsNotFound(fetched)) {
-    return absl::FailedPreconditionError(
-        "the PACS has the series of this case no longer; nothing is stored");
-  }
-  if (!absl::IsFailedPrecondition(fetched) && !absl::IsUnimplemented(fetched)) return fetched;
-  // It gives nobody anything: what was kept stands for it, for a while.
-  const int64_t age_s = std::time(nullptr) - series.first_s;
-  if (!series.has_header || age_s > options_.header_lifetime.count()) {
-    return absl::FailedPreconditionError(
-        "the PACS gives no header, and none is kept any longer; have it send the series again");
-  }
-  fs::copy_file(queue_->header_path(series.key), path, ignored);
-  return ignored ? FileError(ignored.value(), "cannot copy the header to", path) : absl::OkStatus();
-}
-
 absl::Status ExportWork::Fetch(QueuedExport* queued) {
   TF_ASSIGN_OR_RETURN(const QueuedSeries series, received_.GetByCase(queued->case_name));
   const std::string folder = queue_->object_folder(queued->key);
@@ -166,7 +135,11 @@ absl::Status ExportWork::Fetch(QueuedExport* queued) {
   TF_RETURN_IF_ERROR(
       server_->UpdateExport(queued->name, v1::EXPORT_STATE_STORING, "is being written", 0));
   const std::string path = folder + "/header.dcm";
-  TF_RETURN_IF_ERROR(FetchHeader(series, path));
+  TF_RETURN_IF_ERROR(FetchPatientHeader(pacs_,
+                                        {.series = series,
+                                         .kept = queue_->header_path(series.key),
+                                         .lifetime = options_.header_lifetime},
+                                        path));
   TF_FAULT_POINT("export.header");
   TF_ASSIGN_OR_RETURN(const InstanceHeader header, ReadInstanceHeader(path));
   if (header.study_uid != series.study_uid || header.series_uid != series.uid) {
@@ -179,12 +152,7 @@ absl::Status ExportWork::Fetch(QueuedExport* queued) {
   }
   // Whoever confirmed has seen somebody else: once more, with what the PACS says now.
   TF_ASSIGN_OR_RETURN(const QueuedStudy study, received_.GetStudy(series.study_uid));
-  std::string note = WhatDiffers(study.patient, now);
-  if (!now.readable) {
-    note = "the name is in a character set that is not known here; compare with the PACS";
-  } else if (note.empty()) {
-    note = "the patient was corrected after it was confirmed";
-  }
+  const std::string note = WhatHasChanged(study.patient, now);
   TF_RETURN_IF_ERROR(received_.UpdatePatient(series.study_uid, now));
   TF_FAULT_POINT("export.patient_changed");
   TF_RETURN_IF_ERROR(server_->UpdateExport(queued->name, v1::EXPORT_STATE_CONFIRMATION,

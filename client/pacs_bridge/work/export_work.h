@@ -62,7 +62,6 @@ class ExportWork {
  private:
   absl::Status RunStep(QueuedExport* queued);
   absl::Status Fetch(QueuedExport* queued);
-  absl::Status FetchHeader(const QueuedSeries& series, const std::string& path);
   absl::StatusOr<ExportMaterial> Gather(const QueuedExport& queued);
   absl::Status Write(QueuedExport* queued);
   absl::Status Send(QueuedExport* queued);
