@@ -142,7 +142,7 @@ function(tissueform_install_data)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/build/web" DESTINATION "${TISSUEFORM_INSTALL_DATA}" COMPONENT gateway OPTIONAL)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/tests/data/plans" DESTINATION "${TISSUEFORM_INSTALL_DATA}")
   install(FILES "${PROJECT_SOURCE_DIR}/docs/plan.schema.json" "${PROJECT_SOURCE_DIR}/docs/recipe.schema.json"
-                "${PROJECT_SOURCE_DIR}/docs/targets.schema.json" "${PROJECT_SOURCE_DIR}/docs/case.schema.json" "${PROJECT_SOURCE_DIR}/docs/viewer.schema.json"
+                "${PROJECT_SOURCE_DIR}/docs/targets.schema.json" "${PROJECT_SOURCE_DIR}/docs/case.schema.json" "${PROJECT_SOURCE_DIR}/docs/viewer.schema.json" "${PROJECT_SOURCE_DIR}/docs/series-rules.schema.json"
           DESTINATION "${TISSUEFORM_INSTALL_DATA}")
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/proto/tissueform" DESTINATION "${TISSUEFORM_INSTALL_DATA}/proto"
           FILES_MATCHING PATTERN "*.proto" PATTERN "store" EXCLUDE)  # what a server keeps for itself is no interface
