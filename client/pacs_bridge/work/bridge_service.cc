@@ -178,6 +178,8 @@ void BridgeService::WorkOnExports() {
 }
 
 void BridgeService::WatchServer() {
+  constexpr char kWatch[] = "watch";
+  if (!watch_retries_.Due(kWatch)) return;
   const Cancellation cancelled([this] { return stopping(); });
   const absl::Status status = parts_.server->WatchExports(
       [this](const v1::Export& told) {
@@ -185,10 +187,13 @@ void BridgeService::WatchServer() {
           MutexLock lock(mutex_);
           if (heard_.size() < kMostHeard) heard_.push_back(told);
         }
+        watch_retries_.Succeeded(kWatch);
         Wake();
       },
       cancelled);
-  if (!stopping()) Tell(status, "the watch of exports has ended; it is taken up again");
+  if (stopping()) return;
+  watch_retries_.Failed(kWatch);
+  Tell(status, "the watch of exports has ended; it is taken up again");
 }
 
 }  // namespace tissueform

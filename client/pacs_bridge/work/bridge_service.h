@@ -67,6 +67,7 @@ class BridgeService {
   // Each of one thread.
   RetryTimes plan_retries_;
   RetryTimes export_retries_;
+  RetryTimes watch_retries_;
   std::chrono::steady_clock::time_point next_deletion_ = {};
   std::set<std::string> drawn_;  // keys of exports whose pictures were drawn, or could not be
 
