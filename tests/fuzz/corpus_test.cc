@@ -64,7 +64,8 @@ INSTANTIATE_TEST_SUITE_P(
         Target{"case_file", FuzzCaseFile}, Target{"case_upload", FuzzCaseUpload},
         Target{"answers", FuzzAnswers}, Target{"socket_frame", FuzzSocketFrame},
         Target{"web_request", FuzzWebRequest}, Target{"gateway_connection", FuzzGatewayConnection},
-        Target{"token", FuzzToken}, Target{"token_keys", FuzzTokenKeys}),
+        Target{"token", FuzzToken}, Target{"token_keys", FuzzTokenKeys},
+        Target{"multipart", FuzzMultipart}, Target{"instance_header", FuzzInstanceHeader}),
     [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

@@ -83,4 +83,10 @@ void FuzzToken(const uint8_t* data, size_t size);
 // A key set, or PEM keys, and a revocation list (KeySet::Parse, RevocationList::Parse).
 void FuzzTokenKeys(const uint8_t* data, size_t size);
 
+// The body of a WADO-RS answer (MultipartSplitter): the same in pieces of any size.
+void FuzzMultipart(const uint8_t* data, size_t size);
+
+// A DICOM file as the PACS bridge reads it (ReadInstanceHeader).
+void FuzzInstanceHeader(const uint8_t* data, size_t size);
+
 }  // namespace tissueform::fuzz

@@ -20,6 +20,7 @@ declare -A corpora=([FuzzPlan]=plan [FuzzMeshValidation]=mesh_validation [FuzzMe
   [FuzzDicomSeries]=dicom_series [FuzzVolumeHeader]=volume_header [FuzzRecipe]=recipe [FuzzMeditLines]=medit
   [FuzzDisplacements]=displacements [FuzzStoreRecord]=store_record [FuzzDeformStream]=deform_stream [FuzzCaseFile]=case_file
   [FuzzCaseUpload]=case_upload [FuzzAnswers]=answers [FuzzSocketFrame]=socket_frame [FuzzWebRequest]=web_request
+  [FuzzMultipart]=multipart [FuzzInstanceHeader]=instance_header
   [FuzzGatewayConnection]=gateway_connection)
 
 cmake -S . -B "$build_dir" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O1 -g1" \
