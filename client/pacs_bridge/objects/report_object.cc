@@ -162,8 +162,11 @@ void AddWritten(const PredictionObjectsInput& input, const std::string& study_ui
     const bool is_model = absl::StartsWith(key, "stl:");
     const std::string class_uid(is_model ? kEncapsulatedStlClass : kColourCaptureClass);
     const std::string& instance_uid = input.uids.at(key);
-    tree->AddReference(is_model ? OwnTerm("SURFACE", "Surface") : OwnTerm("CAPTURE", "Pictures"),
-                       class_uid, instance_uid);
+    if (is_model) {
+      tree->AddReference(OwnTerm("SURFACE", "Surface"), class_uid, instance_uid);
+    } else {
+      tree->AddImage(OwnTerm("CAPTURE", "Pictures"), class_uid, instance_uid);
+    }
     tree->AddEvidence(study_uid, input.uids.at(SeriesKeyOf(key)), class_uid, instance_uid);
   }
   for (const SourceImage& image : input.source_images) {

@@ -115,11 +115,21 @@ void ReportTree::AddContext(const std::string& device_name, const std::string& d
                    {"121013", "DCM", "Device Observer Name"}, device_name);
 }
 
-void ReportTree::AddReference(const CodedTerm& name, absl::string_view class_uid,
+void ReportTree::AddImage(const CodedTerm& name, const std::string& class_uid,
+                          const std::string& instance_uid) {
+  if (!impl_->Down(DSRTypes::RT_contains, DSRTypes::VT_Image, name)) return;
+  impl_->Check(impl_->Current().setImageReference(
+                   DSRImageReferenceValue(class_uid.c_str(), instance_uid.c_str())),
+               name);
+  impl_->Up();
+}
+
+void ReportTree::AddReference(const CodedTerm& name, const std::string& class_uid,
                               const std::string& instance_uid) {
   if (!impl_->Down(DSRTypes::RT_contains, DSRTypes::VT_Composite, name)) return;
-  const DSRCompositeReferenceValue reference(std::string(class_uid).c_str(), instance_uid.c_str());
-  impl_->Check(impl_->Current().setCompositeReference(reference), name);
+  impl_->Check(impl_->Current().setCompositeReference(
+                   DSRCompositeReferenceValue(class_uid.c_str(), instance_uid.c_str())),
+               name);
   impl_->Up();
 }
 

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "absl/status/status.h"
-#include "absl/strings/string_view.h"
 
 #include "client/pacs_bridge/objects/dicom_items.h"
 
@@ -36,8 +35,10 @@ class ReportTree {
                  const CodedTerm& derivation = {});
   // The language, and that a device made it.
   void AddContext(const std::string& device_name, const std::string& device_uid);
-  // Another object of the study, which becomes evidence of the report.
-  void AddReference(const CodedTerm& name, absl::string_view class_uid,
+  // Another object of the study; what is referred to has to be evidence of the report, too.
+  void AddImage(const CodedTerm& name, const std::string& class_uid,
+                const std::string& instance_uid);
+  void AddReference(const CodedTerm& name, const std::string& class_uid,
                     const std::string& instance_uid);
   void AddEvidence(const std::string& study_uid, const std::string& series_uid,
                    const std::string& class_uid, const std::string& instance_uid);
