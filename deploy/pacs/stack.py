@@ -256,7 +256,7 @@ backend orthanc
 
     def start_gateway(self, web):
         certificate, key = self.identities["gateway"]
-        self.start("gateway", [self.programs / "tissueform-gateway", "--port", self.gateway_port, "--server", f"localhost:{self.server_port}",
+        self.start("gateway", [self.programs / "tissueform-gateway", "--listen", f"{HOST}:{self.gateway_port}", "--server", f"localhost:{self.server_port}",
                                "--server-ca", self.authority.certificate, "--cert", certificate, "--key", key, "--web", web])
         self.wait_for("the gateway", lambda: self.listens(self.gateway_port), needs="gateway")
 
