@@ -145,9 +145,10 @@ endfunction()
 # tissueform_test(core_mesh SOURCES tet_mesh_test.cc DEPS core_mesh LABELS server)
 #
 # One test program a folder, named core_mesh_test; ctest sees every test of it by itself. The targets tests-server
-# and tests-inputs build the programs with these labels: the server; what reads from outside.
+# and tests-inputs build the programs with these labels: the server; what reads from outside. FIXTURE: what ctest makes
+# before (tests/client/web).
 function(tissueform_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT;PRECOMPILED" "SOURCES;DEPS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT;PRECOMPILED;FIXTURE" "SOURCES;DEPS;LABELS" ${ARGN})
   if(NOT ARG_PRECOMPILED)
     set(ARG_PRECOMPILED test)
   endif()
@@ -171,6 +172,9 @@ function(tissueform_test name)
       ENVIRONMENT_MODIFICATION "TISSUEFORM_SOURCE_DIR=set:${PROJECT_SOURCE_DIR}")
   if(ARG_LABELS)
     list(APPEND properties LABELS "${ARG_LABELS}")
+  endif()
+  if(ARG_FIXTURE)
+    list(APPEND properties FIXTURES_REQUIRED "${ARG_FIXTURE}")
   endif()
   foreach(label IN LISTS ARG_LABELS)
     if(NOT TARGET tests-${label})

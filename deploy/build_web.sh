@@ -2,8 +2,8 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
-# Builds the browser planner (client/web) into build/web: what `tissueform-gateway --web build/web` gives out. Does nothing
-# where that is newer than all it is made from.
+# Builds the browser planner (client/web) into build/web: what `tissueform-gateway --web build/web` gives out, and the page that
+# `tissueform export` fills. Does nothing where that is newer than all it is made from.
 #
 #   deploy/build_web.sh [--tools]      --tools: packages and generated messages only, as tests need them
 #
@@ -52,7 +52,7 @@ if ! is_newer "$generated/made" proto/tissueform/v1 deploy/build_web.sh "$web/pa
   touch "$generated/made"
 fi
 
-if [[ ${1:-} == --tools ]] || is_newer "$target/index.html" "$web/src" "$web/index.html" "$web/public" "$web/vite.config.ts" "$web/package-lock.json"; then
+if [[ ${1:-} == --tools ]] || is_newer "$target/moving-file.html" "$web/src" "$web/index.html" "$web/moving-file.template.html" "$web/build_moving_file.mjs" "$web/public" "$web/vite.config.ts" "$web/package-lock.json"; then
   exit 0
 fi
 (cd "$web" && npm run --silent build -- --logLevel warn)

@@ -32,7 +32,6 @@
 #include "server/rpc/prediction_service.h"
 #include "server/rpc/server_info_service.h"
 #include "server/rpc/session_service.h"
-#include "server/rpc/session_watches.h"
 #include "server/server_options.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/housekeeping.h"
@@ -45,6 +44,7 @@
 #include "server/telemetry/telemetry.h"
 #include "server/transport/connection_listener.h"
 #include "server/transport/rotated_files.h"
+#include "server/watches/session_watches.h"
 
 namespace tissueform {
 

@@ -241,6 +241,21 @@ absl::StatusOr<std::unique_ptr<DeformStream>> TissueformClient::OpenStream(
   return stream;
 }
 
+absl::StatusOr<std::unique_ptr<PreparedEvaluator>> TissueformClient::FetchPreparedAnswers(
+    const v1::Session& session, const DeformStream::Options& options) {
+  v1::DeformConfiguration configuration = DeformStream::ConfigurationOf(options);
+  v1::GetPreparedAnswersRequest request;
+  request.set_session(session.name());
+  *request.mutable_vertices() = std::move(*configuration.mutable_vertices());
+  request.set_model(configuration.model());
+  if (configuration.has_prepared()) {
+    *request.mutable_prepared() = std::move(*configuration.mutable_prepared());
+  }
+  return PreparedEvaluator::Fetch(deform_.get(), request,
+                                  {session.handles().begin(), session.handles().end()},
+                                  std::chrono::system_clock::now() + options_.call_deadline);
+}
+
 absl::StatusOr<std::unique_ptr<WatchStream>> TissueformClient::Watch(
     const std::string& session, const WatchStream::Options& options) {
   std::unique_ptr<WatchStream> watch(new WatchStream(deform_.get(), options));

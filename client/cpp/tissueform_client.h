@@ -21,6 +21,7 @@
 #include "client/cpp/mesh_upload.h"
 #include "client/cpp/prediction_calls.h"
 #include "client/cpp/prepare_session.h"
+#include "client/cpp/prepared_evaluator.h"
 #include "client/cpp/token_file.h"
 #include "client/cpp/watch_stream.h"
 #include "core/mesh/tet_mesh.h"
@@ -101,6 +102,12 @@ class TissueformClient {
   // The stream has no deadline.
   absl::StatusOr<std::unique_ptr<DeformStream>> OpenStream(const std::string& session,
                                                            const DeformStream::Options& options);
+
+  // The prepared answers that a stream with these options answers from, to evaluate them here;
+  // `session` is what the server says of it. Errors: those of PreparedEvaluator::Fetch;
+  // InvalidArgument (options.prepared is left out).
+  absl::StatusOr<std::unique_ptr<PreparedEvaluator>> FetchPreparedAnswers(
+      const v1::Session& session, const DeformStream::Options& options);
 
   // Follows what others drag. The watch has no deadline.
   absl::StatusOr<std::unique_ptr<WatchStream>> Watch(const std::string& session,

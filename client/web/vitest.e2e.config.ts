@@ -11,7 +11,7 @@ const path = (relative: string) => fileURLToPath(new URL(relative, import.meta.u
 export default defineConfig(({ mode }) => ({
   root: path("../../tests/e2e"),
   cacheDir: path("node_modules/.vite-e2e"),
-  resolve: { alias: { "playwright-core": path("node_modules/playwright-core/index.mjs"), "oidc-provider": path("node_modules/oidc-provider/lib/index.js") } },
+  resolve: { alias: { "playwright-core": path("node_modules/playwright-core/index.mjs"), "puppeteer-core": path("node_modules/puppeteer-core/lib/esm/puppeteer/puppeteer-core.js"), "oidc-provider": path("node_modules/oidc-provider/lib/index.js") } },
   server: { fs: { strict: false } },
   test: {
     globals: true,

@@ -105,9 +105,9 @@ class PreparedAnswersStream final : public MessageStream<v1::GetPreparedAnswersR
     const auto size = static_cast<int64_t>(bytes_.size());
     const int64_t most = std::min<int64_t>(limits_.max_prepared_answer_bytes, kMostAnswerBytes);
     if (size > most) {
-      return absl::ResourceExhaustedError(
-          absl::StrCat("the prepared answers have ", size, " bytes; the server sends at most ",
-                       most, ": ask for fewer vertices"));
+      return absl::ResourceExhaustedError(absl::StrCat("the prepared answers have ", size,
+                                                       " bytes; the server sends at most ", most,
+                                                       ": ask for fewer vertices"));
     }
     if (request_.read_offset() < 0 || request_.read_offset() > size) {
       return absl::InvalidArgumentError(absl::StrCat("read_offset is ", request_.read_offset(),

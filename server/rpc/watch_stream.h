@@ -19,10 +19,10 @@
 #include "core/constraints/handle_pose.h"
 #include "server/access/access.h"
 #include "server/calls/call_scope.h"
-#include "server/rpc/session_watches.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
 #include "server/session/session_registry.h"
+#include "server/watches/session_watches.h"
 
 namespace tissueform {
 

@@ -68,8 +68,7 @@ absl::StatusOr<OpenedPlan> OpenPlan(const std::string& plan_path, const PlanRead
   about.commit = SoftwareCommit();
   about.created = absl::FormatTime("%Y-%m-%dT%H:%M:%SZ", absl::Now(), absl::UTCTimeZone());
   about.plan_sha256 = Sha256Hex({text});
-  TF_ASSIGN_OR_RETURN(CaseFile contents,
-                      CaseOfPlan(problem, std::move(about), std::move(viewer)));
+  TF_ASSIGN_OR_RETURN(CaseFile contents, CaseOfPlan(problem, std::move(about), std::move(viewer)));
   return OpenedPlan{.problem = std::move(problem), .contents = std::move(contents)};
 }
 

@@ -63,8 +63,7 @@ absl::Status Export(const ExportOptions& options) {
     TF_ASSIGN_OR_RETURN(password, ReadPasswordFile(options.password_file));
   }
   if (!options.face.title.empty()) {
-    absl::FPrintF(stderr,
-                  "--title stands in the file: make sure that it names nobody%s\n",
+    absl::FPrintF(stderr, "--title stands in the file: make sure that it names nobody%s\n",
                   password.empty() ? ", for all who have the file read it" : "");
   }
   TF_ASSIGN_OR_RETURN(OpenedPlan opened, OpenPlan(options.plan, options.reading, ""));
@@ -75,8 +74,9 @@ absl::Status Export(const ExportOptions& options) {
   absl::PrintF("%s, %d surfaces, %.1f MB, %s: %s\n", data.model, data.surfaces.size(),
                static_cast<double>(html.size()) * 1e-6,
                password.empty() ? "not encrypted" : "encrypted", options.html);
-  absl::PrintF("not a medical device; a face identifies: treat it like a photograph of the "
-               "patient\n");
+  absl::PrintF(
+      "not a medical device; a face identifies: treat it like a photograph of the "
+      "patient\n");
   return absl::OkStatus();
 }
 

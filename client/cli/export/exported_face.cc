@@ -39,9 +39,9 @@ absl::StatusOr<std::vector<bool>> FreeHandles(const std::vector<CaseHandle>& han
                                     [&](const CaseHandle& h) { return h.name == segment; });
     if (found == handles.end()) {
       const auto add_name = [](std::string* text, const CaseHandle& h) { *text += h.name; };
-      return absl::InvalidArgumentError(
-          absl::StrCat("--segments: the plan has no handle \"", segment, "\"; it has ",
-                       absl::StrJoin(handles, ", ", add_name)));
+      return absl::InvalidArgumentError(absl::StrCat("--segments: the plan has no handle \"",
+                                                     segment, "\"; it has ",
+                                                     absl::StrJoin(handles, ", ", add_name)));
     }
     is_free[static_cast<size_t>(found - handles.begin())] = true;
   }

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <memory>
 #include <utility>
+#include <zlib.h>
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
@@ -14,7 +15,6 @@
 #include <openssl/crypto.h>
 #include <openssl/evp.h>
 #include <openssl/rand.h>
-#include <zlib.h>
 
 #include "core/base/status_macros.h"
 #include "core/mesh_payload/sha256.h"
@@ -74,31 +74,29 @@ struct SecretKey {
 };
 
 // The tag stands behind the text, as WebCrypto has it.
-absl::StatusOr<Bytes> EncryptGcm(absl::string_view text, const SecretKey& key,
-                                 const Bytes& nonce) {
+absl::StatusOr<Bytes> EncryptGcm(absl::string_view text, const SecretKey& key, const Bytes& nonce) {
   const std::unique_ptr<EVP_CIPHER_CTX, decltype(&EVP_CIPHER_CTX_free)> context(
       EVP_CIPHER_CTX_new(), EVP_CIPHER_CTX_free);
   Bytes out(text.size() + kTagBytes, '\0');
   int written = 0;
   int rest = 0;
-  const bool done =
-      context != nullptr &&
-      EVP_EncryptInit_ex(context.get(), EVP_aes_256_gcm(), nullptr, key.bytes.data(),
-                         Raw(absl::string_view(nonce))) == 1 &&
-      EVP_EncryptUpdate(context.get(), Raw(&out), &written, Raw(text),
-                        static_cast<int>(text.size())) == 1 &&
-      EVP_EncryptFinal_ex(context.get(), Raw(&out) + written, &rest) == 1 &&
-      EVP_CIPHER_CTX_ctrl(context.get(), EVP_CTRL_GCM_GET_TAG, static_cast<int>(kTagBytes),
-                          Raw(&out) + text.size()) == 1;
+  const bool done = context != nullptr &&
+                    EVP_EncryptInit_ex(context.get(), EVP_aes_256_gcm(), nullptr, key.bytes.data(),
+                                       Raw(absl::string_view(nonce))) == 1 &&
+                    EVP_EncryptUpdate(context.get(), Raw(&out), &written, Raw(text),
+                                      static_cast<int>(text.size())) == 1 &&
+                    EVP_EncryptFinal_ex(context.get(), Raw(&out) + written, &rest) == 1 &&
+                    EVP_CIPHER_CTX_ctrl(context.get(), EVP_CTRL_GCM_GET_TAG,
+                                        static_cast<int>(kTagBytes), Raw(&out) + text.size()) == 1;
   if (!done) return absl::InternalError("OpenSSL does not encrypt the data");
   return out;
 }
 
 absl::Status DeriveKey(const std::string& password, const Bytes& salt, SecretKey* key) {
-  const int done = PKCS5_PBKDF2_HMAC(password.data(), static_cast<int>(password.size()),
-                                     Raw(absl::string_view(salt)), static_cast<int>(salt.size()),
-                                     kMovingFileKeyRounds, EVP_sha256(), kKeyBytes,
-                                     key->bytes.data());
+  const int done =
+      PKCS5_PBKDF2_HMAC(password.data(), static_cast<int>(password.size()),
+                        Raw(absl::string_view(salt)), static_cast<int>(salt.size()),
+                        kMovingFileKeyRounds, EVP_sha256(), kKeyBytes, key->bytes.data());
   return done == 1 ? absl::OkStatus() : absl::InternalError("OpenSSL does not make a key");
 }
 
@@ -156,9 +154,9 @@ absl::StatusOr<std::string> ReadPasswordFile(const std::string& path) {
   if (!text.empty() && text.back() == '\r') text.pop_back();
   if (text.size() > kMostPasswordBytes || text.find_first_of("\n\r") != std::string::npos ||
       !IsUtf8(text) || CountLetters(text) < kLeastPasswordLetters) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "--password-file ", path, ": a password is one line of UTF-8 with at least ",
-        kLeastPasswordLetters, " letters and at most ", kMostPasswordBytes, " bytes"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("--password-file ", path, ": a password is one line of UTF-8 with at least ",
+                     kLeastPasswordLetters, " letters and at most ", kMostPasswordBytes, " bytes"));
   }
   return text;
 }

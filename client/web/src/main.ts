@@ -5,6 +5,7 @@ import "./styles/base.css";
 import "./styles/start.css";
 import "./styles/planner.css";
 import "./styles/panel.css";
+import "./styles/report.css";
 import { Bearer } from "./calls/bearer";
 import { Code, sentenceOf, toCallError } from "./calls/call_error";
 import { Gateway } from "./calls/gateway";

@@ -23,6 +23,8 @@ export interface Evaluation {
 }
 
 const ORIGIN = new Float64Array(3);
+const AT_REST: Pose = { rotationVector: [0, 0, 0], pivotMm: [0, 0, 0], translationMm: [0, 0, 0], scale: 1 };
+const TRIALS = 15;
 
 /**
  * Prepared answers at work (docs/prepared-answers.md): the positions that the server gives, by all of the columns. Nothing is
@@ -60,6 +62,17 @@ export class AnswerEvaluator {
     this.motions = Array.from({ length: answers.numbers.handles }, () => new Motion());
     const positions = restPositions(answers, this.places);
     this.result = { positions, coverage: "covered", errorBoundMm: 0, isEstimate: this.isClustered };
+  }
+
+  /** How long one evaluation takes here, in ms: the median of a few at rest. */
+  measure(now: () => number): number {
+    const rest = Array.from({ length: this.answers.numbers.handles }, () => AT_REST);
+    const times = Array.from({ length: TRIALS }, () => {
+      const start = now();
+      this.evaluate(rest);
+      return now() - start;
+    });
+    return times.sort((a, b) => a - b)[Math.floor(TRIALS / 2)];
   }
 
   get model(): AnswerModel {

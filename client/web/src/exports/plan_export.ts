@@ -38,6 +38,8 @@ export function planDocument(bench: Workbench): string {
   const { manifest } = bench.file;
   const poses = bench.plan.poses();
   const summary = bench.picture.value?.summary;
+  const skin = bench.file.surfaces.findIndex(({ entry }) => entry.kind === "skin");
+  const band = skin < 0 ? null : bench.bandOf(skin);
   const document = {
     format: "tissueform-planner-export",
     version: 1,
@@ -65,6 +67,7 @@ export function planDocument(bench: Workbench): string {
     landmarks: manifest.landmarks.map((landmark) => ({
       name: landmark.name,
       ...landmarkMovement(landmark, bench.shownPoses, bench.skinPoint, manifest.headFrame),
+      ...(landmark.skinVertex === null || band === null ? {} : { band_95_mm: band[landmark.skinVertex] }),
     })),
     measurement_landmarks: bench.landmarks.save(),
     measures: measureFace(bench).flatMap((result) => {

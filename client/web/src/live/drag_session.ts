@@ -27,6 +27,8 @@ export interface Picture {
   uncertainty: Float32Array | null;
   /** From sending its pose to now. */
   roundTripMs: number;
+  /** How many poses are newer than the one that it answers. */
+  posesBehind: number;
 }
 
 /** What a drag tells its owner. */
@@ -146,6 +148,7 @@ export class DragSession {
       positions: asFloats(raw, frame.positions),
       uncertainty,
       roundTripMs: this.now() - (this.sendTimes.get(frame.sequence) ?? this.now()),
+      posesBehind: Number(this.sequence - frame.sequence),
     };
     const call = this.call;
     this.listener.onPicture(picture, () => {

@@ -4,7 +4,7 @@
 import { type CallError, Code, sentenceOf, toCallError } from "../calls/call_error";
 import type { Gateway } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
-import type { DeformNotice } from "../generated/tissueform/v1/deform_service_pb";
+import type { DeformConfiguration, DeformNotice } from "../generated/tissueform/v1/deform_service_pb";
 import type { DeformationModel, Session } from "../generated/tissueform/v1/session_pb";
 import type { Pose } from "../geometry/pose";
 import { Backoff } from "./backoff";
@@ -26,6 +26,10 @@ export interface LiveListener {
   /** Poses that the session had before, when it is opened again. */
   onCommittedPoses(poses: Map<string, Pose>): void;
   onFollowers(count: number): void;
+  /** The drag goes on with this; again after every break. */
+  onStarted(configuration: DeformConfiguration): void;
+  /** The session is made from something else now. */
+  onUpdated(): void;
   /** A sentence that the planner should read. */
   onNotice(text: string): void;
 }
@@ -153,8 +157,12 @@ export class LiveSession {
     const isUnkept = this.hasUnkeptPoses || this.drag?.isCommitted === false;
     this.drag?.close();
     this.hasUnkeptPoses = false;
-    this.drag = new DragSession(this.gateway, dragConfiguration(this.session, this.file, this.choice), {
-      onStarted: () => this.listener.onConnection({ kind: "live" }),
+    const configuration = dragConfiguration(this.session, this.file, this.choice);
+    this.drag = new DragSession(this.gateway, configuration, {
+      onStarted: () => {
+        this.listener.onConnection({ kind: "live" });
+        this.listener.onStarted(configuration);
+      },
       onPicture: (picture, used) => this.listener.onPicture(picture, used),
       onNotice: (notice) => this.tell(notice),
       onBroken: (error) => this.listener.onConnection({ kind: "broken", text: sentenceOf(error) }),
@@ -183,7 +191,10 @@ export class LiveSession {
     if (notice.case === "draining") this.listener.onNotice("The server is about to end. Your poses are kept; the page connects again by itself.");
     if (notice.case === "evicted") this.listener.onNotice("The session had left the server's memory and is being prepared again.");
     if (notice.case === "restored") this.listener.onNotice("The session is back in the server's memory.");
-    if (notice.case === "updated") this.listener.onNotice("Somebody has updated the session: the face is that of the new one.");
+    if (notice.case === "updated") {
+      this.listener.onNotice("Somebody has updated the session: the face is that of the new one.");
+      this.listener.onUpdated();
+    }
     if (notice.case === "committed" && notice.value.failure !== "") this.listener.onNotice(`The server could not keep the poses: ${sentenceOf(notice.value.failure)}`);
   }
 

@@ -12,10 +12,9 @@ export function bandText(band: Band | null): string {
   return band === null ? "" : `${formatNumber(band.lowest)} to ${formatNumber(band.highest)}`;
 }
 
-/** A number that is at least 0, with how far it may be off: "6.0, 5.4 to 6.5". */
-export function lengthWithBand(value: number, bandMm: number | null): string {
-  if (bandMm === null) return formatNumber(value);
-  return `${formatNumber(value)}, ${bandText({ lowest: Math.max(0, value - bandMm), highest: value + bandMm })}`;
+/** Of a length, which is at least 0: "5.4 to 6.5". */
+export function lengthBand(valueMm: number, bandMm: number): string {
+  return bandText({ lowest: Math.max(0, valueMm - bandMm), highest: valueMm + bandMm });
 }
 
 /** "102 ± 8, Legan and Burstone 1980" */

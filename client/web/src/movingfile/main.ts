@@ -4,7 +4,7 @@
 import "../styles/base.css";
 import "../styles/planner.css";
 import "../styles/panel.css";
-import "./moving.css";
+import "../styles/moving.css";
 import { DamagedError, type Envelope, type Sealed, WrongPasswordError, checkWhole, fromBase64, unseal } from "../movingdata/sealed_payload";
 import { readMovingData } from "../movingdata/moving_data";
 import { el } from "../panels/dom";

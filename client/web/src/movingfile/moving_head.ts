@@ -75,6 +75,11 @@ export class MovingHead {
     return this.engine.isInWorker;
   }
 
+  /** The picture is that of the newest poses. */
+  get isIdle(): boolean {
+    return !this.isAsking && !this.isWaiting;
+  }
+
   /** 0: before, all at rest; 1: as the plan has it. Segments without sliders stay as the plan has them. */
   showShare(share: number): void {
     const before = this.plan.restPoses();

@@ -48,7 +48,7 @@ export async function movingPage(data: MovingData, engine: Engine): Promise<{ el
     legend.show(shown.legend);
   };
   const segments = data.handles.flatMap((handle, index) => (handle.isFree ? [segmentSection(head, index)] : []));
-  const panel = el("aside", { attributes: { "aria-label": "Movements" } }, [beforeAfter(head), ...segments, numbers.element]);
+  const panel = el("aside", { attributes: { "aria-label": "Movements" } }, [beforeAfter(head), numbers.element, ...segments]);
   const title = data.title === "" ? null : el("h1", { text: data.title });
   return { element: el("div", { class: "moving" }, [title, el("main", {}, [picture, viewBar(head.view)]), panel]), head };
 }

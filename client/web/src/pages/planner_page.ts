@@ -6,6 +6,7 @@ import type { CaseFile } from "../case/case_file";
 import { FollowLinks } from "../live/follow_links";
 import { button, el, onceAPicture } from "../panels/dom";
 import { exportPanel } from "../panels/export_panel";
+import { jawPanel } from "../panels/jaw_panel";
 import { bindKeys, helpDialog } from "../panels/keyboard";
 import { legendBox, mapPanel, modelPanel } from "../panels/maps_panel";
 import { measuresPanel } from "../panels/measures_panel";
@@ -13,6 +14,7 @@ import { movementsPanel } from "../panels/movements_panel";
 import { bindPicking, pickingBox } from "../panels/picking";
 import { predictionsPanel } from "../panels/predictions_panel";
 import { profilePanel } from "../panels/profile_panel";
+import { reportPanel } from "../panels/report_panel";
 import { segmentsPanel } from "../panels/segments_panel";
 import { noticeBox, statusBar } from "../panels/status_bar";
 import { pictureMarks, viewBar } from "../panels/view_bar";
@@ -90,10 +92,12 @@ export function plannerPage(
     measuresPanel(bench),
     profilePanel(bench),
     wishPanel(bench),
+    jawPanel(bench),
     modelPanel(bench),
     mapPanel(bench),
     predictionsPanel(bench),
     exportPanel(bench),
+    reportPanel(bench),
   ]);
   const element = el("div", { class: "planner" }, [status.element, el("main", {}, [picture, viewBar(view)]), panel, help]);
   return { element, bench };

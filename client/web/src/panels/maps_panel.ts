@@ -5,9 +5,10 @@ import { sentenceOf } from "../calls/call_error";
 import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
 import { VIRIDIS, colorTable } from "../geometry/color_map";
 import { formatNumber } from "../planning/numbers";
+import type { LocalState } from "../live/local_answers";
 import type { MapLegend } from "../workbench/face_colors";
 import type { MapChoice, Workbench } from "../workbench/workbench";
-import { type Choice, el, newId, onceAPicture, section, select } from "./dom";
+import { type Choice, button, el, newId, onceAPicture, section, select } from "./dom";
 
 interface ModelText {
   label: string;
@@ -40,7 +41,43 @@ export function modelPanel(bench: Workbench): HTMLElement {
     if (answer.textContent !== text) answer.textContent = text;
   };
   bench.picture.watch(onceAPicture(show));
-  return section("Model", [el("div", { attributes: { role: "radiogroup", "aria-label": "Model" } }, items), answer]);
+  return section("Model", [el("div", { attributes: { role: "radiogroup", "aria-label": "Model" } }, items), answer, localAnswers(bench)]);
+}
+
+/** Who answers the hand, and what stops or starts that. */
+function localAnswers(bench: Workbench): HTMLElement {
+  const text = el("span", { attributes: { "data-local": "none" } });
+  const stop = button("Stop", () => bench.local.stop(), { attributes: { title: "The server answers every move" } });
+  const start = button("Answer here", () => bench.local.resume(), { attributes: { title: "This page answers moves by itself, without waiting for the server" } });
+  const show = () => {
+    const state = bench.localState.value;
+    const told = describeLocal(state);
+    if (text.textContent !== told) text.textContent = told;
+    text.dataset.local = state.kind === "ready" ? state.coverage : state.kind;
+    stop.hidden = state.kind !== "fetching" && state.kind !== "ready";
+    start.hidden = state.kind !== "stopped" && state.kind !== "failed";
+  };
+  bench.localState.watch(onceAPicture(show));
+  show();
+  return el("p", { class: "quiet local" }, [text, " ", stop, start]);
+}
+
+function describeLocal(state: LocalState): string {
+  switch (state.kind) {
+    case "none":
+      return "The server answers.";
+    case "fetching":
+      return `The server answers. This page learns to: ${Math.round(100 * state.share)} %.`;
+    case "stopped":
+      return "The server answers.";
+    case "failed":
+      return `The server answers. This page cannot: ${state.text}`;
+    case "ready": {
+      if (state.coverage === "beyond") return "Beyond what was prepared: the server answers.";
+      const slow = state.kernel === "webassembly" ? "" : " (without WebAssembly: slower)";
+      return `This page answers at once${slow}; the server confirms.`;
+    }
+  }
 }
 
 function describeAnswer({ summary, isRefining }: NonNullable<Workbench["picture"]["value"]>): string {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { cell, describeMovement, landmarkMovement } from "../planning/landmarks";
+import { lengthBand } from "../measures/texts";
 import type { Workbench } from "../workbench/workbench";
 import { el, onceAPicture, section } from "./dom";
 
@@ -13,12 +14,16 @@ function captionOf(source: string): string {
 /** Where landmarks go, in mm of the head frame. */
 export function movementsPanel(bench: Workbench): HTMLElement {
   const { landmarks, headFrame } = bench.file.manifest;
+  const caption = el("caption");
   const rows = landmarks.map((landmark) => {
     const cells = Array.from({ length: 4 }, () => el("td"));
     const row = el("tr", {}, [el("th", { text: landmark.label, attributes: { scope: "row" } }), ...cells]);
     return { landmark, row, cells };
   });
+  const skin = bench.file.surfaces.findIndex(({ entry }) => entry.kind === "skin");
   const show = () => {
+    const band = skin < 0 ? null : bench.bandOf(skin);
+    caption.textContent = `${captionOf(headFrame.source)}${band === null ? "" : " Below “in all”: where it stays in 95 of 100 cases if nothing but the material is in doubt."}`;
     for (const { landmark, row, cells } of rows) {
       const movement = landmarkMovement(landmark, bench.shownPoses, bench.skinPoint, headFrame);
       const values = [movement.forwardMm, movement.leftMm, movement.upMm, movement.totalMm];
@@ -27,10 +32,12 @@ export function movementsPanel(bench: Workbench): HTMLElement {
         if (cells[index].textContent !== text) cells[index].textContent = text;
       });
       row.title = describeMovement(movement);
+      const bandMm = landmark.skinVertex === null ? null : (band?.[landmark.skinVertex] ?? null);
+      if (bandMm !== null) cells[3].replaceChildren(cell(movement.totalMm), el("small", { class: "band", text: lengthBand(movement.totalMm, bandMm) }));
     }
   };
   bench.shown.watch(onceAPicture(show));
   const heads = ["Landmark", "Forward", "Left", "Up", "In all"].map((text) => el("th", { text, attributes: { scope: "col" } }));
-  const table = el("table", {}, [el("caption", { text: captionOf(headFrame.source) }), el("thead", {}, [el("tr", {}, heads)]), el("tbody", {}, rows.map(({ row }) => row))]);
+  const table = el("table", {}, [caption, el("thead", {}, [el("tr", {}, heads)]), el("tbody", {}, rows.map(({ row }) => row))]);
   return section("Movements", [landmarks.length === 0 ? el("p", { class: "quiet", text: "The case has no landmarks." }) : table]);
 }

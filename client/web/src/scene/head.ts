@@ -9,6 +9,8 @@ import { type Pose, headAxes } from "../geometry/pose";
 import { type Matrix, type Vector, apply, fromRotationVector, subtract } from "../geometry/rotation";
 import { SKIN_COLOR, boneMaterial, depthMaterial, ghostMaterial, segmentMaterial, skinMaterial, teethMaterial } from "./materials";
 
+const WHITE = new three.Color(0xffffff);
+
 /** What is drawn of a case. */
 export interface DrawnCase {
   manifest: Pick<Manifest, "handles" | "headFrame">;
@@ -127,6 +129,29 @@ export class Head {
       else toLinear(colors[index], array);
       attribute.needsUpdate = true;
     });
+  }
+
+  /** Three bytes of each vertex of each surface of these, sRGB; null: as they look. */
+  colorSurfaces(surfaces: readonly DrawnSurface[], colors: Uint8Array[] | null): void {
+    surfaces.forEach(({ mesh, source }, index) => {
+      if (mesh.geometry.attributes.color === undefined) mesh.geometry.setAttribute("color", dynamic(new three.BufferAttribute(new Float32Array(source.positions.length), 3)));
+      const attribute = mesh.geometry.attributes.color as three.BufferAttribute;
+      if (colors !== null) toLinear(colors[index], attribute.array as Float32Array);
+      attribute.needsUpdate = true;
+      if (mesh.material.vertexColors === (colors !== null)) return;
+      mesh.material.vertexColors = colors !== null;
+      mesh.material.color.copy(colors === null ? this.material(source).color : WHITE);
+      mesh.material.needsUpdate = true;
+    });
+  }
+
+  /** Teeth alone, or all. */
+  setTeethOnly(isOnly: boolean): void {
+    this.group.children.forEach((child) => {
+      const surface = this.surfaces.find(({ mesh }) => mesh === child);
+      if (surface !== undefined) child.visible = !isOnly || surface.source.entry.kind === "teeth";
+    });
+    this.depth.visible = !isOnly && this.skin.transparent && this.skin.opacity > 0;
   }
 
   /** From LPS to the stage. */

@@ -128,7 +128,8 @@ export class WishFit {
 
   private request(): FitAsk {
     const names = this.plan.handles.map(({ name }) => name);
-    const poses = names.map((name) => this.start.get(name) as Pose);
+    // From what was found last it is a few steps to what is found next.
+    const poses = names.map((name) => ((this.free.has(name) ? this.found?.get(name) : undefined) ?? this.start.get(name)) as Pose);
     return {
       targets: this.wishes.value.map((wish, index) => this.target(wish, index)),
       freedoms: this.plan.handles.flatMap((handle, index) => (this.free.has(handle.name) ? [this.freedom(index)] : [])),

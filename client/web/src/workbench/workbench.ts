@@ -15,9 +15,11 @@ import { type Pose, toMove } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
 import type { Picture } from "../live/drag_session";
 import { type Connection, LiveSession } from "../live/live_session";
+import { LocalAnswers, type LocalState } from "../live/local_answers";
 import type { Anchor } from "../measures/anchor";
 import { type ShownFace, collectMeasures, suggestLandmarks } from "../measures/face_measures";
 import { LandmarkBook } from "../measures/landmark_book";
+import { type HingeAxis, hingeAxis, lowerJawHandles, opened } from "../planning/jaw_opening";
 import { Plan } from "../planning/plan";
 import { Gizmo } from "../scene/gizmo";
 import type { HeadView } from "../scene/head_view";
@@ -66,12 +68,14 @@ export class Workbench implements ShownFace {
   readonly landmarks: LandmarkBook;
   readonly wishes: WishFit;
   readonly pacs: PacsExports;
+  readonly local: LocalAnswers;
 
   readonly selected = new Signal(0);
   readonly connection = new Signal<Connection>({ kind: "preparing", text: "Opening", share: null });
   readonly followers = new Signal(0);
   readonly notice = new Signal("");
   readonly picture = new Signal<PictureFacts | null>(null);
+  readonly localState = new Signal<LocalState>({ kind: "none" });
   readonly model = new Signal<DeformationModel>(0);
   readonly map = new Signal<MapChoice>({ kind: "none" });
   readonly legend = new Signal<MapLegend | null>(null);
@@ -80,6 +84,8 @@ export class Workbench implements ShownFace {
   readonly penetrations = new Signal<Penetration[]>([]);
   /** What the next click upon the picture is for; null: for nothing but looking and taking a segment. */
   readonly picking = new Signal<Picking | null>(null);
+  /** Degrees by which the lower jaw is open; a look at it, no part of the plan. */
+  readonly opening = new Signal(0);
   /** The face or the bone on the stage changed. */
   readonly shown = new Signal(0);
 
@@ -87,6 +93,7 @@ export class Workbench implements ShownFace {
   private readonly colors: FaceColors;
   private readonly rest: Float32Array;
   private readonly displacements: Float32Array;
+  private foundHinge: { axis: HingeAxis | null } | null = null;
   private readonly penetrationTest: PenetrationTest;
   private uncertainty: Float32Array | null = null;
   private other: Float32Array | null = null;
@@ -117,12 +124,18 @@ export class Workbench implements ShownFace {
     );
     this.gizmo = new Gizmo(view.stage, view.head, (pose, isFinal) => this.pull(pose, isFinal));
     this.model.value = models.find((model) => model.name === file.manifest.model)?.model ?? file.sessionRequest.model;
+    this.local = new LocalAnswers(gateway, {
+      onState: (state) => (this.localState.value = state),
+      onEvaluation: ({ positions }) => this.showLocal(positions),
+    });
     this.live = new LiveSession(gateway, file, caseName, {
       onConnection: (connection) => (this.connection.value = connection),
       onPicture: (picture, used) => this.show(picture, used),
       onCommittedPoses: (poses) => this.plan.setPoses(poses),
       onFollowers: (count) => (this.followers.value = count),
       onNotice: (text) => (this.notice.value = text),
+      onStarted: (configuration) => void this.local.follow(configuration),
+      onUpdated: () => this.local.renew(),
     }, this.dragChoice());
     this.plan.onChange((_, { isFinal }) => this.planChanged(isFinal));
     this.selected.watch(() => this.placeGizmo());
@@ -148,6 +161,7 @@ export class Workbench implements ShownFace {
 
   async chooseModel(model: DeformationModel): Promise<void> {
     this.model.value = model;
+    this.local.drop();
     if (this.map.value.kind === "band" && !this.hasBand) this.map.value = { kind: "none" };
     await this.live.choose(this.dragChoice());
   }
@@ -232,7 +246,26 @@ export class Workbench implements ShownFace {
   }
 
   get showsPlan(): boolean {
-    return this.comparison.value === null;
+    return this.comparison.value === null && this.opening.value === 0;
+  }
+
+  /** The hinge of the lower jaw at rest; null where the case has none. */
+  get hinge(): HingeAxis | null {
+    return (this.foundHinge ??= { axis: hingeAxis(this.file) }).axis;
+  }
+
+  open(degrees: number): void {
+    this.opening.value = degrees;
+    this.planChanged(degrees === 0);
+  }
+
+  /** The plan's, with the jaw open. */
+  private openedPoses(): Pose[] {
+    const poses = this.plan.poses();
+    const { hinge } = this;
+    if (this.opening.value === 0 || hinge === null) return poses;
+    const lower = lowerJawHandles(this.file);
+    return poses.map((pose, index) => (lower.includes(this.plan.handles[index].name) ? opened(pose, hinge, this.opening.value) : pose));
   }
 
   posesByHandle(poses: readonly Pose[]): Map<string, Pose> {
@@ -262,10 +295,12 @@ export class Workbench implements ShownFace {
   }
 
   private planChanged(isFinal: boolean): void {
-    const poses = this.plan.poses();
-    this.live.sendPoses(poses, isFinal);
+    const poses = this.openedPoses();
+    // What the server keeps is the plan.
+    this.live.sendPoses(poses, isFinal && this.opening.value === 0);
     this.waitingFrom ??= performance.now();
     if (this.comparison.value === null) this.setPoses(poses);
+    this.local.ask(poses);
     if (!this.gizmo.isDragging) this.placeGizmo();
     clearTimeout(this.settling);
     this.settling = setTimeout(() => this.settled(), SETTLE_MS);
@@ -290,12 +325,24 @@ export class Workbench implements ShownFace {
 
   private show(picture: Picture, used: () => void): void {
     if (picture.positions.length !== this.rest.length) throw new Error("a picture came that has other vertices than the case");
-    subtractInto(picture.positions, this.rest, this.displacements);
     this.waitingFrom = null;
-    if (picture.frame.refinement === 0) this.uncertainty = picture.uncertainty;
     this.picture.value = { roundTripMs: picture.roundTripMs, summary: picture.frame.summary ?? null, isRefining: picture.frame.refining };
+    // The face never goes back to poses that the hand has left, once the page itself has shown newer ones.
+    if (picture.posesBehind > this.local.posesSinceTold) {
+      used();
+      return;
+    }
+    subtractInto(picture.positions, this.rest, this.displacements);
+    if (picture.frame.refinement === 0) this.uncertainty = picture.uncertainty;
     if (this.comparison.value !== null) used();
     else this.lay(this.displacements, used);
+  }
+
+  /** The page's own answer, in the picture that shows the bone there. */
+  private showLocal(positions: Float32Array): void {
+    if (positions.length !== this.rest.length) return this.local.drop();
+    subtractInto(positions, this.rest, this.displacements);
+    if (this.comparison.value === null) this.lay(this.displacements);
   }
 
   private lay(displacements: Float32Array, used?: () => void): void {
@@ -335,7 +382,7 @@ export class Workbench implements ShownFace {
 
   private async redraw(): Promise<void> {
     const comparison = this.comparison.value;
-    const planned = { displacements: this.displacements, poses: this.plan.poses() };
+    const planned = { displacements: this.displacements, poses: this.openedPoses() };
     const shape = comparison === null ? planned : await this.comparer.between(comparison, planned);
     // Another comparison may have been chosen meanwhile.
     if (comparison !== this.comparison.value) return;

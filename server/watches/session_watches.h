@@ -14,10 +14,10 @@
 
 #include "core/base/mutex.h"
 #include "server/auth/authenticator.h"
-#include "server/rpc/watch_channel.h"
 #include "server/session/limits.h"
 #include "server/session/session_registry.h"
 #include "server/session/worker_pool.h"
+#include "server/watches/watch_channel.h"
 
 namespace tissueform {
 

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/rpc/watch_channel.h"
+#include "server/watches/watch_channel.h"
 
 #include <utility>
 

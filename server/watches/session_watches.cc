@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/rpc/session_watches.h"
+#include "server/watches/session_watches.h"
 
 #include <utility>
 

@@ -1,0 +1,124 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import type { Pose } from "../geometry/pose";
+import { AnswersError, readAnswers } from "./answer_bytes";
+import { AnswerEvaluator, type Evaluation } from "./answer_evaluator";
+import type { FromWorker, ToWorker } from "./evaluation_service";
+import { makeEvaluator } from "./evaluator";
+
+/**
+ * An evaluation in the page itself is shown in the same picture as the pose; from a worker it comes a picture later. So long, in
+ * ms, the page does it: a quarter of a picture.
+ */
+const PAGE_BUDGET_MS = 4;
+
+/** `number`: that of the question. */
+export type OnEvaluation = (evaluation: Evaluation, number: number) => void;
+
+/** Where answers are evaluated. A question replaces one that waits. */
+export interface EvaluationHost {
+  readonly place: "page" | "worker";
+  readonly kernel: string;
+  /** In the page it is answered before this returns. */
+  ask(poses: readonly Pose[], number: number): void;
+  close(): void;
+}
+
+/** What of a worker is used; tests have their own. */
+export type WorkerLike = Pick<Worker, "onmessage" | "onerror" | "terminate"> & { postMessage(message: ToWorker): void };
+
+/** Null where the browser makes none. */
+export function evaluationWorker(): WorkerLike | null {
+  try {
+    return new Worker(new URL("./evaluation_worker.ts", import.meta.url));
+  } catch {
+    return null;
+  }
+}
+
+/** Checks and unpacks the bytes beside the page where it can. Rejects with an AnswersError for bytes that are not good. */
+export async function makeHost(bytes: Uint8Array, sha256: string, onEvaluation: OnEvaluation, makeWorker: () => WorkerLike | null = evaluationWorker): Promise<EvaluationHost> {
+  const worker = makeWorker();
+  const ready = worker === null ? null : await load(worker, bytes, sha256);
+  if (worker === null || ready === null) return new PageHost(await makeEvaluator(bytes, { sha256 }), onEvaluation);
+  if (ready.medianMs > PAGE_BUDGET_MS) return new WorkerHost(worker, ready.kernel, onEvaluation);
+  worker.terminate();
+  return new PageHost(new AnswerEvaluator(readAnswers(bytes)), onEvaluation);
+}
+
+/** Null where the worker does not run at all. */
+function load(worker: WorkerLike, bytes: Uint8Array, sha256: string): Promise<{ medianMs: number; kernel: string } | null> {
+  return new Promise((resolve, reject) => {
+    worker.onerror = () => {
+      worker.terminate();
+      resolve(null);
+    };
+    worker.onmessage = ({ data }: MessageEvent<FromWorker>) => {
+      if (data.kind === "ready") resolve(data);
+      if (data.kind !== "failed") return;
+      worker.terminate();
+      reject(new AnswersError(data.message));
+    };
+    worker.postMessage({ kind: "load", bytes, sha256 });
+  });
+}
+
+class PageHost implements EvaluationHost {
+  readonly place = "page";
+
+  constructor(
+    private readonly evaluator: AnswerEvaluator,
+    private readonly onEvaluation: OnEvaluation,
+  ) {}
+
+  get kernel(): string {
+    return this.evaluator.kernel.name;
+  }
+
+  ask(poses: readonly Pose[], number: number): void {
+    this.onEvaluation(this.evaluator.evaluate(poses), number);
+  }
+
+  close(): void {}
+}
+
+class WorkerHost implements EvaluationHost {
+  readonly place = "worker";
+  /** Of the question that the worker has; null: none. */
+  private asked: number | null = null;
+  private waiting: { poses: readonly Pose[]; number: number } | null = null;
+
+  constructor(
+    private readonly worker: WorkerLike,
+    readonly kernel: string,
+    private readonly onEvaluation: OnEvaluation,
+  ) {
+    worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.take(data);
+  }
+
+  ask(poses: readonly Pose[], number: number): void {
+    this.waiting = { poses, number };
+    this.send();
+  }
+
+  close(): void {
+    this.worker.onmessage = null;
+    this.worker.terminate();
+  }
+
+  private send(): void {
+    if (this.asked !== null || this.waiting === null) return;
+    this.asked = this.waiting.number;
+    this.worker.postMessage({ kind: "evaluate", poses: [...this.waiting.poses] });
+    this.waiting = null;
+  }
+
+  private take(message: FromWorker): void {
+    if (message.kind !== "evaluated" || this.asked === null) return;
+    const number = this.asked;
+    this.asked = null;
+    this.send();
+    this.onEvaluation(message, number);
+  }
+}

@@ -1,0 +1,45 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import type { Pose } from "../geometry/pose";
+import type { AnswerEvaluator } from "./answer_evaluator";
+import { makeEvaluator } from "./evaluator";
+
+// What page and worker say to each other. A worker is loaded once, and answers one question at a time.
+
+export type ToWorker = { kind: "load"; bytes: Uint8Array; sha256: string } | { kind: "evaluate"; poses: Pose[] };
+
+export type FromWorker =
+  | { kind: "ready"; medianMs: number; kernel: string }
+  | { kind: "failed"; message: string }
+  | { kind: "evaluated"; positions: Float32Array; coverage: "covered" | "beyond"; errorBoundMm: number; isEstimate: boolean };
+
+/** The worker's side, for whoever has a `post`. */
+export class EvaluationService {
+  private evaluator: AnswerEvaluator | null = null;
+
+  constructor(private readonly post: (message: FromWorker, transfer: Transferable[]) => void) {}
+
+  async take(message: ToWorker): Promise<void> {
+    if (message.kind === "load") await this.load(message.bytes, message.sha256);
+    else this.evaluate(message.poses);
+  }
+
+  private async load(bytes: Uint8Array, sha256: string): Promise<void> {
+    try {
+      this.evaluator = await makeEvaluator(bytes, { sha256 });
+      const medianMs = this.evaluator.measure(() => performance.now());
+      this.post({ kind: "ready", medianMs, kernel: this.evaluator.kernel.name }, []);
+    } catch (thrown) {
+      this.post({ kind: "failed", message: thrown instanceof Error ? thrown.message : String(thrown) }, []);
+    }
+  }
+
+  private evaluate(poses: Pose[]): void {
+    if (this.evaluator === null) return;
+    const { positions, ...rest } = this.evaluator.evaluate(poses);
+    // The evaluator's own array stays here.
+    const sent = positions.slice();
+    this.post({ kind: "evaluated", positions: sent, ...rest }, [sent.buffer]);
+  }
+}

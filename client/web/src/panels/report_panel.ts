@@ -1,0 +1,35 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { sentenceOf } from "../calls/call_error";
+import { download } from "../exports/files";
+import { reportFile } from "../report/report_file";
+import { reportSheet } from "../report/report_sheet";
+import type { Workbench } from "../workbench/workbench";
+import { button, collapsible, el, whileBusy } from "./dom";
+
+/** One page for the patient's file: looked at, printed by the browser (to paper or PDF), or kept as a file. */
+export function reportPanel(bench: Workbench): HTMLElement {
+  const open = button("Open the report", () => {
+    const run = async () => showReport(await reportSheet(bench));
+    void whileBusy(open, run, (thrown) => (bench.notice.value = sentenceOf(thrown)));
+  });
+  const text = "Plan, measures, profile, pictures and how they came about, as shown now. It names nobody; its pictures show the face.";
+  return collapsible("Report", [el("p", { class: "quiet", text }), el("div", { class: "buttons" }, [open])]);
+}
+
+/** Over the planner until it is closed; what else is on the page is not printed. */
+function showReport(sheet: HTMLElement): void {
+  const others = Array.from(document.body.children).filter((element): element is HTMLElement => element instanceof HTMLElement && !element.hidden);
+  const close = () => {
+    page.remove();
+    others.forEach((element) => (element.hidden = false));
+  };
+  const save = () => void reportFile(sheet).then((html) => download("tissueform-report.html", new Blob([html], { type: "text/html" })));
+  const buttons = [button("Print or save as PDF", () => print()), button("Report HTML", save), button("Back to the plan", close)];
+  const page = el("main", { class: "report-page", attributes: { "aria-label": "Report" } }, [el("div", { class: "buttons" }, buttons), sheet]);
+  page.addEventListener("keydown", (event) => event.key === "Escape" && close());
+  others.forEach((element) => (element.hidden = true));
+  document.body.append(page);
+  buttons[0].focus();
+}

@@ -1,0 +1,72 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { NOTICE } from "../exports/files";
+import { provenanceLines } from "../exports/plan_export";
+import { ProfileDrawing } from "../exports/profile_svg";
+import { labelOf, measureFace } from "../measures/face_measures";
+import { bandText, normText, unitText, valueTexts, whyNot } from "../measures/texts";
+import { formatNumber } from "../planning/numbers";
+import { MOVE_KEYS } from "../planning/plan";
+import type { Workbench } from "../workbench/workbench";
+import { reportPictures } from "./report_pictures";
+
+// One page for the patient's file, without anything that says whose it is: no title of the case, no name, no date of birth. Texts
+// are texts; nothing in them is read as HTML.
+
+const HEADS: Readonly<Record<string, string>> = { forwardMm: "Forward, mm", leftMm: "Left, mm", upMm: "Up, mm", pitchDeg: "Pitch, °", rollDeg: "Roll, °", yawDeg: "Yaw, °" };
+
+function node(tag: string, content: (Node | string)[], className = ""): HTMLElement {
+  const element = document.createElement(tag);
+  if (className !== "") element.className = className;
+  element.append(...content);
+  return element;
+}
+
+function table(heads: readonly string[], rows: readonly (readonly (Node | string)[])[]): HTMLElement {
+  const cells = (tag: string, of: readonly (Node | string)[]) => node("tr", of.map((content) => node(tag, [content])));
+  return node("table", [node("thead", [cells("th", heads)]), node("tbody", rows.map((row) => cells("td", row)))]);
+}
+
+/** The sheet of what is shown now. Its pictures are `data:` addresses, so that it is whole wherever it is kept. */
+export async function reportSheet(bench: Workbench): Promise<HTMLElement> {
+  const pictures = await reportPictures(bench);
+  const model = bench.modelInfo(bench.model.value)?.name ?? "unknown";
+  return node("article", [
+    node("header", [node("h1", ["Surgical plan and predicted face"]), node("p", [`${NOTICE[0].toUpperCase()}${NOTICE.slice(1)}: a prediction by a model, not for diagnosis or treatment.`], "notice")]),
+    node("section", [node("h2", ["Plan"]), planTable(bench)]),
+    node("section", [node("h2", ["Measures"]), measureTable(bench)], "wide"),
+    node("section", [node("h2", ["Profile"]), new ProfileDrawing(bench).draw()]),
+    node("section", [node("h2", ["Pictures"]), node("div", pictures, "pictures")]),
+    node("section", [node("h2", ["How it came about"]), facts(bench, model)], "wide"),
+  ], "report");
+}
+
+function planTable(bench: Workbench): HTMLElement {
+  const rows = bench.plan.handles.map(({ label }, index) => [label, ...MOVE_KEYS.map((key) => formatNumber(bench.plan.moves[index][key]))]);
+  return table(["Segment", ...MOVE_KEYS.map((key) => HEADS[key])], rows);
+}
+
+function measureTable(bench: Workbench): HTMLElement {
+  const rows = measureFace(bench).map((result) => {
+    const why = whyNot(result, (name) => labelOf(bench.landmarks, name));
+    const [before, after, change] = valueTexts(result);
+    const band = result.kind === "value" ? bandText(result.band) : "";
+    return [`${result.definition.title}, ${unitText(result)}`, before, why === "" ? after : why, band, change, normText(result.definition.norm)];
+  });
+  return table(["Measure", "Before", "After", "95 of 100", "Change", "Norm"], rows);
+}
+
+function facts(bench: Workbench, model: string): HTMLElement {
+  const summary = bench.picture.value?.summary;
+  const answer = summary == null ? "no answer yet" : summary.prepared ? `prepared, within ${formatNumber(Math.max(summary.errorBoundMm, 0.01), 2)} mm of the full one` : "full";
+  const lines = [
+    `made ${new Date().toISOString()}`,
+    `model ${model}, answer ${answer}`,
+    bench.hasBand ? "95 of 100: where it stays if nothing but the material is in doubt; excludes errors of model and surgery" : "the band of uncertainty is not known for this model or case",
+    bench.showsPlan ? "" : "the face that is shown is not the plan's: a comparison, or an open jaw",
+    "mm and degrees in the head frame: forward, up and the patient's left are positive",
+    ...provenanceLines(bench).filter((line) => !line.startsWith("model")),
+  ];
+  return node("ul", lines.filter((line) => line !== "").map((line) => node("li", [line])));
+}

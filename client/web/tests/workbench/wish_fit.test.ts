@@ -1,0 +1,105 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { create } from "@bufbuild/protobuf";
+import { expect, test } from "vitest";
+import { openCase } from "../../src/case/case_file";
+import { FitResponseSchema } from "../../src/generated/tissueform/v1/plan_service_pb";
+import { Plan } from "../../src/planning/plan";
+import { type FitAsk, type Wish, WishFit } from "../../src/workbench/wish_fit";
+import { placeOfAnchor, placeOfRegion } from "../../src/workbench/wish_place";
+import { smallCase, sourceOf } from "../testing/small_case";
+
+/** Answers wait until the test gives them. */
+async function bench() {
+  const file = await openCase(sourceOf(smallCase()));
+  const plan = new Plan(file);
+  const asked: FitAsk[] = [];
+  const answers: ((forwardMm: number | Error) => Promise<void>)[] = [];
+  const fit = new WishFit(file, plan, (request) => {
+    asked.push(request);
+    return new Promise((resolve, reject) => {
+      answers.push(async (forwardMm) => {
+        if (forwardMm instanceof Error) reject(forwardMm);
+        else resolve(create(FitResponseSchema, { poses: [{ handle: "mandible", rotationVector: {}, pivotMm: { x: 5, y: 5, z: 0 }, translationMm: { x: 0, y: -forwardMm, z: 0 }, scale: 1 }] }));
+        await new Promise((done) => setTimeout(done, 0));
+      });
+    });
+  });
+  const place = placeOfAnchor(file, { surface: 0, triangle: 0, weights: [1, 0, 0] }) ?? expect.fail("no place");
+  const wish = (forwardMm: number): Wish => ({ label: "Chin", place, move: { forwardMm, leftMm: 0, upMm: 0 }, isAlong: false });
+  return { file, plan, fit, asked, answers, wish };
+}
+
+test("one call is on its way at a time, and the newest wish alone is asked next", async () => {
+  const { fit, asked, answers, wish } = await bench();
+  for (const mm of [1, 2, 3]) fit.set([wish(mm)]);
+  expect(asked.length).toBe(1);
+  await answers[0](1);
+  expect(asked.length).toBe(2);
+  expect(asked[1].targets?.[0].wanted).toEqual({ case: "displacementMm", value: { x: 0, y: -3, z: 0 } });
+  await answers[1](3);
+  expect([asked.length, fit.isAsking.value]).toEqual([2, false]);
+});
+
+test("what is found is shown at once, and accepting makes one step of it all", async () => {
+  const { plan, fit, answers, wish } = await bench();
+  fit.set([wish(1)]);
+  await answers[0](1);
+  fit.set([wish(2)]);
+  await answers[1](2);
+  expect(plan.moves[0].forwardMm).toBeCloseTo(2);
+  expect(plan.canUndo).toBe(false);
+  fit.accept();
+  expect(fit.isActive).toBe(false);
+  expect(plan.moves[0].forwardMm).toBeCloseTo(2);
+  plan.undo();
+  expect([plan.moves[0].forwardMm, plan.canUndo]).toEqual([0, false]);
+});
+
+test("rejecting brings the plan back, and an answer that comes later changes nothing", async () => {
+  const { plan, fit, answers, wish } = await bench();
+  plan.change(0, { upMm: 1 }, true);
+  fit.set([wish(1)]);
+  await answers[0](1);
+  fit.set([wish(4)]);
+  fit.reject();
+  await answers[1](4);
+  expect(plan.moves[0]).toMatchObject({ forwardMm: 0, upMm: 1 });
+  expect(fit.fitted.value).toBeNull();
+});
+
+test("the search goes on from what was found, within the limits, by those that may move", async () => {
+  const { fit, asked, answers, wish } = await bench();
+  fit.set([wish(1)]);
+  expect(asked[0].poses?.[0].translationMm).toMatchObject({ y: 0 });
+  expect(asked[0].freedoms?.[0].translationMm?.x).toEqual({ lowest: -15, highest: 15 });
+  await answers[0](1);
+  fit.free.clear();
+  void fit.update();
+  expect(asked[1]).toMatchObject({ freedoms: [], poses: [{ translationMm: { y: 0 } }] });
+  await answers[1](0);
+  fit.free.add("mandible");
+  fit.set([{ ...wish(2), isAlong: true }]);
+  expect(asked[2].targets?.[0].wanted).toEqual({ case: "movement", value: { direction: { x: 0, y: -2, z: 0 }, byMm: 2 } });
+});
+
+test("a refusal is kept for who reads it, and the next wish is asked all the same", async () => {
+  const { fit, asked, answers, wish } = await bench();
+  fit.set([wish(1)]);
+  await answers[0](new Error("the point lies off the skin"));
+  expect(fit.problem.value).toMatchObject({ message: "the point lies off the skin" });
+  fit.set([wish(2)]);
+  await answers[1](2);
+  expect([asked.length, fit.problem.value]).toEqual([2, null]);
+});
+
+test("a place is where the drawn skin follows the mesh, and none where it does not", async () => {
+  const { file } = await bench();
+  expect(placeOfAnchor(file, { surface: 0, triangle: 0, weights: [0.2, 0.6, 0.2] })).toMatchObject({ pointMm: [5, 5, 0], share: 1, drawnMm: [10, 0, 0] });
+  expect(placeOfAnchor(file, { surface: 0, triangle: 1, weights: [0, 1, 0] })).toBeNull();
+  expect(placeOfAnchor(file, { surface: 1, triangle: 0, weights: [1, 0, 0] })).toBeNull();
+  expect(placeOfRegion(file, 1)).toBeNull();
+  const regions = { ...file, surfaces: file.surfaces.map((surface) => ({ ...surface, regions: Uint8Array.from([1, 1, 0, 0]) })) };
+  expect(placeOfRegion(regions, 1)?.vertices?.length).toBe(2);
+});

@@ -1,0 +1,170 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import type { BrowserContext, Page } from "playwright-core";
+import { Planner, type Hook, live, openPage, takeSegment, typeMove } from "./planner";
+import { SlowLine } from "./slow_line";
+
+// The page's own answers, on a line on which the server's come late.
+
+/** Each way. */
+const DELAY_MS = 150;
+const FRAMES = 40;
+
+let planner: Planner;
+let line: SlowLine;
+beforeAll(async () => {
+  planner = await Planner.start();
+  line = await SlowLine.open(planner.url, DELAY_MS);
+});
+afterAll(async () => {
+  line.close();
+  await planner.stop();
+});
+
+async function openSlowly(context: BrowserContext): Promise<{ page: Page; faults: string[] }> {
+  const opened = await openPage(context, line.url);
+  await opened.page.setInputFiles("input[type=file]", planner.casePath);
+  await live(opened.page);
+  return opened;
+}
+
+/** Until the page answers by itself. */
+async function ready(page: Page, model?: number): Promise<{ place: string; kernel: string }> {
+  await page.waitForFunction((wanted) => {
+    const { bench } = (globalThis as unknown as Hook).tissueform;
+    return bench.localState.value.kind === "ready" && (wanted === undefined || bench.local.configuration.model === wanted);
+  }, model);
+  return page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.localState.value);
+}
+
+function modelOf(page: Page, name: string): Promise<number> {
+  return page.evaluate((wanted) => (globalThis as unknown as Hook).tissueform.bench.models.find((info: any) => info.name === wanted).model, name);
+}
+
+interface DragFrame {
+  /** Of the face's largest movement, right after the hand's move. */
+  largestMm: number;
+  /** Later, before the next move. */
+  laterMm: number;
+}
+
+/** One move of the lower jaw forward in each animation frame. */
+function dragForward(page: Page, frames: number): Promise<{ frames: DragFrame[]; roundTripMs: number }> {
+  return page.evaluate(async (count) => {
+    const { bench, view } = (globalThis as unknown as Hook).tissueform;
+    const { shape } = view.head.skins[0];
+    const largest = () => {
+      let most = 0;
+      for (let i = 0; i < shape.positions.length; i += 3) {
+        most = Math.max(most, Math.hypot(...[0, 1, 2].map((k) => shape.positions[i + k] - shape.rest[i + k])));
+      }
+      return most;
+    };
+    view.stage.setDrawing(false);
+    const seen = [];
+    for (let step = 1; step <= count; ++step) {
+      await new Promise((done) => requestAnimationFrame(done));
+      bench.plan.change(1, { forwardMm: (5 * step) / count }, step === count);
+      const largestMm = largest();
+      await new Promise((done) => setTimeout(done, 12));
+      seen.push({ largestMm, laterMm: largest() });
+    }
+    view.stage.setDrawing(true);
+    return { frames: seen, roundTripMs: bench.picture.value.roundTripMs };
+  }, frames);
+}
+
+const MODELS = [["gradient_field", "Gradient field"], ["linear_elastic", "Linear elastic"], ["neo_hookean", "Neo-Hookean"]] as const;
+
+describe("on a line with delay", () => {
+  let opened: Awaited<ReturnType<typeof openSlowly>>;
+  beforeAll(async () => (opened = await openSlowly(await planner.browse())));
+  afterEach(() => expect(opened.faults).toEqual([]));
+
+  test.each(MODELS)("%s: the face follows the hand in the same animation frame, and never goes back", async (name, label) => {
+    const { page } = opened;
+    await takeSegment(page, "Lower jaw");
+    await page.getByRole("radio", { name: new RegExp(`^${label}`) }).check();
+    await typeMove(page, "Forward", "0");
+    await ready(page, await modelOf(page, name));
+    const { frames, roundTripMs } = await dragForward(page, FRAMES);
+    expect(roundTripMs).toBeGreaterThan(2 * DELAY_MS);
+    let before = 0;
+    for (const { largestMm, laterMm } of frames) {
+      expect(largestMm).toBeGreaterThan(before + 0.03);
+      expect(laterMm).toBeGreaterThan(largestMm - 0.05);
+      before = largestMm;
+    }
+    expect(before).toBeGreaterThan(3);
+  });
+
+  test("the server's answer to the newest poses confirms the page's", async () => {
+    const { page } = opened;
+    await page.getByRole("radio", { name: /^Linear elastic/ }).check();
+    const [own, confirmed] = await page.evaluate(async () => {
+      const { bench } = (globalThis as unknown as Hook).tissueform;
+      while (bench.localState.value.kind !== "ready") await new Promise((done) => setTimeout(done, 20));
+      bench.plan.change(1, { forwardMm: 5, pitchDeg: 2 }, true);
+      const mine = Array.from(bench.displacements as Float32Array);
+      const show = bench.live.listener.onPicture;
+      await new Promise<void>((done) => {
+        bench.live.listener.onPicture = (picture: any, used: () => void) => {
+          show(picture, used);
+          if (picture.posesBehind === 0) done();
+        };
+      });
+      bench.live.listener.onPicture = show;
+      return [mine, Array.from(bench.displacements as Float32Array)];
+    });
+    const off = own.reduce((most, value, i) => Math.max(most, Math.abs(value - confirmed[i])), 0);
+    expect(off).toBeLessThan(0.02);
+  });
+
+  test("beyond what was prepared the server answers, and the page says so", async () => {
+    const { page } = opened;
+    await page.getByRole("radio", { name: /^Neo-Hookean/ }).check();
+    await ready(page, await modelOf(page, "neo_hookean"));
+    await typeMove(page, "Forward", "12");
+    await page.getByText("Beyond what was prepared: the server answers.").waitFor();
+    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.picture.value.summary?.prepared === false);
+    await typeMove(page, "Forward", "1");
+    await page.getByText("This page answers at once").waitFor();
+  });
+
+  test("a line that broke off takes nothing from the hand", async () => {
+    const { page } = opened;
+    line.breakOff();
+    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.connection.value.kind !== "live");
+    await page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.plan.change(1, { forwardMm: 0, pitchDeg: 0 }, true));
+    const { frames } = await dragForward(page, 5);
+    expect(frames[4].largestMm).toBeGreaterThan(3);
+    await live(page);
+    await ready(page);
+  });
+
+  test("who stops it has the server answer, and may start it again", async () => {
+    const { page } = opened;
+    await page.getByRole("button", { name: "Stop", exact: true }).click();
+    await page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.plan.change(1, { forwardMm: 1 }, true));
+    expect(await page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.localState.value.kind)).toBe("stopped");
+    await page.getByRole("button", { name: "Answer here" }).click();
+    await ready(page);
+  });
+});
+
+test.each([
+  ["WebAssembly", "without WebAssembly"],
+  ["Worker", "This page answers at once"],
+])("a browser without %s answers, too", async (missing, words) => {
+  const context = await planner.browse();
+  await context.addInitScript((name) => {
+    delete (globalThis as unknown as Record<string, unknown>)[name];
+  }, missing);
+  const { page, faults } = await openSlowly(context);
+  await ready(page);
+  await page.getByText(words).waitFor();
+  const { frames } = await dragForward(page, 10);
+  expect(frames[9].largestMm).toBeGreaterThan(3);
+  expect(faults).toEqual([]);
+});
