@@ -12,6 +12,7 @@
 #include "absl/strings/string_view.h"
 
 #include "client/pacs_bridge/dicom/dicom_file.h"
+#include "client/pacs_bridge/dicom/partial_file.h"
 #include "client/pacs_bridge/network/instance_sink.h"
 
 namespace tissueform {
@@ -23,7 +24,7 @@ struct InstanceFolderOptions {
   DicomLimits limits = {};  // of one object
 };
 
-// What is said of an object before its bytes come.
+// What is said of an object before its bytes come. UIDs: empty where nothing was said.
 struct AnnouncedInstance {
   std::string class_uid = {};
   std::string instance_uid = {};
@@ -48,16 +49,15 @@ class InstanceFolder {
 
   const InstanceFolderOptions& options() const { return options_; }
 
-  // A file name beside the others for an object that begins to come; ends in ".partial".
-  std::string PartialName();
+  // For an object that begins to come: a file beside the others, empty.
+  absl::StatusOr<PartialFile> NewPartial() const;
 
-  // Takes the whole file `partial` (PS3.10) into the folder and shows it to the sink; `partial` is
-  // gone afterwards, whatever happened.
+  // Takes a whole file (PS3.10) into the folder and shows it to the sink.
   //
-  // Errors: InvalidArgument (not readable as DICOM, or not what was announced, where something
-  // was), those of the disk and of the sink.
-  absl::StatusOr<ReceivedInstance> Take(const std::string& partial,
-                                        const AnnouncedInstance& announced, InstanceSink* sink);
+  // Errors: InvalidArgument (not readable as DICOM, or not what was announced, where UIDs were),
+  // those of the disk and of the sink.
+  absl::StatusOr<ReceivedInstance> Take(PartialFile partial, const AnnouncedInstance& announced,
+                                        InstanceSink* sink) const;
 
  private:
   explicit InstanceFolder(InstanceFolderOptions options) : options_(std::move(options)) {}

@@ -25,7 +25,7 @@ enum class TlsRole { kReceiver, kSender };
 // asked of both sides. A sender also compares the peer's certificate with `host`.
 //
 // Errors name the file: those of ReadPemFile, ReadSecretPemFile, CheckIdentity, CheckAuthorities.
-absl::StatusOr<std::unique_ptr<DcmTransportLayer>> MakeTlsLayer(const TlsFiles& files, TlsRole role,
+absl::StatusOr<std::shared_ptr<DcmTransportLayer>> MakeTlsLayer(const TlsFiles& files, TlsRole role,
                                                                 const std::string& host = {});
 
 }  // namespace tissueform

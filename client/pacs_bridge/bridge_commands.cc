@@ -1,0 +1,196 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/bridge_commands.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/string_view.h"
+
+#include "client/pacs_bridge/bridge_parts.h"
+#include "client/pacs_bridge/bridge_run.h"
+#include "client/pacs_bridge/queue/export_rows.h"
+#include "client/pacs_bridge/status_text.h"
+#include "client/pacs_bridge/worklist/worklist_page.h"
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+// More than the steps that anything has.
+constexpr int kMostSteps = 16;
+
+PlanWork PlanWorkOf(BridgeParts* parts, const BridgeOptions& options) {
+  PlanWorkOptions work = options.plan;
+  work.tell = [](const std::string& series, absl::string_view stage, double fraction) {
+    absl::FPrintF(stderr, "%s %3.0f %% %s\n", series, 100 * fraction, stage);
+  };
+  return PlanWork(&parts->queue(), parts->server(), std::move(work));
+}
+
+void PrintPatient(const QueuedStudy& study, const QueuedExport& queued) {
+  absl::PrintF("%s goes to the study of\n  name        %s\n  born        %s\n  patient ID  %s\n"
+               "  study of    %s\n",
+               queued.name, ShownName(study.patient.name), ShownDate(study.patient.birth_date),
+               study.patient.id, ShownDate(study.date));
+  if (!queued.note.empty()) absl::PrintF("  note        %s\n", queued.note);
+}
+
+}  // namespace
+
+BridgeCommands::BridgeCommands(CLI::App& app, const BridgeOptions* options) : options_(options) {
+  app.fallthrough();
+  app.require_subcommand(0, 1);
+  run_ = app.add_subcommand("run", "receive, build, publish and store, by rules, until SIGTERM");
+  listen_ = app.add_subcommand("listen", "receive only, until SIGTERM");
+  fetch_ = app.add_subcommand("fetch", "have the PACS send the series of a study");
+  fetch_->add_option("STUDY", name_, "its StudyInstanceUID")->required();
+  series_ = app.add_subcommand("series", "what was received, and why it was chosen or not");
+  build_ = app.add_subcommand("build", "build and pack the plan of a series, whatever rules say");
+  build_->add_option("SERIES", name_, "its key, as `series` shows it")->required();
+  publish_ = app.add_subcommand("publish", "give the server the case that was built of a series");
+  publish_->add_option("SERIES", name_, "its key")->required();
+  store_ = app.add_subcommand("store", "show whose prediction it is, and store it in the PACS");
+  store_->add_option("EXPORT", name_, "exports/ID, as `status` shows it")->required();
+  store_->add_flag("--patient-is-right", confirmed_,
+                   "store it: you have compared the patient that was shown");
+  status_ = app.add_subcommand("status", "how far everything in the queue is; names no patient");
+  status_->add_flag("--json", json_, "as JSON");
+}
+
+int BridgeCommands::Run() const {
+  if (run_->parsed()) return RunBridge(*options_, BridgeRunKind::kEverything);
+  if (listen_->parsed()) return RunBridge(*options_, BridgeRunKind::kReceiving);
+  const std::vector<std::pair<const CLI::App*, absl::Status (BridgeCommands::*)() const>> steps = {
+      {fetch_, &BridgeCommands::Fetch},     {series_, &BridgeCommands::Series},
+      {build_, &BridgeCommands::Build},     {publish_, &BridgeCommands::Publish},
+      {store_, &BridgeCommands::Store},     {status_, &BridgeCommands::Status}};
+  for (const auto& [command, step] : steps) {
+    if (!command->parsed()) continue;
+    const absl::Status status = (this->*step)();
+    if (status.ok()) return 0;
+    absl::FPrintF(stderr, "tissueform-pacs: %s\n", status.message());
+    return 1;
+  }
+  absl::FPrintF(stderr, "tissueform-pacs: say what to do: run, listen, fetch, series, build, "
+                        "publish, store or status; see --help\n");
+  return 2;
+}
+
+absl::Status BridgeCommands::Fetch() const {
+  if (!options_->has_pacs()) {
+    return absl::FailedPreconditionError("which PACS? give --pacs HOST:PORT or --pacs-url URL");
+  }
+  BridgeOptions options = *options_;
+  options.quiet = std::chrono::seconds(0);  // when it returns everything has come
+  TF_ASSIGN_OR_RETURN(const auto parts, BridgeParts::Open(options));
+  std::unique_ptr<StorageReceiver> receiver;
+  if (options.pacs.url.empty() && options.pacs.fetch == PacsPeer::Fetch::kMove) {
+    TF_ASSIGN_OR_RETURN(receiver, StorageReceiver::Start(ReceiverOptionsOf(options),
+                                                         &parts->folder(), &parts->sink()));
+  }
+  TF_ASSIGN_OR_RETURN(const std::vector<SeriesSummary> study,
+                      parts->pacs()->FindSeries({.study_uid = name_}));
+  for (const SeriesSummary& series : study) {
+    TF_ASSIGN_OR_RETURN(const FetchCounts counts,
+                        parts->pacs()->FetchSeries(name_, series.series_uid, &parts->folder(),
+                                                   &parts->sink()));
+    absl::PrintF("series %d: %d objects, %d failed\n", series.number, counts.completed,
+                 counts.failed);
+    TF_RETURN_IF_ERROR(parts->intake().Settle().status());
+  }
+  TF_ASSIGN_OR_RETURN(const std::string table, StatusTable(&parts->queue()));
+  absl::PrintF("\n%s", table);
+  return absl::OkStatus();
+}
+
+absl::Status BridgeCommands::Series() const {
+  TF_ASSIGN_OR_RETURN(const std::string folder, StateFolderOf(*options_));
+  TF_ASSIGN_OR_RETURN(const auto queue, BridgeQueue::OpenForReading(folder));
+  SeriesIntake intake(queue.get(), {});
+  TF_ASSIGN_OR_RETURN(const std::string table, SeriesTable(queue.get(), &intake));
+  absl::PrintF("%s", table);
+  return absl::OkStatus();
+}
+
+absl::Status BridgeCommands::Build() const {
+  TF_ASSIGN_OR_RETURN(const auto parts, BridgeParts::Open(*options_));
+  ReceivedRows rows(&parts->queue());
+  TF_ASSIGN_OR_RETURN(QueuedSeries series, rows.Get(name_));
+  if (series.state != SeriesState::kChosen && series.state != SeriesState::kBuilt) {
+    const std::string recipe = options_->recipe.empty() ? series.recipe : options_->recipe;
+    TF_RETURN_IF_ERROR(parts->intake().Choose(series, recipe, "chosen by hand"));
+    TF_ASSIGN_OR_RETURN(series, rows.Get(name_));
+  }
+  PlanWork work = PlanWorkOf(parts.get(), *options_);
+  while (series.state == SeriesState::kChosen || series.state == SeriesState::kBuilt) {
+    TF_RETURN_IF_ERROR(work.Step(&series));
+  }
+  absl::PrintF("%s is %s: %s\n", series.key, SeriesStateName(series.state), series.case_name);
+  return absl::OkStatus();
+}
+
+absl::Status BridgeCommands::Publish() const {
+  TF_ASSIGN_OR_RETURN(const auto parts, BridgeParts::Open(*options_));
+  TF_ASSIGN_OR_RETURN(QueuedSeries series, ReceivedRows(&parts->queue()).Get(name_));
+  if (series.state != SeriesState::kPublished) {
+    PlanWork work = PlanWorkOf(parts.get(), *options_);
+    TF_RETURN_IF_ERROR(work.Step(&series));
+  }
+  absl::PrintF("%s is %s: %s\n", series.key, SeriesStateName(series.state), series.case_name);
+  return absl::OkStatus();
+}
+
+absl::Status BridgeCommands::Store() const {
+  TF_ASSIGN_OR_RETURN(const auto parts, BridgeParts::Open(*options_));
+  const std::unique_ptr<ExportWork> work = parts->MakeExportWork();
+  if (work == nullptr) {
+    return absl::FailedPreconditionError("storing needs a server and a PACS; give --server and "
+                                         "--pacs or --pacs-url");
+  }
+  ExportRows exports(&parts->queue());
+  ReceivedRows received(&parts->queue());
+  absl::StatusOr<QueuedExport> found = exports.Get(name_);
+  if (absl::IsNotFound(found.status())) {
+    TF_ASSIGN_OR_RETURN(const v1::Export told, parts->server()->GetExport(name_));
+    TF_RETURN_IF_ERROR(work->Take(told));
+    found = exports.Get(name_);
+  }
+  TF_RETURN_IF_ERROR(found.status());
+  QueuedExport queued = *found;
+  TF_ASSIGN_OR_RETURN(const QueuedSeries series, received.GetByCase(queued.case_name));
+  TF_ASSIGN_OR_RETURN(const QueuedStudy study, received.GetStudy(series.study_uid));
+  PrintPatient(study, queued);
+  if (queued.state == BridgeExportState::kAsked) {
+    if (!confirmed_) {
+      absl::PrintF("compare, then give --patient-is-right to store it\n");
+      return absl::OkStatus();
+    }
+    TF_RETURN_IF_ERROR(exports.Confirm(name_, DigestOf(study.patient)));
+    TF_ASSIGN_OR_RETURN(queued, exports.Get(name_));
+  }
+  for (int step = 0; step < kMostSteps && queued.state != BridgeExportState::kTold; ++step) {
+    TF_RETURN_IF_ERROR(work->Step(&queued));
+    if (queued.state == BridgeExportState::kAsked) {
+      return absl::AbortedError(absl::StrCat(queued.note, "; look at the patient again"));
+    }
+  }
+  absl::PrintF("%s is %s\n", queued.name, BridgeExportStateName(queued.state));
+  return absl::OkStatus();
+}
+
+absl::Status BridgeCommands::Status() const {
+  TF_ASSIGN_OR_RETURN(const std::string folder, StateFolderOf(*options_));
+  TF_ASSIGN_OR_RETURN(const auto queue, BridgeQueue::OpenForReading(folder));
+  TF_ASSIGN_OR_RETURN(const std::string text,
+                      json_ ? StatusJson(queue.get()) : StatusTable(queue.get()));
+  absl::PrintF("%s", text);
+  return absl::OkStatus();
+}
+
+}  // namespace tissueform

@@ -1,0 +1,225 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/bridge_options.h"
+
+#include <cstdlib>
+#include <functional>
+#include <limits>
+#include <utility>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "server/program/program_options.h"
+
+namespace tissueform {
+namespace {
+
+constexpr int64_t kMostPort = 65535;
+constexpr int64_t kMostSetting = std::numeric_limits<int32_t>::max();
+constexpr int64_t kBytesOfMebibyte = 1 << 20;
+
+// One whole number, shown in the unit of its option.
+void AddNumber(CLI::App& app, const std::string& name, int64_t shown, int64_t least, int64_t most,
+               std::function<void(int64_t)> set, const std::string& help) {
+  app.add_option_function<int64_t>(name, [set](const int64_t& value) { set(value); }, help)
+      ->check(CLI::Range(least, most))
+      ->default_str(std::to_string(shown))
+      ->type_name("INT");
+}
+
+// "HOST:PORT".
+void AddAddress(CLI::App& app, const std::string& name, std::string* host, int* port,
+                bool has_default, const std::string& help) {
+  CLI::Option* option =
+      app.add_option_function<std::string>(
+             name,
+             [name, host, port](const std::string& text) {
+               const size_t colon = text.rfind(':');
+               int64_t number = -1;
+               if (colon == std::string::npos || colon == 0 ||
+                   !absl::SimpleAtoi(text.substr(colon + 1), &number) || number < 0 ||
+                   number > kMostPort) {
+                 throw CLI::ValidationError(name, "HOST:PORT is needed");
+               }
+               *host = text.substr(0, colon);
+               *port = static_cast<int>(number);
+             },
+             help)
+          ->type_name("HOST:PORT");
+  if (has_default) option->default_str(absl::StrCat(*host, ":", *port));
+}
+
+void AddReceiver(CLI::App& app, BridgeOptions* options) {
+  ReceiverOptions* receiver = &options->receiver;
+  app.add_option("--ae-title", receiver->ae_title, "the bridge's own AE title")
+      ->capture_default_str()
+      ->type_name("AE");
+  receiver->port = 11112;
+  AddAddress(app, "--listen", &receiver->address, &receiver->port, true,
+             "where images are received; port 0 takes a free one");
+  app.add_option("--allow-ae", receiver->calling_ae_titles,
+                 "AE title that may send; may be given again. Without one nobody may")
+      ->type_name("AE");
+  app.add_option("--allow-from", receiver->addresses,
+                 "IPv4 address or network (10.1.2.0/24) from which images are taken")
+      ->default_str("127.0.0.1")
+      ->type_name("ADDRESS");
+  AddNumber(app, "--max-associations", receiver->max_associations, 1, 1024,
+            [receiver](int64_t value) { receiver->max_associations = static_cast<int>(value); },
+            "associations at once; who comes later is refused for now");
+  AddNumber(app, "--watermark-mib", options->watermark_bytes / kBytesOfMebibyte, 1, kMostSetting,
+            [options](int64_t value) { options->watermark_bytes = value * kBytesOfMebibyte; },
+            "what stays free on the disk; an image that would take it is answered with 0xA700");
+  CLI::Option* certificate =
+      app.add_option("--dicom-cert", options->tls.certificate,
+                     "the bridge's certificate for DICOM, PEM: then nothing is received plain")
+          ->type_name("FILE");
+  CLI::Option* key =
+      app.add_option("--dicom-key", options->tls.key, "its key")->type_name("FILE");
+  CLI::Option* authorities =
+      app.add_option("--dicom-ca", options->tls.authorities,
+                     "authorities of those who may send, and of the PACS")
+          ->type_name("FILE");
+  certificate->needs(key)->needs(authorities);
+  key->needs(certificate);
+}
+
+void AddPacs(CLI::App& app, PacsPeer* pacs) {
+  AddAddress(app, "--pacs", &pacs->host, &pacs->port, false,
+             "the PACS by DICOM associations: where it listens");
+  app.add_option("--pacs-ae-title", pacs->ae_title, "its AE title")->type_name("AE");
+  app.add_option_function<std::string>(
+         "--pacs-fetch",
+         [pacs](const std::string& how) {
+           pacs->fetch = how == "move" ? PacsPeer::Fetch::kMove : PacsPeer::Fetch::kGet;
+         },
+         "how series are fetched: get (C-GET), or move (C-MOVE to --ae-title, which the PACS must "
+         "know)")
+      ->check(CLI::IsMember({"get", "move"}))
+      ->default_str("get");
+  app.add_flag_callback("--pacs-tls", [pacs] { pacs->tls.emplace(); },
+                        "speak to it by TLS, with --dicom-cert, --dicom-key and --dicom-ca");
+  app.add_option("--pacs-url", pacs->url,
+                 "the PACS by DICOMweb instead: https://pacs.example.org/dicom-web")
+      ->type_name("URL");
+}
+
+void AddPlans(CLI::App& app, BridgeOptions* options) {
+  app.add_option("--rules", options->rules,
+                 "which series becomes a plan, and by which recipe: JSON (docs/pacs.md)")
+      ->type_name("FILE");
+  app.add_option("--recipe", options->recipe,
+                 "the recipe where there are no --rules (docs/recipe-format.md)")
+      ->type_name("FILE");
+  AddNumber(app, "--quiet-seconds", options->quiet.count(), 1, 24 * 3600,
+            [options](int64_t value) { options->quiet = std::chrono::seconds(value); },
+            "a series is complete, or has stopped midway, when nothing came for so long; at once "
+            "where its association ends and the PACS counts as many images");
+  PlanWorkOptions* plan = &options->plan;
+  AddNumber(app, "--plan-threads", plan->threads, 0, 1024,
+            [plan](int64_t value) { plan->threads = static_cast<int>(value); },
+            "threads of `plan build`; 0: all processors");
+  AddNumber(app, "--plan-seconds", plan->max_seconds, 1, kMostSetting,
+            [plan](int64_t value) { plan->max_seconds = static_cast<int>(value); },
+            "of processor time, after which `plan build` is ended");
+  AddNumber(app, "--plan-memory-mib", plan->max_memory_bytes / kBytesOfMebibyte, 256, kMostSetting,
+            [plan](int64_t value) { plan->max_memory_bytes = value * kBytesOfMebibyte; },
+            "memory that `plan build` may take");
+  app.add_flag("--accept-defects", plan->accept_defects,
+               "publish also a plan that misses a quality requirement");
+}
+
+void AddServer(CLI::App& app, BridgeOptions* options) {
+  app.add_option("--server", options->server,
+                 "the tissueform-server: cases are published there, and planners' wishes heard")
+      ->type_name("HOST:PORT");
+  ConnectionOptions* connection = &options->connection;
+  app.add_flag("--server-tls", connection->tls, "encrypted, with this machine's authorities");
+  app.add_option("--server-ca", connection->tls_ca,
+                 "encrypted, with these authorities of the server's certificate (PEM)")
+      ->type_name("FILE");
+  app.add_option("--server-cert", connection->tls_certificate,
+                 "the bridge's certificate, where the server asks for one")
+      ->type_name("FILE");
+  app.add_option("--server-key", connection->tls_key, "its key")->type_name("FILE");
+  app.add_option("--server-token-file", connection->token_file,
+                 "the bridge's token, with the roles publisher and bridge; mode 0600, read again "
+                 "when it is renewed")
+      ->type_name("FILE");
+}
+
+void AddWorkList(CLI::App& app, BridgeOptions* options) {
+  WorkListOptions* worklist = &options->worklist;
+  AddAddress(app, "--worklist-listen", &worklist->address, &worklist->port, true,
+             "where the work list is served; port 0 takes a free one. It shows names of patients");
+  app.add_flag_callback("--no-worklist", [options] { options->has_worklist = false; },
+                        "serve none: exports are confirmed by `tissueform-pacs store`");
+  app.add_option("--worklist-host", worklist->allowed_hosts,
+                 "name by which browsers reach it, behind a proxy")
+      ->type_name("HOST");
+  app.add_option("--worklist-token-file", worklist->token_file,
+                 "its password (HTTP Basic, any name), mode 0600; needed off loopback")
+      ->type_name("FILE");
+  app.add_option("--planner-url", worklist->planner_url,
+                 "the planner, to which the work list links: https://planner.example.org/")
+      ->type_name("URL");
+}
+
+void AddRetention(CLI::App& app, RetentionOptions* retention) {
+  AddNumber(app, "--keep-images", retention->keep_images.count() / 24, 0, 36500,
+            [retention](int64_t days) { retention->keep_images = std::chrono::hours(days * 24); },
+            "days for which received images, and the plan built of them, are kept after that");
+  AddNumber(app, "--keep-headers", retention->keep_headers.count() / 24, 0, 36500,
+            [retention](int64_t days) { retention->keep_headers = std::chrono::hours(days * 24); },
+            "days for which a header without pixels is kept, for where the PACS gives none");
+}
+
+}  // namespace
+
+void AddBridgeOptions(CLI::App& app, BridgeOptions* options) {
+  app.add_option("--state-dir", options->state_dir,
+                 "folder of the queue and of what is received, 0700 (default: "
+                 "$XDG_STATE_HOME/tissueform-pacs)")
+      ->type_name("DIR");
+  AddReceiver(app, options);
+  AddPacs(app, &options->pacs);
+  AddPlans(app, options);
+  AddServer(app, options);
+  AddWorkList(app, options);
+  AddRetention(app, &options->retention);
+  app.add_option("--log-level", options->log_level,
+                 "what is logged on stderr, by keys of the queue and never by patient")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
+      ->capture_default_str();
+  app.add_option("--log-format", options->log_format,
+                 "how lines of the log look: for people, or one JSON object each")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
+  AddConfiguration(app, "TISSUEFORM_PACS_");  // last: it looks at all options
+}
+
+absl::StatusOr<std::string> StateFolderOf(const BridgeOptions& options) {
+  if (!options.state_dir.empty()) return options.state_dir;
+  for (const auto& [variable, below] :
+       {std::pair("XDG_STATE_HOME", ""), std::pair("HOME", "/.local/state")}) {
+    const char* const value = std::getenv(variable);
+    if (value != nullptr && *value == '/') return absl::StrCat(value, below, "/tissueform-pacs");
+  }
+  return absl::FailedPreconditionError("no folder for the queue; give --state-dir DIR");
+}
+
+absl::StatusOr<std::vector<SeriesRule>> RulesOf(const BridgeOptions& options) {
+  if (!options.rules.empty()) return ReadSeriesRules(options.rules);
+  if (options.recipe.empty()) {
+    return absl::FailedPreconditionError(
+        "it is not said what becomes a plan; give --rules FILE or --recipe FILE");
+  }
+  SeriesRule rule;
+  rule.recipe = options.recipe;
+  return std::vector<SeriesRule>{rule};
+}
+
+}  // namespace tissueform

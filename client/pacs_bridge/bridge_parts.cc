@@ -1,0 +1,124 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/bridge_parts.h"
+
+#include <cstdint>
+#include <unistd.h>
+#include <utility>
+
+#include <sys/eventfd.h>
+
+#include "client/pacs_bridge/work/prediction_writer.h"
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+PacsPeer PeerOf(const BridgeOptions& options) {
+  PacsPeer peer = options.pacs;
+  peer.name = "the PACS";
+  peer.kind = peer.url.empty() ? PacsPeer::Kind::kDimse : PacsPeer::Kind::kDicomWeb;
+  peer.own_ae_title = options.receiver.ae_title;
+  const bool web_with_files = !peer.url.empty() && !options.tls.authorities.empty();
+  if (peer.tls.has_value() || web_with_files) peer.tls = options.tls;
+  return peer;
+}
+
+// What the PACS says that a series has.
+absl::StatusOr<int64_t> CountImages(PacsClient* pacs, const std::string& study_uid,
+                                    const std::string& series_uid) {
+  TF_ASSIGN_OR_RETURN(const std::vector<SeriesSummary> study,
+                      pacs->FindSeries({.study_uid = study_uid}));
+  for (const SeriesSummary& series : study) {
+    if (series.series_uid == series_uid) return series.instances;
+  }
+  return absl::NotFoundError("the PACS has no such series");
+}
+
+}  // namespace
+
+absl::Status IntakeSink::Keep(const ReceivedInstance& instance) {
+  if (instance.novelty == ReceivedInstance::Novelty::kChanged) {
+    return absl::AlreadyExistsError("an image has come again with other bytes");
+  }
+  {
+    MutexLock lock(mutex_);
+    series_[instance.association].insert(instance.header.series_uid);
+  }
+  intake_->Arrived(instance.path, instance.header);
+  return absl::OkStatus();
+}
+
+void IntakeSink::AssociationEnded(const EndedAssociation& ended) {
+  std::set<std::string> brought;
+  {
+    MutexLock lock(mutex_);
+    const auto found = series_.find(ended.association);
+    if (found == series_.end()) return;
+    brought.swap(found->second);
+    series_.erase(found);
+  }
+  intake_->Ended({brought.begin(), brought.end()}, ended.released && ended.refused == 0);
+}
+
+ReceiverOptions ReceiverOptionsOf(const BridgeOptions& options) {
+  ReceiverOptions receiver = options.receiver;
+  if (!options.tls.certificate.empty()) receiver.tls = options.tls;
+  return receiver;
+}
+
+absl::Status BridgeParts::OpenPacs(const BridgeOptions& options) {
+  if (!options.has_pacs()) return absl::OkStatus();
+  const PacsPeer peer = PeerOf(options);
+  TF_ASSIGN_OR_RETURN(pacs_, MakePacsClient(peer));
+  TF_ASSIGN_OR_RETURN(counting_pacs_, MakePacsClient(peer));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<BridgeParts>> BridgeParts::Open(const BridgeOptions& options) {
+  std::unique_ptr<BridgeParts> parts(new BridgeParts());
+  TF_ASSIGN_OR_RETURN(const std::string folder, StateFolderOf(options));
+  TF_ASSIGN_OR_RETURN(parts->queue_, BridgeQueue::Open(folder));
+  TF_ASSIGN_OR_RETURN(parts->folder_,
+                      InstanceFolder::Open({.path = parts->queue_->received_folder(),
+                                            .watermark_bytes = options.watermark_bytes}));
+  if (!options.server.empty()) {
+    TF_ASSIGN_OR_RETURN(parts->server_, ConnectToCaseServer(options.server, options.connection));
+  }
+  TF_RETURN_IF_ERROR(parts->OpenPacs(options));
+  SeriesIntakeOptions intake;
+  intake.quiet = options.quiet;
+  if (!options.rules.empty() || !options.recipe.empty()) {
+    TF_ASSIGN_OR_RETURN(intake.rules, RulesOf(options));
+  }
+  if (PacsClient* const pacs = parts->counting_pacs_.get()) {
+    intake.count_images = [pacs](const std::string& study, const std::string& series) {
+      return CountImages(pacs, study, series);
+    };
+  }
+  parts->intake_ = std::make_unique<SeriesIntake>(parts->queue_.get(), std::move(intake));
+  parts->sink_ = std::make_unique<IntakeSink>(parts->intake_.get());
+  parts->writer_ = MakePredictionWriter(options.receiver.ae_title);
+  parts->export_options_.header_lifetime = options.retention.keep_headers;
+  parts->cancel_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  TF_RETURN_IF_ERROR(parts->intake_->Recover());
+  return parts;
+}
+
+BridgeParts::~BridgeParts() {
+  if (cancel_ >= 0) close(cancel_);
+}
+
+void BridgeParts::Cancel() {
+  const uint64_t one = 1;
+  [[maybe_unused]] const ssize_t written = write(cancel_, &one, sizeof(one));
+}
+
+std::unique_ptr<ExportWork> BridgeParts::MakeExportWork() {
+  if (server_ == nullptr || pacs_ == nullptr) return nullptr;
+  return std::make_unique<ExportWork>(queue_.get(), server_.get(), pacs_.get(), writer_.get(),
+                                      export_options_);
+}
+
+}  // namespace tissueform

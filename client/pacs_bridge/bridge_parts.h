@@ -1,0 +1,86 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+#include "client/pacs_bridge/bridge_options.h"
+#include "client/pacs_bridge/network/instance_folder.h"
+#include "client/pacs_bridge/network/instance_sink.h"
+#include "client/pacs_bridge/work/export_work.h"
+#include "client/pacs_bridge/work/series_intake.h"
+
+namespace tissueform {
+
+// Shows what is received to the intake. What comes again with other bytes is refused: nobody can
+// say which of two images of one name is right. Thread-safe.
+class IntakeSink final : public InstanceSink {
+ public:
+  explicit IntakeSink(SeriesIntake* intake) : intake_(intake) {}
+
+  absl::Status Keep(const ReceivedInstance& instance) override;
+  void AssociationEnded(const EndedAssociation& ended) override;
+
+ private:
+  SeriesIntake* const intake_;
+
+  Mutex mutex_;
+  // Series that associations which are open have brought.
+  std::map<int64_t, std::set<std::string>> series_ ABSL_GUARDED_BY(mutex_);
+};
+
+// What the commands of a bridge work with, joined by its options in one place.
+class BridgeParts {
+ public:
+  // Opens the queue, and what was received and a crash has kept from it. Asks nobody yet.
+  //
+  // Errors: those of BridgeQueue::Open, InstanceFolder::Open, RulesOf (a file of rules; none is
+  // needed for receiving), ConnectToCaseServer and MakePacsClient.
+  static absl::StatusOr<std::unique_ptr<BridgeParts>> Open(const BridgeOptions& options);
+
+  BridgeQueue& queue() { return *queue_; }
+  SeriesIntake& intake() { return *intake_; }
+  InstanceFolder& folder() { return *folder_; }
+  IntakeSink& sink() { return *sink_; }
+  // Null: --server, or the PACS, is not given.
+  CaseServer* server() { return server_.get(); }
+  PacsClient* pacs() { return pacs_.get(); }
+
+  // Becomes readable by Cancel: what PlanWork ends by.
+  int cancel() const { return cancel_; }
+  void Cancel();
+
+  // Null where there is no server, or no PACS.
+  std::unique_ptr<ExportWork> MakeExportWork();
+
+  ~BridgeParts();
+  BridgeParts(const BridgeParts&) = delete;
+  BridgeParts& operator=(const BridgeParts&) = delete;
+
+ private:
+  BridgeParts() = default;
+  absl::Status OpenPacs(const BridgeOptions& options);
+
+  std::unique_ptr<BridgeQueue> queue_;
+  std::unique_ptr<InstanceFolder> folder_;
+  std::unique_ptr<CaseServer> server_;
+  std::unique_ptr<PacsClient> pacs_;
+  std::unique_ptr<PacsClient> counting_pacs_;  // of the intake's thread
+  std::unique_ptr<ObjectWriter> writer_;
+  std::unique_ptr<SeriesIntake> intake_;
+  std::unique_ptr<IntakeSink> sink_;
+  ExportWorkOptions export_options_ = {};
+  int cancel_ = -1;
+};
+
+// The options of the receiver, with TLS where that is set.
+ReceiverOptions ReceiverOptionsOf(const BridgeOptions& options);
+
+}  // namespace tissueform

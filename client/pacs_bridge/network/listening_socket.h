@@ -1,0 +1,63 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+namespace tissueform {
+
+// IPv4 addresses and networks ("10.1.2.0/24") that may connect.
+class AddressSet {
+ public:
+  // Errors: InvalidArgument, with the text.
+  static absl::StatusOr<AddressSet> Parse(const std::vector<std::string>& texts);
+
+  bool Contains(const std::string& address) const;
+
+ private:
+  struct Network {
+    uint32_t bits = 0;
+    uint32_t mask = 0;
+  };
+  std::vector<Network> networks_;
+};
+
+// A socket that waits for connections, and a way to stop waiting.
+class ListeningSocket {
+ public:
+  struct Connection {
+    int socket = -1;           // the taker's to close
+    std::string address = {};  // without the port
+  };
+
+  // Port 0: a free one. Errors: InvalidArgument (no IPv4 address), Unavailable (taken).
+  static absl::StatusOr<ListeningSocket> Listen(const std::string& address, int port);
+  ~ListeningSocket();
+  ListeningSocket(ListeningSocket&& other) noexcept;
+  ListeningSocket& operator=(ListeningSocket&&) = delete;
+
+  int port() const { return port_; }
+
+  // Waits for a connection. Nothing: Wake was called, or there are no descriptors at the moment.
+  std::optional<Connection> Accept();
+  // From any thread, until it is closed: Accept returns, now and every time.
+  void Wake();
+  // Refuses whoever still waits. Nobody is in Accept or Wake, nor calls them later.
+  void Close();
+
+ private:
+  ListeningSocket(int socket, int wake, int port) : socket_(socket), wake_(wake), port_(port) {}
+
+  int socket_;
+  int wake_;
+  const int port_;
+};
+
+}  // namespace tissueform

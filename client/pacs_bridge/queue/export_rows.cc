@@ -1,0 +1,172 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/queue/export_rows.h"
+
+#include <array>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+constexpr std::array<const char*, 7> kExportStates = {"asked", "confirmed", "fetched", "written",
+                                                      "sent",  "told",      "failed"};
+
+absl::StatusOr<QueuedExport> ExportOf(const Database::Query& row) {
+  QueuedExport found;
+  int column = 0;
+  for (std::string* text : {&found.name, &found.key, &found.prediction, &found.case_name}) {
+    *text = TextOf(row, column++);
+  }
+  const absl::string_view state = row.Text(column++);
+  size_t number = 0;
+  while (number < kExportStates.size() && state != kExportStates[number]) ++number;
+  if (number == kExportStates.size()) {
+    return absl::DataLossError(
+        "the queue has an export in a state that this program does not know");
+  }
+  found.state = static_cast<BridgeExportState>(number);
+  found.note = TextOf(row, column++);
+  found.confirmed = TextOf(row, column++);
+  found.attempts = row.Integer(column++);
+  found.last_error = TextOf(row, column++);
+  found.first_s = row.Integer(column++);
+  found.done_s = row.Integer(column++);
+  return found;
+}
+
+absl::Status NoExport() { return absl::NotFoundError("no such export in the queue"); }
+
+}  // namespace
+
+const char* BridgeExportStateName(BridgeExportState state) {
+  return kExportStates[static_cast<size_t>(state)];
+}
+
+absl::StatusOr<QueuedExport> ExportRows::Add(const QueuedExport& asked) {
+  const absl::Status done = queue_->Change([&](Database& database) {
+    return database
+        .Prepare("INSERT OR IGNORE INTO exports VALUES (?, ?, ?, ?, ?, ?, '', 0, '', ?, 0)")
+        .Bind(asked.name)
+        .Bind(asked.key)
+        .Bind(asked.prediction)
+        .Bind(asked.case_name)
+        .Bind(BridgeExportStateName(asked.state))
+        .Bind(asked.note)
+        .Bind(asked.first_s)
+        .Run();
+  });
+  TF_RETURN_IF_ERROR(done);
+  return Get(asked.name);
+}
+
+absl::Status ExportRows::Update(const QueuedExport& changed) {
+  return queue_->Change([&](Database& database) -> absl::Status {
+    const int64_t before = database.total_changes();
+    TF_RETURN_IF_ERROR(database
+                           .Prepare("UPDATE exports SET state = ?, note = ?, confirmed = ?, "
+                                    "attempts = ?, last_error = ?, done_s = ? WHERE name = ?")
+                           .Bind(BridgeExportStateName(changed.state))
+                           .Bind(changed.note)
+                           .Bind(changed.confirmed)
+                           .Bind(changed.attempts)
+                           .Bind(changed.last_error)
+                           .Bind(changed.done_s)
+                           .Bind(changed.name)
+                           .Run());
+    return database.total_changes() > before ? absl::OkStatus() : NoExport();
+  });
+}
+
+absl::Status ExportRows::Confirm(const std::string& name, const std::string& digest) {
+  TF_RETURN_IF_ERROR(Get(name).status());
+  return queue_->Change([&](Database& database) -> absl::Status {
+    const int64_t before = database.total_changes();
+    TF_RETURN_IF_ERROR(
+        database
+            .Prepare("UPDATE exports SET state = 'confirmed', confirmed = ?, attempts = 0, "
+                     "last_error = '' WHERE name = ? AND state = 'asked'")
+            .Bind(digest)
+            .Bind(name)
+            .Run());
+    if (database.total_changes() > before) return absl::OkStatus();
+    return absl::FailedPreconditionError("the export does not wait for a person's word");
+  });
+}
+
+absl::StatusOr<QueuedExport> ExportRows::Get(const std::string& name) {
+  QueuedExport found;
+  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
+    Database::Query row = database.Prepare("SELECT * FROM exports WHERE name = ?");
+    row.Bind(name);
+    TF_ASSIGN_OR_RETURN(const bool any, row.Step());
+    if (!any) return NoExport();
+    TF_ASSIGN_OR_RETURN(found, ExportOf(row));
+    return absl::OkStatus();
+  });
+  TF_RETURN_IF_ERROR(done);
+  return found;
+}
+
+absl::StatusOr<std::vector<QueuedExport>> ExportRows::List() {
+  std::vector<QueuedExport> all;
+  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
+    Database::Query row = database.Prepare("SELECT * FROM exports ORDER BY first_s, name");
+    for (;;) {
+      TF_ASSIGN_OR_RETURN(const bool any, row.Step());
+      if (!any) return absl::OkStatus();
+      TF_ASSIGN_OR_RETURN(all.emplace_back(), ExportOf(row));
+    }
+  });
+  TF_RETURN_IF_ERROR(done);
+  return all;
+}
+
+absl::StatusOr<std::vector<QueuedObject>> ExportRows::EnsureObjects(
+    const std::string& name, const std::vector<std::string>& keys, std::string (*make_uid)()) {
+  const absl::Status done = queue_->Change([&](Database& database) -> absl::Status {
+    for (const std::string& key : keys) {
+      const std::string uid = make_uid();
+      TF_RETURN_IF_ERROR(database.Prepare("INSERT OR IGNORE INTO objects VALUES (?, ?, ?, '', 0)")
+                             .Bind(name)
+                             .Bind(key)
+                             .Bind(uid)
+                             .Run());
+    }
+    return absl::OkStatus();
+  });
+  TF_RETURN_IF_ERROR(done);
+  return ListObjects(name);
+}
+
+absl::StatusOr<std::vector<QueuedObject>> ExportRows::ListObjects(const std::string& name) {
+  std::vector<QueuedObject> objects;
+  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
+    Database::Query row =
+        database.Prepare("SELECT key, uid, file, sent FROM objects WHERE export = ? ORDER BY key");
+    row.Bind(name);
+    for (;;) {
+      TF_ASSIGN_OR_RETURN(const bool any, row.Step());
+      if (!any) return absl::OkStatus();
+      objects.push_back({TextOf(row, 0), TextOf(row, 1), TextOf(row, 2), row.Integer(3) != 0});
+    }
+  });
+  TF_RETURN_IF_ERROR(done);
+  return objects;
+}
+
+absl::Status ExportRows::UpdateObject(const std::string& name, const QueuedObject& object) {
+  return queue_->Change([&](Database& database) {
+    return database.Prepare("UPDATE objects SET file = ?, sent = ? WHERE export = ? AND key = ?")
+        .Bind(object.file)
+        .Bind(int64_t{object.sent})
+        .Bind(name)
+        .Bind(object.key)
+        .Run();
+  });
+}
+
+}  // namespace tissueform

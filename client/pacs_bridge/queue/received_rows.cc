@@ -1,0 +1,301 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/queue/received_rows.h"
+
+#include <array>
+#include <optional>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "core/mesh_payload/sha256.h"
+
+namespace tissueform {
+namespace {
+
+constexpr std::array<const char*, 9> kSeriesStates = {
+    "receiving", "incomplete", "complete",  "passed_over", "chosen",
+    "built",     "packed",     "published", "failed"};
+
+#define TF_SERIES_COLUMNS                                                                        \
+  "SELECT key, study_uid, uid, frame_uid, modality, state, reason, recipe, case_name, attempts, " \
+  "last_error, first_s, done_s, has_files, has_header, (SELECT COUNT(*) FROM images WHERE "      \
+  "images.series = series.key) FROM series "
+
+absl::StatusOr<SeriesState> StateOf(absl::string_view name) {
+  for (size_t i = 0; i < kSeriesStates.size(); ++i) {
+    if (name == kSeriesStates[i]) return static_cast<SeriesState>(i);
+  }
+  return absl::DataLossError("the queue has a series in a state that this program does not know");
+}
+
+absl::StatusOr<QueuedSeries> SeriesOf(const Database::Query& row) {
+  QueuedSeries series;
+  int column = 0;
+  for (std::string* text :
+       {&series.key, &series.study_uid, &series.uid, &series.frame_uid, &series.modality}) {
+    *text = TextOf(row, column++);
+  }
+  TF_ASSIGN_OR_RETURN(series.state, StateOf(row.Text(column++)));
+  for (std::string* text : {&series.reason, &series.recipe, &series.case_name}) {
+    *text = TextOf(row, column++);
+  }
+  series.attempts = row.Integer(column++);
+  series.last_error = TextOf(row, column++);
+  series.first_s = row.Integer(column++);
+  series.done_s = row.Integer(column++);
+  series.has_files = row.Integer(column++) != 0;
+  series.has_header = row.Integer(column++) != 0;
+  series.images = row.Integer(column++);
+  return series;
+}
+
+absl::Status InsertStudy(Database& database, const QueuedStudy& study) {
+  return database
+      .Prepare("INSERT OR IGNORE INTO studies VALUES (?, ?, ?, ?, ?, ?, ?, ?)")
+      .Bind(study.uid)
+      .Bind(study.patient.id)
+      .Bind(study.patient.issuer)
+      .Bind(study.patient.name)
+      .Bind(study.patient.birth_date)
+      .Bind(int64_t{study.patient.readable})
+      .Bind(study.date)
+      .Bind(study.description)
+      .Run();
+}
+
+absl::Status InsertSeries(Database& database, const QueuedSeries& series, const std::string& key) {
+  return database
+      .Prepare("INSERT OR IGNORE INTO series VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, 0, '', ?, 0, 1, 0)")
+      .Bind(key)
+      .Bind(series.study_uid)
+      .Bind(series.uid)
+      .Bind(series.frame_uid)
+      .Bind(series.modality)
+      .Bind(SeriesStateName(SeriesState::kReceiving))
+      .Bind(series.reason)
+      .Bind(series.recipe)
+      .Bind(series.case_name)
+      .Bind(series.first_s)
+      .Run();
+}
+
+// True when it, or its file, was not there.
+absl::StatusOr<bool> InsertImage(Database& database, const std::string& series,
+                                 const QueuedImage& image) {
+  const int64_t before = database.total_changes();
+  TF_RETURN_IF_ERROR(database
+                         .Prepare("INSERT INTO images VALUES (?, ?, ?, ?) ON CONFLICT (series, uid) "
+                                  "DO UPDATE SET file = excluded.file WHERE images.file = ''")
+                         .Bind(series)
+                         .Bind(image.uid)
+                         .Bind(image.class_uid)
+                         .Bind(image.file)
+                         .Run());
+  return database.total_changes() > before;
+}
+
+absl::StatusOr<std::optional<QueuedSeries>> FindSeries(Database& database, const char* sql,
+                                                       const std::string& value) {
+  Database::Query query = database.Prepare(sql);
+  query.Bind(value);
+  TF_ASSIGN_OR_RETURN(const bool row, query.Step());
+  if (!row) return std::nullopt;
+  TF_ASSIGN_OR_RETURN(QueuedSeries series, SeriesOf(query));
+  return std::optional<QueuedSeries>(std::move(series));
+}
+
+constexpr char kByKey[] = TF_SERIES_COLUMNS "WHERE key = ?";
+constexpr char kByUid[] = TF_SERIES_COLUMNS "WHERE uid = ?";
+constexpr char kByCase[] = TF_SERIES_COLUMNS "WHERE case_name = ? AND case_name <> '' LIMIT 1";
+constexpr char kOfStudy[] = TF_SERIES_COLUMNS "WHERE study_uid = ? ORDER BY first_s, key";
+constexpr char kAll[] = TF_SERIES_COLUMNS "WHERE ? = '' ORDER BY first_s, key";
+
+}  // namespace
+
+PatientIdentity IdentityOf(const InstanceHeader& image) {
+  const auto cut = [](const std::string& text) { return text.substr(0, kMostIdentityBytes); };
+  return {.id = cut(image.patient_id),
+          .issuer = cut(image.issuer_of_patient_id),
+          .name = cut(image.patient_name),
+          .birth_date = cut(image.birth_date),
+          .readable = image.text_problem.empty()};
+}
+
+std::string DigestOf(const PatientIdentity& patient) {
+  const std::string lengths = absl::StrCat(patient.id.size(), " ", patient.issuer.size(), " ",
+                                           patient.name.size(), " ", patient.readable);
+  return Sha256Hex({lengths, patient.id, patient.issuer, patient.name, patient.birth_date});
+}
+
+const char* SeriesStateName(SeriesState state) {
+  return kSeriesStates[static_cast<size_t>(state)];
+}
+
+absl::StatusOr<QueuedSeries> ReceivedRows::Add(const QueuedStudy& study, const QueuedSeries& series,
+                                               const std::string& new_key,
+                                               const std::vector<QueuedImage>& images) {
+  QueuedSeries kept;
+  const absl::Status done = queue_->Change([&](Database& database) -> absl::Status {
+    TF_RETURN_IF_ERROR(InsertStudy(database, study));
+    TF_RETURN_IF_ERROR(InsertSeries(database, series, new_key));
+    TF_ASSIGN_OR_RETURN(std::optional<QueuedSeries> found,
+                        FindSeries(database, kByUid, series.uid));
+    if (!found.has_value() || found->study_uid != series.study_uid) {
+      return absl::FailedPreconditionError(
+          "a series is known as one of another study; look at what sends it");
+    }
+    bool any_new = false;
+    for (const QueuedImage& image : images) {
+      TF_ASSIGN_OR_RETURN(const bool is_new, InsertImage(database, found->key, image));
+      any_new = any_new || is_new;
+    }
+    if (any_new) {
+      TF_RETURN_IF_ERROR(
+          database
+              .Prepare("UPDATE series SET has_files = 1, state = CASE WHEN state IN "
+                       "('incomplete', 'complete') THEN 'receiving' ELSE state END WHERE key = ?")
+              .Bind(found->key)
+              .Run());
+    }
+    TF_ASSIGN_OR_RETURN(found, FindSeries(database, kByUid, series.uid));
+    kept = *std::move(found);
+    return absl::OkStatus();
+  });
+  TF_RETURN_IF_ERROR(done);
+  return kept;
+}
+
+absl::Status ReceivedRows::Update(const QueuedSeries& series) {
+  return queue_->Change([&](Database& database) -> absl::Status {
+    const int64_t before = database.total_changes();
+    TF_RETURN_IF_ERROR(
+        database
+            .Prepare("UPDATE series SET state = ?, reason = ?, recipe = ?, case_name = ?, attempts "
+                     "= ?, last_error = ?, done_s = ?, has_files = ?, has_header = ? WHERE key = ?")
+            .Bind(SeriesStateName(series.state))
+            .Bind(series.reason)
+            .Bind(series.recipe)
+            .Bind(series.case_name)
+            .Bind(series.attempts)
+            .Bind(series.last_error)
+            .Bind(series.done_s)
+            .Bind(int64_t{series.has_files})
+            .Bind(int64_t{series.has_header})
+            .Bind(series.key)
+            .Run());
+    if (database.total_changes() > before) return absl::OkStatus();
+    return absl::NotFoundError(absl::StrCat("no series ", series.key, " in the queue"));
+  });
+}
+
+absl::Status ReceivedRows::UpdatePatient(const std::string& study_uid,
+                                         const PatientIdentity& patient) {
+  return queue_->Change([&](Database& database) {
+    return database
+        .Prepare("UPDATE studies SET patient_id = ?, issuer = ?, name = ?, birth_date = ?, "
+                 "readable = ? WHERE uid = ?")
+        .Bind(patient.id)
+        .Bind(patient.issuer)
+        .Bind(patient.name)
+        .Bind(patient.birth_date)
+        .Bind(int64_t{patient.readable})
+        .Bind(study_uid)
+        .Run();
+  });
+}
+
+absl::StatusOr<QueuedSeries> ReceivedRows::SelectOne(const char* sql, const std::string& value) {
+  std::optional<QueuedSeries> found;
+  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
+    TF_ASSIGN_OR_RETURN(found, FindSeries(database, sql, value));
+    return absl::OkStatus();
+  });
+  TF_RETURN_IF_ERROR(done);
+  if (!found.has_value()) return absl::NotFoundError("no such series in the queue");
+  return *std::move(found);
+}
+
+absl::StatusOr<std::vector<QueuedSeries>> ReceivedRows::Select(const char* sql,
+                                                               const std::string& value) {
+  std::vector<QueuedSeries> all;
+  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
+    Database::Query query = database.Prepare(sql);
+    query.Bind(value);
+    for (;;) {
+      TF_ASSIGN_OR_RETURN(const bool row, query.Step());
+      if (!row) return absl::OkStatus();
+      TF_ASSIGN_OR_RETURN(all.emplace_back(), SeriesOf(query));
+    }
+  });
+  TF_RETURN_IF_ERROR(done);
+  return all;
+}
+
+absl::StatusOr<QueuedSeries> ReceivedRows::Get(const std::string& key) {
+  return SelectOne(kByKey, key);
+}
+
+absl::StatusOr<QueuedSeries> ReceivedRows::GetByUid(const std::string& uid) {
+  return SelectOne(kByUid, uid);
+}
+
+absl::StatusOr<QueuedSeries> ReceivedRows::GetByCase(const std::string& case_name) {
+  return SelectOne(kByCase, case_name);
+}
+
+absl::StatusOr<std::vector<QueuedSeries>> ReceivedRows::List() { return Select(kAll, ""); }
+
+absl::StatusOr<std::vector<QueuedSeries>> ReceivedRows::ListStudy(const std::string& study_uid) {
+  return Select(kOfStudy, study_uid);
+}
+
+absl::StatusOr<QueuedStudy> ReceivedRows::GetStudy(const std::string& uid) {
+  QueuedStudy study;
+  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
+    Database::Query row = database.Prepare(
+        "SELECT uid, patient_id, issuer, name, birth_date, readable, study_date, "
+        "description FROM studies WHERE uid = ?");
+    row.Bind(uid);
+    TF_ASSIGN_OR_RETURN(const bool found, row.Step());
+    if (!found) return absl::NotFoundError("no such study in the queue");
+    study = {.uid = TextOf(row, 0),
+             .patient = {.id = TextOf(row, 1),
+                         .issuer = TextOf(row, 2),
+                         .name = TextOf(row, 3),
+                         .birth_date = TextOf(row, 4),
+                         .readable = row.Integer(5) != 0},
+             .date = TextOf(row, 6),
+             .description = TextOf(row, 7)};
+    return absl::OkStatus();
+  });
+  TF_RETURN_IF_ERROR(done);
+  return study;
+}
+
+absl::StatusOr<std::vector<QueuedImage>> ReceivedRows::ListImages(const std::string& series) {
+  std::vector<QueuedImage> images;
+  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
+    Database::Query row = database.Prepare(
+        "SELECT series, uid, class_uid, file FROM images WHERE series = ? ORDER BY uid");
+    row.Bind(series);
+    for (;;) {
+      TF_ASSIGN_OR_RETURN(const bool found, row.Step());
+      if (!found) return absl::OkStatus();
+      images.push_back({TextOf(row, 0), TextOf(row, 1), TextOf(row, 2), TextOf(row, 3)});
+    }
+  });
+  TF_RETURN_IF_ERROR(done);
+  return images;
+}
+
+absl::Status ReceivedRows::ForgetFiles(const std::string& series) {
+  return queue_->Change([&](Database& database) -> absl::Status {
+    TF_RETURN_IF_ERROR(
+        database.Prepare("UPDATE images SET file = '' WHERE series = ?").Bind(series).Run());
+    return database.Prepare("UPDATE series SET has_files = 0 WHERE key = ?").Bind(series).Run();
+  });
+}
+
+}  // namespace tissueform

@@ -1,0 +1,169 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/series/series_facts.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <set>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/string_view.h"
+#include <Eigen/Geometry>
+
+namespace tissueform {
+namespace {
+
+using Eigen::Vector3d;
+
+// Two images nearer than this lie at one place.
+constexpr double kSamePlaceMm = 0.01;
+// Directions whose cosine is nearer to 1 are the same; what scanners write has 6 digits.
+constexpr double kSameDirection = 1e-4;
+// A gantry is tilted by up to 30 degrees.
+const double kAxialCosine = std::cos(31.0 * M_PI / 180.0);
+// A place is missing where the next image is farther than so many spacings.
+constexpr double kGapSpacings = 1.5;
+// From which number on Siemens' kernels are sharp (B60s, H60s, Hr59 are; B30f, J40s are not).
+constexpr int kSharpNumber = 50;
+
+Vector3d NormalOf(const InstanceHeader& image) {
+  const Vector3d row = image.axes->col(0);
+  const Vector3d column = image.axes->col(1);
+  const Vector3d normal = row.cross(column);
+  const double length = normal.norm();
+  return length > 0 ? Vector3d(normal / length) : Vector3d::UnitZ();
+}
+
+SlicePlane PlaneOf(const Vector3d& normal) {
+  if (std::abs(normal.z()) >= kAxialCosine) return SlicePlane::kAxial;
+  if (std::abs(normal.y()) >= kAxialCosine) return SlicePlane::kCoronal;
+  if (std::abs(normal.x()) >= kAxialCosine) return SlicePlane::kSagittal;
+  return SlicePlane::kOblique;
+}
+
+// Sorted, of those that have a place; all along the first one's normal.
+std::vector<double> PlacesOf(const std::vector<InstanceHeader>& images, SeriesFacts* facts) {
+  std::vector<Vector3d> normals;
+  std::vector<double> places;
+  for (const InstanceHeader& image : images) {
+    if (!image.position.has_value() || !image.axes.has_value()) continue;
+    const Vector3d normal = NormalOf(image);
+    const auto same = [&normal](const Vector3d& known) {
+      return known.dot(normal) > 1 - kSameDirection;
+    };
+    if (std::none_of(normals.begin(), normals.end(), same)) normals.push_back(normal);
+    places.push_back(normals.front().dot(*image.position));
+  }
+  std::sort(places.begin(), places.end());
+  facts->orientations = static_cast<int>(normals.size());
+  if (!normals.empty()) facts->plane = PlaneOf(normals.front());
+  return places;
+}
+
+void MeasurePlaces(const std::vector<double>& places, SeriesFacts* facts) {
+  std::vector<double> steps;
+  for (size_t i = 1; i < places.size(); ++i) {
+    const double step = places[i] - places[i - 1];
+    if (step <= kSamePlaceMm) {
+      ++facts->duplicates;
+    } else {
+      steps.push_back(step);
+    }
+  }
+  facts->slices = static_cast<int>(places.size()) - facts->duplicates;
+  if (steps.empty()) return;
+  std::vector<double> sorted = steps;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<long>(sorted.size() / 2),
+                   sorted.end());
+  facts->spacing_mm = sorted[sorted.size() / 2];
+  facts->coverage_mm = places.back() - places.front() + facts->spacing_mm;
+  for (const double step : steps) {
+    if (step > kGapSpacings * facts->spacing_mm) {
+      // A place far off is one gap, not a million.
+      facts->missing += static_cast<int>(
+          std::min(std::round(step / facts->spacing_mm) - 1, 100'000.0));
+    }
+  }
+}
+
+bool IsLocaliser(const InstanceHeader& image) {
+  return absl::StrContains(image.image_type, "LOCALIZER") ||
+         absl::StrContains(image.image_type, "SCOUT");
+}
+
+// The digits after the leading letters: 60 of "Hr60s"; -1: none.
+int NumberIn(absl::string_view name) {
+  size_t begin = 0;
+  while (begin < name.size() && absl::ascii_isalpha(static_cast<unsigned char>(name[begin]))) ++begin;
+  size_t end = begin;
+  while (end < name.size() && absl::ascii_isdigit(static_cast<unsigned char>(name[end]))) ++end;
+  int number = -1;
+  if (begin == 0 || end - begin != 2) return -1;
+  return absl::SimpleAtoi(name.substr(begin, end - begin), &number) ? number : -1;
+}
+
+const char* PlaneName(SlicePlane plane) {
+  constexpr std::array<const char*, 5> kNames = {"axial", "coronal", "sagittal", "oblique",
+                                                 "placeless"};
+  return kNames[static_cast<size_t>(plane)];
+}
+
+}  // namespace
+
+KernelKind KernelKindOf(const std::string& kernel) {
+  const std::string upper = absl::AsciiStrToUpper(kernel);
+  for (const char* word : {"BONE", "EDGE", "SHARP", "LUNG", "DETAIL"}) {
+    if (absl::StrContains(upper, word)) return KernelKind::kBone;
+  }
+  for (const char* word : {"SOFT", "STANDARD", "STND", "SMOOTH", "BRAIN"}) {
+    if (absl::StrContains(upper, word)) return KernelKind::kSoft;
+  }
+  const int number = NumberIn(upper);
+  if (absl::StartsWith(upper, "FC") && number >= 0) {  // Canon, Toshiba
+    return (number >= 30 && number < 40) || number >= 50 ? KernelKind::kBone : KernelKind::kSoft;
+  }
+  if (number < 0) return KernelKind::kUnknown;
+  return number >= kSharpNumber ? KernelKind::kBone : KernelKind::kSoft;
+}
+
+SeriesFacts FactsOfSeries(const std::string& key, const std::vector<InstanceHeader>& images) {
+  const InstanceHeader& first = images.front();
+  SeriesFacts facts = {.key = key,
+                       .study_uid = first.study_uid,
+                       .modality = first.modality,
+                       .description = first.series_description,
+                       .number = first.series_number,
+                       .thickness_mm = first.slice_thickness_mm.value_or(0),
+                       .kernel = KernelKindOf(first.convolution_kernel)};
+  std::set<std::string> frames;
+  for (const InstanceHeader& image : images) {
+    frames.insert(image.frame_uid);
+    facts.contrast = facts.contrast || !image.contrast.empty();
+    facts.localiser = facts.localiser || IsLocaliser(image);
+    facts.derived = facts.derived || absl::StartsWith(image.image_type, "DERIVED");
+    facts.hounsfield = facts.hounsfield && image.rescale_slope.has_value() &&
+                       image.rescale_intercept.has_value() &&
+                       (image.rescale_type.empty() || image.rescale_type == "HU");
+  }
+  facts.frames_of_reference = static_cast<int>(frames.size());
+  MeasurePlaces(PlacesOf(images, &facts), &facts);
+  return facts;
+}
+
+std::string DescribeFacts(const SeriesFacts& facts) {
+  constexpr std::array<const char*, 3> kKernels = {"soft kernel", "sharp kernel",
+                                                   "kernel of unknown kind"};
+  return absl::StrFormat("%d %s slices, %.2f mm apart, over %.0f mm, %s%s", facts.slices,
+                         PlaneName(facts.plane), facts.spacing_mm, facts.coverage_mm,
+                         kKernels[static_cast<size_t>(facts.kernel)],
+                         facts.contrast ? ", contrast medium" : "");
+}
+
+}  // namespace tissueform

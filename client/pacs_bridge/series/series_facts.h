@@ -1,0 +1,51 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "client/pacs_bridge/dicom/instance_header.h"
+
+namespace tissueform {
+
+enum class SlicePlane { kAxial, kCoronal, kSagittal, kOblique, kNone };
+enum class KernelKind { kSoft, kBone, kUnknown };
+
+// What a series is, by its images' headers: what rules decide by. Numbers are of the slices that
+// lie at different places.
+struct SeriesFacts {
+  std::string key = {};  // of the queue
+  std::string study_uid = {};
+  std::string modality = {};
+  std::string description = {};  // for rules only, never in a text: it may hold anything
+  int number = 0;
+  int slices = 0;
+  int duplicates = 0;         // images at a place that another image has
+  int missing = 0;            // places between the first and the last that have no image
+  int frames_of_reference = 0;
+  int orientations = 0;
+  SlicePlane plane = SlicePlane::kNone;
+  double spacing_mm = 0;  // between slices: the median
+  double thickness_mm = 0;
+  double coverage_mm = 0;  // along the slices' normal
+  KernelKind kernel = KernelKind::kUnknown;
+  bool contrast = false;
+  bool localiser = false;
+  bool derived = false;
+  bool hounsfield = true;  // all say how their values become Hounsfield units
+};
+
+// REQUIRES: headers of one series, at least one.
+SeriesFacts FactsOfSeries(const std::string& key, const std::vector<InstanceHeader>& images);
+
+// By the names that manufacturers give their kernels: "H60s" (sharp from 50 on), "BONEPLUS", "FC81";
+// a name that says neither is unknown.
+KernelKind KernelKindOf(const std::string& kernel);
+
+// "231 axial slices, 0.60 mm apart, over 138 mm, soft kernel", for people; nothing of a patient.
+std::string DescribeFacts(const SeriesFacts& facts);
+
+}  // namespace tissueform

@@ -1,0 +1,84 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/series/series_rules.h"
+
+#include <filesystem>
+#include <map>
+
+#include "nlohmann/json.hpp"
+
+#include "core/base/status_macros.h"
+#include "core/json/json_file.h"
+#include "core/json/json_schema.h"
+#include "core/json/json_text.h"
+
+namespace tissueform {
+namespace {
+
+using RulesJson = nlohmann::json;
+
+const JsonSchema& RulesSchema() {
+  static const JsonSchema* const schema = new JsonSchema(SeriesRulesSchemaText());
+  return *schema;
+}
+
+// What follows reads a text that has passed the schema.
+
+SeriesPreference PreferenceOf(const std::string& name) {
+  static const auto* const names = new std::map<std::string, SeriesPreference>{
+      {"soft_kernel", SeriesPreference::kSoftKernel},
+      {"bone_kernel", SeriesPreference::kBoneKernel},
+      {"thin_slices", SeriesPreference::kThinSlices},
+      {"no_contrast", SeriesPreference::kNoContrast},
+      {"more_coverage", SeriesPreference::kMoreCoverage}};
+  return names->at(name);
+}
+
+template <typename Value>
+void TakeValue(const RulesJson& json, const char* key, Value* value) {
+  if (json.contains(key)) *value = json.at(key).get<Value>();
+}
+
+SeriesRule RuleOf(const RulesJson& json, const std::string& folder) {
+  SeriesRule rule;
+  TakeValue(json, "name", &rule.name);
+  const std::filesystem::path recipe(json.at("recipe").get<std::string>());
+  rule.recipe = (recipe.is_absolute() ? recipe : std::filesystem::path(folder) / recipe).string();
+  TakeValue(json, "modality", &rule.modality);
+  TakeValue(json, "axial_only", &rule.axial_only);
+  TakeValue(json, "min_slices", &rule.min_slices);
+  TakeValue(json, "max_spacing_mm", &rule.max_spacing_mm);
+  TakeValue(json, "max_thickness_mm", &rule.max_thickness_mm);
+  TakeValue(json, "min_coverage_mm", &rule.min_coverage_mm);
+  TakeValue(json, "max_coverage_mm", &rule.max_coverage_mm);
+  TakeValue(json, "max_missing", &rule.max_missing);
+  TakeValue(json, "hounsfield", &rule.hounsfield);
+  TakeValue(json, "derived", &rule.derived);
+  TakeValue(json, "contrast", &rule.contrast);
+  TakeValue(json, "description_has", &rule.description_has);
+  TakeValue(json, "description_lacks", &rule.description_lacks);
+  if (json.contains("prefer")) {
+    rule.prefer.clear();
+    for (const RulesJson& name : json.at("prefer")) rule.prefer.push_back(PreferenceOf(name));
+  }
+  return rule;
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<SeriesRule>> ParseSeriesRules(const std::string& json,
+                                                         const std::string& folder) {
+  TF_ASSIGN_OR_RETURN(const RulesJson document, ParseJsonStrictly(json));
+  TF_RETURN_IF_ERROR(RulesSchema().Check(document));
+  std::vector<SeriesRule> rules;
+  for (const RulesJson& rule : document.at("rules")) rules.push_back(RuleOf(rule, folder));
+  return rules;
+}
+
+absl::StatusOr<std::vector<SeriesRule>> ReadSeriesRules(const std::string& path) {
+  TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(path, "series rules", kMostRulesBytes));
+  return ParseSeriesRules(text, std::filesystem::path(path).parent_path().string());
+}
+
+}  // namespace tissueform

@@ -1,0 +1,196 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/work/bridge_service.h"
+
+#include <ctime>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+namespace tissueform {
+namespace {
+
+// Series are complete after seconds without an image; nobody waits for less.
+constexpr std::chrono::milliseconds kIntakePause{250};
+constexpr std::chrono::milliseconds kStepPause{1000};
+constexpr std::chrono::hours kDeletionPause{1};
+// What a server may tell of before it is taken; each is told again by the next watch.
+constexpr size_t kMostHeard = 4096;
+
+bool HasPlanStep(SeriesState state) {
+  return state == SeriesState::kChosen || state == SeriesState::kBuilt ||
+         state == SeriesState::kPacked;
+}
+
+bool HasExportStep(const QueuedExport& queued) {
+  switch (queued.state) {
+    case BridgeExportState::kConfirmed:
+    case BridgeExportState::kFetched:
+    case BridgeExportState::kWritten:
+    case BridgeExportState::kSent:
+      return true;
+    case BridgeExportState::kFailed:
+      return queued.done_s == 0;
+    case BridgeExportState::kAsked:
+    case BridgeExportState::kTold:
+      return false;
+  }
+  return false;
+}
+
+}  // namespace
+
+BridgeService::BridgeService(BridgeServiceParts parts) : parts_(std::move(parts)) {
+  if (parts_.intake != nullptr) {
+    threads_.emplace_back([this] { Loop(kIntakePause, [this] { TakeIn(); }); });
+  }
+  if (parts_.plans != nullptr) {
+    threads_.emplace_back([this] { Loop(kStepPause, [this] { WorkOnPlans(); }); });
+  }
+  if (parts_.exports != nullptr) {
+    threads_.emplace_back([this] { Loop(kStepPause, [this] { WorkOnExports(); }); });
+    threads_.emplace_back([this] { Loop(kStepPause, [this] { WatchServer(); }); });
+  }
+}
+
+BridgeService::~BridgeService() {
+  {
+    MutexLock lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.NotifyAll();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+void BridgeService::Wake() {
+  {
+    MutexLock lock(mutex_);
+    ++wakes_;
+  }
+  changed_.NotifyAll();
+}
+
+bool BridgeService::stopping() {
+  MutexLock lock(mutex_);
+  return stopping_;
+}
+
+bool BridgeService::Lives() {
+  MutexLock lock(mutex_);
+  return std::exchange(rounds_seen_, rounds_) != rounds_ || threads_.empty();
+}
+
+void BridgeService::Loop(std::chrono::milliseconds pause, const std::function<void()>& work) {
+  int64_t seen = 0;
+  while (!stopping()) {
+    {
+      MutexLock lock(mutex_);
+      seen = wakes_;
+      ++rounds_;
+    }
+    work();
+    const auto until = std::chrono::steady_clock::now() + pause;
+    MutexLock lock(mutex_);
+    while (!stopping_ && wakes_ == seen && changed_.WaitUntil(mutex_, until)) {
+    }
+  }
+}
+
+void BridgeService::Tell(const absl::Status& status, const std::string& line) {
+  if (!parts_.log) return;
+  parts_.log(!status.ok(), status.ok() ? line : absl::StrCat(line, ": ", status.message()));
+}
+
+void BridgeService::TakeIn() {
+  const absl::StatusOr<std::vector<std::string>> changed = parts_.intake->Settle();
+  if (!changed.ok()) {
+    Tell(changed.status(), "what was received cannot be put into the queue");
+  } else if (!changed->empty()) {
+    ReceivedRows rows(parts_.queue);
+    for (const std::string& key : *changed) {
+      const absl::StatusOr<QueuedSeries> series = rows.Get(key);
+      if (!series.ok()) continue;
+      Tell(absl::OkStatus(),
+           absl::StrCat("series ", key, " is ", SeriesStateName(series->state),
+                        series->reason.empty() ? "" : ": ", series->reason));
+    }
+    Wake();
+  }
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_deletion_) return;
+  next_deletion_ = now + kDeletionPause;
+  const absl::StatusOr<int> deleted =
+      DeleteOld(parts_.queue, parts_.retention, std::time(nullptr));
+  if (!deleted.ok() || *deleted > 0) {
+    Tell(deleted.status(), "deleted what is older than it is kept");
+  }
+}
+
+void BridgeService::WorkOnPlans() {
+  ReceivedRows rows(parts_.queue);
+  const absl::StatusOr<std::vector<QueuedSeries>> all = rows.List();
+  if (!all.ok()) return Tell(all.status(), "the queue cannot be read");
+  for (QueuedSeries series : *all) {
+    while (HasPlanStep(series.state) && !stopping() && plan_retries_.Due(series.key)) {
+      const std::string before = SeriesStateName(series.state);
+      const absl::Status status = parts_.plans->Step(&series);
+      if (absl::IsCancelled(status)) return;
+      Tell(status, absl::StrCat("series ", series.key, ": ", before, " -> ",
+                                SeriesStateName(series.state)));
+      if (status.ok()) {
+        plan_retries_.Succeeded(series.key);
+      } else {
+        plan_retries_.Failed(series.key);
+      }
+    }
+  }
+}
+
+void BridgeService::WorkOnExports() {
+  std::deque<v1::Export> heard;
+  {
+    MutexLock lock(mutex_);
+    heard.swap(heard_);
+  }
+  for (const v1::Export& told : heard) {
+    const absl::Status status = parts_.exports->Take(told);
+    if (!status.ok()) Tell(status, "an export cannot be taken into the queue");
+  }
+  ExportRows rows(parts_.queue);
+  const absl::StatusOr<std::vector<QueuedExport>> all = rows.List();
+  if (!all.ok()) return Tell(all.status(), "the queue cannot be read");
+  for (QueuedExport queued : *all) {
+    if (queued.state == BridgeExportState::kAsked && drawn_.insert(queued.key).second) {
+      const absl::Status status = parts_.exports->Draw(queued);
+      if (!status.ok()) Tell(status, absl::StrCat(queued.name, " has no pictures"));
+    }
+    while (HasExportStep(queued) && !stopping() && export_retries_.Due(queued.key)) {
+      const std::string before = BridgeExportStateName(queued.state);
+      const absl::Status status = parts_.exports->Step(&queued);
+      Tell(status, absl::StrCat(queued.name, ": ", before, " -> ",
+                                BridgeExportStateName(queued.state)));
+      if (status.ok()) {
+        export_retries_.Succeeded(queued.key);
+      } else {
+        export_retries_.Failed(queued.key);
+      }
+    }
+  }
+}
+
+void BridgeService::WatchServer() {
+  const Cancellation cancelled([this] { return stopping(); });
+  const absl::Status status = parts_.server->WatchExports(
+      [this](const v1::Export& told) {
+        {
+          MutexLock lock(mutex_);
+          if (heard_.size() < kMostHeard) heard_.push_back(told);
+        }
+        Wake();
+      },
+      cancelled);
+  if (!stopping()) Tell(status, "the watch of exports has ended; it is taken up again");
+}
+
+}  // namespace tissueform

@@ -1,0 +1,84 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <atomic>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/pacs_bridge/work/export_work.h"
+#include "client/pacs_bridge/work/plan_work.h"
+#include "client/pacs_bridge/work/retention.h"
+#include "client/pacs_bridge/work/retry_times.h"
+#include "client/pacs_bridge/work/series_intake.h"
+#include "core/base/mutex.h"
+
+namespace tissueform {
+
+// What works on a queue; all must outlive the service. Null: that work is not done.
+struct BridgeServiceParts {
+  BridgeQueue* queue = nullptr;
+  SeriesIntake* intake = nullptr;
+  PlanWork* plans = nullptr;
+  ExportWork* exports = nullptr;
+  CaseServer* server = nullptr;  // to hear of exports
+  RetentionOptions retention = {};
+  // One line about what was done, or went wrong; keys of the queue and nothing of a patient.
+  std::function<void(bool wrong, const std::string& line)> log = {};
+};
+
+// Moves everything in the queue on, each kind of work on a thread of its own: what comes in, plans
+// one after the other, exports, and the watch of the server, which is taken up again when it
+// breaks. What fails for now is tried again (RetryTimes).
+class BridgeService {
+ public:
+  explicit BridgeService(BridgeServiceParts parts);
+  // Ends what is between two steps; a plan that is being built must be cancelled by its descriptor.
+  ~BridgeService();
+  BridgeService(const BridgeService&) = delete;
+  BridgeService& operator=(const BridgeService&) = delete;
+
+  // There is something new: an image, an association's end, a person's word. Any thread.
+  void Wake() ABSL_LOCKS_EXCLUDED(mutex_);
+
+  // Whether every thread has come round since the last time this was asked, or is at work on a
+  // step: for a watchdog.
+  bool Lives() ABSL_LOCKS_EXCLUDED(mutex_);
+
+ private:
+  // Calls `work` until the end, at once when somebody wakes it and otherwise every `pause`.
+  void Loop(std::chrono::milliseconds pause, const std::function<void()>& work)
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  void TakeIn();
+  void WorkOnPlans();
+  void WorkOnExports();
+  void WatchServer();
+  void Tell(const absl::Status& status, const std::string& line);
+  bool stopping() ABSL_LOCKS_EXCLUDED(mutex_);
+
+  const BridgeServiceParts parts_;
+
+  // Each of one thread.
+  RetryTimes plan_retries_;
+  RetryTimes export_retries_;
+  std::chrono::steady_clock::time_point next_deletion_ = {};
+  std::set<std::string> drawn_;  // keys of exports whose pictures were drawn, or could not be
+
+  Mutex mutex_;
+  ConditionVariable changed_;
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
+  int64_t wakes_ ABSL_GUARDED_BY(mutex_) = 0;
+  int64_t rounds_ ABSL_GUARDED_BY(mutex_) = 0;
+  int64_t rounds_seen_ ABSL_GUARDED_BY(mutex_) = -1;
+  std::deque<v1::Export> heard_ ABSL_GUARDED_BY(mutex_);
+
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,324 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/work/export_work.h"
+
+#include <algorithm>
+#include <ctime>
+#include <filesystem>
+#include <system_error>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+
+#include "client/cpp/backoff.h"
+#include "client/pacs_bridge/dicom/dicom_uid.h"
+#include "client/pacs_bridge/dicom/instance_header.h"
+#include "client/pacs_bridge/work/plan_work.h"
+#include "core/base/error_reason.h"
+#include "core/base/status_macros.h"
+#include "core/case_file/case_reader.h"
+#include "server/store/durable_file.h"
+#include "server/store/fault_points.h"
+
+namespace tissueform {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Of UpdateExportRequest.detail.
+constexpr size_t kMostDetailBytes = 256;
+// Once a minute: a PACS may be down for a day.
+constexpr int64_t kMostExportAttempts = 1440;
+constexpr char kSeriesKey[] = "series:";
+
+bool IsSeriesKey(const std::string& key) { return absl::StartsWith(key, kSeriesKey); }
+
+std::string DetailOf(const std::string& text) {
+  std::string line = text.substr(0, kMostDetailBytes);
+  std::replace_if(
+      line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7F; }, '?');
+  return line;
+}
+
+// The PACS may come back, or there may be room again.
+bool MayCome(const absl::Status& status) {
+  return IsTransient(status) || absl::IsDeadlineExceeded(status) ||
+         HasReason(status, ErrorReason::kDiskFull);
+}
+
+// What is another one, without saying what it is.
+std::string WhatDiffers(const PatientIdentity& seen, const PatientIdentity& now) {
+  if (seen.id != now.id || seen.issuer != now.issuer) {
+    return "the PACS names another patient ID than the images that were received (a merged or "
+           "corrected patient?)";
+  }
+  if (seen.name != now.name || seen.birth_date != now.birth_date) {
+    return "the PACS names another name or birth date than the images that were received";
+  }
+  return "";
+}
+
+int CountSent(const std::vector<QueuedObject>& objects) {
+  return static_cast<int>(
+      std::count_if(objects.begin(), objects.end(), [](const QueuedObject& o) { return o.sent; }));
+}
+
+}  // namespace
+
+absl::Status ExportWork::Take(const v1::Export& told) {
+  if (told.state() == v1::EXPORT_STATE_STORED || told.state() == v1::EXPORT_STATE_FAILED) {
+    return absl::OkStatus();
+  }
+  const absl::StatusOr<QueuedSeries> series = received_.GetByCase(told.case_());
+  if (absl::IsNotFound(series.status())) return absl::OkStatus();
+  TF_RETURN_IF_ERROR(series.status());
+  QueuedExport asked;
+  asked.name = told.name();
+  asked.key = NewQueueKey();
+  asked.prediction = told.prediction();
+  asked.case_name = told.case_();
+  asked.first_s = std::time(nullptr);
+  TF_ASSIGN_OR_RETURN(QueuedExport queued, rows_.Add(asked));
+  if (told.state() != v1::EXPORT_STATE_WAITING) return absl::OkStatus();
+  // It does not know, or asks again for what has failed.
+  if (queued.state == BridgeExportState::kFailed && queued.done_s != 0) {
+    queued.state = BridgeExportState::kAsked;
+    queued.note.clear();
+    queued.last_error.clear();
+    queued.done_s = 0;
+    TF_RETURN_IF_ERROR(rows_.Update(queued));
+  }
+  if (queued.state != BridgeExportState::kAsked) return absl::OkStatus();
+  TF_FAULT_POINT("export.asked");
+  return server_->UpdateExport(queued.name, v1::EXPORT_STATE_CONFIRMATION,
+                               "waits for a person at the work list of the bridge", 0);
+}
+
+absl::Status ExportWork::RunStep(QueuedExport* queued) {
+  switch (queued->state) {
+    case BridgeExportState::kConfirmed:
+      return Fetch(queued);
+    case BridgeExportState::kFetched:
+      return Write(queued);
+    case BridgeExportState::kWritten:
+      return Send(queued);
+    case BridgeExportState::kSent:
+      return TellStored(queued);
+    case BridgeExportState::kFailed:
+      return queued->done_s == 0 ? TellFailed(queued) : absl::OkStatus();
+    case BridgeExportState::kAsked:
+    case BridgeExportState::kTold:
+      return absl::OkStatus();
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ExportWork::Step(QueuedExport* queued) {
+  const BridgeExportState before = queued->state;
+  const absl::Status status = RunStep(queued);
+  if (status.ok()) {
+    queued->attempts = 0;
+    queued->last_error.clear();
+  } else {
+    queued->state = before;
+    ++queued->attempts;
+    queued->last_error = DetailOf(std::string(status.message()));
+    if (!MayCome(status) || queued->attempts >= kMostExportAttempts) {
+      if (before == BridgeExportState::kFailed) {
+        queued->done_s = std::time(nullptr);
+      } else {
+        queued->note = queued->last_error;
+      }
+      queued->state = BridgeExportState::kFailed;
+      queued->attempts = 0;
+    }
+  }
+  TF_FAULT_POINT("export.stepped");
+  TF_RETURN_IF_ERROR(rows_.Update(*queued));
+  return status;
+}
+
+absl::Status ExportWork::FetchHeader(const QueuedSeries& series, const std::string& path) {
+  std::error_code ignored;
+  fs::remove(path, ignored);
+  const absl::Status fetched = pacs_->FetchHeader(series.study_uid, series.uid, path);
+  if (fetched.ok()) return absl::OkStatus();
+  if (absl::IsNotFound(fetched)) {
+    return absl::FailedPreconditionError(
+        "the PACS has the series of this case no longer; nothing is stored");
+  }
+  if (!absl::IsFailedPrecondition(fetched) && !absl::IsUnimplemented(fetched)) return fetched;
+  // It gives nobody anything: what was kept stands for it, for a while.
+  const int64_t age_s = std::time(nullptr) - series.first_s;
+  if (!series.has_header || age_s > options_.header_lifetime.count()) {
+    return absl::FailedPreconditionError(
+        "the PACS gives no header, and none is kept any longer; have it send the series again");
+  }
+  fs::copy_file(queue_->header_path(series.key), path, ignored);
+  return ignored ? FileError(ignored.value(), "cannot copy the header to", path) : absl::OkStatus();
+}
+
+absl::Status ExportWork::Fetch(QueuedExport* queued) {
+  TF_ASSIGN_OR_RETURN(const QueuedSeries series, received_.GetByCase(queued->case_name));
+  const std::string folder = queue_->object_folder(queued->key);
+  TF_RETURN_IF_ERROR(MakeFolder(folder));
+  TF_RETURN_IF_ERROR(
+      server_->UpdateExport(queued->name, v1::EXPORT_STATE_STORING, "is being written", 0));
+  const std::string path = folder + "/header.dcm";
+  TF_RETURN_IF_ERROR(FetchHeader(series, path));
+  TF_FAULT_POINT("export.header");
+  TF_ASSIGN_OR_RETURN(const InstanceHeader header, ReadInstanceHeader(path));
+  if (header.study_uid != series.study_uid || header.series_uid != series.uid) {
+    return absl::FailedPreconditionError("the PACS gave a header of another series");
+  }
+  const PatientIdentity now = IdentityOf(header);
+  if (DigestOf(now) == queued->confirmed) {
+    queued->state = BridgeExportState::kFetched;
+    return absl::OkStatus();
+  }
+  // Whoever confirmed has seen somebody else: once more, with what the PACS says now.
+  TF_ASSIGN_OR_RETURN(const QueuedStudy study, received_.GetStudy(series.study_uid));
+  std::string note = WhatDiffers(study.patient, now);
+  if (!now.readable) {
+    note = "the name is in a character set that is not known here; compare with the PACS";
+  } else if (note.empty()) {
+    note = "the patient was corrected after it was confirmed";
+  }
+  TF_RETURN_IF_ERROR(received_.UpdatePatient(series.study_uid, now));
+  TF_FAULT_POINT("export.patient_changed");
+  TF_RETURN_IF_ERROR(server_->UpdateExport(queued->name, v1::EXPORT_STATE_CONFIRMATION,
+                                           "the patient's data have changed: waits for a person",
+                                           0));
+  queued->state = BridgeExportState::kAsked;
+  queued->note = note;
+  queued->confirmed.clear();
+  return absl::OkStatus();
+}
+
+absl::StatusOr<ExportMaterial> ExportWork::Gather(const QueuedExport& queued) {
+  TF_ASSIGN_OR_RETURN(const QueuedSeries series, received_.GetByCase(queued.case_name));
+  const std::string folder = queue_->object_folder(queued.key);
+  TF_RETURN_IF_ERROR(MakeFolder(folder));
+  ExportMaterial material;
+  material.header = folder + "/header.dcm";
+  material.case_path = CasePathOf(*queue_, series.key);
+  std::error_code failed;
+  if (!fs::exists(material.case_path, failed)) {
+    material.case_path = folder + "/case.tfcase";
+    TF_ASSIGN_OR_RETURN(const std::string bytes, server_->ReadCase(queued.case_name));
+    TF_RETURN_IF_ERROR(WriteDurably(material.case_path, {bytes}));
+  }
+  TF_ASSIGN_OR_RETURN(material.case_file, ReadCase(material.case_path));
+  TF_ASSIGN_OR_RETURN(material.prediction, server_->ReadPrediction(queued.prediction));
+  TF_ASSIGN_OR_RETURN(material.asked, server_->GetExport(queued.name));
+  TF_ASSIGN_OR_RETURN(material.sources, received_.ListImages(series.key));
+  material.series_uid = series.uid;
+  material.pictures = folder + "/pictures";
+  material.folder = folder + "/written";
+  return material;
+}
+
+absl::Status ExportWork::Draw(const QueuedExport& queued) {
+  std::error_code failed;
+  const std::string pictures = queue_->object_folder(queued.key) + "/pictures";
+  if (fs::exists(pictures, failed)) return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(const ExportMaterial material, Gather(queued));
+  return writer_->Draw(material, pictures);
+}
+
+absl::Status ExportWork::Write(QueuedExport* queued) {
+  TF_ASSIGN_OR_RETURN(ExportMaterial material, Gather(*queued));
+  std::error_code failed;
+  if (!fs::exists(material.pictures, failed)) {
+    TF_RETURN_IF_ERROR(writer_->Draw(material, material.pictures));
+  }
+  TF_ASSIGN_OR_RETURN(const std::vector<std::string> keys, writer_->KeysOf(material));
+  TF_ASSIGN_OR_RETURN(const std::vector<QueuedObject> objects,
+                      rows_.EnsureObjects(queued->name, keys, NewDicomUid));
+  TF_FAULT_POINT("export.uids");
+  for (const QueuedObject& object : objects) material.uids[object.key] = object.uid;
+  fs::remove_all(material.folder, failed);
+  TF_RETURN_IF_ERROR(MakeFolder(material.folder));
+  TF_ASSIGN_OR_RETURN(const std::vector<ExportFile> files, writer_->Write(material));
+  TF_FAULT_POINT("export.files");
+  for (const ExportFile& file : files) {
+    TF_RETURN_IF_ERROR(rows_.UpdateObject(
+        queued->name, {.key = file.key, .uid = "", .file = file.path, .sent = false}));
+  }
+  queued->state = BridgeExportState::kWritten;
+  return absl::OkStatus();
+}
+
+absl::Status ExportWork::SendMissing(const QueuedExport& queued,
+                                     std::vector<QueuedObject>* objects) {
+  TF_ASSIGN_OR_RETURN(const QueuedSeries series, received_.GetByCase(queued.case_name));
+  std::vector<std::string> paths;
+  std::vector<QueuedObject*> missing;
+  for (QueuedObject& object : *objects) {
+    if (object.sent) continue;
+    TF_ASSIGN_OR_RETURN(const InstanceHeader header, ReadInstanceHeader(object.file));
+    const absl::StatusOr<bool> there =
+        pacs_->Has(series.study_uid, header.series_uid, object.uid);
+    // One that cannot be asked gets an object with the same UID again, which it knows by that.
+    if (!there.ok() && !absl::IsFailedPrecondition(there.status())) return there.status();
+    if (there.ok() && *there) {
+      object.sent = true;
+      TF_RETURN_IF_ERROR(rows_.UpdateObject(queued.name, object));
+    } else {
+      paths.push_back(object.file);
+      missing.push_back(&object);
+    }
+  }
+  TF_FAULT_POINT("export.sending");
+  if (paths.empty()) return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(const std::vector<StoredObject> stored, pacs_->Store(paths));
+  TF_FAULT_POINT("export.transferred");
+  absl::Status first_error;
+  for (size_t i = 0; i < missing.size() && i < stored.size(); ++i) {
+    first_error.Update(stored[i].status);
+    if (!stored[i].status.ok()) continue;
+    missing[i]->sent = true;
+    TF_RETURN_IF_ERROR(rows_.UpdateObject(queued.name, *missing[i]));
+    TF_FAULT_POINT("export.marked");
+  }
+  return first_error;
+}
+
+absl::Status ExportWork::Send(QueuedExport* queued) {
+  TF_ASSIGN_OR_RETURN(std::vector<QueuedObject> objects, rows_.ListObjects(queued->name));
+  const auto never_sent = [](const QueuedObject& o) { return IsSeriesKey(o.key) || o.file.empty(); };
+  objects.erase(std::remove_if(objects.begin(), objects.end(), never_sent), objects.end());
+  TF_RETURN_IF_ERROR(SendMissing(*queued, &objects));
+  if (CountSent(objects) != static_cast<int>(objects.size()) || objects.empty()) {
+    return absl::UnavailableError("the PACS has not taken all objects");
+  }
+  queued->state = BridgeExportState::kSent;
+  return absl::OkStatus();
+}
+
+absl::Status ExportWork::TellStored(QueuedExport* queued) {
+  TF_ASSIGN_OR_RETURN(const std::vector<QueuedObject> objects, rows_.ListObjects(queued->name));
+  const absl::Status told = server_->UpdateExport(queued->name, v1::EXPORT_STATE_STORED, "",
+                                                  CountSent(objects));
+  // Whoever asked has taken it back meanwhile: it is in the PACS all the same.
+  if (!told.ok() && !absl::IsNotFound(told)) return told;
+  TF_FAULT_POINT("export.told");
+  std::error_code ignored;
+  fs::remove_all(queue_->object_folder(queued->key), ignored);
+  queued->state = BridgeExportState::kTold;
+  queued->done_s = std::time(nullptr);
+  return absl::OkStatus();
+}
+
+absl::Status ExportWork::TellFailed(QueuedExport* queued) {
+  const absl::Status told = server_->UpdateExport(queued->name, v1::EXPORT_STATE_FAILED,
+                                                  DetailOf(queued->note), 0);
+  if (!told.ok() && !absl::IsNotFound(told)) return told;
+  std::error_code ignored;
+  fs::remove_all(queue_->object_folder(queued->key), ignored);
+  queued->done_s = std::time(nullptr);
+  return absl::OkStatus();
+}
+
+}  // namespace tissueform

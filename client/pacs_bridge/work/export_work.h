@@ -1,0 +1,82 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <string>
+
+#include "absl/status/status.h"
+
+#include "client/pacs_bridge/network/pacs_client.h"
+#include "client/pacs_bridge/queue/export_rows.h"
+#include "client/pacs_bridge/queue/received_rows.h"
+#include "client/pacs_bridge/work/case_server.h"
+#include "client/pacs_bridge/work/object_writer.h"
+
+namespace tissueform {
+
+struct ExportWorkOptions {
+  // How long a kept header stands for the PACS's own where that cannot be asked for one.
+  std::chrono::seconds header_lifetime = std::chrono::hours(24) * 90;
+};
+
+// From a planner's wish to objects in the patient's study, one durable step after the other:
+//
+//   asked      waits for a person (ExportRows::Confirm), who has seen the patient
+//   confirmed  fetches the patient's header; who is another one than the person has seen goes back
+//              to asked, with a note
+//   fetched    puts UIDs into the queue, then writes the objects
+//   written    asks the PACS for each, and sends those that it has not
+//   sent       tells the server
+//   told
+//
+// Every step may be repeated: an object keeps its UID, so the PACS gets each once. One thread at a
+// time. What it is given must outlive it.
+class ExportWork {
+ public:
+  ExportWork(BridgeQueue* queue, CaseServer* server, PacsClient* pacs, ObjectWriter* writer,
+             const ExportWorkOptions& options)
+      : queue_(queue),
+        rows_(queue),
+        received_(queue),
+        server_(server),
+        pacs_(pacs),
+        writer_(writer),
+        options_(options) {}
+
+  // Takes what the server tells of an export into the queue. A case that is none of this bridge is
+  // another bridge's: nothing happens. Errors: those of the queue.
+  absl::Status Take(const v1::Export& told);
+
+  // Draws the pictures for one that is asked for, for who is to confirm it; nothing happens where
+  // they are there. Errors: those of the server and of drawing; they keep nobody from confirming.
+  absl::Status Draw(const QueuedExport& queued);
+
+  // The next step of an export, whose new state is written to the queue and into it. An error that
+  // is no transient one makes it kFailed. Also tells the server of one that waits or has failed.
+  //
+  // Errors: those of the step; they hold nothing of a patient.
+  absl::Status Step(QueuedExport* queued);
+
+ private:
+  absl::Status RunStep(QueuedExport* queued);
+  absl::Status Fetch(QueuedExport* queued);
+  absl::Status FetchHeader(const QueuedSeries& series, const std::string& path);
+  absl::StatusOr<ExportMaterial> Gather(const QueuedExport& queued);
+  absl::Status Write(QueuedExport* queued);
+  absl::Status Send(QueuedExport* queued);
+  absl::Status SendMissing(const QueuedExport& queued, std::vector<QueuedObject>* objects);
+  absl::Status TellStored(QueuedExport* queued);
+  absl::Status TellFailed(QueuedExport* queued);
+
+  BridgeQueue* const queue_;
+  ExportRows rows_;
+  ReceivedRows received_;
+  CaseServer* const server_;
+  PacsClient* const pacs_;
+  ObjectWriter* const writer_;
+  const ExportWorkOptions options_;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,71 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+
+#include "client/pacs_bridge/queue/received_rows.h"
+#include "client/pacs_bridge/work/case_server.h"
+
+namespace tissueform {
+
+struct PlanWorkOptions {
+  int threads = 0;  // of `plan build`; 0: all processors
+  int max_seconds = 3600;  // of processor time
+  int64_t max_memory_bytes = int64_t{16} << 30;
+  bool pictures = false;  // in the report: they need Xvfb
+  bool accept_defects = false;  // publish also a plan that is not ready
+  // Readable when the work is to end; -1: never.
+  int cancel = -1;
+  // Told what begins and how much of building is done; may be empty.
+  std::function<void(const std::string& series, absl::string_view stage, double fraction)> tell =
+      {};
+};
+
+// From a chosen series to a case on the server, one durable step after the other:
+//
+//   chosen     `plan build` by the rule's recipe, as a limited child, into plans/KEY/plan
+//   built      `case pack` into plans/KEY/case.tfcase, whose SHA-256 becomes the case's name
+//   packed     the case to the server
+//   published
+//
+// Every step may be repeated: a folder appears at once, a case is named by its bytes before it is
+// sent. Neither the plan's folder nor the case names a patient: they see pixels and geometry only,
+// and folder and title are named by the series' random key.
+//
+// One thread at a time. `queue` and `server` must outlive it; `server` may be null for what does
+// not publish.
+class PlanWork {
+ public:
+  PlanWork(BridgeQueue* queue, CaseServer* server, PlanWorkOptions options)
+      : queue_(queue), rows_(queue), server_(server), options_(std::move(options)) {}
+
+  // The next step of `series`, whose new state is written to the queue and into it. An error that
+  // is no transient one makes the series kFailed, with the reason; the others count an attempt.
+  //
+  // Errors: those of the step, for whoever tells them; they hold nothing of a patient.
+  absl::Status Step(QueuedSeries* series);
+
+ private:
+  absl::Status Build(QueuedSeries* series);
+  absl::Status Pack(QueuedSeries* series);
+  absl::Status Publish(QueuedSeries* series);
+
+  BridgeQueue* const queue_;
+  ReceivedRows rows_;
+  CaseServer* const server_;
+  const PlanWorkOptions options_;
+};
+
+// What a case of the series is called where others see it: "Case 1a2b3c4d".
+std::string TitleOfSeries(const std::string& key);
+// The case's file in the plan's folder.
+std::string CasePathOf(const BridgeQueue& queue, const std::string& series);
+
+}  // namespace tissueform

@@ -1,0 +1,29 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+#include "absl/status/statusor.h"
+
+#include "client/pacs_bridge/queue/bridge_queue.h"
+
+namespace tissueform {
+
+// How long what shows a patient stays in the bridge's folder.
+struct RetentionOptions {
+  // Received images and the plan that was built of them, after the series is done: published,
+  // passed over, failed, or stopped midway.
+  std::chrono::hours keep_images{24 * 7};
+  // The header without pixels that stands for the PACS where that cannot be asked for one.
+  std::chrono::hours keep_headers{24 * 90};
+};
+
+// Deletes what is older, by the wall clock `now_s`. What is being worked on stays, however old it
+// is, and so does what is known of a case: UIDs and whose it is. Returns how many series had
+// something deleted. Errors: those of the queue; a file that cannot be deleted is tried again.
+absl::StatusOr<int> DeleteOld(BridgeQueue* queue, const RetentionOptions& options, int64_t now_s);
+
+}  // namespace tissueform

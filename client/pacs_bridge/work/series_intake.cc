@@ -1,0 +1,280 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/work/series_intake.h"
+
+#include <algorithm>
+#include <ctime>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+
+#include "client/pacs_bridge/dicom/dicom_file.h"
+#include "core/base/status_macros.h"
+#include "server/store/fault_points.h"
+
+namespace tissueform {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Goes to logs and tables, so it must be what it should be.
+bool IsModality(const std::string& text) {
+  return !text.empty() && text.size() <= 16 && std::all_of(text.begin(), text.end(), [](unsigned char c) {
+    return absl::ascii_isupper(c) || absl::ascii_isdigit(c);
+  });
+}
+
+bool HasPlan(SeriesState state) {
+  return state == SeriesState::kChosen || state == SeriesState::kBuilt ||
+         state == SeriesState::kPacked || state == SeriesState::kPublished;
+}
+
+}  // namespace
+
+SeriesIntake::SeriesIntake(BridgeQueue* queue, SeriesIntakeOptions options)
+    : queue_(queue), options_(std::move(options)), rows_(queue) {}
+
+void SeriesIntake::Arrived(const std::string& file, const InstanceHeader& image) {
+  MutexLock lock(mutex_);
+  arrivals_.push_back({file, image});
+  progress_[image.series_uid] = {.last = options_.now()};
+}
+
+void SeriesIntake::Ended(const std::vector<std::string>& series_uids, bool released) {
+  MutexLock lock(mutex_);
+  for (const std::string& uid : series_uids) {
+    const auto found = progress_.find(uid);
+    if (found == progress_.end()) continue;
+    found->second.ended = true;
+    found->second.aborted = !released;
+  }
+}
+
+absl::Status SeriesIntake::Recover() {
+  std::set<std::string> known;
+  TF_ASSIGN_OR_RETURN(const std::vector<QueuedSeries> all, rows_.List());
+  for (const QueuedSeries& series : all) {
+    TF_ASSIGN_OR_RETURN(const std::vector<QueuedImage> images, rows_.ListImages(series.key));
+    for (const QueuedImage& image : images) known.insert(image.file);
+    if (series.state != SeriesState::kReceiving) continue;
+    MutexLock lock(mutex_);
+    progress_[series.uid] = {.last = options_.now()};
+  }
+  std::error_code error;
+  for (fs::recursive_directory_iterator file(queue_->received_folder(), error), end; file != end;
+       file.increment(error)) {
+    if (error) break;
+    const std::string path = file->path().string();
+    if (!file->is_regular_file(error) || known.contains(path)) continue;
+    const absl::StatusOr<InstanceHeader> image = ReadInstanceHeader(path);
+    if (image.ok()) Arrived(path, *image);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SeriesIntake::PutSeries(const std::vector<const Arrival*>& arrivals) {
+  const InstanceHeader& first = arrivals.front()->image;
+  const QueuedStudy study = {.uid = first.study_uid,
+                             .patient = IdentityOf(first),
+                             .date = first.study_date,
+                             .description = first.study_description};
+  QueuedSeries series;
+  series.study_uid = first.study_uid;
+  series.uid = first.series_uid;
+  series.frame_uid = first.frame_uid;
+  series.modality = IsModality(first.modality) ? first.modality : "?";
+  series.first_s = std::time(nullptr);
+  bool one_patient = true;
+  std::vector<QueuedImage> images;
+  for (const Arrival* arrival : arrivals) {
+    one_patient = one_patient && IdentityOf(arrival->image) == study.patient &&
+                  arrival->image.study_uid == study.uid;
+    images.push_back({.uid = arrival->image.instance_uid,
+                      .class_uid = arrival->image.class_uid,
+                      .file = arrival->file});
+  }
+  const absl::StatusOr<QueuedSeries> kept = rows_.Add(study, series, NewQueueKey(), images);
+  // Of two studies at once: it stays on the disk, and nothing is made of it.
+  if (absl::IsFailedPrecondition(kept.status())) return absl::OkStatus();
+  TF_RETURN_IF_ERROR(kept.status());
+  TF_ASSIGN_OR_RETURN(const QueuedStudy known, rows_.GetStudy(study.uid));
+  if (one_patient && known.patient == study.patient) return absl::OkStatus();
+  if (HasPlan(kept->state)) return absl::OkStatus();
+  return Write(*kept, SeriesState::kFailed,
+               "its images say different things of their patient; look at what sends them");
+}
+
+absl::StatusOr<std::set<std::string>> SeriesIntake::Flush() {
+  std::vector<Arrival> arrivals;
+  {
+    MutexLock lock(mutex_);
+    arrivals.swap(arrivals_);
+  }
+  std::map<std::string, std::vector<const Arrival*>> by_series;
+  for (const Arrival& arrival : arrivals) by_series[arrival.image.series_uid].push_back(&arrival);
+  std::set<std::string> touched;
+  for (const auto& [uid, of_series] : by_series) {
+    if (const absl::Status status = PutSeries(of_series); !status.ok()) {
+      // What was put there already is known by its UID the next time.
+      MutexLock lock(mutex_);
+      arrivals_.insert(arrivals_.begin(), arrivals.begin(), arrivals.end());
+      return status;
+    }
+    touched.insert(uid);
+  }
+  TF_FAULT_POINT("intake.flushed");
+  return touched;
+}
+
+absl::StatusOr<std::optional<SeriesState>> SeriesIntake::Judge(const QueuedSeries& series) {
+  Progress progress;
+  {
+    MutexLock lock(mutex_);
+    progress = progress_.try_emplace(series.uid, Progress{.last = options_.now()}).first->second;
+  }
+  const bool quiet = options_.now() - progress.last >= options_.quiet;
+  if (!quiet && (!progress.ended || progress.aborted || progress.asked)) return std::nullopt;
+  std::optional<int64_t> expected;
+  if (options_.count_images) {
+    const absl::StatusOr<int64_t> count = options_.count_images(series.study_uid, series.uid);
+    if (count.ok() && *count > 0) expected = *count;
+    MutexLock lock(mutex_);
+    progress_[series.uid].asked = true;
+  }
+  if (expected.has_value() && series.images >= *expected) return SeriesState::kComplete;
+  if (!quiet) return std::nullopt;
+  if (expected.has_value() || progress.aborted) return SeriesState::kIncomplete;
+  TF_ASSIGN_OR_RETURN(const SeriesFacts facts, FactsOf(series));
+  return facts.missing > 0 ? SeriesState::kIncomplete : SeriesState::kComplete;
+}
+
+absl::StatusOr<std::vector<std::string>> SeriesIntake::Settle() {
+  TF_RETURN_IF_ERROR(Flush().status());
+  TF_ASSIGN_OR_RETURN(const std::vector<QueuedSeries> all, rows_.List());
+  std::vector<std::string> changed;
+  std::set<std::string> studies;
+  std::set<std::string> busy;
+  for (const QueuedSeries& series : all) {
+    SeriesState state = series.state;
+    if (state == SeriesState::kReceiving) {
+      TF_ASSIGN_OR_RETURN(const std::optional<SeriesState> judged, Judge(series));
+      if (judged.has_value()) {
+        state = *judged;
+        TF_RETURN_IF_ERROR(Write(series, state,
+                                 state == SeriesState::kIncomplete
+                                     ? "it has stopped midway; what is missing completes it"
+                                     : ""));
+        changed.push_back(series.key);
+      }
+    }
+    if (state == SeriesState::kReceiving) busy.insert(series.study_uid);
+    if (state == SeriesState::kComplete) studies.insert(series.study_uid);
+  }
+  if (options_.rules.empty()) return changed;
+  for (const std::string& study : studies) {
+    if (busy.contains(study)) continue;
+    TF_ASSIGN_OR_RETURN(const std::vector<std::string> keys, ChooseOfStudy(study));
+    changed.insert(changed.end(), keys.begin(), keys.end());
+  }
+  return changed;
+}
+
+absl::StatusOr<SeriesFacts> SeriesIntake::FactsOf(const QueuedSeries& series) {
+  TF_ASSIGN_OR_RETURN(const std::vector<QueuedImage> images, rows_.ListImages(series.key));
+  std::vector<InstanceHeader> headers;
+  for (const QueuedImage& image : images) {
+    if (image.file.empty()) continue;
+    TF_ASSIGN_OR_RETURN(headers.emplace_back(), ReadInstanceHeader(image.file));
+  }
+  if (headers.empty()) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("the images of series ", series.key, " are deleted"));
+  }
+  return FactsOfSeries(series.key, headers);
+}
+
+absl::StatusOr<std::vector<std::string>> SeriesIntake::ChooseOfStudy(
+    const std::string& study_uid) {
+  TF_ASSIGN_OR_RETURN(const std::vector<QueuedSeries> all, rows_.ListStudy(study_uid));
+  const bool has_plan = std::any_of(all.begin(), all.end(), [](const QueuedSeries& series) {
+    return HasPlan(series.state);
+  });
+  std::vector<QueuedSeries> candidates;
+  std::vector<SeriesFacts> facts;
+  std::vector<std::string> changed;
+  for (const QueuedSeries& series : all) {
+    const bool fits = series.state == SeriesState::kComplete ||
+                      (series.state == SeriesState::kPassedOver && series.has_files);
+    if (!fits) continue;
+    if (series.state == SeriesState::kComplete) changed.push_back(series.key);
+    if (has_plan) {
+      if (series.state == SeriesState::kComplete) {
+        TF_RETURN_IF_ERROR(
+            Write(series, SeriesState::kPassedOver, "another series of the study came before"));
+      }
+      continue;
+    }
+    const absl::StatusOr<SeriesFacts> read = FactsOf(series);
+    if (!read.ok()) {
+      TF_RETURN_IF_ERROR(Write(series, SeriesState::kFailed, "its images cannot be read"));
+      continue;
+    }
+    candidates.push_back(series);
+    facts.push_back(*read);
+  }
+  const std::vector<SeriesVerdict> verdicts = PickSeries(facts, options_.rules);
+  for (size_t i = 0; i < verdicts.size(); ++i) {
+    if (verdicts[i].chosen) {
+      const SeriesRule& rule = options_.rules[static_cast<size_t>(verdicts[i].rule)];
+      TF_RETURN_IF_ERROR(Choose(candidates[i], rule.recipe, verdicts[i].reason));
+    } else {
+      TF_RETURN_IF_ERROR(Write(candidates[i], SeriesState::kPassedOver, verdicts[i].reason));
+    }
+  }
+  return changed;
+}
+
+absl::Status SeriesIntake::KeepHeader(QueuedSeries* series) {
+  TF_ASSIGN_OR_RETURN(const std::vector<QueuedImage> images, rows_.ListImages(series->key));
+  if (images.empty() || images.front().file.empty()) {
+    return absl::FailedPreconditionError("the images of the series are deleted");
+  }
+  TF_RETURN_IF_ERROR(CopyHeaderOnly(images.front().file, queue_->header_path(series->key)));
+  series->has_header = true;
+  return absl::OkStatus();
+}
+
+absl::Status SeriesIntake::Choose(QueuedSeries series, const std::string& recipe,
+                                  const std::string& reason) {
+  if (series.state == SeriesState::kReceiving || series.state == SeriesState::kIncomplete) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "series ", series.key, " is ", SeriesStateName(series.state), ": nothing is built of it"));
+  }
+  if (recipe.empty()) return absl::FailedPreconditionError("no recipe; give --recipe FILE");
+  TF_RETURN_IF_ERROR(KeepHeader(&series));
+  TF_FAULT_POINT("intake.header_kept");
+  series.recipe = recipe;
+  series.attempts = 0;
+  series.last_error.clear();
+  return Write(std::move(series), SeriesState::kChosen, reason);
+}
+
+absl::Status SeriesIntake::Write(QueuedSeries series, SeriesState state,
+                                 const std::string& reason) {
+  series.state = state;
+  series.reason = reason;
+  const bool done = state == SeriesState::kPassedOver || state == SeriesState::kFailed ||
+                    state == SeriesState::kIncomplete;
+  series.done_s = done ? std::time(nullptr) : 0;
+  if (state != SeriesState::kReceiving) {
+    MutexLock lock(mutex_);
+    progress_.erase(series.uid);
+  }
+  return rows_.Update(series);
+}
+
+}  // namespace tissueform

@@ -1,0 +1,106 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "client/pacs_bridge/dicom/instance_header.h"
+#include "client/pacs_bridge/queue/received_rows.h"
+#include "client/pacs_bridge/series/series_pick.h"
+#include "core/base/mutex.h"
+
+namespace tissueform {
+
+struct SeriesIntakeOptions {
+  std::vector<SeriesRule> rules = {};  // none: nothing is chosen
+  // A series is complete, or has stopped midway, when nothing came for so long.
+  std::chrono::milliseconds quiet{30'000};
+  // How many images the PACS has of a series; empty, or an error: nobody knows. Called on the
+  // thread of Settle.
+  std::function<absl::StatusOr<int64_t>(const std::string& study_uid,
+                                        const std::string& series_uid)>
+      count_images = {};
+  std::function<std::chrono::steady_clock::time_point()> now = std::chrono::steady_clock::now;
+};
+
+// Takes what is received into the queue, finds out when a series is complete, and chooses which one
+// of its study becomes a plan.
+//
+// A file that is on the disk is received: its sender may be told before the queue knows it, and
+// Recover finds it there after a crash. A series is complete
+//   * when its association has ended and the queue has as many images as the PACS says, at once;
+//   * when nothing came for `quiet`, and the PACS says so; or nobody can say, its association was
+//     released by its sender, and no slice between its first and its last is missing.
+// Otherwise it is incomplete after `quiet`, and nothing is made of it unless more comes. What is
+// chosen waits for all series of the study that are being received.
+//
+// Arrived and Ended: any thread. The others: one thread.
+class SeriesIntake {
+ public:
+  SeriesIntake(BridgeQueue* queue, SeriesIntakeOptions options);
+
+  // An image is in a file. Blocks for no disk.
+  void Arrived(const std::string& file, const InstanceHeader& image) ABSL_LOCKS_EXCLUDED(mutex_);
+  // All that an association has brought is there; `released`: it was not aborted.
+  void Ended(const std::vector<std::string>& series_uids, bool released)
+      ABSL_LOCKS_EXCLUDED(mutex_);
+
+  // At the start: takes files in that a crash has kept from the queue. Files that are no DICOM stay
+  // and are not looked at. Errors: those of the queue.
+  absl::Status Recover();
+
+  // Puts what has arrived into the queue, and moves series on by the clock. Returns keys of series
+  // whose state has changed. Errors: those of the queue; what was to be put there is kept.
+  absl::StatusOr<std::vector<std::string>> Settle();
+
+  // What a series is, by its files. Errors: FailedPrecondition: its files are deleted; those of
+  // ReadInstanceHeader.
+  absl::StatusOr<SeriesFacts> FactsOf(const QueuedSeries& series);
+
+  // Makes a series the one that becomes a plan, whatever the rules say: a person has chosen it.
+  // Errors: FailedPrecondition: it is not complete, or no recipe.
+  absl::Status Choose(QueuedSeries series, const std::string& recipe, const std::string& reason);
+
+ private:
+  struct Arrival {
+    std::string file = {};
+    InstanceHeader image = {};
+  };
+  // Of a series that is being received.
+  struct Progress {
+    std::chrono::steady_clock::time_point last = {};
+    bool ended = false;     // since the last image
+    bool aborted = false;   // the last association that has brought some
+    bool asked = false;     // the PACS, since the last image
+  };
+
+  absl::StatusOr<std::set<std::string>> Flush();
+  absl::Status PutSeries(const std::vector<const Arrival*>& arrivals);
+  // Complete, incomplete, or nothing as long as it may go on.
+  absl::StatusOr<std::optional<SeriesState>> Judge(const QueuedSeries& series);
+  absl::StatusOr<std::vector<std::string>> ChooseOfStudy(const std::string& study_uid);
+  absl::Status Write(QueuedSeries series, SeriesState state, const std::string& reason);
+  absl::Status KeepHeader(QueuedSeries* series);
+
+  // Constant.
+  BridgeQueue* const queue_;
+  const SeriesIntakeOptions options_;
+
+  ReceivedRows rows_;
+
+  Mutex mutex_;
+  std::vector<Arrival> arrivals_ ABSL_GUARDED_BY(mutex_);
+  std::map<std::string, Progress> progress_ ABSL_GUARDED_BY(mutex_);  // by UID
+};
+
+}  // namespace tissueform

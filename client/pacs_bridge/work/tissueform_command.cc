@@ -1,0 +1,52 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/work/tissueform_command.h"
+
+#include <fstream>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "core/process/guarded_program.h"
+
+namespace tissueform {
+namespace {
+
+constexpr std::chrono::seconds kCommandGrace{2};
+constexpr size_t kMostLineBytes = 400;
+
+// The last line that is not empty, without control characters.
+std::string LastLine(const std::string& path) {
+  std::ifstream file(path);
+  std::string last;
+  for (std::string line; std::getline(file, line);) {
+    if (!line.empty()) last = line.substr(0, kMostLineBytes);
+  }
+  for (char& c : last) {
+    if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+  }
+  return last;
+}
+
+}  // namespace
+
+absl::Status RunTissueform(const std::vector<std::string>& arguments, absl::string_view what,
+                           const std::string& log, std::chrono::seconds most_time) {
+  ChildOptions options;
+  TF_ASSIGN_OR_RETURN(options.program, FindProgram("tissueform"));
+  options.arguments = arguments;
+  options.output = ChildStream::File(log);
+  options.errors = ChildStream::File(log);
+  TF_ASSIGN_OR_RETURN(const auto child, GuardedProgram::Start(std::move(options), kCommandGrace));
+  const std::optional<ChildEnd> end = child->WaitFor(most_time);
+  if (!end.has_value()) {
+    return absl::DeadlineExceededError(absl::StrCat(what, " took too long and was ended"));
+  }
+  if (end->exit_code == 0) return absl::OkStatus();
+  return absl::FailedPreconditionError(absl::StrCat(what, " failed: ", LastLine(log)));
+}
+
+}  // namespace tissueform
