@@ -87,9 +87,10 @@ class Authority:
 class Stack:
     """Orthanc, HAProxy before it, and three programs of ours in one folder. Call end(), or use it as a context."""
 
-    def __init__(self, programs, folder, recipe, quiet_s=5, plan_threads=0):
+    def __init__(self, programs, folder, recipe, quiet_s=5, plan_threads=0, by_web=True):
         self.programs, self.folder = pathlib.Path(programs), pathlib.Path(folder)
         self.recipe, self.quiet_s, self.plan_threads = recipe, quiet_s, plan_threads
+        self.by_web = by_web
         self.folder.mkdir(parents=True, exist_ok=True)
         self.running = {}
         self.authority = Authority(self.folder / "tls")
@@ -260,11 +261,17 @@ backend orthanc
                                "--server-ca", self.authority.certificate, "--cert", certificate, "--key", key, "--web", web])
         self.wait_for("the gateway", lambda: self.listens(self.gateway_port), needs="gateway")
 
+    def bridge_pacs(self):
+        """How the bridge asks the PACS: by DICOMweb, or by associations."""
+        if self.by_web:
+            return ["--pacs-url", self.dicomweb]
+        return ["--pacs", f"{HOST}:{self.orthanc_dicom}", "--pacs-ae-title", ORTHANC, "--pacs-tls"]
+
     def bridge_options(self):
         certificate, key = self.identities["bridge"]
         return ["--state-dir", self.folder / "bridge", "--ae-title", BRIDGE, "--listen", f"{HOST}:{self.bridge_dicom}", "--allow-ae", ORTHANC,
                 "--allow-from", HOST, "--dicom-cert", certificate, "--dicom-key", key, "--dicom-ca", self.authority.certificate,
-                "--pacs-url", self.dicomweb, "--recipe", self.recipe, "--quiet-seconds", self.quiet_s, "--plan-threads", self.plan_threads,
+                *self.bridge_pacs(), "--recipe", self.recipe, "--quiet-seconds", self.quiet_s, "--plan-threads", self.plan_threads,
                 "--accept-defects", "--server", f"localhost:{self.server_port}", "--server-ca", self.authority.certificate, "--server-cert", certificate,
                 "--server-key", key, "--worklist-listen", f"{HOST}:{self.worklist_port}", "--planner-url", f"http://localhost:{self.gateway_port}/"]
 
