@@ -19,7 +19,7 @@ commands=(
   "tissueform plan build" "tissueform plan check" "tissueform plan fit" "tissueform case pack"
   "tissueform deform" "tissueform run" "tissueform demo" "tissueform load" "tissueform server-info" "tissueform doctor" "tissueform compare" "tissueform experiments" "tissueform bench"
   "tissueform login" "tissueform logout" "tissueform token" "tissueform token keygen" "tissueform token make" "tissueform token show"
-  "tissueform-server" "tissueform-gateway"
+  "tissueform-server" "tissueform-gateway" "tissueform-pacs"
 )
 
 mkdir -p "$out"

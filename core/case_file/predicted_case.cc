@@ -87,6 +87,10 @@ absl::StatusOr<PredictedCase> PredictCase(const CaseFile& contents, const Positi
   PredictedCase predicted;
   for (const CaseSurface& surface : contents.surfaces) {
     TF_ASSIGN_OR_RETURN(FloatPositions moved, PredictSurface(surface, displacements, poses));
+    if (!moved.allFinite()) {
+      return absl::InvalidArgumentError(absl::StrCat("the prediction moves the surface \"",
+                                                     surface.name, "\" beyond all bounds"));
+    }
     predicted.surfaces.push_back(std::move(moved));
   }
   const size_t skin = FirstSkin(contents);

@@ -30,7 +30,7 @@ Positions RestPositions(const CaseMesh& mesh);
 // it stays; landmarks likewise.
 //
 // Errors: InvalidArgument: not as many positions as the mesh has vertices, or one that is no
-// number; a handle of a surface or landmark without a pose.
+// number, or beyond what float32 holds; a handle of a surface or landmark without a pose.
 absl::StatusOr<PredictedCase> PredictCase(const CaseFile& contents, const Positions& deformed,
                                           const std::map<std::string, HandlePose>& poses);
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -11,11 +12,13 @@
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
 
+#include "client/rendering/virtual_display.h"
 #include "core/mesh/tet_topology.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "core/mesh_io/triangle_mesh_io.h"
 #include "tests/integration/served_cli_test.h"
 #include "tests/testing/run_tissueform.h"
+#include "tests/testing/scoped_environment.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
 
@@ -194,6 +197,43 @@ TEST_F(PredictionCommandTest, RangesOfThePlanGiveAnExportTheBandThatDeformGives)
   EXPECT_THAT(changed.err, HasSubstr("its uncertainty from the material is not told"));
   ASSERT_OK_AND_ASSIGN(const TetMeshFile without, ReadTetMesh(Path("after.vtu")));
   EXPECT_EQ(FindAttribute(without.point_data, kArray), nullptr);
+}
+
+TEST_F(PredictionCommandTest, PicturesAreOfItsCaseOrOfItsPlan) {
+  if (absl::IsNotFound(VirtualDisplay::Open().status())) GTEST_SKIP() << "no display and no Xvfb";
+  // Under AddressSanitizer: Mesa's leaks, see tests/client/rendering/figure_test.cc.
+  const ScopedEnvironment no_leak_check("LSAN_OPTIONS", "detect_leaks=0");
+  ASSERT_EQ(Run({"case", "pack", kTonguePlan, "--out", "tongue.tfcase"}).exit_code, 0);
+  const ProcessResult published =
+      Run({"case", "publish", "tongue.tfcase", "--server", server_->address()});
+  ASSERT_EQ(published.exit_code, 0) << published.err;
+  const size_t at = published.out.find("cases/");
+  ASSERT_NE(at, std::string::npos);
+  const std::string name = Create({"--case", published.out.substr(at, 6 + 64)});
+  EXPECT_THAT(Prediction({"export", name, "--png", "of_case"}), Succeeds());
+  EXPECT_THAT(Prediction({"export", name, "--png", "of_plan", "--plan", kTonguePlan, "--out",
+                          "after.json"}),
+              Succeeds());
+  for (const char* picture : {"front.png", "left.png", "three_quarter.png"}) {
+    EXPECT_THAT(Read(std::string("of_case/") + picture), StartsWith("\x89PNG")) << picture;
+    EXPECT_THAT(Read(std::string("of_plan/") + picture), StartsWith("\x89PNG")) << picture;
+  }
+  EXPECT_EQ(ReadJson("after.json")["prediction"], name);
+}
+
+TEST_F(PredictionCommandTest, PicturesWithoutAnythingToShowAreRefused) {
+  if (absl::IsNotFound(VirtualDisplay::Open().status())) GTEST_SKIP() << "no display and no Xvfb";
+  const std::string name = Create({});
+  EXPECT_THAT(Prediction({"export", name}), FailsWith(1, HasSubstr("--png")));
+  EXPECT_THAT(Prediction({"export", name, "--png", "pictures"}),
+              FailsWith(1, HasSubstr("names no case")));
+  const std::string lost = Create({"--case", std::string(64, 'c')});
+  EXPECT_EQ(Prediction({"export", lost, "--png", "pictures"}).exit_code, 1);
+  std::filesystem::create_directory(Path("full"));
+  Write("full/mine.txt", "mine");
+  EXPECT_THAT(Prediction({"export", name, "--png", "full", "--plan", kTonguePlan}),
+              FailsWith(1, HasSubstr("full")));
+  EXPECT_FALSE(std::filesystem::exists(Path("pictures")));
 }
 
 TEST_F(PredictionCommandTest, ExportRefusesAnotherMeshAndWritesNothing) {

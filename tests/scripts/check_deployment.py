@@ -5,8 +5,8 @@
 
     tests/scripts/check_deployment.py FOLDER_OF_PROGRAMS
 
-systemd finds the units right and little exposed; logrotate rotates what a program goes on writing; server and gateway
-read the example configurations, those lines too that are commented out, and print them back. Exit code 0 when all is so,
+systemd finds the units right and little exposed; logrotate rotates what a program goes on writing; server, gateway and
+bridge read the example configurations, those lines too that are commented out, and print them back. Exit code 0 when all is so,
 77 when systemd or logrotate is not installed.
 """
 
@@ -66,7 +66,7 @@ def check_rotation(logrotate, scratch):
 
 
 def check_configuration(programs, scratch):
-    for name in ("server", "gateway"):
+    for name in ("server", "gateway", "pacs"):
         example = (ROOT / f"deploy/config/{name}.ini").read_text()
         full = scratch / f"{name}.ini"
         full.write_text(re.sub(r"^#(?=[a-z-]+ = )", "", example, flags=re.MULTILINE))

@@ -83,8 +83,8 @@ absl::StatusOr<HandlePose> PoseOfVertices(const v1::Handle& handle, const Positi
   return pose;
 }
 
-absl::StatusOr<std::map<std::string, HandlePose>> PosesOf(const CaseFile& contents,
-                                                          const Positions& deformed) {
+absl::StatusOr<std::map<std::string, HandlePose>> PosesOfHandles(const CaseFile& contents,
+                                                                 const Positions& deformed) {
   v1::CreateSessionRequest request;
   if (!request.ParseFromString(contents.session_request)) {
     return absl::InvalidArgumentError("the case has no session that can be read; pack it again");
@@ -107,7 +107,7 @@ absl::Status Render(const CaseRenderOptions& options) {
     return absl::InvalidArgumentError(
         absl::StrCat(options.positions, " holds a position that is no number"));
   }
-  TF_ASSIGN_OR_RETURN(const auto poses, PosesOf(contents, deformed));
+  TF_ASSIGN_OR_RETURN(const auto poses, PosesOfHandles(contents, deformed));
   TF_ASSIGN_OR_RETURN(const PredictedCase predicted, PredictCase(contents, deformed, poses));
   TF_ASSIGN_OR_RETURN(const BeforeAndAfter what, BeforeAndAfterOfCase(contents, predicted, poses));
   TF_ASSIGN_OR_RETURN(const auto display, VirtualDisplay::Open());

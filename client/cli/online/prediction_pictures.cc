@@ -134,7 +134,7 @@ std::string MovesInTitle(const CaseFile& contents, const std::map<std::string, H
 }
 
 // One of a few, in the order of the handles.
-Colour SegmentColour(const CaseFile& contents, const std::string& handle) {
+Colour HandleColour(const CaseFile& contents, const std::string& handle) {
   const std::array<Colour, 3> colours = {kBlue, kOrange, kGreen};
   for (size_t h = 0; h < contents.handles.size(); ++h) {
     if (contents.handles[h].name == handle) return colours.at(h % colours.size());
@@ -142,7 +142,7 @@ Colour SegmentColour(const CaseFile& contents, const std::string& handle) {
   return kFixedBone;
 }
 
-void AddSkin(const CaseSurface& surface, const Positions& after, BeforeAndAfter* what) {
+void AppendSkin(const CaseSurface& surface, const Positions& after, BeforeAndAfter* what) {
   const Eigen::Index vertices = what->rest.rows();
   const Eigen::Index triangles = what->skin.rows();
   what->rest.conservativeResize(vertices + after.rows(), 3);
@@ -175,10 +175,10 @@ absl::StatusOr<BeforeAndAfter> BeforeAndAfterOfCase(
     const Positions after = predicted.surfaces[s].cast<double>();
     if (surface.kind != SurfaceKind::kSkin) {
       const Colour colour =
-          surface.kind == SurfaceKind::kTeeth ? kTeeth : SegmentColour(contents, surface.handle);
+          surface.kind == SurfaceKind::kTeeth ? kTeeth : HandleColour(contents, surface.handle);
       what.bone.push_back(Smooth(after, surface.triangles, colour));
     } else {
-      AddSkin(surface, after, &what);
+      AppendSkin(surface, after, &what);
     }
   }
   if (what.rest.rows() > 0) return what;

@@ -3,9 +3,6 @@
 
 #include "client/pacs_bridge/network/dimse_client.h"
 
-#include <algorithm>
-#include <cstdlib>
-#include <filesystem>
 #include <set>
 #include <utility>
 
@@ -19,6 +16,7 @@
 #include "client/pacs_bridge/dicom/dicom_text.h"
 #include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "client/pacs_bridge/network/dimse_queries.h"
+#include "client/pacs_bridge/network/one_header.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -26,38 +24,6 @@ namespace {
 
 constexpr size_t kMostContexts = 128;
 constexpr DIC_US kWarningClass = 0xB000;
-
-// Takes what comes, and remembers where the last lies.
-class LastPath : public InstanceSink {
- public:
-  absl::Status Keep(const ReceivedInstance& instance) override {
-    path_ = instance.path;
-    return absl::OkStatus();
-  }
-  void AssociationEnded(const EndedAssociation& /*ended*/) override {}
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
-
-// A folder beside `path` for one fetch; it goes with all that is in it.
-class ScratchFolder {
- public:
-  explicit ScratchFolder(const std::string& path) : name_(path + ".fetch-XXXXXX") {
-    if (mkdtemp(name_.data()) == nullptr) name_.clear();
-  }
-  ~ScratchFolder() {
-    std::error_code error;
-    if (!name_.empty()) std::filesystem::remove_all(name_, error);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  const std::string& name() const { return name_; }
-
- private:
-  std::string name_;
-};
 
 int Whole(const std::string& text) {
   int number = 0;
@@ -153,7 +119,7 @@ class DimseClient : public PacsClient {
   absl::StatusOr<FetchCounts> FetchSeries(const std::string& study_uid,
                                           const std::string& series_uid, InstanceFolder* folder,
                                           InstanceSink* sink) override {
-    TF_RETURN_IF_ERROR(CheckUids({study_uid, series_uid}));
+    TF_RETURN_IF_ERROR(CheckDicomUids({study_uid, series_uid}));
     const StudyRootQuery wanted = {
         "SERIES", {{DCM_StudyInstanceUID, study_uid}, {DCM_SeriesInstanceUID, series_uid}}};
     if (peer_.fetch == PacsPeer::Fetch::kMove) {
@@ -165,25 +131,20 @@ class DimseClient : public PacsClient {
 
   absl::Status FetchHeader(const std::string& study_uid, const std::string& series_uid,
                            const std::string& path) override {
-    TF_RETURN_IF_ERROR(CheckUids({study_uid, series_uid}));
+    TF_RETURN_IF_ERROR(CheckDicomUids({study_uid, series_uid}));
     TF_ASSIGN_OR_RETURN(const std::string instance, AnyInstance(study_uid, series_uid));
-    const ScratchFolder scratch(path);
-    TF_ASSIGN_OR_RETURN(const std::unique_ptr<InstanceFolder> folder,
-                        InstanceFolder::Open({.path = scratch.name(), .watermark_bytes = 0}));
-    LastPath last;
-    TF_RETURN_IF_ERROR(Get({"IMAGE",
-                            {{DCM_StudyInstanceUID, study_uid},
-                             {DCM_SeriesInstanceUID, series_uid},
-                             {DCM_SOPInstanceUID, instance}}},
-                           *folder, &last)
-                           .status());
-    if (last.path().empty()) return NotThere("object");
-    return CopyHeaderOnly(last.path(), path);
+    const StudyRootQuery wanted = {"IMAGE",
+                                   {{DCM_StudyInstanceUID, study_uid},
+                                    {DCM_SeriesInstanceUID, series_uid},
+                                    {DCM_SOPInstanceUID, instance}}};
+    return KeepOneHeader(path, [&](const InstanceFolder& folder, InstanceSink* sink) {
+      return Get(wanted, folder, sink).status();
+    });
   }
 
   absl::StatusOr<bool> Has(const std::string& study_uid, const std::string& series_uid,
                            const std::string& instance_uid) override {
-    TF_RETURN_IF_ERROR(CheckUids({study_uid, series_uid, instance_uid}));
+    TF_RETURN_IF_ERROR(CheckDicomUids({study_uid, series_uid, instance_uid}));
     TF_ASSIGN_OR_RETURN(const auto association, Associate(FindContexts()));
     bool found = false;
     TF_RETURN_IF_ERROR(Find(association.get(),
@@ -304,13 +265,6 @@ class DimseClient : public PacsClient {
       return absl::UnavailableError(message + " (it has no room): try again later");
     }
     return absl::FailedPreconditionError(message + ": see its log");
-  }
-
-  absl::Status CheckUids(const std::vector<std::string>& uids) const {
-    if (std::all_of(uids.begin(), uids.end(), [](const auto& uid) { return IsDicomUid(uid); })) {
-      return absl::OkStatus();
-    }
-    return absl::InvalidArgumentError("a UID of study, series or object is no UID");
   }
 
   absl::Status NotThere(absl::string_view what) const {

@@ -15,7 +15,7 @@
 namespace tissueform {
 
 // Of one picture, each way.
-inline constexpr uint32_t kMostPicturePixels = 4096;
+inline constexpr uint32_t kMostPicturePixels = 2048;
 
 // Pictures of one size, one after the other: 3 bytes a pixel (red, green, blue), row by row from
 // the top.

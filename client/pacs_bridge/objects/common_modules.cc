@@ -37,7 +37,7 @@ absl::TimeZone ZoneOf(DcmItem* source) {
   return absl::FixedTimeZone((number / 100 * 60 + number % 100) * 60);
 }
 
-absl::Status CheckLengths(DcmItem* item) {
+absl::Status CheckTextLengths(DcmItem* item) {
   DcmStack stack;
   while (item->nextObject(stack, OFTrue).good()) {
     DcmObject* object = stack.top();
@@ -101,6 +101,15 @@ void WriteReferencedSeries(const PredictionObjectsInput& input, ItemWriter* writ
   writer->Take(series);
 }
 
+// What an object must have, though a scanner may have left it out.
+void WriteMissingEmpty(DcmItem* object, ItemWriter* writer) {
+  for (const DcmTagKey& tag :
+       {DCM_PatientName, DCM_PatientID, DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyDate,
+        DCM_StudyTime, DCM_StudyID, DCM_AccessionNumber, DCM_ReferringPhysicianName}) {
+    if (!object->tagExists(tag)) writer->Text(tag, "");
+  }
+}
+
 // Whose the terms of OwnTerm are.
 void WriteCodingScheme(ItemWriter* writer) {
   ItemWriter scheme = writer->NewItem(DCM_CodingSchemeIdentificationSequence);
@@ -127,13 +136,14 @@ absl::Status CheckSource(DcmDataset* source) {
   }
   DcmDataset copy;
   TF_RETURN_IF_ERROR(CopyPatientAndStudy(source, &copy));
-  return CheckLengths(&copy);
+  return CheckTextLengths(&copy);
 }
 
 absl::Status WriteCommonModules(DcmDataset* source, const PredictionObjectsInput& input,
                                 const ObjectIdentity& identity, DcmDataset* object) {
   TF_RETURN_IF_ERROR(CopyPatientAndStudy(source, object));
   ItemWriter writer(object);
+  WriteMissingEmpty(object, &writer);
   WriteSeries(input, identity, TimesOf(source, input.made), &writer);
   if (identity.in_frame) {
     writer.Text(DCM_FrameOfReferenceUID, ValueOf(source, DCM_FrameOfReferenceUID));

@@ -20,7 +20,7 @@ namespace tissueform {
 
 // Largest sizes that are taken.
 inline constexpr size_t kMostSourceImages = 20'000;
-inline constexpr size_t kMostPictures = 16;
+inline constexpr size_t kMostPictures = 8;
 inline constexpr int kMostReportedMeasures = 64;
 
 // Said in every object.

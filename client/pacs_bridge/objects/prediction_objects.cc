@@ -49,8 +49,8 @@ bool BelongsTo(const std::string& key, const CaseSurface& surface) {
 }
 
 // Which surfaces of the case they hold, and as what.
-ModelSurface ModelOf(const std::string& key, const CaseFile& contents,
-                     const PredictedCase& predicted) {
+ModelSurface ModelOfKey(const std::string& key, const CaseFile& contents,
+                        const PredictedCase& predicted) {
   const bool before = key == "stl:skin-before";
   ModelSurface model{.key = key};
   for (size_t s = 0; s < contents.surfaces.size(); ++s) {
@@ -78,9 +78,9 @@ ModelSurface ModelOf(const std::string& key, const CaseFile& contents,
 }
 
 // The objects of one call.
-class ObjectWriter {
+class StudyFiles {
  public:
-  ObjectWriter(const PredictionObjectsInput& input, DcmDataset* source, std::string folder)
+  StudyFiles(const PredictionObjectsInput& input, DcmDataset* source, std::string folder)
       : input_(input), source_(source), folder_(std::move(folder)) {}
 
   // `fill` writes what is the object's own, before the common modules.
@@ -107,7 +107,7 @@ class ObjectWriter {
 };
 
 absl::Status WriteModels(const PredictionObjectsInput& input, const PredictedCase& predicted,
-                         ObjectWriter* writer) {
+                         StudyFiles* writer) {
   ObjectIdentity identity{.class_uid = kEncapsulatedStlClass,
                           .modality = "M3D",
                           .series_number = kModelsSeries,
@@ -116,7 +116,7 @@ absl::Status WriteModels(const PredictionObjectsInput& input, const PredictedCas
   for (const std::string& key : ObjectKeys(input.contents)) {
     if (!absl::StartsWith(key, "stl:")) continue;
     identity.key = key;
-    const ModelSurface model = ModelOf(key, input.contents, predicted);
+    const ModelSurface model = ModelOfKey(key, input.contents, predicted);
     TF_RETURN_IF_ERROR(writer->Write(
         identity, [&](DcmDataset* object) { return WriteStlModules(input, model, object); }));
     ++identity.instance_number;
@@ -141,7 +141,7 @@ absl::StatusOr<std::vector<WrittenObject>> WritePredictionObjects(
                       LoadDicomHeader(input.source_header));
   DcmDataset* source = file->getDataset();
   TF_RETURN_IF_ERROR(CheckSource(source));
-  ObjectWriter writer(input, source, folder);
+  StudyFiles writer(input, source, folder);
   TF_RETURN_IF_ERROR(WriteModels(input, predicted, &writer));
   TF_RETURN_IF_ERROR(
       writer.Write({.key = "capture",

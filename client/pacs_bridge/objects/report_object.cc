@@ -154,7 +154,7 @@ void AddMeasures(const PredictionObjectsInput& input, ReportTree* tree) {
   tree->Close();
 }
 
-void AddObjects(const PredictionObjectsInput& input, const std::string& study_uid,
+void AddWritten(const PredictionObjectsInput& input, const std::string& study_uid,
                 ReportTree* tree) {
   tree->Open(OwnTerm("OBJECTS", "Objects of this prediction"));
   for (const std::string& key : ObjectKeys(input.contents)) {
@@ -184,7 +184,7 @@ absl::Status WriteReportModules(const PredictionObjectsInput& input, const Predi
   AddPlaces(input, predicted, &tree);
   AddLandmarks(input, predicted, &tree);
   AddMeasures(input, &tree);
-  AddObjects(input, study_uid, &tree);
+  AddWritten(input, study_uid, &tree);
   return tree.Write(object);
 }
 

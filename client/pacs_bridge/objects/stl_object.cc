@@ -21,13 +21,13 @@ constexpr size_t kStlTriangleBytes = 50;
 constexpr char kStlHeader[] = "Tissueform, mm, DICOM LPS. Research, not a medical device";
 
 template <typename T>
-void Append(const T& value, std::vector<uint8_t>* bytes) {
+void AppendBytes(const T& value, std::vector<uint8_t>* bytes) {
   const auto* first = reinterpret_cast<const uint8_t*>(&value);
   bytes->insert(bytes->end(), first, first + sizeof(T));
 }
 
 void AppendPoint(const Eigen::Vector3f& point, std::vector<uint8_t>* bytes) {
-  for (const float coordinate : point) Append(coordinate, bytes);
+  for (const float coordinate : point) AppendBytes(coordinate, bytes);
 }
 
 void WriteIcon(const PredictionObjectsInput& input, const ModelSurface& surface,
@@ -90,14 +90,14 @@ std::vector<uint8_t> BinaryStl(const ModelSurface& surface) {
   std::memcpy(bytes.data(), kStlHeader, sizeof(kStlHeader) - 1);
   const auto count = static_cast<size_t>(surface.triangles.rows());
   bytes.reserve(kStlHeaderBytes + 4 + kStlTriangleBytes * count);
-  Append(static_cast<uint32_t>(count), &bytes);
+  AppendBytes(static_cast<uint32_t>(count), &bytes);
   for (const auto& triangle : surface.triangles.rowwise()) {
     const auto corner = [&](int k) -> Eigen::Vector3f {
       return surface.positions.row(triangle[k]);
     };
     AppendPoint((corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized(), &bytes);
     for (int k = 0; k < 3; ++k) AppendPoint(corner(k), &bytes);
-    Append(uint16_t{0}, &bytes);
+    AppendBytes(uint16_t{0}, &bytes);
   }
   return bytes;
 }

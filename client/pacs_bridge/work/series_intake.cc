@@ -180,6 +180,8 @@ absl::StatusOr<std::vector<std::string>> SeriesIntake::Settle() {
     TF_ASSIGN_OR_RETURN(const std::vector<std::string> keys, ChooseOfStudy(study));
     changed.insert(changed.end(), keys.begin(), keys.end());
   }
+  std::sort(changed.begin(), changed.end());
+  changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
   return changed;
 }
 

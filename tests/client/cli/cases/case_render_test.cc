@@ -10,6 +10,7 @@
 #include "client/rendering/virtual_display.h"
 #include "core/case_file/case_reader.h"
 #include "core/case_file/predicted_case.h"
+#include "tests/testing/meshes.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/scoped_environment.h"
 #include "tests/testing/status_matchers.h"

@@ -29,6 +29,7 @@ namespace fs = std::filesystem;
 constexpr std::chrono::seconds kPatience{20};
 
 fs::path Find(const std::string& program) {
+  if (fs::path(program).is_absolute()) return fs::exists(program) ? fs::path(program) : fs::path();
   const char* path = std::getenv("PATH");
   std::vector<std::string> folders = absl::StrSplit(path == nullptr ? "" : path, ':');
   folders.push_back("/usr/sbin");

@@ -1,0 +1,348 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/network/dicom_web_client.h"
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
+#include <nlohmann/json.hpp>
+
+#include "client/pacs_bridge/dicom/dicom_uid.h"
+#include "client/pacs_bridge/network/http_exchange.h"
+#include "client/pacs_bridge/network/multipart_splitter.h"
+#include "client/pacs_bridge/network/one_header.h"
+#include "core/base/certificates.h"
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr size_t kMostJsonBytes = 32 << 20;
+constexpr int64_t kMostSentBytes = int64_t{1} << 30;
+
+// The first value of an attribute of DICOM's JSON (PS3.18 F), as text; empty: none.
+std::string ValueOf(const Json& object, const char* tag) {
+  if (!object.is_object() || !object.contains(tag) || !object[tag].is_object()) return {};
+  const Json& attribute = object[tag];
+  if (!attribute.contains("Value") || !attribute["Value"].is_array() ||
+      attribute["Value"].empty()) {
+    return {};
+  }
+  const Json& value = attribute["Value"][0];
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_number_integer()) return absl::StrCat(value.get<int64_t>());
+  if (value.is_number()) return absl::StrCat(static_cast<int64_t>(value.get<double>()));
+  return {};
+}
+
+int NumberIn(const Json& object, const char* tag) {
+  const std::string text = ValueOf(object, tag);
+  return text.empty() ? 0 : std::atoi(text.c_str());
+}
+
+SeriesSummary SummaryFrom(const Json& object) {
+  SeriesSummary summary;
+  summary.study_uid = ValueOf(object, "0020000D");
+  summary.series_uid = ValueOf(object, "0020000E");
+  summary.modality = ValueOf(object, "00080060");
+  summary.description = ValueOf(object, "0008103E");
+  summary.study_date = ValueOf(object, "00080020");
+  summary.patient_id = ValueOf(object, "00100020");
+  summary.number = NumberIn(object, "00200011");
+  summary.instances = NumberIn(object, "00201209");
+  return summary;
+}
+
+// Objects out of a multipart body, each into the folder and to the sink.
+class ComingObjects {
+ public:
+  ComingObjects(const PacsPeer& peer, const InstanceFolder& folder, InstanceSink* sink)
+      : folder_(folder), sink_(sink) {
+    announced_.calling_ae = peer.name;
+  }
+
+  absl::Status Take(const std::string& content_type, absl::string_view piece) {
+    if (!splitter_) {
+      MultipartSplitter::Events events;
+      events.begin = [this] { return Begin(); };
+      events.data = [this](absl::string_view bytes) { return Write(bytes); };
+      events.end = [this] { return End(); };
+      auto made = MultipartSplitter::Create(content_type, std::move(events));
+      if (!made.ok()) return made.status();
+      splitter_.emplace(*std::move(made));
+    }
+    return splitter_->Take(piece);
+  }
+
+  absl::StatusOr<FetchCounts> Finish() const {
+    if (splitter_) TF_RETURN_IF_ERROR(splitter_->Finish());
+    if (counts_.completed == 0 && !first_problem_.ok()) return first_problem_;
+    return counts_;
+  }
+
+ private:
+  absl::Status Begin() {
+    TF_RETURN_IF_ERROR(folder_.CheckRoom());
+    TF_ASSIGN_OR_RETURN(PartialFile partial, folder_.NewPartial());
+    partial_.emplace(std::move(partial));
+    file_ = std::ofstream(partial_->path(), std::ios::binary | std::ios::trunc);
+    bytes_ = 0;
+    return absl::OkStatus();
+  }
+  absl::Status Write(absl::string_view bytes) {
+    bytes_ += static_cast<int64_t>(bytes.size());
+    if (bytes_ > folder_.options().limits.max_file_bytes) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "an object has more than ", folder_.options().limits.max_file_bytes, " bytes"));
+    }
+    file_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    return absl::OkStatus();
+  }
+  absl::Status End() {
+    file_.close();
+    if (file_.fail()) {
+      return absl::ResourceExhaustedError("an object cannot be written: is the disk full?");
+    }
+    PartialFile whole = *std::move(partial_);
+    partial_.reset();
+    const absl::Status kept = folder_.Take(std::move(whole), announced_, sink_).status();
+    if (!kept.ok() && first_problem_.ok()) first_problem_ = kept;
+    ++(kept.ok() ? counts_.completed : counts_.failed);
+    return absl::OkStatus();
+  }
+
+  const InstanceFolder& folder_;
+  InstanceSink* const sink_;
+  AnnouncedInstance announced_;
+  std::optional<MultipartSplitter> splitter_;
+  std::optional<PartialFile> partial_;
+  std::ofstream file_;
+  int64_t bytes_ = 0;
+  FetchCounts counts_;
+  absl::Status first_problem_;
+};
+
+class DicomWebClient : public PacsClient {
+ public:
+  explicit DicomWebClient(PacsPeer peer) : peer_(std::move(peer)) {}
+
+  absl::Status Echo() override {
+    return Query(absl::StrCat("/studies?StudyInstanceUID=", NewDicomUid())).status();
+  }
+
+  absl::StatusOr<std::vector<SeriesSummary>> FindSeries(const SeriesQuery& query) override {
+    std::vector<std::string> studies = {query.study_uid};
+    if (query.study_uid.empty()) {
+      TF_ASSIGN_OR_RETURN(studies, FindStudies(query.accession_number));
+    }
+    std::vector<SeriesSummary> series;
+    for (const std::string& study : studies) {
+      TF_RETURN_IF_ERROR(CheckDicomUids({study}));
+      TF_ASSIGN_OR_RETURN(const Json answer,
+                          Query(absl::StrCat("/studies/", study,
+                                             "/series?includefield=0008103E&includefield=00080020"
+                                             "&includefield=00100020&includefield=00201209")));
+      for (const Json& object : answer) {
+        series.push_back(SummaryFrom(object));
+        if (series.back().study_uid.empty()) series.back().study_uid = study;
+      }
+    }
+    if (series.empty()) return Missing("study");
+    return series;
+  }
+
+  absl::StatusOr<FetchCounts> FetchSeries(const std::string& study_uid,
+                                          const std::string& series_uid, InstanceFolder* folder,
+                                          InstanceSink* sink) override {
+    TF_RETURN_IF_ERROR(CheckDicomUids({study_uid, series_uid}));
+    return Retrieve(absl::StrCat("/studies/", study_uid, "/series/", series_uid), *folder, sink);
+  }
+
+  absl::Status FetchHeader(const std::string& study_uid, const std::string& series_uid,
+                           const std::string& path) override {
+    TF_RETURN_IF_ERROR(CheckDicomUids({study_uid, series_uid}));
+    const std::string instances =
+        absl::StrCat("/studies/", study_uid, "/series/", series_uid, "/instances");
+    TF_ASSIGN_OR_RETURN(const Json answer, Query(absl::StrCat(instances, "?limit=1")));
+    const std::string instance = answer.empty() ? "" : ValueOf(answer[0], "00080018");
+    if (!IsDicomUid(instance)) return Missing("series");
+    return KeepOneHeader(path, [&](const InstanceFolder& folder, InstanceSink* sink) {
+      return Retrieve(absl::StrCat(instances, "/", instance), folder, sink).status();
+    });
+  }
+
+  absl::StatusOr<bool> Has(const std::string& study_uid, const std::string& series_uid,
+                           const std::string& instance_uid) override {
+    TF_RETURN_IF_ERROR(CheckDicomUids({study_uid, series_uid, instance_uid}));
+    const auto answer = Query(absl::StrCat("/studies/", study_uid, "/series/", series_uid,
+                                           "/instances?SOPInstanceUID=", instance_uid));
+    if (absl::IsNotFound(answer.status())) return false;
+    if (!answer.ok()) return answer.status();
+    for (const Json& object : *answer) {
+      if (ValueOf(object, "00080018") == instance_uid) return true;
+    }
+    return false;
+  }
+
+  absl::StatusOr<std::vector<StoredObject>> Store(absl::Span<const std::string> paths) override {
+    std::vector<StoredObject> stored;
+    for (const std::string& path : paths) {
+      TF_ASSIGN_OR_RETURN(const InstanceHeader header, ReadInstanceHeader(path));
+      stored.push_back({path, header.instance_uid});
+    }
+    for (StoredObject& object : stored) object.status = StoreOne(object);
+    return stored;
+  }
+
+ private:
+  // A QIDO-RS answer: an array, empty where there is nothing.
+  absl::StatusOr<Json> Query(const std::string& path) {
+    std::string text;
+    TF_ASSIGN_OR_RETURN(
+        const PacsHttpAnswer answer,
+        Exchange(peer_, {.path = path, .headers = {"Accept: application/dicom+json"}},
+                 [&](const std::string& /*type*/, absl::string_view piece) -> absl::Status {
+                   if (text.size() + piece.size() > kMostJsonBytes) {
+                     return absl::InternalError(absl::StrCat("the PACS '", peer_.name,
+                                                             "' answers a query with more than ",
+                                                             kMostJsonBytes, " bytes"));
+                   }
+                   text.append(piece.data(), piece.size());
+                   return absl::OkStatus();
+                 }));
+    if (answer.status == 204) return Json::array();
+    if (answer.status != 200) return HttpFailed(answer, "a query (QIDO-RS)");
+    Json parsed = Json::parse(text, nullptr, false);
+    if (!parsed.is_array()) {
+      return absl::InternalError(
+          absl::StrCat("the PACS '", peer_.name, "' answers a query with no DICOM JSON"));
+    }
+    return parsed;
+  }
+
+  absl::StatusOr<std::vector<std::string>> FindStudies(const std::string& accession_number) {
+    // What is not plain would need escapes, and wild cards match other patients.
+    for (const char c : accession_number) {
+      if (!absl::ascii_isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '.' && c != '_') {
+        return absl::InvalidArgumentError(
+            "an accession number with other characters than letters, digits, - . _ cannot be "
+            "asked for: name the study's UID");
+      }
+    }
+    if (accession_number.empty()) {
+      return absl::InvalidArgumentError("name a study's UID or an accession number");
+    }
+    TF_ASSIGN_OR_RETURN(const Json answer,
+                        Query(absl::StrCat("/studies?AccessionNumber=", accession_number)));
+    std::vector<std::string> studies;
+    for (const Json& object : answer) studies.push_back(ValueOf(object, "0020000D"));
+    return studies;
+  }
+
+  // WADO-RS, every object in the transfer syntax that it has.
+  absl::StatusOr<FetchCounts> Retrieve(const std::string& path, const InstanceFolder& folder,
+                                       InstanceSink* sink) {
+    ComingObjects objects(peer_, folder, sink);
+    TF_ASSIGN_OR_RETURN(
+        const PacsHttpAnswer answer,
+        Exchange(peer_,
+                 {.path = path,
+                  .headers = {"Accept: multipart/related; type=\"application/dicom\"; "
+                              "transfer-syntax=*"}},
+                 [&](const std::string& type, absl::string_view piece) {
+                   return objects.Take(type, piece);
+                 }));
+    if (answer.status != 200) return HttpFailed(answer, "a request for objects (WADO-RS)");
+    return objects.Finish();
+  }
+
+  absl::Status StoreOne(const StoredObject& object) {
+    std::error_code error;
+    if (std::filesystem::file_size(object.path, error) > kMostSentBytes || error) {
+      return absl::InvalidArgumentError(absl::StrCat(object.path, ": too large to be sent"));
+    }
+    std::ifstream file(object.path, std::ios::binary);
+    const std::string boundary = absl::StrCat("tissueform-", NewDicomUid());
+    std::string body = absl::StrCat("--", boundary, "\r\nContent-Type: application/dicom\r\n\r\n");
+    body.append(std::istreambuf_iterator<char>(file), {});
+    absl::StrAppend(&body, "\r\n--", boundary, "--\r\n");
+    std::string text;
+    TF_ASSIGN_OR_RETURN(const PacsHttpAnswer answer,
+                        Exchange(peer_,
+                                 {.path = "/studies",
+                                  .headers = {absl::StrCat("Content-Type: multipart/related; "
+                                                           "type=\"application/dicom\"; boundary=",
+                                                           boundary),
+                                              "Accept: application/dicom+json", "Expect:"},
+                                  .body = &body},
+                                 [&](const std::string& /*type*/, absl::string_view piece) {
+                                   if (text.size() < kMostJsonBytes)
+                                     text.append(piece.data(), piece.size());
+                                   return absl::OkStatus();
+                                 }));
+    if (answer.status != 200) return HttpFailed(answer, "an object (STOW-RS)");
+    // Stored only where it is listed: 00081199 ReferencedSOPSequence.
+    if (absl::StrContains(text, object.instance_uid)) {
+      const Json parsed = Json::parse(text, nullptr, false);
+      if (parsed.is_object() && parsed.contains("00081199")) return absl::OkStatus();
+    }
+    return absl::FailedPreconditionError(absl::StrCat("the PACS '", peer_.name,
+                                                      "' does not say that it has the object ",
+                                                      object.instance_uid, ": see its log"));
+  }
+
+  absl::Status HttpFailed(const PacsHttpAnswer& answer, absl::string_view what) const {
+    const std::string message = absl::StrCat("the PACS '", peer_.name, "' answers ", what,
+                                             " with HTTP status ", answer.status);
+    switch (answer.status) {
+      case 401:
+      case 403:
+        return absl::PermissionDeniedError(message + ": let our certificate in there");
+      case 404:
+        return absl::NotFoundError(message);
+      case 429:
+      case 500:
+      case 502:
+      case 503:
+      case 504:
+        return absl::UnavailableError(message + ": try again");
+      default:
+        return absl::FailedPreconditionError(message + ": see its log, and its URL here");
+    }
+  }
+
+  absl::Status Missing(absl::string_view what) const {
+    return absl::NotFoundError(absl::StrCat("the PACS '", peer_.name, "' has no such ", what));
+  }
+
+  const PacsPeer peer_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<PacsClient>> MakeDicomWebClient(const PacsPeer& peer) {
+  PacsPeer checked = peer;
+  checked.url = std::string(absl::StripSuffix(peer.url, "/"));
+  TF_RETURN_IF_ERROR(CheckPacsUrl(checked));
+  if (peer.tls && !peer.tls->authorities.empty()) {
+    TF_RETURN_IF_ERROR(ReadPemFile(peer.tls->authorities).status());
+  }
+  if (peer.tls && !peer.tls->certificate.empty()) {
+    TF_RETURN_IF_ERROR(ReadPemFile(peer.tls->certificate).status());
+    TF_RETURN_IF_ERROR(ReadSecretPemFile(peer.tls->key).status());
+  }
+  return std::make_unique<DicomWebClient>(std::move(checked));
+}
+
+}  // namespace tissueform

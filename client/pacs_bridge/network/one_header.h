@@ -1,0 +1,28 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <functional>
+#include <initializer_list>
+#include <string>
+
+#include "absl/status/status.h"
+
+#include "client/pacs_bridge/network/instance_folder.h"
+#include "client/pacs_bridge/network/instance_sink.h"
+
+namespace tissueform {
+
+// Lets `fetch` bring one object into a folder beside `path`, keeps its header, without pixels, as
+// the file `path` (0600), and removes the rest.
+//
+// Errors: those of `fetch`, NotFound when nothing came, those of CopyHeaderOnly.
+absl::Status KeepOneHeader(
+    const std::string& path,
+    const std::function<absl::Status(const InstanceFolder& folder, InstanceSink* sink)>& fetch);
+
+// Errors: InvalidArgument when one is no UID.
+absl::Status CheckDicomUids(std::initializer_list<std::string> uids);
+
+}  // namespace tissueform

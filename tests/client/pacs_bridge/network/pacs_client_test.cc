@@ -1,0 +1,322 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/network/pacs_client.h"
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dctk.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "client/pacs_bridge/dicom/dicom_file.h"
+#include "client/pacs_bridge/dicom/dicom_uid.h"
+#include "client/pacs_bridge/network/storage_receiver.h"
+#include "tests/client/pacs_bridge/network/dicom_peers.h"
+#include "tests/testing/ct_series.h"
+#include "tests/testing/status_matchers.h"
+#include "tests/testing/test_authority.h"
+
+namespace tissueform {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::BytesOfFile;
+using testing::CtSeries;
+using testing::CtSeriesOptions;
+using testing::DataSetOfFile;
+using testing::EmptyTestFolder;
+using testing::FreePort;
+using testing::HasProgram;
+using ::testing::HasSubstr;
+using testing::IsOk;
+using ::testing::Not;
+using testing::RecordingSink;
+using ::testing::SizeIs;
+using testing::StatusIs;
+using testing::TestAuthority;
+using testing::TestFiles;
+using testing::WaitForPort;
+using testing::WriteCtSeries;
+using testing::WriteTestFile;
+
+constexpr char kDicomWebPlugin[] = "/usr/share/orthanc/plugins/libOrthancDicomWeb.so";
+
+struct PeerKind {
+  std::string called;
+  PacsPeer::Kind kind = PacsPeer::Kind::kDimse;
+  PacsPeer::Fetch fetch = PacsPeer::Fetch::kGet;
+  bool secure = false;
+};
+
+// Orthanc on ports of its own, with a client of ours to it and a receiver that it knows.
+class PacsClientTest : public ::testing::TestWithParam<PeerKind> {
+ protected:
+  void SetUp() override {
+    if (!HasProgram("Orthanc")) GTEST_SKIP() << "Orthanc is absent: install orthanc";
+    if (GetParam().kind == PacsPeer::Kind::kDicomWeb && !fs::exists(kDicomWebPlugin)) {
+      GTEST_SKIP() << "DICOMweb of Orthanc is absent: install orthanc-dicomweb";
+    }
+    std::string name = ::testing::UnitTest::GetInstance()->current_test_info()->name();
+    for (char& c : name) c = c == '/' ? '_' : c;
+    home_ = EmptyTestFolder(absl::StrCat("orthanc_", name));
+    fs::create_directories(home_ / "keys");
+    fs::create_directories(home_ / "received");
+    fs::create_directories(home_ / "sent");
+    folder_ = *InstanceFolder::Open({.path = home_ / "received", .watermark_bytes = 0});
+    if (GetParam().secure) {
+      files_ = authority_.IssueFiles(home_ / "keys", "bridge");
+      peer_.tls = TlsFiles{files_->certificate, files_->key, files_->roots};
+    }
+    ReceiverOptions options;
+    options.calling_ae_titles = {"ORTHANC"};
+    options.tls = peer_.tls;
+    auto receiver = StorageReceiver::Start(options, folder_.get(), &sink_);
+    ASSERT_THAT(receiver.status(), IsOk());
+    receiver_ = *std::move(receiver);
+    StartOrthanc();
+    auto client = MakePacsClient(peer_);
+    ASSERT_THAT(client.status(), IsOk());
+    client_ = *std::move(client);
+  }
+
+  void StartOrthanc() {
+    const int http = FreePort();
+    const int dicom = FreePort();
+    nlohmann::json config = {
+        {"Name", "test"},
+        {"StorageDirectory", home_ / "store"},
+        {"IndexDirectory", home_ / "store"},
+        {"TemporaryDirectory", home_},
+        {"HttpPort", http},
+        {"DicomPort", dicom},
+        {"DicomAet", "ORTHANC"},
+        {"DicomCheckCalledAet", true},
+        {"RemoteAccessAllowed", true},  // of clients of loopback with certificates too
+        {"AuthenticationEnabled", false},
+        {"DicomAlwaysAllowGet", true},
+        {"DicomAlwaysAllowFind", true},
+        {"DicomAlwaysAllowMove", true},
+        {"DicomScpTimeout", 10},
+        {"DicomModalities",
+         {{"tissueform",
+           {{"AET", "TISSUEFORM"},
+            {"Host", "127.0.0.1"},
+            {"Port", receiver_->port()},
+            {"UseDicomTls", GetParam().secure}}}}}};
+    if (GetParam().kind == PacsPeer::Kind::kDicomWeb) {
+      config["Plugins"] = {kDicomWebPlugin};
+      config["DicomWeb"] = {{"Enable", true}, {"Root", "/dicom-web/"}};
+    }
+    if (GetParam().secure) {
+      const TestFiles own = authority_.IssueFiles(home_ / "keys", "orthanc");
+      WriteTestFile(home_ / "keys/both.pem", BytesOfFile(own.certificate) + BytesOfFile(own.key));
+      config["SslEnabled"] = true;
+      config["SslCertificate"] = home_ / "keys/both.pem";
+      config["SslVerifyPeers"] = true;
+      config["SslTrustedClientCertificates"] = own.roots;
+      config["DicomTlsEnabled"] = true;
+      config["DicomTlsCertificate"] = own.certificate;
+      config["DicomTlsPrivateKey"] = own.key;
+      config["DicomTlsTrustedCertificates"] = own.roots;
+    }
+    WriteTestFile(home_ / "orthanc.json", config.dump());
+    ChildOptions options;
+    options.program = HasProgram("/usr/sbin/Orthanc") ? "/usr/sbin/Orthanc" : "Orthanc";
+    options.arguments = {(home_ / "orthanc.json").string()};
+    options.output = ChildStream::File(home_ / "log");
+    options.errors = ChildStream::File(home_ / "log");
+    auto started = GuardedProgram::Start(options, std::chrono::seconds(5));
+    ASSERT_THAT(started.status(), IsOk());
+    orthanc_ = *std::move(started);
+    ASSERT_TRUE(WaitForPort(http) && WaitForPort(dicom)) << BytesOfFile(home_ / "log");
+    peer_.name = "orthanc";
+    peer_.kind = GetParam().kind;
+    peer_.fetch = GetParam().fetch;
+    peer_.host = "127.0.0.1";
+    peer_.port = dicom;
+    peer_.ae_title = "ORTHANC";
+    peer_.url =
+        absl::StrCat(GetParam().secure ? "https" : "http", "://127.0.0.1:", http, "/dicom-web/");
+  }
+
+  const TestAuthority authority_;
+  fs::path home_;
+  std::optional<TestFiles> files_;
+  RecordingSink sink_;
+  std::unique_ptr<InstanceFolder> folder_;
+  std::unique_ptr<StorageReceiver> receiver_;
+  std::unique_ptr<GuardedProgram> orthanc_;
+  PacsPeer peer_;
+  std::unique_ptr<PacsClient> client_;
+};
+
+TEST_P(PacsClientTest, WhatIsStoredIsFoundAndComesBackToTheLastBit) {
+  EXPECT_THAT(client_->Echo(), IsOk());
+  CtSeriesOptions options;
+  options.slices = 3;
+  options.character_set = "ISO_IR 100";
+  options.series_description =
+      "Sch\xE4"
+      "del";
+  options.private_text = "private";
+  const CtSeries series = WriteCtSeries(home_ / "sent", options);
+
+  const auto before = client_->Has(series.study_uid, series.series_uid, series.instance_uids[1]);
+  ASSERT_THAT(before.status(), IsOk());
+  EXPECT_FALSE(*before);
+  EXPECT_THAT(client_->FindSeries({.study_uid = series.study_uid}).status(),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("no such study")));
+
+  const auto stored = client_->Store(series.files);
+  ASSERT_THAT(stored.status(), IsOk());
+  ASSERT_THAT(*stored, SizeIs(3));
+  for (size_t i = 0; i < 3; ++i) {
+    EXPECT_THAT((*stored)[i].status, IsOk());
+    EXPECT_EQ((*stored)[i].instance_uid, series.instance_uids[i]);
+  }
+  const auto after = client_->Has(series.study_uid, series.series_uid, series.instance_uids[1]);
+  ASSERT_THAT(after.status(), IsOk());
+  EXPECT_TRUE(*after);
+
+  for (const SeriesQuery& query : {SeriesQuery{.study_uid = series.study_uid},
+                                   SeriesQuery{.accession_number = options.accession_number}}) {
+    const auto found = client_->FindSeries(query);
+    ASSERT_THAT(found.status(), IsOk());
+    ASSERT_THAT(*found, SizeIs(1));
+    EXPECT_EQ((*found)[0].study_uid, series.study_uid);
+    EXPECT_EQ((*found)[0].series_uid, series.series_uid);
+    EXPECT_EQ((*found)[0].modality, "CT");
+    EXPECT_EQ((*found)[0].description, "Schädel");
+    EXPECT_EQ((*found)[0].number, 2);
+    EXPECT_EQ((*found)[0].instances, 3);
+    EXPECT_EQ((*found)[0].patient_id, options.patient_id);
+  }
+
+  const auto fetched =
+      client_->FetchSeries(series.study_uid, series.series_uid, folder_.get(), &sink_);
+  ASSERT_THAT(fetched.status(), IsOk());
+  EXPECT_EQ(fetched->completed, 3);
+  EXPECT_EQ(fetched->failed, 0);
+  ASSERT_THAT(sink_.instances(), SizeIs(3));
+  for (const ReceivedInstance& instance : sink_.instances()) {
+    const size_t number = static_cast<size_t>(instance.header.instance_number - 1);
+    EXPECT_EQ(DataSetOfFile(instance.path), DataSetOfFile(series.files[number]));
+  }
+}
+
+TEST_P(PacsClientTest, AHeaderComesWithoutPixels) {
+  if (GetParam().fetch == PacsPeer::Fetch::kMove) GTEST_SKIP() << "a header comes by C-GET";
+  const CtSeries series = WriteCtSeries(home_ / "sent", {.slices = 2});
+  ASSERT_THAT(client_->Store(series.files).status(), IsOk());
+  ASSERT_THAT(client_->FetchHeader(series.study_uid, series.series_uid, home_ / "header"), IsOk());
+  const auto header = LoadDicomHeader(home_ / "header");
+  ASSERT_THAT(header.status(), IsOk());
+  EXPECT_FALSE((*header)->getDataset()->tagExists(DCM_PixelData));
+  EXPECT_TRUE((*header)->getDataset()->tagExists(DCM_PatientBirthDate));
+  EXPECT_EQ(fs::status(home_ / "header").permissions(),
+            fs::perms::owner_read | fs::perms::owner_write);
+  for (const auto& entry : fs::directory_iterator(home_)) {
+    EXPECT_THAT(entry.path().string(), Not(HasSubstr(".fetch-")));
+  }
+  EXPECT_THAT(client_->FetchHeader(series.study_uid, NewDicomUid(), home_ / "none"),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("no such series")));
+}
+
+TEST_P(PacsClientTest, APacsThatHasGoneIsUnavailable) {
+  orthanc_.reset();
+  EXPECT_THAT(client_->Echo(), StatusIs(absl::StatusCode::kUnavailable, HasSubstr("'orthanc'")));
+  const CtSeries series = WriteCtSeries(home_ / "sent", {.slices = 1});
+  EXPECT_THAT(client_->Store(series.files).status().ok()
+                  ? client_->Store(series.files)->at(0).status
+                  : client_->Store(series.files).status(),
+              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("'orthanc'")));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, PacsClientTest,
+    ::testing::Values(
+        PeerKind{"DimseGet"}, PeerKind{"DimseMove", PacsPeer::Kind::kDimse, PacsPeer::Fetch::kMove},
+        PeerKind{"DicomWeb", PacsPeer::Kind::kDicomWeb},
+        PeerKind{"DimseGetTls", PacsPeer::Kind::kDimse, PacsPeer::Fetch::kGet, true},
+        PeerKind{"DimseMoveTls", PacsPeer::Kind::kDimse, PacsPeer::Fetch::kMove, true},
+        PeerKind{"DicomWebTls", PacsPeer::Kind::kDicomWeb, PacsPeer::Fetch::kGet, true}),
+    [](const auto& kind) { return kind.param.called; });
+
+TEST(PacsClient, WrongTitlesAreToldApart) {
+  RecordingSink sink;
+  const fs::path received = EmptyTestFolder("client_titles");
+  const auto folder = *InstanceFolder::Open({.path = received, .watermark_bytes = 0});
+  ReceiverOptions options;
+  options.calling_ae_titles = {"FRIEND"};
+  const auto receiver = StorageReceiver::Start(options, folder.get(), &sink);
+  ASSERT_THAT(receiver.status(), IsOk());
+  PacsPeer peer;
+  peer.name = "other";
+  peer.host = "127.0.0.1";
+  peer.port = (*receiver)->port();
+  peer.ae_title = "TISSUEFORM";
+  peer.own_ae_title = "STRANGER";
+  EXPECT_THAT((*MakePacsClient(peer))->Echo(),
+              StatusIs(absl::StatusCode::kPermissionDenied, HasSubstr("our AE title STRANGER")));
+  peer.own_ae_title = "FRIEND";
+  EXPECT_THAT((*MakePacsClient(peer))->Echo(), IsOk());
+  peer.ae_title = "ELSEWHERE";
+  EXPECT_THAT((*MakePacsClient(peer))->Echo(),
+              StatusIs(absl::StatusCode::kPermissionDenied, HasSubstr("is not called ELSEWHERE")));
+}
+
+TEST(PacsClient, AnObjectThatIsRefusedIsToldByItsUid) {
+  RecordingSink sink;
+  sink.Answer(absl::InternalError("not now"));
+  const auto folder =
+      *InstanceFolder::Open({.path = EmptyTestFolder("client_refused"), .watermark_bytes = 0});
+  ReceiverOptions options;
+  options.calling_ae_titles = {"TISSUEFORM"};
+  const auto receiver = StorageReceiver::Start(options, folder.get(), &sink);
+  ASSERT_THAT(receiver.status(), IsOk());
+  const CtSeries series = WriteCtSeries(EmptyTestFolder("client_refused_sent"), {.slices = 1});
+  PacsPeer peer;
+  peer.name = "strict";
+  peer.host = "127.0.0.1";
+  peer.port = (*receiver)->port();
+  peer.ae_title = "TISSUEFORM";
+  const auto stored = (*MakePacsClient(peer))->Store(series.files);
+  ASSERT_THAT(stored.status(), IsOk());
+  ASSERT_THAT(*stored, SizeIs(1));
+  EXPECT_THAT((*stored)[0].status,
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr(series.instance_uids[0])));
+  EXPECT_THAT((*stored)[0].status,
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("0x0110")));
+}
+
+TEST(PacsClient, PeersThatCannotBeAreTold) {
+  PacsPeer peer;
+  peer.name = "p";
+  EXPECT_THAT(MakePacsClient(peer).status(),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("1 to 16 characters")));
+  peer.ae_title = "P";
+  EXPECT_THAT(MakePacsClient(peer).status(),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("a host and a port")));
+  peer.kind = PacsPeer::Kind::kDicomWeb;
+  for (const auto& [url, message] : std::vector<std::pair<std::string, std::string>>{
+           {"", "it has no URL"},
+           {"http://pacs.example/dicom-web", "must be https"},
+           {"ftp://127.0.0.1/", "must be https"},
+           {"https://u:p@pacs.example/", "a user or password"}}) {
+    peer.url = url;
+    EXPECT_THAT(MakePacsClient(peer).status(),
+                StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(message)));
+  }
+}
+
+}  // namespace
+}  // namespace tissueform

@@ -1,0 +1,210 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/series/series_pick.h"
+
+#include <cmath>
+#include <functional>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::StatusIs;
+
+// A head in axial slices, as a scanner sends it.
+std::vector<InstanceHeader> Head(int slices = 200, double spacing_mm = 0.8) {
+  std::vector<InstanceHeader> images;
+  for (int i = 0; i < slices; ++i) {
+    InstanceHeader image;
+    image.study_uid = "1.2.3";
+    image.series_uid = "1.2.3.4";
+    image.frame_uid = "1.2.3.5";
+    image.modality = "CT";
+    image.series_description = "Head PLANTED^PATRICIA";
+    image.convolution_kernel = "H30s";
+    image.image_type = "ORIGINAL\\PRIMARY\\AXIAL";
+    image.series_number = 2;
+    image.instance_number = i + 1;
+    image.position = Eigen::Vector3d(-100, -100, i * spacing_mm);
+    image.axes = Eigen::Matrix<double, 3, 2>::Identity();
+    image.slice_thickness_mm = spacing_mm;
+    image.rescale_slope = 1;
+    image.rescale_intercept = -1024;
+    images.push_back(image);
+  }
+  return images;
+}
+
+SeriesFacts FactsAfter(const std::function<void(std::vector<InstanceHeader>*)>& change) {
+  std::vector<InstanceHeader> images = Head();
+  change(&images);
+  return FactsOfSeries("key", images);
+}
+
+SeriesRule SomeRule() {
+  SeriesRule rule;
+  rule.name = "head";
+  rule.recipe = "recipe.json";
+  return rule;
+}
+
+TEST(SeriesFactsTest, MeasuresAHead) {
+  const SeriesFacts facts = FactsOfSeries("key", Head());
+  EXPECT_EQ(facts.slices, 200);
+  EXPECT_NEAR(facts.spacing_mm, 0.8, 1e-9);
+  EXPECT_NEAR(facts.coverage_mm, 160, 1e-6);
+  EXPECT_EQ(facts.plane, SlicePlane::kAxial);
+  EXPECT_EQ(facts.kernel, KernelKind::kSoft);
+  EXPECT_EQ(facts.missing, 0);
+  EXPECT_EQ(facts.duplicates, 0);
+  EXPECT_EQ(WhatIsAgainst(facts, SomeRule()), "");
+}
+
+TEST(SeriesFactsTest, KernelsOfManufacturersAreSoftOrSharp) {
+  for (const char* kernel : {"H30s", "B30f", "STANDARD", "SOFT", "FC21", "Hr40f"}) {
+    EXPECT_EQ(KernelKindOf(kernel), KernelKind::kSoft) << kernel;
+  }
+  for (const char* kernel : {"H60s", "B70h", "BONEPLUS", "EDGE", "FC81", "Hr59"}) {
+    EXPECT_EQ(KernelKindOf(kernel), KernelKind::kBone) << kernel;
+  }
+  for (const char* kernel : {"", "YB", "4711"}) {
+    EXPECT_EQ(KernelKindOf(kernel), KernelKind::kUnknown) << kernel;
+  }
+}
+
+TEST(SeriesFactsTest, ATiltedGantryIsAxialAndAReformattedSeriesIsNot) {
+  const auto turn = [](double degrees) {
+    return FactsAfter([degrees](std::vector<InstanceHeader>* images) {
+      const double angle = degrees * M_PI / 180;
+      for (InstanceHeader& image : *images) {
+        image.axes->col(1) = Eigen::Vector3d(0, std::cos(angle), -std::sin(angle));
+      }
+    });
+  };
+  EXPECT_EQ(turn(20).plane, SlicePlane::kAxial);
+  EXPECT_EQ(turn(90).plane, SlicePlane::kCoronal);
+  EXPECT_EQ(turn(45).plane, SlicePlane::kOblique);
+}
+
+struct Defect {
+  const char* name;
+  std::function<void(std::vector<InstanceHeader>*)> change;
+  const char* said;
+};
+
+class DefectTest : public ::testing::TestWithParam<Defect> {};
+
+TEST_P(DefectTest, IsSaidAndNothingOfThePatient) {
+  const SeriesFacts facts = FactsAfter(GetParam().change);
+  const std::string against = WhatIsAgainst(facts, SomeRule());
+  EXPECT_THAT(against, HasSubstr(GetParam().said));
+  EXPECT_THAT(against, Not(HasSubstr("PLANTED")));
+  EXPECT_THAT(DescribeFacts(facts), Not(HasSubstr("PLANTED")));
+  EXPECT_FALSE(PickSeries({facts}, {SomeRule()}).front().chosen);
+}
+
+using Images = std::vector<InstanceHeader>;
+
+INSTANTIATE_TEST_SUITE_P(
+    All, DefectTest,
+    ::testing::Values(
+        Defect{"MissingSlices", [](Images* i) { i->erase(i->begin() + 9, i->begin() + 12); },
+               "3 slices are missing"},
+        Defect{"DuplicateSlices", [](Images* i) { i->push_back(i->front()); },
+               "1 images lie where another one lies"},
+        Defect{"MixedFrames", [](Images* i) { i->back().frame_uid = "9"; },
+               "2 frames of reference"},
+        Defect{"MixedOrientations",
+               [](Images* i) { i->back().axes->col(1) = Eigen::Vector3d::UnitZ(); },
+               "turned differently"},
+        Defect{"Few", [](Images* i) { i->resize(20); }, "it has 20 slices, fewer than 60"},
+        Defect{"Thick", [](Images* i) { i->front().slice_thickness_mm = 5; }, "5.00 mm thick"},
+        Defect{"Scout", [](Images* i) { i->front().image_type = "ORIGINAL\\PRIMARY\\LOCALIZER"; },
+               "localiser"},
+        Defect{"Derived", [](Images* i) { i->front().image_type = "DERIVED\\SECONDARY"; },
+               "derived"},
+        Defect{"Magnetic", [](Images* i) { i->front().modality = "MR"; },
+               "no Hounsfield units"},
+        Defect{"HostileModality", [](Images* i) { i->front().modality = "PLANTED\nx"; },
+               "of modality unknown"},
+        Defect{"ConeBeam",
+               [](Images* i) {
+                 for (InstanceHeader& image : *i) image.rescale_slope.reset();
+               },
+               "cone-beam"},
+        Defect{"NoPlaces",
+               [](Images* i) {
+                 for (InstanceHeader& image : *i) image.position.reset();
+               },
+               "it has 0 slices"}),
+    [](const auto& defect) { return std::string(defect.param.name); });
+
+TEST(PickSeriesTest, TheSofterKernelWinsAndTheOtherIsToldWhy) {
+  SeriesFacts sharp = FactsAfter([](Images* images) {
+    for (InstanceHeader& image : *images) image.convolution_kernel = "H60s";
+  });
+  const std::vector<SeriesVerdict> verdicts =
+      PickSeries({sharp, FactsOfSeries("soft", Head())}, {SomeRule()});
+  EXPECT_FALSE(verdicts[0].chosen);
+  EXPECT_EQ(verdicts[0].reason, "the chosen one has a softer kernel");
+  EXPECT_TRUE(verdicts[1].chosen);
+  EXPECT_THAT(verdicts[1].reason, HasSubstr("by rule \"head\": 200 axial slices"));
+}
+
+TEST(PickSeriesTest, AnEarlierRuleGoesBeforeABetterSeries) {
+  SeriesRule sharp_first = SomeRule();
+  sharp_first.description_has = {"sharp"};
+  SeriesFacts sharp = FactsOfSeries("a", Head());
+  sharp.description = "Head SHARP";
+  sharp.kernel = KernelKind::kBone;
+  const auto verdicts =
+      PickSeries({FactsOfSeries("b", Head()), sharp}, {sharp_first, SomeRule()});
+  EXPECT_FALSE(verdicts[0].chosen);
+  EXPECT_TRUE(verdicts[1].chosen);
+  EXPECT_EQ(verdicts[1].rule, 0);
+}
+
+TEST(PickSeriesTest, NothingIsChosenOfNothing) {
+  EXPECT_TRUE(PickSeries({}, {SomeRule()}).empty());
+  EXPECT_FALSE(PickSeries({FactsOfSeries("a", Head())}, {}).front().chosen);
+}
+
+TEST(SeriesRulesTest, ARuleSaysWhatDiffersFromTheDefaults) {
+  const auto rules = ParseSeriesRules(
+      R"({"format": "tissueform-series-rules", "version": 1, "rules": [
+          {"name": "thin", "recipe": "a/recipe.json", "max_spacing_mm": 0.7, "contrast": false,
+           "prefer": ["bone_kernel", "more_coverage"]}]})",
+      "/etc/tissueform");
+  ASSERT_THAT(rules, testing::IsOk());
+  ASSERT_EQ(rules->size(), 1);
+  const SeriesRule& rule = rules->front();
+  EXPECT_EQ(rule.recipe, "/etc/tissueform/a/recipe.json");
+  EXPECT_EQ(rule.max_spacing_mm, 0.7);
+  EXPECT_FALSE(rule.contrast);
+  EXPECT_EQ(rule.min_slices, 60);
+  EXPECT_THAT(rule.prefer, ::testing::ElementsAre(SeriesPreference::kBoneKernel,
+                                                  SeriesPreference::kMoreCoverage));
+}
+
+TEST(SeriesRulesTest, WrongRulesAreRefusedByTheirPlace) {
+  for (const char* text :
+       {"{", "{}", R"({"format": "tissueform-series-rules", "version": 1, "rules": []})",
+        R"({"format": "tissueform-series-rules", "version": 1, "rules": [{"name": "x"}]})",
+        R"({"format": "tissueform-series-rules", "version": 1, "rules": [{"recipe": "r", "ct": 1}]})",
+        R"({"format": "tissueform-series-rules", "version": 1, "rules": [{"recipe": "r",
+            "prefer": ["nicest"]}]})"}) {
+    EXPECT_THAT(ParseSeriesRules(text, "").status(),
+                StatusIs(absl::StatusCode::kInvalidArgument))
+        << text;
+  }
+}
+
+}  // namespace
+}  // namespace tissueform

@@ -1,0 +1,109 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <csignal>
+#include <filesystem>
+#include <set>
+#include <unistd.h>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "client/pacs_bridge/queue/export_rows.h"
+#include "client/pacs_bridge/queue/received_rows.h"
+#include "core/process/child_process.h"
+#include "tests/client/pacs_bridge/work/bridge_world.h"
+#include "tests/testing/ct_series.h"
+#include "tests/testing/status_matchers.h"
+#include "tests/testing/test_authority.h"
+#include "tests/testing/test_paths.h"
+
+// kill -9 at every place between two writes, from received files to objects in the PACS: the next
+// process goes on, and the PACS has one of each object.
+namespace tissueform {
+namespace {
+
+namespace fs = std::filesystem;
+
+using testing::IsOk;
+
+// The issue asks for twenty.
+constexpr int kLeastPoints = 20;
+constexpr size_t kObjects = 4;
+
+class BridgeCrashTest : public ::testing::Test {
+ protected:
+  void Begin(const std::string& name) {
+    root_ = testing::EmptyTestFolder(name);
+    fs::create_directories(root_ / "world/server");
+    fs::create_directories(root_ / "world/pacs");
+    ASSERT_THAT(BridgeQueue::Open(state()), IsOk());
+    testing::WriteCtSeries(fs::path(state()) / "received");
+  }
+
+  std::string state() const { return (root_ / "state").string(); }
+
+  // Runs the steps; how they ended, and how many places were passed where they came to the end.
+  ChildEnd Run(int kill_at, int* passed = nullptr) {
+    ChildOptions options;
+    options.program = testing::ProgramPath("tissueform-bridge-steps");
+    options.arguments = {state(), (root_ / "world").string(), absl::StrCat(kill_at)};
+    options.output = ChildStream::Pipe();
+    options.errors = ChildStream::File((root_ / "log").string());
+    const auto child = ChildProcess::Start(options);
+    EXPECT_THAT(child.status(), IsOk());
+    std::string text;
+    for (char c = 0; read((*child)->answer(), &c, 1) == 1 && c != '\n';) text += c;
+    if (passed != nullptr) {
+      EXPECT_TRUE(absl::SimpleAtoi(text, passed)) << text;
+    }
+    return (*child)->Wait();
+  }
+
+  void ExpectOneOfEach() {
+    const std::vector<std::string> stores = testing::LinesOfFile(root_ / "world/pacs/stores");
+    const std::set<std::string> different(stores.begin(), stores.end());
+    EXPECT_EQ(different.size(), kObjects);
+    size_t files = 0;
+    for (const auto& file : fs::directory_iterator(root_ / "world/pacs")) {
+      files += file.path().filename() != "stores" ? 1 : 0;
+    }
+    EXPECT_EQ(files, kObjects) << "each object is in the PACS under one name";
+    const auto queue = BridgeQueue::Open(state());
+    ASSERT_THAT(queue, IsOk());
+    EXPECT_EQ(ReceivedRows(queue->get()).List()->size(), 1);
+    EXPECT_EQ(ExportRows(queue->get()).Get("exports/1")->state, BridgeExportState::kTold);
+    EXPECT_EQ(stores.size(), kObjects) << "nothing was sent twice";
+  }
+
+  fs::path root_;
+};
+
+TEST_F(BridgeCrashTest, EveryPlaceOfDeathLeavesOneOfEachObject) {
+  Begin("bridge_crash_none");
+  int points = 0;
+  ASSERT_EQ(Run(0, &points).exit_code, 0);
+  ExpectOneOfEach();
+  ASSERT_GE(points, kLeastPoints);
+  for (int point = 1; point <= points; ++point) {
+    SCOPED_TRACE(absl::StrCat("killed at place ", point, " of ", points));
+    Begin("bridge_crash");
+    ASSERT_EQ(Run(point).signal, SIGKILL);
+    ASSERT_EQ(Run(0).exit_code, 0);
+    ExpectOneOfEach();
+  }
+}
+
+TEST_F(BridgeCrashTest, DeathAfterDeathComesToTheEnd) {
+  Begin("bridge_crash_often");
+  ChildEnd end{.signal = SIGKILL};
+  // A process that dies at its sixteenth place each time still comes on, step by step.
+  for (int i = 0; i < 100 && end.signal == SIGKILL; ++i) end = Run(16);
+  EXPECT_EQ(end.exit_code, 0);
+  ExpectOneOfEach();
+}
+
+}  // namespace
+}  // namespace tissueform

@@ -1,0 +1,136 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+
+#include "client/pacs_bridge/dicom/dicom_file.h"
+#include "client/pacs_bridge/network/pacs_client.h"
+#include "client/pacs_bridge/work/case_server.h"
+#include "client/pacs_bridge/work/object_writer.h"
+#include "core/base/status_macros.h"
+#include "core/mesh_payload/sha256.h"
+
+// What lies about a bridge, as folders, so that it outlives a process that is killed: a server that
+// keeps cases, a PACS that keeps objects, a writer of objects that are headers only.
+namespace tissueform::testing {
+
+inline void AppendLine(const std::filesystem::path& file, const std::string& line) {
+  std::ofstream(file, std::ios::app) << line << "\n";
+}
+
+inline std::vector<std::string> LinesOfFile(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+class FolderCaseServer final : public CaseServer {
+ public:
+  explicit FolderCaseServer(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  absl::StatusOr<std::string> Publish(const std::string& bytes, const std::string& title) override {
+    TF_RETURN_IF_ERROR(away);
+    AppendLine(folder_ / "titles", title);
+    const std::string name = Sha256Hex({bytes});
+    std::ofstream(folder_ / name) << bytes;
+    return "cases/" + name;
+  }
+  absl::StatusOr<std::string> ReadCase(const std::string&) override {
+    return absl::NotFoundError("no such case");
+  }
+  absl::StatusOr<ServedPrediction> ReadPrediction(const std::string& name) override {
+    if (predictions_gone) return absl::NotFoundError("no such prediction");
+    ServedPrediction prediction;
+    prediction.description.set_name(name);
+    return prediction;
+  }
+  absl::StatusOr<v1::Export> GetExport(const std::string& name) override {
+    v1::Export found;
+    found.set_name(name);
+    return found;
+  }
+  absl::Status UpdateExport(const std::string& name, v1::ExportState state,
+                            const std::string& detail, int stored) override {
+    TF_RETURN_IF_ERROR(away);
+    AppendLine(folder_ / "updates", absl::StrCat(name, " ", v1::ExportState_Name(state), " ",
+                                                 stored, " ", detail));
+    return absl::OkStatus();
+  }
+  absl::Status WatchExports(const std::function<void(const v1::Export&)>&,
+                            const Cancellation&) override {
+    return absl::UnimplementedError("not here");
+  }
+
+  absl::Status away = {};
+  bool predictions_gone = false;
+
+ private:
+  const std::filesystem::path folder_;
+};
+
+class FolderPacs final : public PacsClient {
+ public:
+  explicit FolderPacs(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  absl::Status Echo() override { return away; }
+  absl::StatusOr<std::vector<SeriesSummary>> FindSeries(const SeriesQuery&) override {
+    return absl::UnimplementedError("not here");
+  }
+  absl::StatusOr<FetchCounts> FetchSeries(const std::string&, const std::string&, InstanceFolder*,
+                                          InstanceSink*) override {
+    return absl::UnimplementedError("not here");
+  }
+  absl::Status FetchHeader(const std::string&, const std::string& series,
+                           const std::string& path) override {
+    TF_RETURN_IF_ERROR(away);
+    const auto found = headers.find(series);
+    if (found == headers.end()) return absl::NotFoundError("the PACS has no such series");
+    return CopyHeaderOnly(found->second, path);
+  }
+  absl::StatusOr<bool> Has(const std::string&, const std::string&,
+                           const std::string& uid) override {
+    TF_RETURN_IF_ERROR(away);
+    return std::filesystem::exists(folder_ / uid);
+  }
+  absl::StatusOr<std::vector<StoredObject>> Store(absl::Span<const std::string> paths) override {
+    TF_RETURN_IF_ERROR(away);
+    std::vector<StoredObject> stored;
+    for (const std::string& path : paths) {
+      const std::string uid = (*ReadInstanceHeader(path)).instance_uid;
+      AppendLine(folder_ / "stores", uid);
+      std::filesystem::copy_file(path, folder_ / uid);
+      stored.push_back({path, uid, absl::OkStatus()});
+    }
+    return stored;
+  }
+
+  std::map<std::string, std::string> headers = {};  // by series: a file with the header
+  absl::Status away = {};
+
+ private:
+  const std::filesystem::path folder_;
+};
+
+// Writes each object as the header of the source image under its own UID.
+class HeaderWriter final : public ObjectWriter {
+ public:
+  absl::StatusOr<std::vector<std::string>> KeysOf(const ExportMaterial&) override {
+    return std::vector<std::string>{"stl:skin", "stl:bone", "capture", "report", "series:models"};
+  }
+  absl::Status Draw(const ExportMaterial&, const std::string& folder) override {
+    std::filesystem::create_directory(folder);
+    return absl::OkStatus();
+  }
+  absl::StatusOr<std::vector<ExportFile>> Write(const ExportMaterial& material) override;
+};
+
+}  // namespace tissueform::testing
