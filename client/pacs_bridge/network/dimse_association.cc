@@ -37,19 +37,25 @@ absl::Status Rejected(const PacsPeer& peer, T_ASC_Parameters* parameters) {
   }
 }
 
-absl::Status NotReached(const PacsPeer& peer, const OFCondition& condition, bool secure) {
+absl::Status NotReached(const PacsPeer& peer, const OFCondition& condition, bool secure,
+                        bool connected) {
   const std::string where =
       absl::StrCat("the PACS '", peer.name, "' at ", peer.host, ":", peer.port);
-  if (condition.code() == DULC_TLSERROR) {
-    return absl::UnauthenticatedError(absl::StrCat(
-        where, ": the TLS handshake fails: compare certificates and authorities of both sides"));
-  }
   if (condition.code() == DULC_UNKNOWNHOST) {
     return absl::UnavailableError(absl::StrCat(where, ": the host is not known"));
   }
-  return absl::UnavailableError(
-      absl::StrCat(where, " does not answer: is it running, and ",
-                   secure ? "does it take our certificate?" : "does it want TLS?"));
+  if (condition.code() == DULC_READTIMEOUT) {
+    return absl::DeadlineExceededError(
+        absl::StrCat(where, " is silent: does it speak DICOM there", secure ? "?" : ", or TLS?"));
+  }
+  if (!connected) {
+    return absl::UnavailableError(absl::StrCat(where, " does not answer: is it running there?"));
+  }
+  if (secure) {
+    return absl::UnauthenticatedError(absl::StrCat(
+        where, ": the TLS handshake fails: compare certificates and authorities of both sides"));
+  }
+  return absl::UnavailableError(absl::StrCat(where, " hangs up: does it let us in, or want TLS?"));
 }
 
 }  // namespace
@@ -92,7 +98,7 @@ absl::Status DimseAssociation::Open(const PacsPeer& peer, DcmTransportLayer* sec
   broken_ = true;
   absl::Status status = asked == DUL_ASSOCIATIONREJECTED
                             ? Rejected(peer, parameters)
-                            : NotReached(peer, asked, secure != nullptr);
+                            : NotReached(peer, asked, secure != nullptr, layer_->has_socket());
   if (association_ == nullptr) ASC_destroyAssociationParameters(&parameters);
   return status;
 }

@@ -78,6 +78,7 @@ SocketLayer::SocketLayer(DcmTransportLayer* secure, std::chrono::seconds silence
 
 DcmTransportConnection* SocketLayer::createConnection(DcmNativeSocketType socket,
                                                       OFBool /*is_secure*/) {
+  has_socket_ = true;
   const int on = 1;
   setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
   DcmTransportConnection* connection = secure_ == nullptr

@@ -28,12 +28,15 @@ class SocketLayer : public DcmTransportLayer {
               std::function<void()> connected = nullptr);
 
   DcmTransportConnection* createConnection(DcmNativeSocketType socket, OFBool is_secure) override;
+  // Whether a socket has come: what fails later is no matter of reaching the peer.
+  bool has_socket() const { return has_socket_; }
 
  private:
   DcmTransportLayer plain_;
   DcmTransportLayer* const secure_;
   const std::chrono::seconds silence_;
   const std::function<void()> connected_;
+  bool has_socket_ = false;
 };
 
 // The longest wait for one read or write of a socket.
