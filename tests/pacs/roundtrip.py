@@ -18,6 +18,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent.parent / "deploy" / "pacs"))
@@ -100,23 +101,43 @@ def objects_of(programs, study):
     return found
 
 
+class Written(threading.Thread):
+    """What the bridge writes for the PACS, caught before it is sent and deleted: the models' bytes by their UIDs."""
+
+    def __init__(self, folder):
+        super().__init__(daemon=True)
+        self.folder, self.models, self.seen, self.ended = folder, {}, set(), threading.Event()
+        self.start()
+
+    def run(self):
+        while not self.ended.wait(0.02):
+            for path in [path for path in self.folder.rglob("*.dcm") if path not in self.seen]:
+                try:
+                    item = pydicom.dcmread(path)
+                    if item.SOPClassUID == STL:
+                        self.models[item.SOPInstanceUID] = bytes(item.EncapsulatedDocument)
+                    self.seen.add(path)
+                except (OSError, AttributeError, pydicom.errors.InvalidDicomError):
+                    continue  # on its way, or gone
+
+    def end(self):
+        self.ended.set()
+        self.join()
+        return self.models
+
+
 def errors_of(path):
     run = subprocess.run(["dciodvfy", path], capture_output=True, text=True, timeout=stack.PATIENCE_S, check=False)
     return [line for line in (run.stdout + run.stderr).splitlines() if line.startswith("Error")]
 
 
-def check_models(programs, objects, original):
+def check_models(objects, original, written):
     models = [item for _, _, item in objects.values() if item.SOPClassUID == STL]
     check("there are models of skin and bone", len(models) >= 3, str(len(models)))
     check("units are mm", all(model.MeasurementUnitsCodeSequence[0].CodeValue == "mm" for model in models))
     check("models lie in the CT's frame of reference", all(model.FrameOfReferenceUID == original.FrameOfReferenceUID for model in models))
-    written = {}
-    for path in (programs.folder / "bridge" / "objects").rglob("*.dcm"):
-        item = pydicom.dcmread(path)
-        if item.SOPClassUID == STL:
-            written[item.SOPInstanceUID] = bytes(item.EncapsulatedDocument)
     back = {model.SOPInstanceUID: bytes(model.EncapsulatedDocument) for model in models}
-    check("STL comes back byte for byte", not written or written == back, f"{len(written)} written, {len(back)} back")
+    check("STL comes back byte for byte", len(back) > 0 and written == back, f"{len(written)} written, {len(back)} back")
     for model in models:
         length = model.EncapsulatedDocumentLength
         stl = bytes(model.EncapsulatedDocument)[:length]
@@ -136,7 +157,7 @@ def check_capture(programs, path, frames):
         check("GDCM reads all frames of the capture", same, str(raw))
 
 
-def check_objects(programs, study, ct_folder):
+def check_objects(programs, study, ct_folder, written):
     original = pydicom.dcmread(next(pathlib.Path(ct_folder).glob("*.dcm")))
     objects = objects_of(programs, study)
     folder = programs.folder / "back"
@@ -154,7 +175,7 @@ def check_objects(programs, study, ct_folder):
             check_capture(programs, path, int(item.NumberOfFrames))
     kinds = {tags["Modality"] for _, tags, _ in objects.values()}
     check("there are models, a capture and a report", {"M3D", "SR"} <= kinds and len(kinds) >= 3, str(kinds))
-    check_models(programs, objects, original)
+    check_models(objects, original, written)
 
 
 def check_secrets(programs):
@@ -257,11 +278,12 @@ def run(programs):
     print(f"     last slice to published case: {time.monotonic() - last_slice:.1f} s")
     prediction = programs.predict(case)
     export = send(programs, prediction)
+    written = Written(programs.folder / "bridge" / "objects")
     confirm(programs, export, looks=True)
     confirmed = time.monotonic()
     wait_until_stored(programs, export)
     print(f"     word to stored: {time.monotonic() - confirmed:.1f} s")
-    check_objects(programs, study, programs.folder / "ct")
+    check_objects(programs, study, programs.folder / "ct", written.end())
     check_refusals(programs)
 
     # A second study of the patient and another patient, at once.
