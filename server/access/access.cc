@@ -114,12 +114,12 @@ Access::Level Access::PredictionLevel(const Principal& caller, const std::string
 }
 
 bool Access::IsExportedCase(const CaseKey& key) const {
-  const std::set<std::string>& exported = index_.ExportedOfCase(key.sha256);
-  return std::ranges::any_of(exported, [&](const std::string& id) {
+  for (const std::string& id : index_.ExportedOfCase(key.sha256)) {
     // Whoever names a case that is not open to them opens it to no bridge.
     const Principal planner{.name = index_.FindPrediction(id)->owner};
-    return CaseLevel(planner, key) >= Level::kLook;
-  });
+    if (CaseLevel(planner, key) >= Level::kLook) return true;
+  }
+  return false;
 }
 
 Access::Level Access::CaseLevel(const Principal& caller, const CaseKey& key) const {

@@ -26,7 +26,7 @@ struct ExportLimits {
   int max_waiting_of_principal = 50;  // of one who has logged in
   int max_kept = 10'000;              // done or not
   int retention_days = 30;            // one that has not changed for so long goes; 0: none does
-  int max_watches = 64;               // WatchExports calls open at the same time
+  int max_watches = 256;              // WatchExports calls open at the same time
 };
 
 // The exports of a server: all in memory, each change in the store first. Looking never blocks;

@@ -28,7 +28,7 @@ async function picture(page: Page, name: string): Promise<void> {
   await page.screenshot({ path: join(FOLDER, `${name}.jpg`), type: "jpeg", quality: 90 });
 }
 
-test("six pictures", async () => {
+test("seven pictures", async () => {
   const context = await planner.browse();
   const { page } = await openCase(context, planner);
   await page.emulateMedia({ colorScheme: "dark" });
@@ -65,6 +65,11 @@ test("six pictures", async () => {
   await page.locator(".comparison").scrollIntoViewIfNeeded();
   await picture(page, "comparison");
   await page.getByText("Back to the plan").click();
+
+  await page.getByRole("button", { name: "Send Jaw 8 mm forward to the PACS" }).click();
+  await page.getByText("PACS: waiting for the bridge").waitFor();
+  await page.locator(".predictions").scrollIntoViewIfNeeded();
+  await picture(page, "send-to-pacs");
 
   const { session } = await state(page);
   const link = page.url().replace("#case=", `#follow=${session.replace("sessions/", "")}&case=`);

@@ -126,6 +126,21 @@ describe("a planner", () => {
     await moved(page, 6, 10);
   });
 
+  test("sends a stored prediction on its way to the PACS with its measures, and takes it back", async () => {
+    const { page } = opened;
+    const stored = page.locator(".predictions li", { hasText: "Eight <b>forward</b>" });
+    await stored.getByRole("button", { name: /^Send .* to the PACS$/ }).click();
+    await stored.getByText("PACS: waiting for the bridge").waitFor();
+    const names = await page.evaluate(() => {
+      const { bench } = (globalThis as unknown as Hook).tissueform;
+      return Array.from(bench.pacs.byPrediction.value.values() as any[]).flatMap((entry) => entry.measures.map((measure: any) => measure.unit));
+    });
+    expect(new Set(names)).toEqual(new Set(["mm", "deg"]));
+    await stored.getByRole("button", { name: /^Take .* back/ }).click();
+    await stored.getByText("PACS: waiting for the bridge").waitFor({ state: "detached" });
+    await moved(page, 6, 10);
+  });
+
   test.each([["Face STL", "tissueform-face.stl"], ["Face PLY", "tissueform-face.ply"], ["Plan JSON", "tissueform-plan.json"], ["Picture", "tissueform.png"]])(
     "gives out %s that says that it is no medical device",
     async (name, file) => {

@@ -46,6 +46,17 @@ AccessWorld::Level AccessWorld::OfPrediction(const Caller& caller, const std::st
   return OfSession(caller, prediction.session) == kNothing ? kNothing : kLook;
 }
 
+AccessWorld::Level AccessWorld::OfCaseAlone(const std::string& principal,
+                                            const std::string& name) const {
+  if (cases.contains({name, principal})) return kOwn;
+  for (const auto& [key, project] : cases) {
+    if (key.first == name && Shared(key.second, name, project, principal) != kNothing) {
+      return kLook;
+    }
+  }
+  return kNothing;
+}
+
 AccessWorld::Level AccessWorld::OfCase(const Caller& caller, const std::string& name) const {
   if (!caller.link.empty()) {
     if (!IsGood(caller.link)) return kNothing;
@@ -53,20 +64,15 @@ AccessWorld::Level AccessWorld::OfCase(const Caller& caller, const std::string& 
     for (const auto& [token, link] : links) {
       if (link.session != session || link.case_name != name || !IsGood(token)) continue;
       // The maker's of the first such link decides.
-      if (OfCase({link.maker, ""}, name) != kNothing) return kLook;
+      if (OfCaseAlone(link.maker, name) != kNothing) return kLook;
     }
     return kNothing;
   }
-  if (cases.contains({name, caller.name})) return kOwn;
-  for (const auto& [key, project] : cases) {
-    if (key.first == name && Shared(key.second, name, project, caller.name) != kNothing) {
-      return kLook;
-    }
-  }
-  if (!IsBridge(caller)) return kNothing;
+  const Level alone = OfCaseAlone(caller.name, name);
+  if (alone != kNothing || !IsBridge(caller)) return alone;
   for (const auto& [id, prediction] : exports) {
     const Prediction& of = predictions.at(prediction);
-    if (of.case_name == name && OfCase({of.owner, ""}, name) != kNothing) return kLook;
+    if (of.case_name == name && OfCaseAlone(of.owner, name) != kNothing) return kLook;
   }
   return kNothing;
 }

@@ -74,6 +74,8 @@ struct AccessWorld {
   Level OfSession(const Caller& caller, const std::string& name) const;
   Level OfPrediction(const Caller& caller, const std::string& name) const;
   Level OfCase(const Caller& caller, const std::string& name) const;
+  // Its own, or one that is shared with it.
+  Level OfCaseAlone(const std::string& principal, const std::string& name) const;
   Level OfExport(const Caller& caller, const std::string& name) const;
   bool IsExported(const std::string& prediction) const;
   Level OfMesh(const Caller& caller, const std::string& name) const;

@@ -69,6 +69,20 @@ TEST_F(PredictionCommandTest, TitleAndCaseAreKeptAndListed) {
   EXPECT_THAT(Prediction({"list", "--case", "none"}), FailsWith(1, HasSubstr("name of a case")));
 }
 
+TEST_F(PredictionCommandTest, WhatIsSentIsListedAndTakenBack) {
+  const std::string of_case = Create({"--case", std::string(64, 'c')});
+  const ProcessResult sent = Prediction({"send", of_case});
+  EXPECT_THAT(sent, Succeeds());
+  EXPECT_THAT(sent.out, AllOf(StartsWith("exports/"), HasSubstr("waiting")));
+  const std::string name = sent.out.substr(0, sent.out.find(':'));
+  EXPECT_THAT(Prediction({"sent", "--prediction", of_case}).out,
+              AllOf(HasSubstr(name), HasSubstr(of_case), HasSubstr("\n1 exports\n")));
+  EXPECT_THAT(Prediction({"unsend", name}), Succeeds());
+  EXPECT_THAT(Prediction({"sent"}).out, HasSubstr("\n0 exports\n"));
+  EXPECT_THAT(Prediction({"unsend", name}), FailsWith(1, HasSubstr("no export")));
+  EXPECT_THAT(Prediction({"send", Create({})}), FailsWith(1, HasSubstr("of no case")));
+}
+
 TEST_F(PredictionCommandTest, ListsShowsComparesAndDeletes) {
   const std::string field = Create({});
   const std::string elastic = Create({"--model", "linear_elastic"});

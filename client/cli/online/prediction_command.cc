@@ -19,6 +19,7 @@
 #include "client/cli/compare/comparison_report.h"
 #include "client/cli/online/prediction_export.h"
 #include "client/cli/online/prediction_pictures.h"
+#include "client/cli/online/prediction_send_command.h"
 #include "client/cli/online/resource_text.h"
 #include "client/cli/online/server_connection.h"
 #include "client/cli/online/session_command.h"
@@ -318,6 +319,7 @@ void AddPredictionCommand(CLI::App& app, CommandWork* work) {
   save->add_option("--mesh", options->mesh, "the mesh file it was made from")->excludes(plan);
   AddAllowOutside(save, &options->reading);
   add("delete", "take one out of the server's store", true, Delete);
+  AddPredictionSendCommands(*command, work);
   command->footer(
       "Examples:\n"
       "  tissueform prediction create plan.json --server localhost:50051\n"

@@ -41,7 +41,7 @@ inline constexpr CompanionCommand kMeshDeleteCommand = {
 inline constexpr CompanionCommand kWatchCommand = {
     "watch", "follow a session that somebody drags, a line a second", "tissueform-online"};
 inline constexpr CompanionCommand kPredictionCommand = {
-    "prediction", "make, list, compare, export and delete the predictions that a server keeps",
+    "prediction", "make, list, compare, export, delete and send to the PACS what a server keeps",
     "tissueform-online"};
 inline constexpr CompanionCommand kCaseCommand = {"case", "cases: what the browser planner opens",
                                                   "tissueform-online"};

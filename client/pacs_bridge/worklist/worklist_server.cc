@@ -92,9 +92,10 @@ class HttpWorkListServer final : public WorkListServer {
          {"X-Content-Type-Options", "nosniff"},
          {"Referrer-Policy", "same-origin"},
          {"Cross-Origin-Resource-Policy", "same-origin"}});
-    server_.set_exception_handler([](const Request&, Response& response, std::exception_ptr) {
-      Refuse(&response, 500, "this request cannot be answered");
-    });
+    server_.set_exception_handler(
+        [](const Request&, Response& response, const std::exception_ptr&) {
+          Refuse(&response, 500, "this request cannot be answered");
+        });
   }
 
   void SetRoutes() {

@@ -7,6 +7,7 @@ import type { DescMethod, MessageShape } from "@bufbuild/protobuf";
 import { AccessService } from "../generated/tissueform/v1/access_service_pb";
 import { CaseService } from "../generated/tissueform/v1/case_service_pb";
 import { DeformService } from "../generated/tissueform/v1/deform_service_pb";
+import { ExportService } from "../generated/tissueform/v1/export_service_pb";
 import { MeshService } from "../generated/tissueform/v1/mesh_service_pb";
 import { PlanService } from "../generated/tissueform/v1/plan_service_pb";
 import { PredictionService } from "../generated/tissueform/v1/prediction_service_pb";
@@ -31,6 +32,7 @@ export class Gateway {
   readonly plans: Client<typeof PlanService>;
   readonly predictions: Client<typeof PredictionService>;
   readonly deform: Client<typeof DeformService>;
+  readonly exports: Client<typeof ExportService>;
   readonly serverInfo: Client<typeof ServerInfoService>;
 
   /** `base`: where the page comes from, as "http://127.0.0.1:8080". */
@@ -52,6 +54,7 @@ export class Gateway {
     this.plans = createClient(PlanService, transport);
     this.predictions = createClient(PredictionService, transport);
     this.deform = createClient(DeformService, transport);
+    this.exports = createClient(ExportService, transport);
     this.serverInfo = createClient(ServerInfoService, transport);
   }
 

@@ -4,6 +4,7 @@
 import { sentenceOf } from "../calls/call_error";
 import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
 import type { Comparison } from "../workbench/comparison";
+import { exportText, maySend, mayTakeBack } from "../workbench/pacs_exports";
 import type { Workbench } from "../workbench/workbench";
 import { type Choice, button, el, newId, section, select, slider, whileBusy } from "./dom";
 import { modelText } from "./maps_panel";
@@ -46,6 +47,7 @@ function predictionList(bench: Workbench): HTMLElement {
     if (items.length === 0) list.append(el("li", { class: "quiet", text: "None is stored yet." }));
   };
   bench.predictions.watch(show);
+  bench.pacs.byPrediction.watch(show);
   bench.comparison.watch((next) => {
     // While the slider moves the list stays as it is: what has the focus keeps it.
     const shown = list.querySelector("[aria-pressed=true]")?.getAttribute("data-name") ?? undefined;
@@ -67,7 +69,27 @@ function predictionItem(bench: Workbench, prediction: Prediction, isCompared: bo
   const remove = button("Delete", () => void whileBusy(remove, () => bench.removePrediction(prediction), onError), {
     attributes: { "aria-label": `Delete ${prediction.title}` },
   });
-  return el("li", {}, [text, compare, remove]);
+  return el("li", {}, [text, compare, remove, pacsLine(bench, prediction)]);
+}
+
+/** Null where the server sends nothing to a PACS. */
+function pacsLine(bench: Workbench, prediction: Prediction): HTMLElement | null {
+  const all = bench.pacs.byPrediction.value;
+  if (all === null) return null;
+  const entry = all.get(prediction.name);
+  const onError = (thrown: unknown) => (bench.notice.value = sentenceOf(thrown));
+  const send = button("Send to PACS", () => void whileBusy(send, () => bench.sendToPacs(prediction), onError), {
+    attributes: { "aria-label": `Send ${prediction.title} to the PACS` },
+  });
+  const withdraw = async () => (mayTakeBack(entry) ? bench.pacs.takeBack(entry) : undefined);
+  const takeBack = button("Take back", () => void whileBusy(takeBack, withdraw, onError), {
+    attributes: { "aria-label": `Take ${prediction.title} back from the PACS` },
+  });
+  return el("div", { class: "pacs" }, [
+    entry === undefined ? null : el("small", { text: `PACS: ${exportText(entry)}`, attributes: { role: "status" } }),
+    maySend(entry) ? send : null,
+    mayTakeBack(entry) ? takeBack : null,
+  ]);
 }
 
 function comparisonBox(bench: Workbench): HTMLElement {

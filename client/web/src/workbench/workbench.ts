@@ -6,6 +6,7 @@ import type { Gateway } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
 import type { SurfaceKind } from "../case/manifest";
 import type { SolveSummary } from "../generated/tissueform/v1/deform_service_pb";
+import type { Measure } from "../generated/tissueform/v1/export_service_pb";
 import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
 import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
 import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
@@ -16,7 +17,7 @@ import type { Picture } from "../live/drag_session";
 import { type Connection, LiveSession } from "../live/live_session";
 import { LocalAnswers, type LocalState } from "../live/local_answers";
 import type { Anchor } from "../measures/anchor";
-import { type ShownFace, suggestLandmarks } from "../measures/face_measures";
+import { type ShownFace, collectMeasures, suggestLandmarks } from "../measures/face_measures";
 import { LandmarkBook } from "../measures/landmark_book";
 import { type HingeAxis, hingeAxis, lowerJawHandles, opened } from "../planning/jaw_opening";
 import { Plan } from "../planning/plan";
@@ -25,6 +26,7 @@ import type { HeadView } from "../scene/head_view";
 import { Answers } from "./answers";
 import { Comparer, type Comparison } from "./comparison";
 import { FaceColors, type MapLegend, followedRest, subtractInto } from "./face_colors";
+import { PacsExports } from "./pacs_exports";
 import { Signal } from "./signal";
 import { WishFit } from "./wish_fit";
 import { recallLandmarks, rememberLandmarks } from "./work";
@@ -65,6 +67,7 @@ export class Workbench implements ShownFace {
   readonly live: LiveSession;
   readonly landmarks: LandmarkBook;
   readonly wishes: WishFit;
+  readonly pacs: PacsExports;
   readonly local: LocalAnswers;
 
   readonly selected = new Signal(0);
@@ -111,6 +114,7 @@ export class Workbench implements ShownFace {
     this.displacements = new Float32Array(this.rest.length);
     this.colors = new FaceColors(view.head);
     this.answers = new Answers(gateway, file, caseName, this.rest);
+    this.pacs = new PacsExports(gateway, caseName);
     this.comparer = new Comparer(this.plan, this.answers);
     this.wishes = new WishFit(file, this.plan, (request) => this.answers.fit({ ...request, session: this.live.session, model: this.model.value }));
     const solids = file.surfaces.filter(({ entry }) => entry.kind === "bone" || entry.kind === "segment");
@@ -142,6 +146,7 @@ export class Workbench implements ShownFace {
     this.landmarks.restore(recallLandmarks(this.caseName));
     this.landmarks.onChange(() => rememberLandmarks(this.caseName, this.landmarks.save()));
     this.view.setPoses(this.posesByHandle(this.plan.poses()));
+    this.pacs.start();
     await Promise.all([this.live.start(this.plan.poses()), this.loadPredictions()]);
   }
 
@@ -196,6 +201,23 @@ export class Workbench implements ShownFace {
     const prediction = await this.answers.store(this.live.session, this.model.value, this.plan.poses(), title);
     this.predictions.value = [prediction, ...this.predictions.value];
     return prediction;
+  }
+
+  /** Asks for a stored prediction to be stored in the patient's study, with the numbers of its face. */
+  async sendToPacs(prediction: Prediction): Promise<void> {
+    await this.pacs.send(prediction, await this.measuresOf(prediction));
+  }
+
+  /** They are read from the stage: it shows that face for a moment. */
+  private async measuresOf(prediction: Prediction): Promise<Measure[]> {
+    const before = this.comparison.value;
+    await this.compare({ from: "rest", to: prediction, share: 1 });
+    try {
+      const { file, landmarks, shownPoses } = this;
+      return collectMeasures({ file, landmarks, shownPoses, showsPlan: true, bandOf: () => null, positionsOf: (surface) => this.positionsOf(surface) });
+    } finally {
+      await this.compare(before);
+    }
   }
 
   async removePrediction(prediction: Prediction): Promise<void> {

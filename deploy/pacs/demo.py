@@ -1,0 +1,110 @@
+#!/usr/bin/env python3
+# Copyright 2026 The Tissueform Authors.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+"""What deploy/pacs/demo.sh shows, once everything is built.
+
+  demo.py PROGRAMS WEB [--serve] [--folder DIR]
+"""
+
+import argparse
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+import head_series
+import stack
+
+HERE = pathlib.Path(__file__).resolve().parent
+
+
+def curl(programs, path):
+    """What anybody's DICOMweb client sees."""
+    certificate, key = programs.identities["scanner"]
+    command = ["curl", "--silent", "--show-error", "--noproxy", "*", "--cacert", programs.authority.certificate, "--cert", certificate,
+               "--key", key, "--header", "Accept: application/dicom+json", programs.dicomweb + path]
+    return subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=stack.PATIENCE_S, check=True).stdout
+
+
+def shown(programs, study):
+    """Stores what came back, checks it, and tells it."""
+    folder = programs.folder / "back"
+    folder.mkdir(exist_ok=True)
+    for number, instance in enumerate(programs.instances_of(study)):
+        tags = programs.orthanc(f"/instances/{instance}/simplified-tags")
+        if tags["Modality"] == "CT":
+            continue
+        path = folder / f"{tags['Modality']}-{number}.dcm"
+        path.write_bytes(programs.orthanc_file(instance))
+        checked = subprocess.run(["dciodvfy", path], capture_output=True, text=True, timeout=stack.PATIENCE_S, check=False)
+        errors = [line for line in (checked.stdout + checked.stderr).splitlines() if line.startswith("Error")]
+        print(f"  {tags['Modality']:3} {tags.get('SeriesDescription', ''):40} {tags.get('DocumentTitle', ''):32} dciodvfy: {len(errors)} errors")
+        for line in errors:
+            print("     ", line)
+    capture = next(folder.glob("OT-*.dcm"), None) or next(folder.glob("SC-*.dcm"), None)
+    if capture is not None:
+        picture = programs.folder / "capture.png"
+        subprocess.run(["dcmj2pnm", "--write-png", "--frame", "1", capture, picture], check=True, capture_output=True, timeout=stack.PATIENCE_S)
+        print(f"  first frame of the capture: {picture}")
+
+
+def run(programs, web):
+    began = time.monotonic()
+
+    def tell(text):
+        print(f"[{time.monotonic() - began:5.1f} s] {text}", flush=True)
+
+    programs.start_orthanc()
+    programs.start_server()
+    programs.start_gateway(web)
+    programs.start_bridge()
+    tell("Orthanc, server, gateway and bridge run on loopback, TLS between them")
+    study, _ = head_series.write_series(programs.folder / "ct")
+    sent = programs.store_from_scanner(programs.folder / "ct")
+    if sent.returncode != 0:
+        raise SystemExit(f"storescu: {sent.stderr}")
+    tell(f"storescu has sent {len(programs.instances_of(study))} slices to Orthanc")
+    programs.send_to_bridge(study)
+    tell("Orthanc has sent them to the bridge, which builds the plan")
+    case = programs.wait_for("the case", lambda: (programs.cases() or [None])[0], patience_s=300, needs="bridge")
+    tell(f"published: {case}")
+    prediction = programs.predict(case)
+    tell(f"a planner stores {prediction} and sends it to the PACS")
+    programs.tissueform("prediction", "send", prediction)
+    form = programs.wait_for("the work list's question", lambda: (programs.forms() or [None])[0], needs="bridge")
+    programs.confirm(form)
+    tell("confirmed in the work list")
+    programs.wait_for("the objects", lambda: ": stored" in programs.tissueform("prediction", "send", prediction).stdout
+                      or " stored " in programs.tissueform("prediction", "sent").stdout, needs="bridge")
+    tell("stored; QIDO-RS lists the study's series:")
+    print(curl(programs, f"/studies/{study}/series")[:2000])
+    shown(programs, study)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("programs")
+    parser.add_argument("web")
+    parser.add_argument("--serve", action="store_true")
+    parser.add_argument("--folder")
+    words = parser.parse_args()
+    missing = stack.missing_programs()
+    if missing:
+        sys.exit(f"missing: {', '.join(missing)}; deploy/install_packages.sh build installs them")
+    folder = words.folder or tempfile.mkdtemp(prefix="tissueform-pacs-")
+    with stack.Stack(pathlib.Path(words.programs).resolve(), pathlib.Path(folder).resolve(), HERE / "recipe.json") as programs:
+        run(programs, pathlib.Path(words.web).resolve())
+        print(f"everything lies in {folder}")
+        if not words.serve:
+            return
+        print(f"work list http://{stack.HOST}:{programs.worklist_port}/\nplanner   http://localhost:{programs.gateway_port}/\nCtrl-C ends it", flush=True)
+        try:
+            while all(process.poll() is None for process in programs.running.values()):
+                time.sleep(1)
+        except KeyboardInterrupt:
+            pass
+
+
+if __name__ == "__main__":
+    main()
