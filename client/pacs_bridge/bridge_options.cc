@@ -23,7 +23,7 @@ constexpr int64_t kBytesOfMebibyte = 1 << 20;
 
 // One whole number, shown in the unit of its option.
 void AddNumber(CLI::App& app, const std::string& name, int64_t shown, int64_t least, int64_t most,
-               std::function<void(int64_t)> set, const std::string& help) {
+               const std::function<void(int64_t)>& set, const std::string& help) {
   app.add_option_function<int64_t>(
          name, [set](const int64_t& value) { set(value); }, help)
       ->check(CLI::Range(least, most))

@@ -24,8 +24,4 @@ struct SeriesVerdict {
 std::vector<SeriesVerdict> PickSeries(const std::vector<SeriesFacts>& study,
                                       const std::vector<SeriesRule>& rules);
 
-// Why a rule does not take a series, all that is against it; empty: it takes it. For other
-// modalities what they lack: "MR has no Hounsfield units ...".
-std::string WhatIsAgainst(const SeriesFacts& series, const SeriesRule& rule);
-
 }  // namespace tissueform

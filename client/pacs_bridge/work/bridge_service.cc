@@ -17,6 +17,7 @@ constexpr std::chrono::milliseconds kStepPause{1000};
 constexpr std::chrono::hours kDeletionPause{1};
 // What a server may tell of before it is taken; each is told again by the next watch.
 constexpr size_t kMostHeard = 4096;
+constexpr char kWatch[] = "watch";  // among the keys of what is tried again
 
 bool HasPlanStep(SeriesState state) {
   return state == SeriesState::kChosen || state == SeriesState::kBuilt ||
@@ -178,7 +179,6 @@ void BridgeService::WorkOnExports() {
 }
 
 void BridgeService::WatchServer() {
-  constexpr char kWatch[] = "watch";
   if (!watch_retries_.Due(kWatch)) return;
   const Cancellation cancelled([this] { return stopping(); });
   const absl::Status status = parts_.server->WatchExports(

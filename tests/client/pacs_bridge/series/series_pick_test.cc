@@ -9,6 +9,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "client/pacs_bridge/series/series_objections.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {

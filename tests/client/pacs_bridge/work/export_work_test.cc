@@ -68,7 +68,7 @@ class BridgeWorkTest : public ::testing::Test {
   }
 
   // Shows a series to the intake, but for some slices.
-  testing::CtSeries Receive(const std::string& name, testing::CtSeriesOptions options = {},
+  testing::CtSeries Receive(const std::string& name, const testing::CtSeriesOptions& options = {},
                             const std::vector<size_t>& without = {}) {
     const fs::path folder = fs::path(queue_->received_folder()) / name;
     fs::create_directories(folder);
@@ -104,7 +104,7 @@ class BridgeWorkTest : public ::testing::Test {
     return series;
   }
   testing::CtSeries ReceiveWithCase(const std::string& name,
-                                    testing::CtSeriesOptions options = {}) {
+                                    const testing::CtSeriesOptions& options = {}) {
     testing::CtSeries series = Receive(name, options);
     WaitQuietly();
     Settle();

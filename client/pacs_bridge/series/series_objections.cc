@@ -1,0 +1,97 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/series/series_objections.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+
+namespace tissueform {
+namespace {
+
+// Two numbers that are read from headers are the same.
+constexpr double kSameMm = 0.01;
+
+std::string OtherModality(const std::string& modality) {
+  // Of a header: only what is a modality by its form is told again.
+  const bool is_name =
+      modality.size() <= 16 && std::all_of(modality.begin(), modality.end(), [](unsigned char c) {
+        return absl::ascii_isupper(c) || absl::ascii_isdigit(c);
+      });
+  if (modality == "MR") {
+    return "it is of modality MR, which has no Hounsfield units to tell bone and skin by; send a "
+           "CT";
+  }
+  return absl::StrCat("it is of modality ", is_name && !modality.empty() ? modality : "unknown");
+}
+
+bool HasAnyWord(const std::string& text, const std::vector<std::string>& words) {
+  return std::any_of(words.begin(), words.end(), [&text](const std::string& word) {
+    return absl::StrContains(absl::AsciiStrToLower(text), absl::AsciiStrToLower(word));
+  });
+}
+
+void CheckSlices(const SeriesFacts& series, const SeriesRule& rule,
+                 std::vector<std::string>* against) {
+  const auto add = [against](std::string why) { against->push_back(std::move(why)); };
+  if (series.slices < rule.min_slices) {
+    add(absl::StrCat("it has ", series.slices, " slices, fewer than ", rule.min_slices));
+    // All that follows would say the same again.
+    return;
+  }
+  if (series.missing > rule.max_missing) {
+    add(absl::StrCat(series.missing, " slices are missing between the first and the last"));
+  }
+  if (series.duplicates > 0) {
+    add(absl::StrCat(series.duplicates, " images lie where another one lies"));
+  }
+  if (series.frames_of_reference > 1) {
+    add(absl::StrCat("its images are of ", series.frames_of_reference, " frames of reference"));
+  }
+  if (series.orientations > 1) add("its images are turned differently");
+  if (rule.axial_only && series.plane != SlicePlane::kAxial) add("its slices are not axial");
+  if (series.spacing_mm > rule.max_spacing_mm + kSameMm) {
+    add(absl::StrFormat("its slices are %.2f mm apart, more than %.2f", series.spacing_mm,
+                        rule.max_spacing_mm));
+  }
+  if (series.thickness_mm > rule.max_thickness_mm + kSameMm) {
+    add(absl::StrFormat("its slices are %.2f mm thick, more than %.2f", series.thickness_mm,
+                        rule.max_thickness_mm));
+  }
+  if (series.coverage_mm < rule.min_coverage_mm || series.coverage_mm > rule.max_coverage_mm) {
+    add(absl::StrFormat("it covers %.0f mm, not %.0f to %.0f", series.coverage_mm,
+                        rule.min_coverage_mm, rule.max_coverage_mm));
+  }
+}
+
+}  // namespace
+
+std::string WhatIsAgainst(const SeriesFacts& series, const SeriesRule& rule) {
+  if (series.modality != rule.modality) return OtherModality(series.modality);
+  if (series.localiser) return "it is a localiser (scout)";
+  std::vector<std::string> against;
+  if (rule.hounsfield && !series.hounsfield) {
+    against.emplace_back(
+        "it does not say how its values become Hounsfield units, as a cone-beam CT may not; a "
+        "rule with \"hounsfield\": false and a recipe with hu_offset take it");
+  }
+  CheckSlices(series, rule, &against);
+  if (series.derived && !rule.derived) against.emplace_back("it is derived from another series");
+  if (series.contrast && !rule.contrast) against.emplace_back("it has contrast medium");
+  if (!rule.description_has.empty() && !HasAnyWord(series.description, rule.description_has)) {
+    against.emplace_back("its description has none of the rule's words");
+  }
+  if (HasAnyWord(series.description, rule.description_lacks)) {
+    against.emplace_back("its description has a word that the rule does not want");
+  }
+  return absl::StrJoin(against, "; ");
+}
+
+}  // namespace tissueform
