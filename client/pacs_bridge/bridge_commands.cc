@@ -34,10 +34,11 @@ PlanWork PlanWorkOf(BridgeParts* parts, const BridgeOptions& options) {
 }
 
 void PrintPatient(const QueuedStudy& study, const QueuedExport& queued) {
-  absl::PrintF("%s goes to the study of\n  name        %s\n  born        %s\n  patient ID  %s\n"
-               "  study of    %s\n",
-               queued.name, ShownName(study.patient.name), ShownDate(study.patient.birth_date),
-               study.patient.id, ShownDate(study.date));
+  absl::PrintF(
+      "%s goes to the study of\n  name        %s\n  born        %s\n  patient ID  %s\n"
+      "  study of    %s\n",
+      queued.name, ShownName(study.patient.name), ShownDate(study.patient.birth_date),
+      study.patient.id, ShownDate(study.date));
   if (!queued.note.empty()) absl::PrintF("  note        %s\n", queued.note);
 }
 
@@ -67,9 +68,9 @@ int BridgeCommands::Run() const {
   if (run_->parsed()) return RunBridge(*options_, BridgeRunKind::kEverything);
   if (listen_->parsed()) return RunBridge(*options_, BridgeRunKind::kReceiving);
   const std::vector<std::pair<const CLI::App*, absl::Status (BridgeCommands::*)() const>> steps = {
-      {fetch_, &BridgeCommands::Fetch},     {series_, &BridgeCommands::Series},
-      {build_, &BridgeCommands::Build},     {publish_, &BridgeCommands::Publish},
-      {store_, &BridgeCommands::Store},     {status_, &BridgeCommands::Status}};
+      {fetch_, &BridgeCommands::Fetch}, {series_, &BridgeCommands::Series},
+      {build_, &BridgeCommands::Build}, {publish_, &BridgeCommands::Publish},
+      {store_, &BridgeCommands::Store}, {status_, &BridgeCommands::Status}};
   for (const auto& [command, step] : steps) {
     if (!command->parsed()) continue;
     const absl::Status status = (this->*step)();
@@ -77,8 +78,9 @@ int BridgeCommands::Run() const {
     absl::FPrintF(stderr, "tissueform-pacs: %s\n", status.message());
     return 1;
   }
-  absl::FPrintF(stderr, "tissueform-pacs: say what to do: run, listen, fetch, series, build, "
-                        "publish, store or status; see --help\n");
+  absl::FPrintF(stderr,
+                "tissueform-pacs: say what to do: run, listen, fetch, series, build, "
+                "publish, store or status; see --help\n");
   return 2;
 }
 
@@ -97,9 +99,9 @@ absl::Status BridgeCommands::Fetch() const {
   TF_ASSIGN_OR_RETURN(const std::vector<SeriesSummary> study,
                       parts->pacs()->FindSeries({.study_uid = name_}));
   for (const SeriesSummary& series : study) {
-    TF_ASSIGN_OR_RETURN(const FetchCounts counts,
-                        parts->pacs()->FetchSeries(name_, series.series_uid, &parts->folder(),
-                                                   &parts->sink()));
+    TF_ASSIGN_OR_RETURN(
+        const FetchCounts counts,
+        parts->pacs()->FetchSeries(name_, series.series_uid, &parts->folder(), &parts->sink()));
     absl::PrintF("series %d: %d objects, %d failed\n", series.number, counts.completed,
                  counts.failed);
     TF_RETURN_IF_ERROR(parts->intake().Settle().status());
@@ -150,8 +152,9 @@ absl::Status BridgeCommands::Store() const {
   TF_ASSIGN_OR_RETURN(const auto parts, BridgeParts::Open(*options_));
   const std::unique_ptr<ExportWork> work = parts->MakeExportWork();
   if (work == nullptr) {
-    return absl::FailedPreconditionError("storing needs a server and a PACS; give --server and "
-                                         "--pacs or --pacs-url");
+    return absl::FailedPreconditionError(
+        "storing needs a server and a PACS; give --server and "
+        "--pacs or --pacs-url");
   }
   ExportRows exports(&parts->queue());
   ReceivedRows received(&parts->queue());

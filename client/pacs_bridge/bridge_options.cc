@@ -24,7 +24,8 @@ constexpr int64_t kBytesOfMebibyte = 1 << 20;
 // One whole number, shown in the unit of its option.
 void AddNumber(CLI::App& app, const std::string& name, int64_t shown, int64_t least, int64_t most,
                std::function<void(int64_t)> set, const std::string& help) {
-  app.add_option_function<int64_t>(name, [set](const int64_t& value) { set(value); }, help)
+  app.add_option_function<int64_t>(
+         name, [set](const int64_t& value) { set(value); }, help)
       ->check(CLI::Range(least, most))
       ->default_str(std::to_string(shown))
       ->type_name("INT");
@@ -33,22 +34,21 @@ void AddNumber(CLI::App& app, const std::string& name, int64_t shown, int64_t le
 // "HOST:PORT".
 void AddAddress(CLI::App& app, const std::string& name, std::string* host, int* port,
                 bool has_default, const std::string& help) {
-  CLI::Option* option =
-      app.add_option_function<std::string>(
-             name,
-             [name, host, port](const std::string& text) {
-               const size_t colon = text.rfind(':');
-               int64_t number = -1;
-               if (colon == std::string::npos || colon == 0 ||
-                   !absl::SimpleAtoi(text.substr(colon + 1), &number) || number < 0 ||
-                   number > kMostPort) {
-                 throw CLI::ValidationError(name, "HOST:PORT is needed");
-               }
-               *host = text.substr(0, colon);
-               *port = static_cast<int>(number);
-             },
-             help)
-          ->type_name("HOST:PORT");
+  CLI::Option* option = app.add_option_function<std::string>(
+                               name,
+                               [name, host, port](const std::string& text) {
+                                 const size_t colon = text.rfind(':');
+                                 int64_t number = -1;
+                                 if (colon == std::string::npos || colon == 0 ||
+                                     !absl::SimpleAtoi(text.substr(colon + 1), &number) ||
+                                     number < 0 || number > kMostPort) {
+                                   throw CLI::ValidationError(name, "HOST:PORT is needed");
+                                 }
+                                 *host = text.substr(0, colon);
+                                 *port = static_cast<int>(number);
+                               },
+                               help)
+                            ->type_name("HOST:PORT");
   if (has_default) option->default_str(absl::StrCat(*host, ":", *port));
 }
 
@@ -67,22 +67,22 @@ void AddReceiver(CLI::App& app, BridgeOptions* options) {
                  "IPv4 address or network (10.1.2.0/24) from which images are taken")
       ->default_str("127.0.0.1")
       ->type_name("ADDRESS");
-  AddNumber(app, "--max-associations", receiver->max_associations, 1, 1024,
-            [receiver](int64_t value) { receiver->max_associations = static_cast<int>(value); },
-            "associations at once; who comes later is refused for now");
-  AddNumber(app, "--watermark-mib", options->watermark_bytes / kBytesOfMebibyte, 1, kMostSetting,
-            [options](int64_t value) { options->watermark_bytes = value * kBytesOfMebibyte; },
-            "what stays free on the disk; an image that would take it is answered with 0xA700");
+  AddNumber(
+      app, "--max-associations", receiver->max_associations, 1, 1024,
+      [receiver](int64_t value) { receiver->max_associations = static_cast<int>(value); },
+      "associations at once; who comes later is refused for now");
+  AddNumber(
+      app, "--watermark-mib", options->watermark_bytes / kBytesOfMebibyte, 1, kMostSetting,
+      [options](int64_t value) { options->watermark_bytes = value * kBytesOfMebibyte; },
+      "what stays free on the disk; an image that would take it is answered with 0xA700");
   CLI::Option* certificate =
       app.add_option("--dicom-cert", options->tls.certificate,
                      "the bridge's certificate for DICOM, PEM: then nothing is received plain")
           ->type_name("FILE");
-  CLI::Option* key =
-      app.add_option("--dicom-key", options->tls.key, "its key")->type_name("FILE");
-  CLI::Option* authorities =
-      app.add_option("--dicom-ca", options->tls.authorities,
-                     "authorities of those who may send, and of the PACS")
-          ->type_name("FILE");
+  CLI::Option* key = app.add_option("--dicom-key", options->tls.key, "its key")->type_name("FILE");
+  CLI::Option* authorities = app.add_option("--dicom-ca", options->tls.authorities,
+                                            "authorities of those who may send, and of the PACS")
+                                 ->type_name("FILE");
   certificate->needs(key)->needs(authorities);
   key->needs(certificate);
 }
@@ -100,8 +100,9 @@ void AddPacs(CLI::App& app, PacsPeer* pacs) {
          "know)")
       ->check(CLI::IsMember({"get", "move"}))
       ->default_str("get");
-  app.add_flag_callback("--pacs-tls", [pacs] { pacs->tls.emplace(); },
-                        "speak to it by TLS, with --dicom-cert, --dicom-key and --dicom-ca");
+  app.add_flag_callback(
+      "--pacs-tls", [pacs] { pacs->tls.emplace(); },
+      "speak to it by TLS, with --dicom-cert, --dicom-key and --dicom-ca");
   app.add_option("--pacs-url", pacs->url,
                  "the PACS by DICOMweb instead: https://pacs.example.org/dicom-web")
       ->type_name("URL");
@@ -114,20 +115,24 @@ void AddPlans(CLI::App& app, BridgeOptions* options) {
   app.add_option("--recipe", options->recipe,
                  "the recipe where there are no --rules (docs/recipe-format.md)")
       ->type_name("FILE");
-  AddNumber(app, "--quiet-seconds", options->quiet.count(), 1, 24 * 3600,
-            [options](int64_t value) { options->quiet = std::chrono::seconds(value); },
-            "a series is complete, or has stopped midway, when nothing came for so long; at once "
-            "where its association ends and the PACS counts as many images");
+  AddNumber(
+      app, "--quiet-seconds", options->quiet.count(), 1, 24 * 3600,
+      [options](int64_t value) { options->quiet = std::chrono::seconds(value); },
+      "a series is complete, or has stopped midway, when nothing came for so long; at once "
+      "where its association ends and the PACS counts as many images");
   PlanWorkOptions* plan = &options->plan;
-  AddNumber(app, "--plan-threads", plan->threads, 0, 1024,
-            [plan](int64_t value) { plan->threads = static_cast<int>(value); },
-            "threads of `plan build`; 0: all processors");
-  AddNumber(app, "--plan-seconds", plan->max_seconds, 1, kMostSetting,
-            [plan](int64_t value) { plan->max_seconds = static_cast<int>(value); },
-            "of processor time, after which `plan build` is ended");
-  AddNumber(app, "--plan-memory-mib", plan->max_memory_bytes / kBytesOfMebibyte, 256, kMostSetting,
-            [plan](int64_t value) { plan->max_memory_bytes = value * kBytesOfMebibyte; },
-            "memory that `plan build` may take");
+  AddNumber(
+      app, "--plan-threads", plan->threads, 0, 1024,
+      [plan](int64_t value) { plan->threads = static_cast<int>(value); },
+      "threads of `plan build`; 0: all processors");
+  AddNumber(
+      app, "--plan-seconds", plan->max_seconds, 1, kMostSetting,
+      [plan](int64_t value) { plan->max_seconds = static_cast<int>(value); },
+      "of processor time, after which `plan build` is ended");
+  AddNumber(
+      app, "--plan-memory-mib", plan->max_memory_bytes / kBytesOfMebibyte, 256, kMostSetting,
+      [plan](int64_t value) { plan->max_memory_bytes = value * kBytesOfMebibyte; },
+      "memory that `plan build` may take");
   app.add_flag("--accept-defects", plan->accept_defects,
                "publish also a plan that misses a quality requirement");
 }
@@ -155,8 +160,9 @@ void AddWorkList(CLI::App& app, BridgeOptions* options) {
   WorkListOptions* worklist = &options->worklist;
   AddAddress(app, "--worklist-listen", &worklist->address, &worklist->port, true,
              "where the work list is served; port 0 takes a free one. It shows names of patients");
-  app.add_flag_callback("--no-worklist", [options] { options->has_worklist = false; },
-                        "serve none: exports are confirmed by `tissueform-pacs store`");
+  app.add_flag_callback(
+      "--no-worklist", [options] { options->has_worklist = false; },
+      "serve none: exports are confirmed by `tissueform-pacs store`");
   app.add_option("--worklist-host", worklist->allowed_hosts,
                  "name by which browsers reach it, behind a proxy")
       ->type_name("HOST");
@@ -169,12 +175,14 @@ void AddWorkList(CLI::App& app, BridgeOptions* options) {
 }
 
 void AddRetention(CLI::App& app, RetentionOptions* retention) {
-  AddNumber(app, "--keep-images", retention->keep_images.count() / 24, 0, 36500,
-            [retention](int64_t days) { retention->keep_images = std::chrono::hours(days * 24); },
-            "days for which received images, and the plan built of them, are kept after that");
-  AddNumber(app, "--keep-headers", retention->keep_headers.count() / 24, 0, 36500,
-            [retention](int64_t days) { retention->keep_headers = std::chrono::hours(days * 24); },
-            "days for which a header without pixels is kept, for where the PACS gives none");
+  AddNumber(
+      app, "--keep-images", retention->keep_images.count() / 24, 0, 36500,
+      [retention](int64_t days) { retention->keep_images = std::chrono::hours(days * 24); },
+      "days for which received images, and the plan built of them, are kept after that");
+  AddNumber(
+      app, "--keep-headers", retention->keep_headers.count() / 24, 0, 36500,
+      [retention](int64_t days) { retention->keep_headers = std::chrono::hours(days * 24); },
+      "days for which a header without pixels is kept, for where the PACS gives none");
 }
 
 }  // namespace

@@ -79,9 +79,8 @@ absl::Status Serve(const BridgeOptions& options, BridgeRunKind kind) {
                          .retention = options.retention,
                          .log = LogLine});
   WakingSink sink(&parts->sink(), [&service] { service.Wake(); });
-  TF_ASSIGN_OR_RETURN(
-      const std::unique_ptr<StorageReceiver> receiver,
-      StorageReceiver::Start(ReceiverOptionsOf(options), &parts->folder(), &sink));
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<StorageReceiver> receiver,
+                      StorageReceiver::Start(ReceiverOptionsOf(options), &parts->folder(), &sink));
   absl::PrintF("receiving on %s:%d\n", options.receiver.address, receiver->port());
   std::unique_ptr<WorkListServer> worklist;
   if (everything && options.has_worklist) {

@@ -40,8 +40,7 @@ constexpr char kFooter[] =
     "  tissueform-pacs status --json          where everything is\n"
     "Exit codes: 0 done, 1 the work failed, 2 wrong use.";
 
-constexpr uint64_t kEndingSignals =
-    (uint64_t{1} << (SIGTERM - 1)) | (uint64_t{1} << (SIGINT - 1));
+constexpr uint64_t kEndingSignals = (uint64_t{1} << (SIGTERM - 1)) | (uint64_t{1} << (SIGINT - 1));
 
 // For every thread that there will be, and before libraries start theirs when they are loaded
 // (OpenBLAS does). The system call itself, as nothing is initialised yet that the sanitizers'

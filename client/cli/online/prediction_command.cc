@@ -18,8 +18,8 @@
 
 #include "client/cli/compare/comparison_report.h"
 #include "client/cli/online/prediction_export.h"
-#include "client/cli/online/prediction_send_command.h"
 #include "client/cli/online/prediction_pictures.h"
+#include "client/cli/online/prediction_send_command.h"
 #include "client/cli/online/resource_text.h"
 #include "client/cli/online/server_connection.h"
 #include "client/cli/online/session_command.h"

@@ -7,7 +7,8 @@
 
 namespace tissueform {
 
-// `tissueform prediction create|list|show|compare|export|delete|send|sent|unsend`: answers that a server keeps.
+// `tissueform prediction create|list|show|compare|export|delete|send|sent|unsend`: answers that a
+// server keeps.
 void AddPredictionCommand(CLI::App& app, CommandWork* work);
 
 }  // namespace tissueform

@@ -7,8 +7,8 @@
 
 namespace tissueform {
 
-// `tissueform prediction send|sent|unsend`, beside the others of `prediction`: stored predictions on
-// their way to the PACS.
+// `tissueform prediction send|sent|unsend`, beside the others of `prediction`: stored predictions
+// on their way to the PACS.
 void AddPredictionSendCommands(CLI::App& prediction, CommandWork* work);
 
 }  // namespace tissueform

@@ -52,9 +52,9 @@ absl::StatusOr<int64_t> PragmaOf(Database& database, const char* sql) {
 absl::Status CheckVersion(Database& database, int64_t version) {
   TF_ASSIGN_OR_RETURN(const int64_t application, PragmaOf(database, "PRAGMA application_id"));
   if (version == kQueueVersion && application == kQueueApplicationId) return absl::OkStatus();
-  return absl::FailedPreconditionError(absl::StrCat(
-      "queue ", database.path(), " is of version ", version, ", this program knows ", kQueueVersion,
-      "; take the program that has made it, or another --state-dir"));
+  return absl::FailedPreconditionError(
+      absl::StrCat("queue ", database.path(), " is of version ", version, ", this program knows ",
+                   kQueueVersion, "; take the program that has made it, or another --state-dir"));
 }
 
 }  // namespace
@@ -71,8 +71,7 @@ absl::StatusOr<std::unique_ptr<BridgeQueue>> BridgeQueue::Open(const std::string
   }
   TF_ASSIGN_OR_RETURN(std::unique_ptr<Database> database, Database::Open(path + "/queue.db"));
   TF_RETURN_IF_ERROR(SyncFolder(path));
-  std::unique_ptr<BridgeQueue> queue(
-      new BridgeQueue(path, std::move(held), std::move(database)));
+  std::unique_ptr<BridgeQueue> queue(new BridgeQueue(path, std::move(held), std::move(database)));
   TF_RETURN_IF_ERROR(queue->PrepareTables());
   return queue;
 }
@@ -83,8 +82,7 @@ absl::StatusOr<std::unique_ptr<BridgeQueue>> BridgeQueue::OpenForReading(
                       Database::OpenForReading(folder + "/queue.db"));
   TF_ASSIGN_OR_RETURN(const int64_t version, PragmaOf(*database, "PRAGMA user_version"));
   TF_RETURN_IF_ERROR(CheckVersion(*database, version));
-  return std::unique_ptr<BridgeQueue>(
-      new BridgeQueue(folder, std::nullopt, std::move(database)));
+  return std::unique_ptr<BridgeQueue>(new BridgeQueue(folder, std::nullopt, std::move(database)));
 }
 
 absl::Status BridgeQueue::PrepareTables() {

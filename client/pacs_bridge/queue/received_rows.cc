@@ -14,13 +14,13 @@
 namespace tissueform {
 namespace {
 
-constexpr std::array<const char*, 9> kSeriesStates = {
-    "receiving", "incomplete", "complete",  "passed_over", "chosen",
-    "built",     "packed",     "published", "failed"};
+constexpr std::array<const char*, 9> kSeriesStates = {"receiving",   "incomplete", "complete",
+                                                      "passed_over", "chosen",     "built",
+                                                      "packed",      "published",  "failed"};
 
-#define TF_SERIES_COLUMNS                                                                        \
+#define TF_SERIES_COLUMNS                                                                         \
   "SELECT key, study_uid, uid, frame_uid, modality, state, reason, recipe, case_name, attempts, " \
-  "last_error, first_s, done_s, has_files, has_header, (SELECT COUNT(*) FROM images WHERE "      \
+  "last_error, first_s, done_s, has_files, has_header, (SELECT COUNT(*) FROM images WHERE "       \
   "images.series = series.key) FROM series "
 
 absl::StatusOr<SeriesState> StateOf(absl::string_view name) {
@@ -52,8 +52,7 @@ absl::StatusOr<QueuedSeries> SeriesOf(const Database::Query& row) {
 }
 
 absl::Status InsertStudy(Database& database, const QueuedStudy& study) {
-  return database
-      .Prepare("INSERT OR IGNORE INTO studies VALUES (?, ?, ?, ?, ?, ?, ?, ?)")
+  return database.Prepare("INSERT OR IGNORE INTO studies VALUES (?, ?, ?, ?, ?, ?, ?, ?)")
       .Bind(study.uid)
       .Bind(study.patient.id)
       .Bind(study.patient.issuer)
@@ -85,14 +84,15 @@ absl::Status InsertSeries(Database& database, const QueuedSeries& series, const 
 absl::StatusOr<bool> InsertImage(Database& database, const std::string& series,
                                  const QueuedImage& image) {
   const int64_t before = database.total_changes();
-  TF_RETURN_IF_ERROR(database
-                         .Prepare("INSERT INTO images VALUES (?, ?, ?, ?) ON CONFLICT (series, uid) "
-                                  "DO UPDATE SET file = excluded.file WHERE images.file = ''")
-                         .Bind(series)
-                         .Bind(image.uid)
-                         .Bind(image.class_uid)
-                         .Bind(image.file)
-                         .Run());
+  TF_RETURN_IF_ERROR(
+      database
+          .Prepare("INSERT INTO images VALUES (?, ?, ?, ?) ON CONFLICT (series, uid) "
+                   "DO UPDATE SET file = excluded.file WHERE images.file = ''")
+          .Bind(series)
+          .Bind(image.uid)
+          .Bind(image.class_uid)
+          .Bind(image.file)
+          .Run());
   return database.total_changes() > before;
 }
 
@@ -129,9 +129,7 @@ std::string DigestOf(const PatientIdentity& patient) {
   return Sha256Hex({lengths, patient.id, patient.issuer, patient.name, patient.birth_date});
 }
 
-const char* SeriesStateName(SeriesState state) {
-  return kSeriesStates[static_cast<size_t>(state)];
-}
+const char* SeriesStateName(SeriesState state) { return kSeriesStates[static_cast<size_t>(state)]; }
 
 absl::StatusOr<QueuedSeries> ReceivedRows::Add(const QueuedStudy& study, const QueuedSeries& series,
                                                const std::string& new_key,
@@ -194,8 +192,9 @@ absl::Status ReceivedRows::UpdatePatient(const std::string& study_uid,
                                          const PatientIdentity& patient) {
   return queue_->Change([&](Database& database) {
     return database
-        .Prepare("UPDATE studies SET patient_id = ?, issuer = ?, name = ?, birth_date = ?, "
-                 "readable = ? WHERE uid = ?")
+        .Prepare(
+            "UPDATE studies SET patient_id = ?, issuer = ?, name = ?, birth_date = ?, "
+            "readable = ? WHERE uid = ?")
         .Bind(patient.id)
         .Bind(patient.issuer)
         .Bind(patient.name)

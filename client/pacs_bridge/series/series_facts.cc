@@ -87,8 +87,8 @@ void MeasurePlaces(const std::vector<double>& places, SeriesFacts* facts) {
   for (const double step : steps) {
     if (step > kGapSpacings * facts->spacing_mm) {
       // A place far off is one gap, not a million.
-      facts->missing += static_cast<int>(
-          std::min(std::round(step / facts->spacing_mm) - 1, 100'000.0));
+      facts->missing +=
+          static_cast<int>(std::min(std::round(step / facts->spacing_mm) - 1, 100'000.0));
     }
   }
 }
@@ -101,7 +101,8 @@ bool IsLocaliser(const InstanceHeader& image) {
 // The digits after the leading letters: 60 of "Hr60s"; -1: none.
 int NumberIn(absl::string_view name) {
   size_t begin = 0;
-  while (begin < name.size() && absl::ascii_isalpha(static_cast<unsigned char>(name[begin]))) ++begin;
+  while (begin < name.size() && absl::ascii_isalpha(static_cast<unsigned char>(name[begin])))
+    ++begin;
   size_t end = begin;
   while (end < name.size() && absl::ascii_isdigit(static_cast<unsigned char>(name[end]))) ++end;
   int number = -1;

@@ -23,8 +23,8 @@ struct SeriesFacts {
   std::string description = {};  // for rules only, never in a text: it may hold anything
   int number = 0;
   int slices = 0;
-  int duplicates = 0;         // images at a place that another image has
-  int missing = 0;            // places between the first and the last that have no image
+  int duplicates = 0;  // images at a place that another image has
+  int missing = 0;     // places between the first and the last that have no image
   int frames_of_reference = 0;
   int orientations = 0;
   SlicePlane plane = SlicePlane::kNone;
@@ -41,8 +41,8 @@ struct SeriesFacts {
 // REQUIRES: headers of one series, at least one.
 SeriesFacts FactsOfSeries(const std::string& key, const std::vector<InstanceHeader>& images);
 
-// By the names that manufacturers give their kernels: "H60s" (sharp from 50 on), "BONEPLUS", "FC81";
-// a name that says neither is unknown.
+// By the names that manufacturers give their kernels: "H60s" (sharp from 50 on), "BONEPLUS",
+// "FC81"; a name that says neither is unknown.
 KernelKind KernelKindOf(const std::string& kernel);
 
 // "231 axial slices, 0.60 mm apart, over 138 mm, soft kernel", for people; nothing of a patient.

@@ -21,11 +21,13 @@ constexpr double kSameMm = 0.01;
 
 std::string OtherModality(const std::string& modality) {
   // Of a header: only what is a modality by its form is told again.
-  const bool is_name = modality.size() <= 16 && std::all_of(modality.begin(), modality.end(), [](unsigned char c) {
-    return absl::ascii_isupper(c) || absl::ascii_isdigit(c);
-  });
+  const bool is_name =
+      modality.size() <= 16 && std::all_of(modality.begin(), modality.end(), [](unsigned char c) {
+        return absl::ascii_isupper(c) || absl::ascii_isdigit(c);
+      });
   if (modality == "MR") {
-    return "it is of modality MR, which has no Hounsfield units to tell bone and skin by; send a CT";
+    return "it is of modality MR, which has no Hounsfield units to tell bone and skin by; send a "
+           "CT";
   }
   return absl::StrCat("it is of modality ", is_name && !modality.empty() ? modality : "unknown");
 }
@@ -180,9 +182,11 @@ std::vector<SeriesVerdict> PickSeries(const std::vector<SeriesFacts>& study,
     SeriesVerdict& verdict = verdicts[i];
     if (i == best) {
       verdict.chosen = true;
-      verdict.reason = absl::StrCat("by ", NameOfRule(rules, best_rule), ": ", DescribeFacts(study[i]));
+      verdict.reason =
+          absl::StrCat("by ", NameOfRule(rules, best_rule), ": ", DescribeFacts(study[i]));
     } else if (verdict.rule == best_rule) {
-      verdict.reason = absl::StrCat("the chosen one has ", Compare(study[*best], study[i], rule).words);
+      verdict.reason =
+          absl::StrCat("the chosen one has ", Compare(study[*best], study[i], rule).words);
     } else if (verdict.rule >= 0) {
       verdict.reason = absl::StrCat(NameOfRule(rules, best_rule), " takes another one");
     }

@@ -34,10 +34,9 @@ struct SeriesRule {
   bool contrast = true;    // whether series with contrast medium are taken
   std::vector<std::string> description_has = {};    // one of these words, whatever their case
   std::vector<std::string> description_lacks = {};  // none of these
-  std::vector<SeriesPreference> prefer = {SeriesPreference::kSoftKernel,
-                                          SeriesPreference::kThinSlices,
-                                          SeriesPreference::kNoContrast,
-                                          SeriesPreference::kMoreCoverage};
+  std::vector<SeriesPreference> prefer = {
+      SeriesPreference::kSoftKernel, SeriesPreference::kThinSlices, SeriesPreference::kNoContrast,
+      SeriesPreference::kMoreCoverage};
 };
 
 // The text of docs/series-rules.schema.json.

@@ -111,17 +111,15 @@ void BridgeService::TakeIn() {
     for (const std::string& key : *changed) {
       const absl::StatusOr<QueuedSeries> series = rows.Get(key);
       if (!series.ok()) continue;
-      Tell(absl::OkStatus(),
-           absl::StrCat("series ", key, " is ", SeriesStateName(series->state),
-                        series->reason.empty() ? "" : ": ", series->reason));
+      Tell(absl::OkStatus(), absl::StrCat("series ", key, " is ", SeriesStateName(series->state),
+                                          series->reason.empty() ? "" : ": ", series->reason));
     }
     Wake();
   }
   const auto now = std::chrono::steady_clock::now();
   if (now < next_deletion_) return;
   next_deletion_ = now + kDeletionPause;
-  const absl::StatusOr<int> deleted =
-      DeleteOld(parts_.queue, parts_.retention, std::time(nullptr));
+  const absl::StatusOr<int> deleted = DeleteOld(parts_.queue, parts_.retention, std::time(nullptr));
   if (!deleted.ok() || *deleted > 0) {
     Tell(deleted.status(), "deleted what is older than it is kept");
   }
@@ -168,8 +166,8 @@ void BridgeService::WorkOnExports() {
     while (HasExportStep(queued) && !stopping() && export_retries_.Due(queued.key)) {
       const std::string before = BridgeExportStateName(queued.state);
       const absl::Status status = parts_.exports->Step(&queued);
-      Tell(status, absl::StrCat(queued.name, ": ", before, " -> ",
-                                BridgeExportStateName(queued.state)));
+      Tell(status,
+           absl::StrCat(queued.name, ": ", before, " -> ", BridgeExportStateName(queued.state)));
       if (status.ok()) {
         export_retries_.Succeeded(queued.key);
       } else {

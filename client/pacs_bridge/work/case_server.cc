@@ -128,9 +128,8 @@ class ConnectedCaseServer final : public CaseServer {
   absl::StatusOr<TissueformClient*> Client() ABSL_LOCKS_EXCLUDED(mutex_) {
     MutexLock lock(mutex_);
     if (client_ == nullptr) {
-      TF_ASSIGN_OR_RETURN(
-          client_, TissueformClient::Connect(
-                       address_, {.own_connection = true, .connection = options_}));
+      TF_ASSIGN_OR_RETURN(client_, TissueformClient::Connect(
+                                       address_, {.own_connection = true, .connection = options_}));
     }
     return client_.get();
   }
@@ -149,8 +148,7 @@ absl::StatusOr<std::unique_ptr<CaseServer>> ConnectToCaseServer(const std::strin
                                                                 const ConnectionOptions& options) {
   // What is wrong with the options is said now; the server may come later.
   TF_ASSIGN_OR_RETURN(const std::shared_ptr<TokenFile> token, OpenTokenOf(options));
-  TF_RETURN_IF_ERROR(
-      MakeServerChannel(address, options, token, grpc::ChannelArguments()).status());
+  TF_RETURN_IF_ERROR(MakeServerChannel(address, options, token, grpc::ChannelArguments()).status());
   return std::unique_ptr<CaseServer>(std::make_unique<ConnectedCaseServer>(address, options));
 }
 

@@ -258,8 +258,7 @@ absl::Status ExportWork::SendMissing(const QueuedExport& queued,
   for (QueuedObject& object : *objects) {
     if (object.sent) continue;
     TF_ASSIGN_OR_RETURN(const InstanceHeader header, ReadInstanceHeader(object.file));
-    const absl::StatusOr<bool> there =
-        pacs_->Has(series.study_uid, header.series_uid, object.uid);
+    const absl::StatusOr<bool> there = pacs_->Has(series.study_uid, header.series_uid, object.uid);
     // One that cannot be asked gets an object with the same UID again, which it knows by that.
     if (!there.ok() && !absl::IsFailedPrecondition(there.status())) return there.status();
     if (there.ok() && *there) {
@@ -287,7 +286,9 @@ absl::Status ExportWork::SendMissing(const QueuedExport& queued,
 
 absl::Status ExportWork::Send(QueuedExport* queued) {
   TF_ASSIGN_OR_RETURN(std::vector<QueuedObject> objects, rows_.ListObjects(queued->name));
-  const auto never_sent = [](const QueuedObject& o) { return IsSeriesKey(o.key) || o.file.empty(); };
+  const auto never_sent = [](const QueuedObject& o) {
+    return IsSeriesKey(o.key) || o.file.empty();
+  };
   objects.erase(std::remove_if(objects.begin(), objects.end(), never_sent), objects.end());
   TF_RETURN_IF_ERROR(SendMissing(*queued, &objects));
   if (CountSent(objects) != static_cast<int>(objects.size()) || objects.empty()) {
@@ -299,8 +300,8 @@ absl::Status ExportWork::Send(QueuedExport* queued) {
 
 absl::Status ExportWork::TellStored(QueuedExport* queued) {
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedObject> objects, rows_.ListObjects(queued->name));
-  const absl::Status told = server_->UpdateExport(queued->name, v1::EXPORT_STATE_STORED, "",
-                                                  CountSent(objects));
+  const absl::Status told =
+      server_->UpdateExport(queued->name, v1::EXPORT_STATE_STORED, "", CountSent(objects));
   // Whoever asked has taken it back meanwhile: it is in the PACS all the same.
   if (!told.ok() && !absl::IsNotFound(told)) return told;
   TF_FAULT_POINT("export.told");
@@ -312,8 +313,8 @@ absl::Status ExportWork::TellStored(QueuedExport* queued) {
 }
 
 absl::Status ExportWork::TellFailed(QueuedExport* queued) {
-  const absl::Status told = server_->UpdateExport(queued->name, v1::EXPORT_STATE_FAILED,
-                                                  DetailOf(queued->note), 0);
+  const absl::Status told =
+      server_->UpdateExport(queued->name, v1::EXPORT_STATE_FAILED, DetailOf(queued->note), 0);
   if (!told.ok() && !absl::IsNotFound(told)) return told;
   std::error_code ignored;
   fs::remove_all(queue_->object_folder(queued->key), ignored);

@@ -18,13 +18,13 @@ namespace tissueform {
 
 // What an export is written from.
 struct ExportMaterial {
-  std::string header = {};  // file: of one of the source images, without pixels
+  std::string header = {};      // file: of one of the source images, without pixels
   std::string series_uid = {};  // of the source series
   std::vector<QueuedImage> sources = {};
   std::string case_path = {};
   CaseFile case_file = {};
   ServedPrediction prediction = {};
-  v1::Export asked = {};                        // with its measures
+  v1::Export asked = {};                         // with its measures
   std::map<std::string, std::string> uids = {};  // by key: of objects and of their series
   std::string pictures = {};                     // folder of what Draw has drawn
   std::string folder = {};                       // empty; for the files

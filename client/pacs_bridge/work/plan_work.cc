@@ -96,9 +96,9 @@ absl::Status PlanWork::Step(QueuedSeries* series) {
       status = Publish(series);
       break;
     default:
-      return absl::FailedPreconditionError(
-          absl::StrCat("series ", series->key, " is ", SeriesStateName(before),
-                       ": it has no step that is next"));
+      return absl::FailedPreconditionError(absl::StrCat("series ", series->key, " is ",
+                                                        SeriesStateName(before),
+                                                        ": it has no step that is next"));
   }
   if (absl::IsCancelled(status)) return status;
   if (status.ok()) {
@@ -153,8 +153,7 @@ absl::Status PlanWork::Build(QueuedSeries* series) {
                                   .max_file_bytes = int64_t{4} << 30}},
                       calling));
     if (!made.ready && !options_.accept_defects) {
-      return absl::FailedPreconditionError(
-          absl::StrCat("the plan is not ready: ", made.defects));
+      return absl::FailedPreconditionError(absl::StrCat("the plan is not ready: ", made.defects));
     }
     TF_RETURN_IF_ERROR(goal.Publish());
   }

@@ -16,10 +16,10 @@
 namespace tissueform {
 
 struct PlanWorkOptions {
-  int threads = 0;  // of `plan build`; 0: all processors
+  int threads = 0;         // of `plan build`; 0: all processors
   int max_seconds = 3600;  // of processor time
   int64_t max_memory_bytes = int64_t{16} << 30;
-  bool pictures = false;  // in the report: they need Xvfb
+  bool pictures = false;        // in the report: they need Xvfb
   bool accept_defects = false;  // publish also a plan that is not ready
   // Readable when the work is to end; -1: never.
   int cancel = -1;

@@ -68,9 +68,9 @@ class PredictionWriter final : public ObjectWriter {
         absl::string_view(reinterpret_cast<const char*>(positions.data()),
                           static_cast<size_t>(positions.size()) * sizeof(float)),
         0600));
-    const absl::Status drawn = RunTissueform(
-        {"case", "render", material.case_path, "--positions", file, "--out", folder},
-        "drawing the pictures", folder + ".log", kRenderTime);
+    const absl::Status drawn =
+        RunTissueform({"case", "render", material.case_path, "--positions", file, "--out", folder},
+                      "drawing the pictures", folder + ".log", kRenderTime);
     std::error_code ignored;
     fs::remove(file, ignored);
     return drawn;

@@ -23,9 +23,10 @@ namespace fs = std::filesystem;
 
 // Goes to logs and tables, so it must be what it should be.
 bool IsModality(const std::string& text) {
-  return !text.empty() && text.size() <= 16 && std::all_of(text.begin(), text.end(), [](unsigned char c) {
-    return absl::ascii_isupper(c) || absl::ascii_isdigit(c);
-  });
+  return !text.empty() && text.size() <= 16 &&
+         std::all_of(text.begin(), text.end(), [](unsigned char c) {
+           return absl::ascii_isupper(c) || absl::ascii_isdigit(c);
+         });
 }
 
 bool HasPlan(SeriesState state) {
@@ -199,12 +200,10 @@ absl::StatusOr<SeriesFacts> SeriesIntake::FactsOf(const QueuedSeries& series) {
   return FactsOfSeries(series.key, headers);
 }
 
-absl::StatusOr<std::vector<std::string>> SeriesIntake::ChooseOfStudy(
-    const std::string& study_uid) {
+absl::StatusOr<std::vector<std::string>> SeriesIntake::ChooseOfStudy(const std::string& study_uid) {
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedSeries> all, rows_.ListStudy(study_uid));
-  const bool has_plan = std::any_of(all.begin(), all.end(), [](const QueuedSeries& series) {
-    return HasPlan(series.state);
-  });
+  const bool has_plan = std::any_of(
+      all.begin(), all.end(), [](const QueuedSeries& series) { return HasPlan(series.state); });
   std::vector<QueuedSeries> candidates;
   std::vector<SeriesFacts> facts;
   std::vector<std::string> changed;

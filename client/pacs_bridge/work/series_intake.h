@@ -79,9 +79,9 @@ class SeriesIntake {
   // Of a series that is being received.
   struct Progress {
     std::chrono::steady_clock::time_point last = {};
-    bool ended = false;     // since the last image
-    bool aborted = false;   // the last association that has brought some
-    bool asked = false;     // the PACS, since the last image
+    bool ended = false;    // since the last image
+    bool aborted = false;  // the last association that has brought some
+    bool asked = false;    // the PACS, since the last image
   };
 
   absl::StatusOr<std::set<std::string>> Flush();

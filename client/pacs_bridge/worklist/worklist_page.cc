@@ -26,10 +26,12 @@ constexpr absl::string_view kReplacement = "\xEF\xBF\xBD";
 // How many bytes of a UTF-8 character begin `text`; 0: none does.
 size_t CharacterBytes(absl::string_view text) {
   const auto byte = [text](size_t i) { return static_cast<unsigned char>(text[i]); };
-  const size_t length = byte(0) < 0x80 ? 1 : byte(0) < 0xC2 ? 0 : byte(0) < 0xE0 ? 2
-                        : byte(0) < 0xF0                    ? 3
-                        : byte(0) < 0xF5                    ? 4
-                                                            : 0;
+  const size_t length = byte(0) < 0x80   ? 1
+                        : byte(0) < 0xC2 ? 0
+                        : byte(0) < 0xE0 ? 2
+                        : byte(0) < 0xF0 ? 3
+                        : byte(0) < 0xF5 ? 4
+                                         : 0;
   if (length == 0 || text.size() < length) return 0;
   for (size_t i = 1; i < length; ++i) {
     if ((byte(i) & 0xC0) != 0x80) return 0;
@@ -88,22 +90,21 @@ const char* WordsOf(BridgeExportState state) {
 
 std::string PlannerLink(const std::string& planner_url, const std::string& case_name) {
   if (planner_url.empty() || case_name.empty()) return {};
-  return absl::StrCat("<a href=\"", EscapedHtml(planner_url), "#case=",
-                      EscapedHtml(absl::StripPrefix(case_name, "cases/")),
+  return absl::StrCat("<a href=\"", EscapedHtml(planner_url),
+                      "#case=", EscapedHtml(absl::StripPrefix(case_name, "cases/")),
                       "\">Open in the planner</a>");
 }
 
 std::string PatientList(const QueuedStudy& study) {
   const auto item = [](const char* term, const std::string& text) {
-    return absl::StrCat("<div><dt>", term, "</dt><dd>",
-                        text.empty() ? "<span class=\"problem\">not given</span>"
-                                     : EscapedHtml(text),
-                        "</dd></div>");
+    return absl::StrCat(
+        "<div><dt>", term, "</dt><dd>",
+        text.empty() ? "<span class=\"problem\">not given</span>" : EscapedHtml(text),
+        "</dd></div>");
   };
   return absl::StrCat("<dl>", item("Name", ShownName(study.patient.name)),
                       item("Born", ShownDate(study.patient.birth_date)),
-                      item("Patient ID", study.patient.id),
-                      item("Study of", ShownDate(study.date)),
+                      item("Patient ID", study.patient.id), item("Study of", ShownDate(study.date)),
                       item("Study", study.description), "</dl>");
 }
 
@@ -131,8 +132,8 @@ std::string ExportArticle(const WorkListExport& waiting, const WorkListPageOptio
   std::string html = absl::StrCat("<article class=\"", asked ? "waits" : "", "\"><h3>Prediction ",
                                   WordsOf(waiting.queued.state), "</h3>");
   if (!waiting.queued.note.empty()) {
-    absl::StrAppend(&html, "<p class=\"problem\" role=\"alert\">",
-                    EscapedHtml(waiting.queued.note), "</p>");
+    absl::StrAppend(&html, "<p class=\"problem\" role=\"alert\">", EscapedHtml(waiting.queued.note),
+                    "</p>");
   }
   if (asked && !waiting.of.study.patient.readable) {
     absl::StrAppend(&html,
@@ -144,8 +145,8 @@ std::string ExportArticle(const WorkListExport& waiting, const WorkListPageOptio
   if (!link.empty()) absl::StrAppend(&html, "<p>", link, "</p>");
   if (asked) absl::StrAppend(&html, ConfirmForm(waiting, options.form_token));
   if (!waiting.queued.last_error.empty()) {
-    absl::StrAppend(&html, "<p class=\"quiet\">Last attempt: ",
-                    EscapedHtml(waiting.queued.last_error), "</p>");
+    absl::StrAppend(
+        &html, "<p class=\"quiet\">Last attempt: ", EscapedHtml(waiting.queued.last_error), "</p>");
   }
   return absl::StrCat(html, "</article>");
 }
@@ -153,16 +154,16 @@ std::string ExportArticle(const WorkListExport& waiting, const WorkListPageOptio
 std::string SeriesRow(const WorkListSeries& row, const WorkListPageOptions& options) {
   const std::string& why =
       row.series.last_error.empty() ? row.series.reason : row.series.last_error;
-  return absl::StrCat(
-      "<tr><th scope=\"row\">", EscapedHtml(ShownName(row.study.patient.name)), "</th>",
-      Cell(ShownDate(row.study.patient.birth_date)), Cell(row.study.patient.id),
-      Cell(ShownDate(row.study.date)), Cell(row.study.description), "<td>",
-      WordsOf(row.series.state),
-      why.empty() ? "" : absl::StrCat("<br><small>", EscapedHtml(why), "</small>"), "</td><td>",
-      row.series.state == SeriesState::kPublished
-          ? PlannerLink(options.planner_url, row.series.case_name)
-          : "",
-      "</td></tr>");
+  return absl::StrCat("<tr><th scope=\"row\">", EscapedHtml(ShownName(row.study.patient.name)),
+                      "</th>", Cell(ShownDate(row.study.patient.birth_date)),
+                      Cell(row.study.patient.id), Cell(ShownDate(row.study.date)),
+                      Cell(row.study.description), "<td>", WordsOf(row.series.state),
+                      why.empty() ? "" : absl::StrCat("<br><small>", EscapedHtml(why), "</small>"),
+                      "</td><td>",
+                      row.series.state == SeriesState::kPublished
+                          ? PlannerLink(options.planner_url, row.series.case_name)
+                          : "",
+                      "</td></tr>");
 }
 
 std::vector<std::string> PicturesIn(const std::string& folder) {
@@ -273,16 +274,18 @@ std::string WorkListPage(const WorkList& list, const WorkListPageOptions& option
       "device.</p><p><a href=\"/\">Refresh</a></p></header><main>";
   if (!options.notice.empty()) {
     absl::StrAppend(&html, "<p role=\"status\" class=\"notice",
-                    options.notice_is_problem ? " problem" : "", "\">",
-                    EscapedHtml(options.notice), "</p>");
+                    options.notice_is_problem ? " problem" : "", "\">", EscapedHtml(options.notice),
+                    "</p>");
   }
-  absl::StrAppend(&html, "<section aria-labelledby=\"exports\"><h2 id=\"exports\">Predictions for "
-                         "the PACS</h2>");
+  absl::StrAppend(&html,
+                  "<section aria-labelledby=\"exports\"><h2 id=\"exports\">Predictions for "
+                  "the PACS</h2>");
   if (list.exports.empty()) absl::StrAppend(&html, "<p class=\"quiet\">None waits.</p>");
   for (const WorkListExport& waiting : list.exports) {
     absl::StrAppend(&html, ExportArticle(waiting, options));
   }
-  absl::StrAppend(&html, "</section><section aria-labelledby=\"cases\"><h2 id=\"cases\">Cases</h2>");
+  absl::StrAppend(&html,
+                  "</section><section aria-labelledby=\"cases\"><h2 id=\"cases\">Cases</h2>");
   if (list.series.empty()) {
     absl::StrAppend(&html, "<p class=\"quiet\">Nothing was received yet.</p>");
   } else {

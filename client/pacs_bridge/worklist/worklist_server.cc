@@ -3,10 +3,9 @@
 
 #include "client/pacs_bridge/worklist/worklist_server.h"
 
-#include <httplib.h>
-
 #include <filesystem>
 #include <fstream>
+#include <httplib.h>
 #include <set>
 #include <sstream>
 #include <thread>
@@ -59,8 +58,7 @@ absl::StatusOr<std::string> ReadPassword(const std::string& path) {
         absl::StrCat(path, " cannot be read; write the work list's password to it"));
   }
   if ((status.permissions() & (fs::perms::group_all | fs::perms::others_all)) != fs::perms::none) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(path, " may be read by others; chmod 600 it"));
+    return absl::InvalidArgumentError(absl::StrCat(path, " may be read by others; chmod 600 it"));
   }
   std::ifstream file(path);
   std::string password(kMostPasswordBytes, '\0');
@@ -68,9 +66,9 @@ absl::StatusOr<std::string> ReadPassword(const std::string& path) {
   password.resize(static_cast<size_t>(file.gcount()));
   absl::StripAsciiWhitespace(&password);
   if (password.size() >= kLeastPasswordCharacters) return password;
-  return absl::InvalidArgumentError(
-      absl::StrCat(path, " holds fewer than ", kLeastPasswordCharacters,
-                   " characters; write a longer password to it"));
+  return absl::InvalidArgumentError(absl::StrCat(path, " holds fewer than ",
+                                                 kLeastPasswordCharacters,
+                                                 " characters; write a longer password to it"));
 }
 
 // "planner.example.org" of "planner.example.org:8043"; IPv6 stays in its brackets.
@@ -215,16 +213,18 @@ class HttpWorkListServer final : public WorkListServer {
 
   void Confirm(const Request& request, Response* response) {
     if (!IsFromHere(request) || !IsSameSecret(request.get_param_value("token"), form_token_)) {
-      return Refuse(response, 403, "this form is not from the work list, or the bridge was started "
-                                   "anew; load the work list again");
+      return Refuse(response, 403,
+                    "this form is not from the work list, or the bridge was started "
+                    "anew; load the work list again");
     }
     const std::string shown = request.get_param_value("patient");
     const absl::Status status = ConfirmAsShown(request.get_param_value("export"), shown);
     if (!status.ok()) {
       response->status = 409;
-      return Show("Not stored: this prediction does not wait any longer, or its patient's data "
-                  "have changed since the page was loaded. Look again.",
-                  true, response);
+      return Show(
+          "Not stored: this prediction does not wait any longer, or its patient's data "
+          "have changed since the page was loaded. Look again.",
+          true, response);
     }
     if (confirmed_) confirmed_();
     response->set_redirect("/?confirmed=1", 303);
@@ -244,8 +244,7 @@ class HttpWorkListServer final : public WorkListServer {
 
   void SendPicture(const std::string& export_key, const std::string& name,
                    Response* response) const {
-    const std::string path =
-        absl::StrCat(queue_->object_folder(export_key), "/pictures/", name);
+    const std::string path = absl::StrCat(queue_->object_folder(export_key), "/pictures/", name);
     std::error_code error;
     const uintmax_t size = std::filesystem::file_size(path, error);
     if (error || size > kMostPictureBytes) return Refuse(response, 404, "there is no such picture");
@@ -276,9 +275,9 @@ absl::StatusOr<std::unique_ptr<WorkListServer>> WorkListServer::Start(
   if (!options.token_file.empty()) {
     TF_ASSIGN_OR_RETURN(password, ReadPassword(options.token_file));
   } else if (!IsLoopback(options.address)) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "the work list shows names of patients: at ", options.address,
-        " it needs --worklist-token-file, or listen on 127.0.0.1"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("the work list shows names of patients: at ", options.address,
+                     " it needs --worklist-token-file, or listen on 127.0.0.1"));
   }
   auto server = std::make_unique<HttpWorkListServer>(options, std::move(password), queue,
                                                      std::move(confirmed));

@@ -64,29 +64,28 @@ TEST_F(BridgeQueueTest, IsHeldByOneProcessAndReadBesideIt) {
   EXPECT_THAT(BridgeQueue::Open(folder_).status(), StatusIs(absl::StatusCode::kUnavailable));
   const auto reader = BridgeQueue::OpenForReading(folder_);
   ASSERT_THAT(reader, IsOk());
-  ASSERT_THAT(ReceivedRows(queue_.get()).Add(Study(), Series(), "k", {{.uid = "1", .class_uid = "c", .file = "f"}}),
+  ASSERT_THAT(ReceivedRows(queue_.get())
+                  .Add(Study(), Series(), "k", {{.uid = "1", .class_uid = "c", .file = "f"}}),
               IsOk());
   EXPECT_EQ(ReceivedRows(reader->get()).List()->size(), 1);
 }
 
 TEST_F(BridgeQueueTest, OfANewerProgramIsLeftAlone) {
-  ASSERT_THAT(queue_->Change([](Database& database) {
-    return database.Execute("PRAGMA user_version=2");
-  }),
-              IsOk());
+  ASSERT_THAT(
+      queue_->Change([](Database& database) { return database.Execute("PRAGMA user_version=2"); }),
+      IsOk());
   queue_.reset();
-  EXPECT_THAT(BridgeQueue::Open(folder_).status(),
-              StatusIs(absl::StatusCode::kFailedPrecondition));
+  EXPECT_THAT(BridgeQueue::Open(folder_).status(), StatusIs(absl::StatusCode::kFailedPrecondition));
 }
 
 TEST_F(BridgeQueueTest, KeepsAllOfAChangeOrNothing) {
-  EXPECT_FALSE(queue_
-                   ->Change([](Database& database) {
-                     database.Execute("INSERT INTO images VALUES ('k', 'u', 'c', 'f')")
-                         .IgnoreError();
-                     return absl::InternalError("no");
-                   })
-                   .ok());
+  EXPECT_FALSE(
+      queue_
+          ->Change([](Database& database) {
+            database.Execute("INSERT INTO images VALUES ('k', 'u', 'c', 'f')").IgnoreError();
+            return absl::InternalError("no");
+          })
+          .ok());
   EXPECT_TRUE(ReceivedRows(queue_.get()).ListImages("k")->empty());
 }
 
@@ -103,7 +102,8 @@ TEST_F(BridgeQueueTest, HasAnImageThatComesAgainOnce) {
 
 TEST_F(BridgeQueueTest, GoesOnWithASeriesThatHadStopped) {
   ReceivedRows rows(queue_.get());
-  QueuedSeries series = *rows.Add(Study(), Series(), "k", {{.uid = "1", .class_uid = "c", .file = "f"}});
+  QueuedSeries series =
+      *rows.Add(Study(), Series(), "k", {{.uid = "1", .class_uid = "c", .file = "f"}});
   series.state = SeriesState::kIncomplete;
   ASSERT_THAT(rows.Update(series), IsOk());
   EXPECT_EQ(rows.Add(Study(), Series(), "x", {{.uid = "1", .class_uid = "c", .file = "f"}})->state,
@@ -140,7 +140,8 @@ TEST_F(BridgeQueueTest, GivesAnObjectOneUidForGood) {
   const auto first = rows.EnsureObjects("exports/1", {"stl:skin", "report"}, NewDicomUid);
   ASSERT_THAT(first, IsOk());
   ASSERT_EQ(first->size(), 2);
-  const auto again = rows.EnsureObjects("exports/1", {"report", "stl:skin", "capture"}, NewDicomUid);
+  const auto again =
+      rows.EnsureObjects("exports/1", {"report", "stl:skin", "capture"}, NewDicomUid);
   ASSERT_THAT(again, IsOk());
   ASSERT_EQ(again->size(), 3);
   EXPECT_EQ((*again)[1].uid, (*first)[0].uid);

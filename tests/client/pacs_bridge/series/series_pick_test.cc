@@ -130,8 +130,7 @@ INSTANTIATE_TEST_SUITE_P(
                "localiser"},
         Defect{"Derived", [](Images* i) { i->front().image_type = "DERIVED\\SECONDARY"; },
                "derived"},
-        Defect{"Magnetic", [](Images* i) { i->front().modality = "MR"; },
-               "no Hounsfield units"},
+        Defect{"Magnetic", [](Images* i) { i->front().modality = "MR"; }, "no Hounsfield units"},
         Defect{"HostileModality", [](Images* i) { i->front().modality = "PLANTED\nx"; },
                "of modality unknown"},
         Defect{"ConeBeam",
@@ -164,8 +163,7 @@ TEST(PickSeriesTest, AnEarlierRuleGoesBeforeABetterSeries) {
   SeriesFacts sharp = FactsOfSeries("a", Head());
   sharp.description = "Head SHARP";
   sharp.kernel = KernelKind::kBone;
-  const auto verdicts =
-      PickSeries({FactsOfSeries("b", Head()), sharp}, {sharp_first, SomeRule()});
+  const auto verdicts = PickSeries({FactsOfSeries("b", Head()), sharp}, {sharp_first, SomeRule()});
   EXPECT_FALSE(verdicts[0].chosen);
   EXPECT_TRUE(verdicts[1].chosen);
   EXPECT_EQ(verdicts[1].rule, 0);
@@ -194,14 +192,14 @@ TEST(SeriesRulesTest, ARuleSaysWhatDiffersFromTheDefaults) {
 }
 
 TEST(SeriesRulesTest, WrongRulesAreRefusedByTheirPlace) {
-  for (const char* text :
-       {"{", "{}", R"({"format": "tissueform-series-rules", "version": 1, "rules": []})",
-        R"({"format": "tissueform-series-rules", "version": 1, "rules": [{"name": "x"}]})",
-        R"({"format": "tissueform-series-rules", "version": 1, "rules": [{"recipe": "r", "ct": 1}]})",
-        R"({"format": "tissueform-series-rules", "version": 1, "rules": [{"recipe": "r",
+  for (
+      const char* text :
+      {"{", "{}", R"({"format": "tissueform-series-rules", "version": 1, "rules": []})",
+       R"({"format": "tissueform-series-rules", "version": 1, "rules": [{"name": "x"}]})",
+       R"({"format": "tissueform-series-rules", "version": 1, "rules": [{"recipe": "r", "ct": 1}]})",
+       R"({"format": "tissueform-series-rules", "version": 1, "rules": [{"recipe": "r",
             "prefer": ["nicest"]}]})"}) {
-    EXPECT_THAT(ParseSeriesRules(text, "").status(),
-                StatusIs(absl::StatusCode::kInvalidArgument))
+    EXPECT_THAT(ParseSeriesRules(text, "").status(), StatusIs(absl::StatusCode::kInvalidArgument))
         << text;
   }
 }

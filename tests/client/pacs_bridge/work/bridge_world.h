@@ -61,8 +61,8 @@ class FolderCaseServer final : public CaseServer {
   absl::Status UpdateExport(const std::string& name, v1::ExportState state,
                             const std::string& detail, int stored) override {
     TF_RETURN_IF_ERROR(away);
-    AppendLine(folder_ / "updates", absl::StrCat(name, " ", v1::ExportState_Name(state), " ",
-                                                 stored, " ", detail));
+    AppendLine(folder_ / "updates",
+               absl::StrCat(name, " ", v1::ExportState_Name(state), " ", stored, " ", detail));
     return absl::OkStatus();
   }
   absl::Status WatchExports(const std::function<void(const v1::Export&)>&,

@@ -28,8 +28,8 @@ namespace fs = std::filesystem;
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
-using ::testing::Not;
 using testing::IsOk;
+using ::testing::Not;
 using testing::StatusIs;
 
 SeriesRule SmallRule() {

@@ -25,9 +25,9 @@ namespace {
 namespace fs = std::filesystem;
 
 using ::testing::HasSubstr;
+using testing::IsOk;
 using ::testing::Not;
 using ::testing::StartsWith;
-using testing::IsOk;
 using testing::StatusIs;
 
 constexpr char kHostileName[] = "<script>alert(1)</script>^\"'&\x01\xff";
@@ -73,8 +73,8 @@ class WorkListTest : public ::testing::Test {
 
   std::string Curl(const std::string& arguments, const std::string& path = "/") {
     const std::string command =
-        absl::StrCat("curl -sS -i --max-time 20 ", arguments, " 'http://127.0.0.1:",
-                     server_->port(), path, "' 2>&1");
+        absl::StrCat("curl -sS -i --max-time 20 ", arguments,
+                     " 'http://127.0.0.1:", server_->port(), path, "' 2>&1");
     std::string answer;
     FILE* pipe = popen(command.c_str(), "r");
     for (int c = std::fgetc(pipe); c != EOF; c = std::fgetc(pipe)) {
@@ -182,14 +182,15 @@ TEST_F(WorkListTest, ItsPasswordIsAskedForEverything) {
 }
 
 TEST_F(WorkListTest, WithoutAPasswordItListensOnLoopbackOnly) {
-  EXPECT_THAT(WorkListServer::Start({.address = "0.0.0.0", .port = 0}, queue_.get(), nullptr)
-                  .status(),
-              StatusIs(absl::StatusCode::kInvalidArgument));
+  EXPECT_THAT(
+      WorkListServer::Start({.address = "0.0.0.0", .port = 0}, queue_.get(), nullptr).status(),
+      StatusIs(absl::StatusCode::kInvalidArgument));
   const std::string file = (root_ / "password").string();
   std::ofstream(file) << "short";
   fs::permissions(file, fs::perms::owner_read | fs::perms::owner_write);
-  EXPECT_THAT(WorkListServer::Start({.port = 0, .token_file = file}, queue_.get(), nullptr).status(),
-              StatusIs(absl::StatusCode::kInvalidArgument));
+  EXPECT_THAT(
+      WorkListServer::Start({.port = 0, .token_file = file}, queue_.get(), nullptr).status(),
+      StatusIs(absl::StatusCode::kInvalidArgument));
 }
 
 TEST_F(WorkListTest, APathLeadsNowhereElse) {
