@@ -7,6 +7,7 @@
 """
 
 import argparse
+import json
 import pathlib
 import subprocess
 import sys
@@ -39,7 +40,7 @@ def shown(programs, study):
         path.write_bytes(programs.orthanc_file(instance))
         checked = subprocess.run(["dciodvfy", path], capture_output=True, text=True, timeout=stack.PATIENCE_S, check=False)
         errors = [line for line in (checked.stdout + checked.stderr).splitlines() if line.startswith("Error")]
-        print(f"  {tags['Modality']:3} {tags.get('SeriesDescription', ''):40} {tags.get('DocumentTitle', ''):32} dciodvfy: {len(errors)} errors")
+        print(f"  {tags['Modality']:3} {tags.get('DocumentTitle') or tags.get('SeriesDescription', ''):72} dciodvfy: {len(errors)} errors")
         for line in errors:
             print("     ", line)
     capture = next(folder.glob("OT-*.dcm"), None) or next(folder.glob("SC-*.dcm"), None)
@@ -78,7 +79,11 @@ def run(programs, web):
     programs.wait_for("the objects", lambda: ": stored" in programs.tissueform("prediction", "send", prediction).stdout
                       or " stored " in programs.tissueform("prediction", "sent").stdout, needs="bridge")
     tell("stored; QIDO-RS lists the study's series:")
-    print(curl(programs, f"/studies/{study}/series")[:2000])
+    for series in json.loads(curl(programs, f"/studies/{study}/series")):
+        def value(tag, of=series):
+            return str((of.get(tag, {}).get("Value") or [""])[0])
+        print(f"  {value('00080060'):3} {value('0008103E'):58} {value('0020000E')}")
+    tell("the objects, as Orthanc has them:")
     shown(programs, study)
 
 

@@ -152,7 +152,7 @@ class Stack:
         data = str(self.folder / "orthanc")
         return {
             "Name": "tissueform", "StorageDirectory": data, "IndexDirectory": data, "StableAge": 1, "OverwriteInstances": False,
-            "Plugins": [dicomweb_plugin()], "DicomWeb": {"Enable": True, "Root": "/dicom-web/"},
+            "Plugins": [dicomweb_plugin()], "DicomWeb": {"Enable": True, "Root": "/dicom-web/", "Ssl": True},
             # This machine alone; HAProxy stands before it.
             "RemoteAccessAllowed": False, "AuthenticationEnabled": False, "HttpPort": self.orthanc_http,
             "DicomAet": ORTHANC, "DicomPort": self.orthanc_dicom, "DicomCheckCalledAet": True, "DicomAlwaysAllowGet": True,

@@ -60,7 +60,7 @@ test("seven pictures", async () => {
   await page.locator(".store button").click();
   await page.locator(".predictions li", { hasText: "chin up" }).waitFor();
   await page.getByRole("button", { name: "Compare Jaw 8 mm forward" }).click();
-  await page.getByLabel("From", { exact: true }).selectOption({ label: "The face at rest" });
+  await page.getByRole("group", { name: "Comparison" }).getByLabel("From", { exact: true }).selectOption({ label: "The face at rest" });
   await page.getByLabel("From one to the other").fill("0.6");
   await page.locator(".comparison").scrollIntoViewIfNeeded();
   await picture(page, "comparison");

@@ -56,6 +56,7 @@ v1::UpdateExportRequest Change(const std::string& name, v1::ExportState state,
 
 std::vector<std::string> NamesOf(const std::vector<v1::Export>& exports) {
   std::vector<std::string> names;
+  names.reserve(exports.size());
   for (const v1::Export& one : exports) names.push_back(one.name());
   return names;
 }
