@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <optional>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -17,8 +16,8 @@
 #include <nlohmann/json.hpp>
 
 #include "client/pacs_bridge/dicom/dicom_uid.h"
+#include "client/pacs_bridge/network/coming_objects.h"
 #include "client/pacs_bridge/network/http_exchange.h"
-#include "client/pacs_bridge/network/multipart_splitter.h"
 #include "client/pacs_bridge/network/one_header.h"
 #include "core/base/certificates.h"
 #include "core/base/status_macros.h"
@@ -63,75 +62,6 @@ SeriesSummary SummaryFrom(const Json& object) {
   summary.instances = NumberIn(object, "00201209");
   return summary;
 }
-
-// Objects out of a multipart body, each into the folder and to the sink.
-class ComingObjects {
- public:
-  ComingObjects(const PacsPeer& peer, const InstanceFolder& folder, InstanceSink* sink)
-      : folder_(folder), sink_(sink) {
-    announced_.calling_ae = peer.name;
-  }
-
-  absl::Status Take(const std::string& content_type, absl::string_view piece) {
-    if (!splitter_) {
-      MultipartSplitter::Events events;
-      events.begin = [this] { return Begin(); };
-      events.data = [this](absl::string_view bytes) { return Write(bytes); };
-      events.end = [this] { return End(); };
-      auto made = MultipartSplitter::Create(content_type, std::move(events));
-      if (!made.ok()) return made.status();
-      splitter_.emplace(*std::move(made));
-    }
-    return splitter_->Take(piece);
-  }
-
-  absl::StatusOr<FetchCounts> Finish() const {
-    if (splitter_) TF_RETURN_IF_ERROR(splitter_->Finish());
-    if (counts_.completed == 0 && !first_problem_.ok()) return first_problem_;
-    return counts_;
-  }
-
- private:
-  absl::Status Begin() {
-    TF_RETURN_IF_ERROR(folder_.CheckRoom());
-    TF_ASSIGN_OR_RETURN(PartialFile partial, folder_.NewPartial());
-    partial_.emplace(std::move(partial));
-    file_ = std::ofstream(partial_->path(), std::ios::binary | std::ios::trunc);
-    bytes_ = 0;
-    return absl::OkStatus();
-  }
-  absl::Status Write(absl::string_view bytes) {
-    bytes_ += static_cast<int64_t>(bytes.size());
-    if (bytes_ > folder_.options().limits.max_file_bytes) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "an object has more than ", folder_.options().limits.max_file_bytes, " bytes"));
-    }
-    file_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    return absl::OkStatus();
-  }
-  absl::Status End() {
-    file_.close();
-    if (file_.fail()) {
-      return absl::ResourceExhaustedError("an object cannot be written: is the disk full?");
-    }
-    PartialFile whole = *std::move(partial_);
-    partial_.reset();
-    const absl::Status kept = folder_.Take(std::move(whole), announced_, sink_).status();
-    if (!kept.ok() && first_problem_.ok()) first_problem_ = kept;
-    ++(kept.ok() ? counts_.completed : counts_.failed);
-    return absl::OkStatus();
-  }
-
-  const InstanceFolder& folder_;
-  InstanceSink* const sink_;
-  AnnouncedInstance announced_;
-  std::optional<MultipartSplitter> splitter_;
-  std::optional<PartialFile> partial_;
-  std::ofstream file_;
-  int64_t bytes_ = 0;
-  FetchCounts counts_;
-  absl::Status first_problem_;
-};
 
 class DicomWebClient : public PacsClient {
  public:
@@ -253,7 +183,7 @@ class DicomWebClient : public PacsClient {
   // WADO-RS, every object in the transfer syntax that it has.
   absl::StatusOr<FetchCounts> Retrieve(const std::string& path, const InstanceFolder& folder,
                                        InstanceSink* sink) {
-    ComingObjects objects(peer_, folder, sink);
+    ComingObjects objects(peer_.name, folder, sink);
     TF_ASSIGN_OR_RETURN(
         const PacsHttpAnswer answer,
         Exchange(peer_,

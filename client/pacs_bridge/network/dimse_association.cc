@@ -85,6 +85,7 @@ absl::Status DimseAssociation::Open(const PacsPeer& peer, DcmTransportLayer* sec
   int number = 1;  // odd ones
   for (const ProposedContext& context : contexts) {
     std::vector<const char*> syntaxes;
+    syntaxes.reserve(context.transfer_syntaxes.size());
     for (const std::string& syntax : context.transfer_syntaxes) syntaxes.push_back(syntax.c_str());
     ASC_addPresentationContext(parameters, static_cast<T_ASC_PresentationContextID>(number),
                                context.abstract_syntax.c_str(), syntaxes.data(),

@@ -14,16 +14,10 @@
 #include <dcmtk/dcmnet/assoc.h>
 
 #include "client/pacs_bridge/network/pacs_client.h"
+#include "client/pacs_bridge/network/proposed_contexts.h"
 #include "client/pacs_bridge/network/socket_layer.h"
 
 namespace tissueform {
-
-// A service that is offered or asked for, with the transfer syntaxes that may carry it.
-struct ProposedContext {
-  std::string abstract_syntax = {};
-  std::vector<std::string> transfer_syntaxes = {};
-  bool we_receive = false;  // the peer sends these to us (C-GET)
-};
 
 // An association that we have asked a PACS for. One thread.
 class DimseAssociation {

@@ -63,6 +63,7 @@ std::vector<ProposedContext> StoreContexts(const std::vector<OutgoingObject>& ob
     kinds.insert({object.class_uid, object.transfer_syntax_uid});
   }
   std::vector<ProposedContext> contexts;
+  contexts.reserve(kinds.size());
   for (const auto& [kind, syntax] : kinds) contexts.push_back({kind, {syntax}});
   return contexts;
 }

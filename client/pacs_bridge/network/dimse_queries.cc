@@ -11,18 +11,13 @@
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmnet/dimse.h>
 
-#include "client/pacs_bridge/dicom/dicom_uid.h"
-#include "client/pacs_bridge/network/storage_association.h"
+#include "client/pacs_bridge/network/store_request.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
 namespace {
 
 constexpr DIC_US kMoveDestinationUnknown = 0xA801;
-
-std::vector<std::string> Uncompressed() {
-  return {std::string(kExplicitLittleEndian), std::string(kImplicitLittleEndian)};
-}
 
 DcmDataset IdentifierOf(const StudyRootQuery& query) {
   DcmDataset identifier;
@@ -194,37 +189,6 @@ absl::StatusOr<FetchCounts> GetByDimse(const std::string& peer_name, DimseAssoci
                                                           nullptr, &identifier, nullptr, nullptr),
                          "it was asked for objects"));
   return GetSession(peer_name, association, silence_seconds).Run(announced, folder, sink);
-}
-
-std::vector<ProposedContext> FindContexts() {
-  return {{UID_FINDStudyRootQueryRetrieveInformationModel, Uncompressed()}};
-}
-
-std::vector<ProposedContext> MoveContexts() {
-  return {{UID_MOVEStudyRootQueryRetrieveInformationModel, Uncompressed()}};
-}
-
-std::vector<ProposedContext> GetContexts() {
-  std::vector<ProposedContext> contexts = {
-      {UID_GETStudyRootQueryRetrieveInformationModel, Uncompressed()}};
-  for (const char* image : {UID_CTImageStorage, UID_MRImageStorage, UID_EnhancedCTImageStorage,
-                            UID_XRay3DCraniofacialImageStorage}) {
-    contexts.push_back({image, Uncompressed(), true});
-    // One context for each: the peer keeps what it has instead of decoding it.
-    for (const char* compressed :
-         {UID_JPEGProcess14SV1TransferSyntax, UID_JPEGLSLosslessTransferSyntax,
-          UID_JPEG2000LosslessOnlyTransferSyntax, UID_JPEG2000TransferSyntax,
-          UID_RLELosslessTransferSyntax, UID_JPEGProcess2_4TransferSyntax}) {
-      contexts.push_back({image, {compressed}, true});
-    }
-  }
-  for (const char* other :
-       {UID_SecondaryCaptureImageStorage, UID_MultiframeTrueColorSecondaryCaptureImageStorage,
-        UID_EncapsulatedSTLStorage, UID_BasicTextSRStorage, UID_EnhancedSRStorage,
-        UID_ComprehensiveSRStorage, UID_Comprehensive3DSRStorage, UID_EncapsulatedPDFStorage}) {
-    contexts.push_back({other, Uncompressed(), true});
-  }
-  return contexts;
 }
 
 }  // namespace tissueform

@@ -44,9 +44,4 @@ absl::StatusOr<FetchCounts> GetByDimse(const std::string& peer_name, DimseAssoci
                                        const AnnouncedInstance& announced,
                                        const InstanceFolder& folder, InstanceSink* sink);
 
-// The services, and for C-GET the classes and transfer syntaxes in which images may come.
-std::vector<ProposedContext> FindContexts();
-std::vector<ProposedContext> MoveContexts();
-std::vector<ProposedContext> GetContexts();
-
 }  // namespace tissueform

@@ -3,16 +3,14 @@
 
 #include "client/pacs_bridge/network/listening_socket.h"
 
-#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdint>
 #include <poll.h>
 #include <unistd.h>
 #include <utility>
 
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_split.h"
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/eventfd.h>
@@ -25,12 +23,6 @@ constexpr int kBacklog = 64;
 // When all descriptors are in use a connection stays in the backlog; it is tried again after this.
 constexpr int kPauseMilliseconds = 100;
 
-std::optional<uint32_t> BitsOf(const std::string& text) {
-  in_addr address = {};
-  if (inet_pton(AF_INET, text.c_str(), &address) != 1) return {};
-  return ntohl(address.s_addr);
-}
-
 absl::Status SystemSaysOf(absl::string_view what, const std::string& address, int port) {
   return absl::UnavailableError(absl::StrCat("cannot ", what, " at ", address, ":", port, ": ",
                                              absl::ErrnoToStatus(errno, "").message(),
@@ -38,30 +30,6 @@ absl::Status SystemSaysOf(absl::string_view what, const std::string& address, in
 }
 
 }  // namespace
-
-absl::StatusOr<AddressSet> AddressSet::Parse(const std::vector<std::string>& texts) {
-  AddressSet set;
-  for (const std::string& text : texts) {
-    const std::vector<std::string> parts = absl::StrSplit(text, absl::MaxSplits('/', 1));
-    const std::optional<uint32_t> bits = BitsOf(parts[0]);
-    int length = 32;
-    if (!bits || (parts.size() == 2 &&
-                  (!absl::SimpleAtoi(parts[1], &length) || length < 0 || length > 32))) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "'", text, "' is no IPv4 address and no network; write 10.1.2.3 or 10.1.2.0/24"));
-    }
-    const uint32_t mask = length == 0 ? 0 : ~uint32_t{0} << (32 - length);
-    set.networks_.push_back({*bits & mask, mask});
-  }
-  return set;
-}
-
-bool AddressSet::Contains(const std::string& address) const {
-  const std::optional<uint32_t> bits = BitsOf(address);
-  return bits && std::any_of(networks_.begin(), networks_.end(), [&](const Network& network) {
-           return (*bits & network.mask) == network.bits;
-         });
-}
 
 absl::StatusOr<ListeningSocket> ListeningSocket::Listen(const std::string& address, int port) {
   sockaddr_in place = {};

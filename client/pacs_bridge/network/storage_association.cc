@@ -3,121 +3,19 @@
 
 #include "client/pacs_bridge/network/storage_association.h"
 
-#include <algorithm>
 #include <memory>
-#include <optional>
-#include <unistd.h>
 #include <utility>
-#include <vector>
 
-#include "absl/strings/ascii.h"
-#include "absl/strings/str_cat.h"
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmnet/dimse.h>
 
-#include "client/pacs_bridge/dicom/dicom_uid.h"
-#include "client/pacs_bridge/network/instance_stream.h"
+#include "client/pacs_bridge/network/association_admission.h"
 #include "client/pacs_bridge/network/socket_layer.h"
-#include "core/base/status_macros.h"
+#include "client/pacs_bridge/network/store_request.h"
 
 namespace tissueform {
 namespace {
-
-constexpr Uint16 kDuplicate = 0x0111;
-constexpr Uint16 kProcessingFailure = 0x0110;
-
-std::string Trimmed(const char* text) { return std::string(absl::StripAsciiWhitespace(text)); }
-
-void Refuse(T_ASC_Association* association, T_ASC_RejectParametersResult result,
-            T_ASC_RejectParametersSource source, T_ASC_RejectParametersReason reason) {
-  const T_ASC_RejectParameters rejection = {result, source, reason};
-  ASC_rejectAssociation(association, &rejection);
-}
-
-// Whether this may be asked of us; tells the peer otherwise.
-bool Admit(const ReceiverOptions& options, T_ASC_Association* association, bool crowded) {
-  const auto& parameters = association->params->DULparams;
-  const auto deny = [&](T_ASC_RejectParametersReason reason) {
-    Refuse(association, ASC_RESULT_REJECTEDPERMANENT, ASC_SOURCE_SERVICEUSER, reason);
-    return false;
-  };
-  if (crowded) {
-    Refuse(association, ASC_RESULT_REJECTEDTRANSIENT,
-           ASC_SOURCE_SERVICEPROVIDER_PRESENTATION_RELATED, ASC_REASON_SP_PRES_LOCALLIMITEXCEEDED);
-    return false;
-  }
-  if (Trimmed(parameters.applicationContextName) != UID_StandardApplicationContext) {
-    return deny(ASC_REASON_SU_APPCONTEXTNAMENOTSUPPORTED);
-  }
-  if (Trimmed(parameters.calledAPTitle) != options.ae_title) {
-    return deny(ASC_REASON_SU_CALLEDAETITLENOTRECOGNIZED);
-  }
-  const auto& titles = options.calling_ae_titles;
-  if (std::find(titles.begin(), titles.end(), Trimmed(parameters.callingAPTitle)) == titles.end()) {
-    return deny(ASC_REASON_SU_CALLINGAETITLENOTRECOGNIZED);
-  }
-  return true;
-}
-
-// The syntax that the sender likes best, whatever it is: nothing is decoded here. Deflated ones
-// would be unpacked before any limit of theirs is known.
-const char* ChooseSyntax(const T_ASC_PresentationContext& context) {
-  for (int i = 0; i < static_cast<int>(context.transferSyntaxCount); ++i) {
-    const char* syntax = context.proposedTransferSyntaxes[i];
-    if (IsDicomUid(syntax) && syntax != kDeflatedLittleEndian) return syntax;
-  }
-  return nullptr;
-}
-
-// False: nothing that was offered is taken.
-bool Negotiate(T_ASC_Parameters* parameters) {
-  const int count = ASC_countPresentationContexts(parameters);
-  for (int i = 0; i < count; ++i) {
-    T_ASC_PresentationContext context;
-    if (ASC_getPresentationContext(parameters, i, &context).bad()) continue;
-    const bool known = context.abstractSyntax == kVerificationClass ||
-                       dcmIsaStorageSOPClassUID(context.abstractSyntax, ESSC_All) == OFTrue;
-    const char* syntax = ChooseSyntax(context);
-    if (known && syntax != nullptr) {
-      ASC_acceptPresentationContext(parameters, context.presentationContextID, syntax);
-    } else {
-      ASC_refusePresentationContext(
-          parameters, context.presentationContextID,
-          known ? ASC_P_TRANSFERSYNTAXESNOTSUPPORTED : ASC_P_ABSTRACTSYNTAXNOTSUPPORTED);
-    }
-  }
-  return ASC_countAcceptedPresentationContexts(parameters) > 0;
-}
-
-Uint16 StoreStatus(const absl::Status& status) {
-  switch (status.code()) {
-    case absl::StatusCode::kOk:
-      return STATUS_STORE_Success;
-    case absl::StatusCode::kResourceExhausted:
-      return STATUS_STORE_Refused_OutOfResources;
-    case absl::StatusCode::kAlreadyExists:
-      return kDuplicate;
-    case absl::StatusCode::kInvalidArgument:
-      return STATUS_STORE_Error_CannotUnderstand;
-    case absl::StatusCode::kUnimplemented:
-      return STATUS_STORE_Refused_SOPClassNotSupported;
-    default:
-      return kProcessingFailure;
-  }
-}
-
-// Why nothing of this object is kept, before a byte of it has come.
-absl::Status CheckRequest(const AnnouncedInstance& announced, absl::string_view abstract_syntax,
-                          const InstanceFolder& folder) {
-  if (!IsDicomUid(announced.instance_uid)) {
-    return absl::InvalidArgumentError("an object's UID is no UID");
-  }
-  if (announced.class_uid != abstract_syntax) {
-    return absl::UnimplementedError("an object is of another class than its presentation context");
-  }
-  return folder.CheckRoom();
-}
 
 struct ServedAssociation {
   std::unique_ptr<SocketLayer> layer;
@@ -211,58 +109,17 @@ class CommandLoop {
 
 }  // namespace
 
-absl::Status ReceiveStore(T_ASC_Association* association, int presentation_context,
-                          const T_DIMSE_C_StoreRQ& request, AnnouncedInstance announced,
-                          int idle_seconds, const InstanceFolder& folder, InstanceSink* sink,
-                          absl::Status* status) {
-  auto presentation = static_cast<T_ASC_PresentationContextID>(presentation_context);
-  T_ASC_PresentationContext context;
-  if (ASC_findAcceptedPresentationContext(association->params, presentation, &context).bad() ||
-      request.DataSetType == DIMSE_DATASET_NULL) {
-    return absl::InvalidArgumentError("a request without a data set or presentation context");
-  }
-  announced.class_uid = Trimmed(request.AffectedSOPClassUID);
-  announced.instance_uid = Trimmed(request.AffectedSOPInstanceUID);
-  announced.transfer_syntax_uid = Trimmed(context.acceptedTransferSyntax);
-  *status = CheckRequest(announced, Trimmed(context.abstractSyntax), folder);
-  std::optional<PartialFile> partial;
-  if (status->ok()) {
-    absl::StatusOr<PartialFile> created = folder.NewPartial();
-    *status = created.status();
-    if (created.ok()) partial.emplace(*std::move(created));
-  }
-  const std::unique_ptr<InstanceStream> stream =
-      partial ? std::make_unique<InstanceStream>(partial->path(), announced,
-                                                 folder.options().limits.max_file_bytes)
-              : std::make_unique<InstanceStream>(*status);
-  const OFCondition received = DIMSE_receiveDataSetInFile(
-      association, DIMSE_NONBLOCKING, idle_seconds, &presentation, stream.get(), nullptr, nullptr);
-  if (received.bad()) {
-    return absl::UnavailableError("it broke off in the middle of an object");
-  }
-  *status = stream->Close();
-  if (status->ok()) *status = folder.Take(*std::move(partial), announced, sink).status();
-  T_DIMSE_C_StoreRSP response = {};
-  response.DimseStatus = StoreStatus(*status);
-  if (DIMSE_sendStoreResponse(association, presentation, &request, &response, nullptr).bad()) {
-    return absl::UnavailableError("it broke off before an answer");
-  }
-  return absl::OkStatus();
-}
-
 void ServeAssociation(const AssociationContext& context, int socket, const std::string& address,
                       int64_t number, bool crowded) {
   ServedAssociation served;
   const OFCondition received =
       ReceiveAssociationFrom(socket, context.secure, context.options->connect_time, &served.layer,
                              &served.network, &served.association);
-  if (received.bad() || !Admit(*context.options, served.association, crowded)) {
+  if (received.bad() || !AdmitAssociation(*context.options, served.association, crowded)) {
     ++*context.refused;
     return;
   }
-  if (!Negotiate(served.association->params)) {
-    Refuse(served.association, ASC_RESULT_REJECTEDPERMANENT, ASC_SOURCE_SERVICEUSER,
-           ASC_REASON_SU_NOREASON);
+  if (!NegotiateAssociation(served.association)) {
     ++*context.refused;
     return;
   }
@@ -270,7 +127,7 @@ void ServeAssociation(const AssociationContext& context, int socket, const std::
   ++*context.accepted;
   EndedAssociation ended;
   ended.association = number;
-  ended.calling_ae = Trimmed(served.association->params->DULparams.callingAPTitle);
+  ended.calling_ae = CallingTitleOf(*served.association);
   ended.address = address;
   CommandLoop(context, served.association, &ended).Run();
   context.sink->AssociationEnded(ended);

@@ -12,8 +12,6 @@
 #include "client/pacs_bridge/network/storage_receiver.h"
 
 class DcmTransportLayer;
-struct T_ASC_Association;
-struct T_DIMSE_C_StoreRQ;
 
 namespace tissueform {
 
@@ -32,12 +30,5 @@ struct AssociationContext {
 // Owns the socket. `crowded`: refuse it for now.
 void ServeAssociation(const AssociationContext& context, int socket, const std::string& address,
                       int64_t number, bool crowded);
-
-// Takes the data set that follows a C-STORE request on any association (C-GET's too), and answers
-// it. `*status` is what the sender is told; an error: the association is broken.
-absl::Status ReceiveStore(T_ASC_Association* association, int presentation_context,
-                          const T_DIMSE_C_StoreRQ& request, AnnouncedInstance announced,
-                          int idle_seconds, const InstanceFolder& folder, InstanceSink* sink,
-                          absl::Status* status);
 
 }  // namespace tissueform

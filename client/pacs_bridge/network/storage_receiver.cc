@@ -16,6 +16,7 @@
 #include <dcmtk/dcmnet/dcmlayer.h>
 #include <sys/socket.h>
 
+#include "client/pacs_bridge/network/address_set.h"
 #include "client/pacs_bridge/network/listening_socket.h"
 #include "client/pacs_bridge/network/socket_layer.h"
 #include "client/pacs_bridge/network/storage_association.h"

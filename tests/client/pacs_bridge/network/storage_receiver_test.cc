@@ -298,6 +298,7 @@ TEST_F(StorageReceiverTest, TwentyAssociationsAreServedAtOnce) {
     all.push_back(WriteCtSeries(sent_ / absl::StrCat(i), {.slices = 2}));
   }
   std::vector<std::thread> senders;
+  senders.reserve(all.size());
   std::atomic<int> good = 0;
   for (const CtSeries& series : all) {
     senders.emplace_back([&] { good += Send(series.files).exit_code == 0 ? 1 : 0; });

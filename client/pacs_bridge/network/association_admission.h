@@ -1,0 +1,25 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+
+#include "client/pacs_bridge/network/storage_receiver.h"
+
+struct T_ASC_Association;
+
+// Whether what asks to be an association may be one, and for what. Who may not is told so.
+namespace tissueform {
+
+// By the AE titles of both sides. `crowded`: there is no room now, whoever it is.
+bool AdmitAssociation(const ReceiverOptions& options, T_ASC_Association* association, bool crowded);
+
+// Takes storage classes and verification, each in the transfer syntax that the sender likes best.
+// False, and refused: nothing that was offered is taken.
+bool NegotiateAssociation(T_ASC_Association* association);
+
+// Without padding.
+std::string CallingTitleOf(const T_ASC_Association& association);
+
+}  // namespace tissueform
