@@ -156,6 +156,7 @@ TEST_F(ExportsTest, BadRequestsAreToldByTheirPlaceAndWithoutTheirText) {
   bad.set_lowest_after(9);
   refused(bad, "range");
   std::vector<v1::Measure> many;
+  many.reserve(65);
   for (int i = 0; i < 65; ++i) many.push_back(SomeMeasure("own_" + std::to_string(i)));
   EXPECT_THAT(exports().Create(prediction, many), StatusIs(absl::StatusCode::kInvalidArgument));
   many.pop_back();
