@@ -53,14 +53,12 @@ if ! is_newer "$generated/made" proto/tissueform/v1 deploy/build_web.sh "$web/pa
 fi
 
 if ! is_newer "$generated/multiply_columns.ts" "$generated/made" "$web/wasm/multiply_columns.cc"; then
-  # Of Debian: a compiler of today has the target, and wasm-ld is in lld.
-  clang=$(command -v clang++ || command -v clang++-14 || true)
-  if [[ -z $clang ]] || ! command -v wasm-ld >/dev/null; then
+  # wasm-ld is in Debian's lld.
+  if ! command -v clang++ >/dev/null || ! command -v wasm-ld >/dev/null; then
     deploy/install_packages.sh build
-    clang=clang++
   fi
   module=$(mktemp)
-  "$clang" --target=wasm32 -msimd128 -O3 -std=c++20 -ffreestanding -fno-exceptions -fno-rtti -nostdlib -Wall -Wextra -Werror \
+  clang++ --target=wasm32 -msimd128 -O3 -std=c++20 -ffreestanding -fno-exceptions -fno-rtti -nostdlib -Wall -Wextra -Werror \
     -Wl,--no-entry -Wl,--import-memory -Wl,--strip-all -o "$module" "$web/wasm/multiply_columns.cc"
   {
     echo "// Made by deploy/build_web.sh of client/web/wasm/multiply_columns.cc."
