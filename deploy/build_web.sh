@@ -70,4 +70,4 @@ fi
 if [[ ${1:-} == --tools ]] || is_newer "$target/moving-file.html" "$web/src" "$web/wasm" "$web/index.html" "$web/moving-file.template.html" "$web/build_moving_file.mjs" "$web/public" "$web/vite.config.ts" "$web/package-lock.json"; then
   exit 0
 fi
-(cd "$web" && npm run --silent build -- --logLevel warn)
+(cd "$web" && npm run --silent build)
