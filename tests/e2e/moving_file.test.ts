@@ -11,6 +11,9 @@ import { fileURLToPath, pathToFileURL } from "node:url";
 import { type Browser, type Page, chromium } from "playwright-core";
 import puppeteer, { type Browser as Firefox, type Page as FirefoxPage } from "puppeteer-core";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { readMovingData } from "../../client/web/src/movingdata/moving_data";
+import { fromBase64, unseal } from "../../client/web/src/movingdata/sealed_payload";
+import { Planner, openCase, typeMove } from "./planner";
 
 // A file that moves as a patient has it: opened from disk, in two browsers, without a network.
 
@@ -293,3 +296,62 @@ describe.skipIf(noFirefox !== "")("in Firefox", () => {
     await page.waitForFunction(() => document.querySelector("[role=alert]")?.textContent?.includes("damaged"));
   });
 });
+
+describe("from the planner", () => {
+  let planner: Planner;
+  beforeAll(async () => (planner = await Planner.start()));
+  afterAll(() => planner?.stop());
+
+  test("its button makes the file that the command makes, with the plan as it is", async () => {
+    const { page, faults } = await openCase(await planner.browse(), planner);
+    await typeMove(page, "Forward", "5");
+    await page.waitForFunction(() => (globalThis as any).tissueform.bench.local.heldColumns !== null);
+    const download = page.waitForEvent("download");
+    await page.getByRole("button", { name: "File that moves" }).click();
+    await (await download).saveAs(path("planner.html"));
+    expect((await download).suggestedFilename()).toBe("tissueform-moves.html");
+    expect(faults).toEqual([]);
+
+    execFileSync(join(BIN, "tissueform"), ["export", join(planner.folder, "plan/plan.json"), "--html", path("command.html")]);
+    const ours = await dataOf("planner.html");
+    const theirs = await dataOf("command.html");
+    expect(ours.surfaces.length).toBe(theirs.surfaces.length);
+    ours.surfaces.forEach((surface, i) => {
+      expect({ ...surface, follows: null }).toEqual({ ...theirs.surfaces[i], follows: null });
+      expect(surface.follows?.weights).toEqual(theirs.surfaces[i].follows?.weights);
+    });
+    expect([ours.model, ours.headFrame, ours.title]).toEqual([theirs.model, theirs.headFrame, ""]);
+    expect(ours.handles.map(({ name, limits }) => [name, limits])).toEqual(theirs.handles.map(({ name, limits }) => [name, limits]));
+    expect(ours.handles[0].pose.translationMm).not.toEqual(theirs.handles[0].pose.translationMm);
+
+    const opened = await openPage("planner.html");
+    await answered(opened.page as Opened);
+    const shown = await opened.page.evaluate(() => (globalThis as unknown as Hook).tissueform?.moving.plan.moves.map((move: any) => move.forwardMm));
+    expect(shown[0]).toBeCloseTo(5, 6);
+    expect(opened.requests).toEqual([]);
+  });
+
+  test("a password that is typed locks it, and a short one is refused", async () => {
+    const { page } = await openCase(await planner.browse(), planner);
+    await page.waitForFunction(() => (globalThis as any).tissueform.bench.local.heldColumns !== null);
+    const password = page.getByLabel("Password");
+    await password.fill("short");
+    await page.getByRole("button", { name: "File that moves" }).click();
+    await page.getByText("at least 8 letters").waitFor();
+    await password.fill(PASSWORD);
+    const download = page.waitForEvent("download");
+    await page.getByRole("button", { name: "File that moves" }).click();
+    await (await download).saveAs(path("planner locked.html"));
+    const opened = await openPage("planner locked.html");
+    await opened.page.getByLabel("password").fill(PASSWORD);
+    await opened.page.getByRole("button", { name: "Open" }).click();
+    await answered(opened.page as Opened);
+  });
+});
+
+async function dataOf(name: string) {
+  const text = readFileSync(path(name), "utf8");
+  const element = (id: string) => new RegExp(`id="${id}">([^<]*)<`).exec(text)?.[1] ?? "";
+  const sealed = { envelope: JSON.parse(element("envelope")), payload: fromBase64(element("payload")) };
+  return readMovingData(await unseal(sealed, ""));
+}
