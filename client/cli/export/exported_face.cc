@@ -61,7 +61,8 @@ absl::StatusOr<std::string> PrepareAnswers(const PlanProblem& problem, Deformati
 }  // namespace
 
 absl::StatusOr<MovingData> ExportFace(OpenedPlan opened, const ExportedFaceOptions& options) {
-  auto& [problem, contents] = opened;
+  const PlanProblem& problem = opened.problem;
+  CaseFile contents = std::move(opened.contents);
   TF_ASSIGN_OR_RETURN(const DeformationModel model, ChosenModel(problem, options.model));
   MovingData data;
   TF_ASSIGN_OR_RETURN(data.handle_is_free, FreeHandles(contents.handles, options.segments));
