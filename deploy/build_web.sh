@@ -52,7 +52,22 @@ if ! is_newer "$generated/made" proto/tissueform/v1 deploy/build_web.sh "$web/pa
   touch "$generated/made"
 fi
 
-if [[ ${1:-} == --tools ]] || is_newer "$target/moving-file.html" "$web/src" "$web/index.html" "$web/moving-file.template.html" "$web/build_moving_file.mjs" "$web/public" "$web/vite.config.ts" "$web/package-lock.json"; then
+if ! is_newer "$generated/multiply_columns.ts" "$generated/made" "$web/wasm/multiply_columns.cc"; then
+  # wasm-ld is in Debian's lld.
+  if ! command -v clang++ >/dev/null || ! command -v wasm-ld >/dev/null; then
+    deploy/install_packages.sh build
+  fi
+  module=$(mktemp)
+  clang++ --target=wasm32 -msimd128 -O3 -std=c++20 -ffreestanding -fno-exceptions -fno-rtti -nostdlib -Wall -Wextra -Werror \
+    -Wl,--no-entry -Wl,--import-memory -Wl,--strip-all -o "$module" "$web/wasm/multiply_columns.cc"
+  {
+    echo "// Made by deploy/build_web.sh of client/web/wasm/multiply_columns.cc."
+    echo "export const MULTIPLY_COLUMNS = \"$(base64 -w0 "$module")\";"
+  } >"$generated/multiply_columns.ts"
+  rm -f "$module"
+fi
+
+if [[ ${1:-} == --tools ]] || is_newer "$target/moving-file.html" "$web/src" "$web/wasm" "$web/index.html" "$web/moving-file.template.html" "$web/build_moving_file.mjs" "$web/public" "$web/vite.config.ts" "$web/package-lock.json"; then
   exit 0
 fi
-(cd "$web" && npm run --silent build -- --logLevel warn)
+(cd "$web" && npm run --silent build)

@@ -108,6 +108,7 @@ absl::StatusOr<std::optional<EvaluatedAnswer>> PreparedEvaluator::Evaluate(
   if (!evaluator_.Answer(in_order, &answer.positions, &answer.error_mm)) {
     return std::optional<EvaluatedAnswer>();
   }
+  evaluator_.Band(in_order, &answer.band_mm);
   return std::optional<EvaluatedAnswer>(std::move(answer));
 }
 

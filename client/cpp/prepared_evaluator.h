@@ -22,6 +22,8 @@ namespace tissueform {
 struct EvaluatedAnswer {
   std::vector<float> positions;  // x y z in mm of every vertex of the question, in its order
   double error_mm = 0;           // a bound; of neo_hookean an estimate
+  // Of each vertex; empty unless ranges of the material were asked for.
+  std::vector<float> band_mm = {};
 };
 
 // The prepared answers of one session, model and selection of vertices, fetched from a server and

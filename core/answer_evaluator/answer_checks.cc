@@ -18,6 +18,7 @@ namespace {
 constexpr double kMostOfAnything = 1 << 28;  // fits into int32_t, and products of two into size_t
 constexpr double kMostHandles = 10000;
 constexpr double kMostDegree = 1000;
+constexpr size_t kMostBandVariables = 17;  // 16 tissues and Poisson's ratio
 
 bool IsCount(double value, double least, double most) {
   return value >= least && value <= most && value == std::floor(value);
@@ -160,6 +161,15 @@ bool SeriesFits(const PortableAnswers& answers, const AnswerSizes& sizes) {
          answers.probes.size() % (3 * sizes.pairs) == 0 && ThirdOrderFits(answers, sizes);
 }
 
+// Only where there are columns of elasticity.
+bool BandFits(const PortableAnswers& answers, const AnswerSizes& sizes, bool is_gradient) {
+  const PackedColumns& band = answers.band;
+  if (band.steps.empty()) return answers.band_map.empty() && band.upper.empty();
+  return !is_gradient && answers.band_map.size() == band.steps.size() * 12 * sizes.handles &&
+         sizes.band_variables <= kMostBandVariables && (sizes.free == 0 || !band.upper.empty()) &&
+         IsPacked(band, 3 * sizes.free * sizes.band_variables, band.steps.size());
+}
+
 }  // namespace
 
 std::string CheckAnswers(const PortableAnswers& answers) {
@@ -171,6 +181,7 @@ std::string CheckAnswers(const PortableAnswers& answers) {
   const bool is_gradient = IsModel(answers, AnswerModel::kGradientField);
   const bool is_neo = IsModel(answers, AnswerModel::kNeoHookean);
   if (!HasNothingElse(answers, is_gradient, is_neo)) return "a section belongs to another model";
+  if (!BandFits(answers, sizes, is_gradient)) return "the band's sizes do not fit";
   if (is_gradient && !ExpansionFits(answers, sizes)) return "the expansion's sizes do not fit";
   if (is_neo) {
     if (!SeriesFits(answers, sizes)) return "the series' sizes do not fit";

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/answer_evaluator/answer_band.h"
 #include "core/answer_evaluator/compression_error.h"
 #include "core/answer_evaluator/packed_product.h"
 #include "core/answer_evaluator/pose_factors.h"
@@ -39,6 +40,16 @@ bool AnswerEvaluator::Answer(std::span<const AnswerPose> poses, std::vector<floa
   }
   Place(poses, moves, positions);
   if (error_mm != nullptr) *error_mm = product.error_mm;
+  return true;
+}
+
+bool AnswerEvaluator::Band(std::span<const AnswerPose> poses, std::vector<float>* band_mm) const {
+  if (!has_band() || !AreLegal(answers_, poses)) return false;
+  const std::vector<float> of_free = BandOfFree(answers_, poses);
+  band_mm->assign(answers_.regions.size(), 0.0F);
+  ForEachVertex(answers_, [&](size_t place, int32_t region, size_t first) {
+    if (region == PortableAnswers::kFree) (*band_mm)[place] = of_free[first / 3];
+  });
   return true;
 }
 

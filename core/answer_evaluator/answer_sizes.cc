@@ -32,6 +32,9 @@ AnswerSizes SizesOf(const PortableAnswers& answers) {
   } else if (sizes.rows > 0) {
     sizes.full_columns = answers.columns.lower.size() / sizes.rows;
   }
+  if (const size_t band_columns = answers.band.steps.size(); band_columns > 0 && sizes.free > 0) {
+    sizes.band_variables = answers.band.upper.size() / band_columns / (3 * sizes.free);
+  }
   return sizes;
 }
 

@@ -24,6 +24,7 @@ struct AnswerSizes {
   size_t pairs = 0;          // of neo_hookean
   size_t triples = 0;        // of neo_hookean with a third order
   size_t full_map_cols = 0;  // of neo_hookean
+  size_t band_variables = 0;
 };
 AnswerSizes SizesOf(const PortableAnswers& answers);
 

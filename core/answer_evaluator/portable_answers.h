@@ -88,6 +88,12 @@ struct PortableAnswers {
   std::vector<float> second_lengths;
   std::vector<float> third_lengths;
   std::vector<double> third_gains;
+
+  // Of the elastic models where ranges of the material are known: how the free vertices' answer
+  // changes with each variable, three rows a vertex, those of all variables one after the other;
+  // upper halves only. band_map is #columns by 12 #handles.
+  std::vector<double> band_map;
+  PackedColumns band;
 };
 
 // Calls visit(number, what) for all that travels, in the order of the bytes. The numbers are those
@@ -122,6 +128,9 @@ void VisitSections(Answers& answers, const Visitor& visit) {
   visit(43, answers.second_lengths);
   visit(44, answers.third_lengths);
   visit(45, answers.third_gains);
+  visit(60, answers.band_map);
+  visit(61, answers.band.steps);
+  visit(62, answers.band.upper);
 }
 
 }  // namespace tissueform

@@ -37,17 +37,6 @@ PoseFactors GradientFactors(const PortableAnswers& answers, std::span<const Answ
   return result;
 }
 
-void AddElasticFactors(const PortableAnswers& answers, std::span<const AnswerPose> poses,
-                       std::vector<double>* factors) {
-  for (const AnswerPose& pose : poses) {
-    const AnswerMotion motion = MotionAbout(pose, answers.origins.data());
-    for (size_t i = 0; i < 3; ++i) {
-      for (size_t j = 0; j < 3; ++j) factors->push_back(motion.turn[3 * i + j]);
-      factors->push_back(motion.move_mm[i]);
-    }
-  }
-}
-
 // Of every handle the sine of its turn times the axis, and how its middle moves.
 std::vector<double> NumbersOf(const PortableAnswers& answers, std::span<const AnswerPose> poses) {
   std::vector<double> numbers;
@@ -152,6 +141,17 @@ PoseFactors NeoHookeanFactors(const PortableAnswers& answers, std::span<const An
 }
 
 }  // namespace
+
+void AddElasticFactors(const PortableAnswers& answers, std::span<const AnswerPose> poses,
+                       std::vector<double>* factors) {
+  for (const AnswerPose& pose : poses) {
+    const AnswerMotion motion = MotionAbout(pose, answers.origins.data());
+    for (size_t i = 0; i < 3; ++i) {
+      for (size_t j = 0; j < 3; ++j) factors->push_back(motion.turn[3 * i + j]);
+      factors->push_back(motion.move_mm[i]);
+    }
+  }
+}
 
 PoseFactors FactorsOf(const PortableAnswers& answers, std::span<const AnswerPose> poses) {
   if (IsModel(answers, AnswerModel::kGradientField)) {

@@ -21,4 +21,8 @@ struct PoseFactors {
 };
 PoseFactors FactorsOf(const PortableAnswers& answers, std::span<const AnswerPose> poses);
 
+// 12 numbers a handle: A and b about the origin of the elastic columns, appended.
+void AddElasticFactors(const PortableAnswers& answers, std::span<const AnswerPose> poses,
+                       std::vector<double>* factors);
+
 }  // namespace tissueform

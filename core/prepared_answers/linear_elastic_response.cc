@@ -33,26 +33,6 @@ Eigen::MatrixXd CoefficientsOf(const ElasticSystem& elastic,
   return coefficients;
 }
 
-// Moves have no range: a sixth of the mesh, which is 3 cm on a head, beside those of turns about a
-// far pivot. What is wider is covered as far as the digits go that these need.
-ColumnUses UsesOf(const MeshPreparation& preparation, const ElasticSystem& elastic,
-                  double max_rotation_rad) {
-  constexpr int kSamples = 400;
-  const double size_mm = preparation.mesh().BoundingBoxDiagonal();
-  const std::vector<Eigen::Vector3d> centroids = HandleCentroids(preparation);
-  const PoseRange typical{.rotation_rad = 0.3 * max_rotation_rad,
-                          .scale_change = 1e-3,  // bone keeps its size
-                          .translation_mm = 0.05 * size_mm,
-                          .pivot_offset_mm = 0.1 * size_mm};
-  const PoseRange widest{.rotation_rad = max_rotation_rad,
-                         .scale_change = 0.1,
-                         .translation_mm = 0.15 * size_mm,
-                         .pivot_offset_mm = 0.35 * size_mm};
-  return {.factors = 1,
-          .typical = CoefficientsOf(elastic, SamplePoses(centroids, typical, kSamples)),
-          .widest = CoefficientsOf(elastic, SamplePoses(centroids, widest, kSamples))};
-}
-
 class LinearElasticResponse : public VertexResponse {
  public:
   LinearElasticResponse(std::shared_ptr<MeshPreparation> preparation, const ElasticSystem& elastic,
@@ -65,7 +45,8 @@ class LinearElasticResponse : public VertexResponse {
         chosen_(std::move(chosen)),
         panel_(preparation_->mesh().positions()(free, Eigen::all),
                PanelResponse::Rows::kCoordinates, RowsOfVertices(elastic_.response_columns(), free),
-               UsesOf(*preparation_, elastic_, options.max_rotation_rad), options.tolerance_mm) {}
+               ElasticUses(*preparation_, elastic_, options.max_rotation_rad),
+               options.tolerance_mm) {}
 
   double ErrorBoundMm(absl::Span<const HandlePose> poses) const override {
     return BoundMm(poses, Choose(poses));
@@ -128,6 +109,24 @@ class LinearElasticResponse : public VertexResponse {
 };
 
 }  // namespace
+
+ColumnUses ElasticUses(const MeshPreparation& preparation, const ElasticSystem& elastic,
+                       double max_rotation_rad) {
+  constexpr int kSamples = 400;
+  const double size_mm = preparation.mesh().BoundingBoxDiagonal();
+  const std::vector<Eigen::Vector3d> centroids = HandleCentroids(preparation);
+  const PoseRange typical{.rotation_rad = 0.3 * max_rotation_rad,
+                          .scale_change = 1e-3,  // bone keeps its size
+                          .translation_mm = 0.05 * size_mm,
+                          .pivot_offset_mm = 0.1 * size_mm};
+  const PoseRange widest{.rotation_rad = max_rotation_rad,
+                         .scale_change = 0.1,
+                         .translation_mm = 0.15 * size_mm,
+                         .pivot_offset_mm = 0.35 * size_mm};
+  return {.factors = 1,
+          .typical = CoefficientsOf(elastic, SamplePoses(centroids, typical, kSamples)),
+          .widest = CoefficientsOf(elastic, SamplePoses(centroids, widest, kSamples))};
+}
 
 int64_t LinearElasticResponseBytes(const MeshPreparation& preparation, Eigen::Index num_vertices) {
   return PanelResponse::BytesNeeded(num_vertices, PanelResponse::Rows::kCoordinates,

@@ -13,6 +13,7 @@
 #include "core/base/cancellation.h"
 #include "core/base/preparation_progress.h"
 #include "core/deformation/mesh_preparation.h"
+#include "core/prepared_answers/column_compression.h"
 #include "core/prepared_answers/vertex_response.h"
 
 namespace tissueform {
@@ -26,6 +27,12 @@ struct LinearElasticResponseOptions {
   FactorAdmission admission = nullptr;
   PreparationObserver observer = nullptr;  // may be empty; told of the columns
 };
+
+// What poses do with the 12 columns a handle. Moves have no range: a sixth of the mesh, which is 3
+// cm on a head, beside those of turns about a far pivot. What is wider is covered as far as the
+// digits go that these need.
+ColumnUses ElasticUses(const MeshPreparation& preparation, const ElasticSystem& elastic,
+                       double max_rotation_rad);
 
 // Bytes that a response of so many vertices needs at most, while it is made; 12 columns a handle.
 int64_t LinearElasticResponseBytes(const MeshPreparation& preparation, Eigen::Index num_vertices);

@@ -8,6 +8,9 @@
 #include "absl/memory/memory.h"
 
 #include "core/base/status_macros.h"
+#include "core/prepared_answers/column_compression.h"
+#include "core/prepared_answers/linear_elastic_response.h"
+#include "core/prepared_answers/panel_matrix.h"
 #include "core/uncertainty/material_expansion.h"
 #include "core/uncertainty/uncertainty_band.h"
 
@@ -49,6 +52,34 @@ void BandColumns::Evaluate(absl::Span<const HandlePose> poses, Eigen::VectorXf* 
     fields.col(static_cast<Eigen::Index>(i)).noalias() = columns_[i] * coefficients;
   }
   *band_mm = FirstOrderBand(fields);
+}
+
+// One variable's rows below the other's: so that all of them share factors, and are compressed by
+// what poses do to them together.
+void BandColumns::Describe(PortableAnswers* answers) const {
+  std::vector<Eigen::Index> rows;  // of free vertices
+  for (size_t v = 0; v < answers->regions.size(); ++v) {
+    if (answers->regions[v] != PortableAnswers::kFree) continue;
+    for (size_t axis = 0; axis < 3; ++axis) rows.push_back(static_cast<Eigen::Index>(3 * v + axis));
+  }
+  const auto count = static_cast<Eigen::Index>(rows.size());
+  Eigen::MatrixXd stacked(count * static_cast<Eigen::Index>(columns_.size()),
+                          columns_.front().cols());
+  for (size_t i = 0; i < columns_.size(); ++i) {
+    stacked.middleRows(count * static_cast<Eigen::Index>(i), count) =
+        columns_[i](rows, Eigen::all).cast<double>();
+  }
+  const ColumnCompression compression(
+      stacked, 3, ElasticUses(*preparation_, elastic_, answers->numbers.max_rotation_rad),
+      kBandTolerance * preparation_->mesh().BoundingBoxDiagonal());
+  PortableAnswers compressed;
+  compression.Describe(&compressed);
+  answers->band_map = std::move(compressed.map);
+  PanelMatrix packed(stacked.rows(), compression.num_kept(), 0);
+  for (Eigen::Index c = 0; c < compression.num_kept(); ++c) {
+    packed.SetColumn(c, compression.kept().col(c));
+  }
+  packed.Describe(&answers->band);
 }
 
 int64_t BandColumns::bytes_held() const {

@@ -10,6 +10,7 @@
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
 
+#include "core/answer_evaluator/portable_answers.h"
 #include "core/base/cancellation.h"
 #include "core/constraints/handle_pose.h"
 #include "core/deformation/mesh_preparation.h"
@@ -36,6 +37,12 @@ class BandColumns {
   // Of each vertex the 95th percentile of the distance in mm, resized. REQUIRES: one legal pose per
   // handle.
   void Evaluate(absl::Span<const HandlePose> poses, Eigen::VectorXf* band_mm) const;
+
+  // Adds the band to answers at the same vertices by an elastic model on the same preparation, in
+  // columns as few as keep its fields within kBandTolerance of the mesh's diagonal (0.05 mm of a
+  // head); see docs/prepared-answers.md.
+  void Describe(PortableAnswers* answers) const;
+  static constexpr double kBandTolerance = 2e-4;
 
   int64_t bytes_held() const;
 

@@ -21,12 +21,13 @@
 namespace tissueform {
 namespace {
 
-// No inline script, nothing from elsewhere; the identity provider may be asked, where there is one.
+// No inline script, nothing from elsewhere, text is never run; the page's own WebAssembly is. The
+// identity provider may be asked, where there is one.
 std::string SecurityPolicy(const LoginConfig& login) {
   const std::string provider = OriginOfIssuer(login);
   return absl::StrCat(
-      "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
-      "font-src 'self'; connect-src 'self'",
+      "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; "
+      "img-src 'self' data: blob:; font-src 'self'; connect-src 'self'",
       provider.empty() ? "" : " ", provider,
       "; worker-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; "
       "frame-ancestors 'none'");

@@ -101,7 +101,9 @@ class PreparedAnswersStream final : public MessageStream<v1::GetPreparedAnswersR
 
   // The bytes, and what the header says of them.
   absl::Status Write(const SharedResponse& shared) {
-    bytes_ = WriteAnswers(shared.response->Describe());
+    PortableAnswers answers = shared.response->Describe();
+    if (shared.band != nullptr) shared.band->Describe(&answers);
+    bytes_ = WriteAnswers(answers);
     const auto size = static_cast<int64_t>(bytes_.size());
     const int64_t most = std::min<int64_t>(limits_.max_prepared_answer_bytes, kMostAnswerBytes);
     if (size > most) {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { join } from "node:path";
+import { pathToFileURL } from "node:url";
 import type { Page } from "playwright-core";
 import { IdentityProvider, enterName } from "./identity_provider";
 import { type Hook, Planner, live, moved, openCase, openPage, state, takeSegment, typeMove } from "./planner";
@@ -140,4 +141,13 @@ test("frames of an animation: the lower jaw 8 mm forward and back", async () => 
     await page.waitForTimeout(150);
     await page.screenshot({ path: join(FOLDER, `drag-${String(step).padStart(2, "0")}.png`), clip: { x: 150, y: 90, width: 1130, height: 510 } });
   }
+});
+
+test("a file that moves, opened from disk", async () => {
+  const { page } = await openPage(await planner.browse(), pathToFileURL(planner.exportWholeHead()).href);
+  await page.emulateMedia({ colorScheme: "dark" });
+  await page.waitForFunction(() => (globalThis as any).tissueform.moving?.answered > 0);
+  await page.getByRole("checkbox").check();
+  await page.waitForTimeout(1500);
+  await page.screenshot({ path: join(FOLDER, "file-that-moves.jpg"), type: "jpeg", quality: 90 });
 });

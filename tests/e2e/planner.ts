@@ -109,6 +109,13 @@ export class Planner {
     return path;
   }
 
+  /** The same as a file that moves. */
+  exportWholeHead(): string {
+    const path = join(this.folder, "moves.html");
+    execFileSync(join(BIN, "tissueform"), ["export", this.writePlan(true), "--html", path, "--model", "linear_elastic"]);
+    return path;
+  }
+
   /** The bundled head with three segments, whose stiffness is known within a range; `isWhole`: and what surrounds it. */
   private writePlan(isWhole: boolean): string {
     const folder = join(this.folder, isWhole ? "whole" : "plan");

@@ -15,6 +15,7 @@
 #include "core/base/status_macros.h"
 #include "core/planning/model_names.h"
 #include "core/prepared_answers/create_response.h"
+#include "core/uncertainty/band_columns.h"
 
 namespace tissueform {
 namespace {
@@ -55,13 +56,20 @@ absl::StatusOr<std::string> PrepareAnswers(const PlanProblem& problem, Deformati
                                               problem.deformer.preparation));
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<VertexResponse> response,
                       CreateResponse(preparation, vertices, {.model = model}));
-  return WriteAnswers(response->Describe());
+  PortableAnswers answers = response->Describe();
+  if (problem.uncertainty && model != DeformationModel::kGradientField) {
+    TF_ASSIGN_OR_RETURN(const std::unique_ptr<BandColumns> band,
+                        BandColumns::Create(preparation, *problem.uncertainty, vertices, nullptr));
+    band->Describe(&answers);
+  }
+  return WriteAnswers(answers);
 }
 
 }  // namespace
 
 absl::StatusOr<MovingData> ExportFace(OpenedPlan opened, const ExportedFaceOptions& options) {
-  auto& [problem, contents] = opened;
+  const PlanProblem& problem = opened.problem;
+  CaseFile contents = std::move(opened.contents);
   TF_ASSIGN_OR_RETURN(const DeformationModel model, ChosenModel(problem, options.model));
   MovingData data;
   TF_ASSIGN_OR_RETURN(data.handle_is_free, FreeHandles(contents.handles, options.segments));

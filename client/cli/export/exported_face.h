@@ -20,10 +20,11 @@ struct ExportedFaceOptions {
 };
 
 // What a file shows of a plan: its surfaces, and prepared answers of the vertices that they follow,
-// made here as a server makes them. Takes what preparing that model takes.
+// made here as a server makes them; of an elastic model with the band of uncertainty where the plan
+// gives ranges of the material. Takes what preparing that model takes.
 //
 // Errors: InvalidArgument (a model or a segment that is none; a model without prepared answers);
-// those of MeshPreparation and CreateResponse.
+// those of MeshPreparation, CreateResponse and BandColumns.
 absl::StatusOr<MovingData> ExportFace(OpenedPlan opened, const ExportedFaceOptions& options);
 
 }  // namespace tissueform

@@ -43,8 +43,9 @@ absl::StatusOr<std::string> ReadPageTemplate() {
   std::error_code error;
   const uintmax_t size = fs::file_size(path, error);
   if (error || size > kMostTemplateBytes) {
-    return absl::NotFoundError(absl::StrCat("the page for files that move is not at ",
-                                            path.string(), "; deploy/build_web.sh builds it"));
+    return absl::NotFoundError(absl::StrCat(
+        "the page for files that move is not at ", path.string(),
+        "; deploy/build_web.sh builds it, and the package tissueform-gateway brings it"));
   }
   std::string page(size, '\0');
   std::ifstream file(path, std::ios::binary);

@@ -118,6 +118,12 @@ size_t CountLetters(const std::string& text) {
 }  // namespace
 
 absl::StatusOr<SealedPayload> SealPayload(absl::string_view data, const std::string& password) {
+  if (data.size() > kMostMovingDataBytes) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("surfaces and prepared answers have ", data.size(),
+                     " bytes, and a file that moves at most ", kMostMovingDataBytes,
+                     "; show fewer triangles, or choose another model"));
+  }
   SealedPayload sealed;
   TF_ASSIGN_OR_RETURN(sealed.payload, Gzip(data));
   Json encryption;

@@ -11,6 +11,8 @@
 namespace tissueform {
 
 inline constexpr int kMovingFileKeyRounds = 600'000;
+// Before they are compressed; the page refuses more.
+inline constexpr size_t kMostMovingDataBytes = size_t{256} << 20;
 inline constexpr size_t kLeastPasswordLetters = 8;
 inline constexpr size_t kMostPasswordBytes = 1024;
 
@@ -21,8 +23,8 @@ struct SealedPayload {
 };
 
 // Compressed (gzip) and, unless the password is empty, encrypted: AES-256 in GCM with a key by
-// PBKDF2 (SHA-256, kMovingFileKeyRounds), salt and nonce new every time. Errors: Internal, when a
-// library fails.
+// PBKDF2 (SHA-256, kMovingFileKeyRounds), salt and nonce new every time. Errors:
+// ResourceExhausted (over kMostMovingDataBytes); Internal, when a library fails.
 absl::StatusOr<SealedPayload> SealPayload(absl::string_view data, const std::string& password);
 
 // The first line of the file, which may end in CR LF. Errors: NotFound (cannot be read),

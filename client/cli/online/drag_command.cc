@@ -41,6 +41,7 @@ struct DragCommandOptions {
   double seconds = 20;
   double poses_per_second = 30;
   double give_up_seconds = 60;
+  bool local = false;
 };
 
 // To the planned pose and back: the hand lifts at both ends, and what it has reached is committed.
@@ -103,9 +104,41 @@ ReattachingStream::Options StreamOptions(const PlanProblem& problem,
   return stream;
 }
 
+// Poses that this command answers itself beside the server; the sending thread's while it runs.
+struct LocalAnswers {
+  std::unique_ptr<PreparedEvaluator> evaluator;  // null: none are
+  std::vector<double> times_ms;                  // of those that were covered
+  int64_t beyond = 0;
+};
+
+absl::StatusOr<LocalAnswers> FetchLocalAnswers(TissueformClient* client, const std::string& session,
+                                               const DeformStream::Options& stream) {
+  if (!stream.prepared.has_value()) {
+    return absl::InvalidArgumentError(
+        "the plan's model has no prepared answers to evaluate here; leave --local out");
+  }
+  LocalAnswers local;
+  TF_ASSIGN_OR_RETURN(const v1::Session described, client->GetSession(session));
+  TF_ASSIGN_OR_RETURN(local.evaluator, client->FetchPreparedAnswers(described, stream));
+  absl::PrintF("answered here, too: %d columns, %.2f MB\n", local.evaluator->header().terms(),
+               1e-6 * static_cast<double>(local.evaluator->header().total_bytes()));
+  return local;
+}
+
+void AnswerHere(const std::vector<NamedPose>& poses, LocalAnswers* local) {
+  if (local->evaluator == nullptr) return;
+  const Stopwatch watch;
+  const auto answer = local->evaluator->Evaluate(poses);
+  if (answer.ok() && answer->has_value()) {
+    local->times_ms.push_back(1e3 * watch.Seconds());
+  } else {
+    ++local->beyond;
+  }
+}
+
 void Send(ReattachingStream* drag, const std::vector<NamedPose>& poses,
           const DragCommandOptions& options, const Stopwatch& since_start, SendTimes* send_times,
-          const std::atomic<bool>& ended) {
+          LocalAnswers* local, const std::atomic<bool>& ended) {
   const auto count = static_cast<uint64_t>(options.seconds * options.poses_per_second);
   const auto poses_there =
       std::max<uint64_t>(1, static_cast<uint64_t>(kSecondsThere * options.poses_per_second));
@@ -116,8 +149,9 @@ void Send(ReattachingStream* drag, const std::vector<NamedPose>& poses,
                     static_cast<double>(i) / options.poses_per_second)));
     const double phase = M_PI * static_cast<double>(i) / static_cast<double>(poses_there);
     send_times->Append(1e3 * since_start.Seconds());
-    drag->SendPoses(i, PartOfPoses(poses, (1 - std::cos(phase)) / 2),
-                    /*commit=*/i % poses_there == 0 || i == count);
+    const std::vector<NamedPose> now = PartOfPoses(poses, (1 - std::cos(phase)) / 2);
+    drag->SendPoses(i, now, /*commit=*/i % poses_there == 0 || i == count);
+    AnswerHere(now, local);
   }
   drag->CloseSending();
 }
@@ -144,6 +178,17 @@ void PrintTotals(const ReattachingStream& drag, const SendTimes& send_times,
   }
 }
 
+void PrintLocal(const LocalAnswers& local) {
+  if (local.evaluator == nullptr) return;
+  absl::PrintF("answered here: %d poses, %d beyond what was prepared", local.times_ms.size(),
+               local.beyond);
+  if (!local.times_ms.empty()) {
+    absl::PrintF("; %.2f ms (p50), %.2f ms (p99)", Percentile(local.times_ms, 50),
+                 Percentile(local.times_ms, 99));
+  }
+  absl::PrintF("\n");
+}
+
 absl::Status Drag(TissueformClient* client, const PlanProblem& problem,
                   const DragCommandOptions& options) {
   DragTotals totals;
@@ -157,11 +202,16 @@ absl::Status Drag(TissueformClient* client, const PlanProblem& problem,
       "dragging %s, %d vertices a frame; kill the server and start it again to see the "
       "drag go on\n",
       session, drag->started().vertex_count());
+  LocalAnswers local;
+  if (options.local) {
+    TF_ASSIGN_OR_RETURN(local, FetchLocalAnswers(client, session, stream.stream));
+  }
   const Stopwatch since_start;
   SendTimes send_times;
   std::atomic<bool> ended = false;
-  std::thread sender(
-      [&] { Send(drag.get(), NamedPoses(problem), options, since_start, &send_times, ended); });
+  std::thread sender([&] {
+    Send(drag.get(), NamedPoses(problem), options, since_start, &send_times, &local, ended);
+  });
   while (std::optional<v1::DeformFrame> frame = drag->Receive()) {
     drag->Ack(*frame);
     Note(*frame, 1e3 * since_start.Seconds() - send_times.Get(frame->sequence()), &totals);
@@ -170,6 +220,7 @@ absl::Status Drag(TissueformClient* client, const PlanProblem& problem,
   ended = true;
   sender.join();
   PrintTotals(*drag, send_times, totals);
+  PrintLocal(local);
   const absl::Status end = drag->Finish();
   return interrupted ? absl::CancelledError("interrupted") : end;
 }
@@ -203,6 +254,8 @@ void AddDragCommand(CLI::App& app, CommandWork* work) {
                    "how long to wait for a server that is away")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
+  command->add_flag("--local", options->local,
+                    "fetch the prepared answers and answer every pose here, too");
   command->footer(
       "Example:\n"
       "  tissueform-server --port 50051 &\n"

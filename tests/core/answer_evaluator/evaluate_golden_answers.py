@@ -22,6 +22,7 @@ except ModuleNotFoundError as missing:
     sys.exit(77)
 
 AGREEMENT_MM = 1e-4
+BAND_AGREEMENT_MM = 2e-3
 TYPES = {1: "<f8", 2: "<f4", 3: "<i4", 4: "<i2"}
 NUMBERS = (
     "model num_vertices num_handles tolerance_mm max_rotation_rad max_scale_change max_estimate_mm largest_rest_mm "
@@ -239,6 +240,24 @@ class Answers:
             positions[self.regions == h] = rest + rest @ A.T + b
         return positions, max(error, self.held_error(poses))
 
+    def band(self, poses):
+        """Of every vertex, where there are columns of the band."""
+        steps, upper = self.section(61), self.section(62)
+        g = self.section(60).reshape(len(steps), 12 * self.handles) @ self.elastic_factors(poses)[:, 0]
+        rows = len(upper) // len(steps)
+        fields = (self.unpacked(steps, upper, np.zeros(0), rows) @ g).reshape(-1, len(self.free), 3)
+        covariance = np.einsum("kvi,kvj->vij", fields, fields)
+        trace = np.trace(covariance, axis1=1, axis2=2)
+        squares = (covariance ** 2).sum(axis=(1, 2))
+        moving = squares > 0
+        x = np.clip(trace[moving] ** 2 / squares[moving], 1, 3) - 2
+        root = 2.447747 + 0.5 * (2.795483 - 1.959964) * x + 0.5 * (1.959964 - 2 * 2.447747 + 2.795483) * x * x
+        of_free = np.zeros(len(self.free))
+        of_free[moving] = np.sqrt(squares[moving] / trace[moving]) * root
+        band = np.zeros(len(self.regions))
+        band[self.regions == FREE] = of_free
+        return band
+
     def covers(self, poses, error):
         slack = 1e-9
         if self.model != LINEAR_ELASTIC:
@@ -271,6 +290,10 @@ def main(path):
         off = np.abs(positions - np.array(case["positions_mm"]).reshape(-1, 3)).max()
         if not off <= AGREEMENT_MM:
             sys.exit(f"case {number}: off by {off} mm")
+        if "band_mm" in case:
+            off = np.abs(answers.band(poses) - np.array(case["band_mm"])).max()
+            if not off <= BAND_AGREEMENT_MM:
+                sys.exit(f"case {number}: the band is off by {off} mm")
 
 
 if __name__ == "__main__":

@@ -15,8 +15,11 @@
 #include <sys/wait.h>
 
 #include "core/answer_evaluator/answer_bytes.h"
+#include "core/answer_evaluator/answer_checks.h"
 #include "core/answer_evaluator/answer_evaluator.h"
+#include "core/uncertainty/band_columns.h"
 #include "tests/core/answer_evaluator/evaluated_problem.h"
+#include "tests/core/uncertainty/uncertain_bar.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
@@ -30,6 +33,7 @@ using Json = nlohmann::json;
 
 constexpr double kToleranceMm = 5e-5;  // of a bound; positions agree to twice that
 constexpr double kAgreementMm = 1e-4;
+constexpr double kBandAgreementMm = 2e-3;
 
 Json ToJson(const HandlePose& pose) {
   return {{"rotation_vector", pose.rotation_vector},
@@ -45,6 +49,12 @@ std::vector<AnswerPose> PosesOf(const Json& json) {
         {pose["rotation_vector"], pose["pivot_mm"], pose["translation_mm"], pose["scale"]});
   }
   return poses;
+}
+
+Json Rounded(const std::vector<float>& values) {
+  Json rounded = Json::array();
+  for (const float value : values) rounded.push_back(std::round(1e6 * double{value}) / 1e6);
+  return rounded;
 }
 
 std::string ReadBytes(const std::string& path) {
@@ -158,6 +168,96 @@ TEST_P(GoldenAnswersTest, AProgramThatIsNotOursGivesTheSame) {
   const int exit_code = WEXITSTATUS(std::system(command.c_str()));
   if (exit_code == 77) GTEST_SKIP() << "numpy is not installed";
   EXPECT_EQ(exit_code, 0);
+}
+
+// Linear elasticity with columns of the band, beside BandColumns.
+class GoldenBandTest : public ::testing::Test {
+ protected:
+  GoldenBandTest() : bar_(DeformationModel::kLinearElastic), preparation_(bar_.Prepare()) {
+    bar_.uncertainty.poisson_ratio_95 = {0.42, 0.47};
+    for (int32_t v = 0; v < bar_.mesh.num_vertices(); v += 2) vertices_.push_back(v);
+    const auto response = *CreateResponse(preparation_, vertices_,
+                                          {.model = DeformationModel::kLinearElastic,
+                                           .tolerance_mm = kToleranceMm,
+                                           .max_rotation_rad = 0.4});
+    columns_ = *BandColumns::Create(preparation_, bar_.uncertainty, vertices_, {});
+    answers_ = response->Describe();
+    columns_->Describe(&answers_);
+  }
+
+  Json MakeCases() const {
+    RandomNumbers random(22);
+    Json cases = Json::array();
+    for (int number = 0; number < 8; ++number) {
+      std::vector<HandlePose> poses =
+          DragPoses(*preparation_, DeformationModel::kLinearElastic, 0, &random);
+      if (number == 0) poses.assign(poses.size(), HandlePose{});
+      Json one = {{"poses", Json::array()}, {"covered", true}};
+      for (const HandlePose& pose : poses) one["poses"].push_back(ToJson(pose));
+      const AnswerEvaluator evaluator(answers_);
+      std::vector<float> positions;
+      EXPECT_TRUE(evaluator.Answer(ToAnswerPoses(poses), &positions));
+      one["error_mm"] = evaluator.ErrorMm(ToAnswerPoses(poses));
+      one["positions_mm"] = Rounded(positions);
+      Eigen::VectorXf band;
+      columns_->Evaluate(poses, &band);
+      one["band_mm"] = Rounded({band.begin(), band.end()});
+      cases.push_back(std::move(one));
+    }
+    return cases;
+  }
+
+  UncertainBar bar_;
+  std::shared_ptr<MeshPreparation> preparation_;
+  std::vector<int32_t> vertices_;
+  std::unique_ptr<BandColumns> columns_;
+  PortableAnswers answers_;
+};
+
+TEST_F(GoldenBandTest, IsThatOfTheServer) {
+  const std::string bytes = WriteAnswers(answers_);
+  const Json file = {{"answers", "linear_elastic_band.bin"}, {"cases", MakeCases()}};
+  if (const char* folder = std::getenv("TISSUEFORM_GOLDEN_ANSWERS")) {
+    std::ofstream(absl::StrCat(folder, "/linear_elastic_band.bin"), std::ios::binary) << bytes;
+    std::ofstream(absl::StrCat(folder, "/linear_elastic_band.json")) << file.dump() << "\n";
+  }
+  AnswerReading reading =
+      ReadAnswers(ReadBytes(TestDataPath("prepared_answers/linear_elastic_band.bin")));
+  ASSERT_EQ(reading.error, AnswerError::kNone) << reading.message;
+  const AnswerEvaluator kept(std::move(reading.answers));
+  const Json golden =
+      Json::parse(ReadBytes(TestDataPath("prepared_answers/linear_elastic_band.json")));
+  for (const Json& cases : {golden["cases"], file["cases"]}) {
+    ASSERT_EQ(cases.size(), 8U);
+    for (const Json& one : cases) {
+      std::vector<float> band;
+      ASSERT_TRUE(kept.Band(PosesOf(one["poses"]), &band));
+      const std::vector<float> expected = one["band_mm"];
+      ASSERT_EQ(band.size(), expected.size());
+      for (size_t v = 0; v < expected.size(); ++v) {
+        ASSERT_NEAR(band[v], expected[v], kBandAgreementMm) << v;
+      }
+    }
+  }
+}
+
+TEST_F(GoldenBandTest, AProgramThatIsNotOursGivesTheSame) {
+  const std::string command = absl::StrCat(
+      "/usr/bin/python3 ", SourcePath("tests/core/answer_evaluator/evaluate_golden_answers.py"),
+      " ", TestDataPath("prepared_answers/linear_elastic_band.json"));
+  const int exit_code = WEXITSTATUS(std::system(command.c_str()));
+  if (exit_code == 77) GTEST_SKIP() << "numpy is not installed";
+  EXPECT_EQ(exit_code, 0);
+}
+
+TEST_F(GoldenBandTest, WhatDoesNotFitIsRefused) {
+  PortableAnswers broken = answers_;
+  broken.band_map.pop_back();
+  EXPECT_EQ(CheckAnswers(broken), "the band's sizes do not fit");
+  broken = answers_;
+  broken.band.upper.pop_back();
+  EXPECT_EQ(CheckAnswers(broken), "the band's sizes do not fit");
+  EXPECT_TRUE(AnswerEvaluator(answers_).has_band());
 }
 
 INSTANTIATE_TEST_SUITE_P(Models, GoldenAnswersTest, ::testing::ValuesIn(EvaluatedModels()),

@@ -34,8 +34,10 @@ TEST_F(GatewayHttpTest, ReadinessIsThatOfTheServer) {
 TEST_F(GatewayHttpTest, EveryAnswerForbidsInlineScriptGuessingAndFrames) {
   for (const char* path : {"/healthz", "/nothing"}) {
     const std::string reply = Ask(port(), absl::StrCat("GET ", path, " HTTP/1.1"));
-    EXPECT_THAT(reply,
-                HasSubstr("content-security-policy: default-src 'none'; script-src 'self'; "));
+    EXPECT_THAT(
+        reply,
+        HasSubstr(
+            "content-security-policy: default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; "));
     EXPECT_THAT(reply, Not(HasSubstr("unsafe")));
     EXPECT_THAT(reply, HasSubstr("x-content-type-options: nosniff"));
     EXPECT_THAT(reply, HasSubstr("frame-ancestors 'none'"));

@@ -90,6 +90,8 @@ export interface PreparedColumns {
   secondLengths: Float32Array;
   thirdLengths: Float32Array;
   thirdGains: Float64Array;
+  bandMap: Float64Array;
+  band: PackedColumns;
 }
 
 interface Entry {
@@ -135,6 +137,8 @@ export function readAnswers(bytes: Uint8Array, mostBytes = MOST_ANSWER_BYTES): P
     secondLengths: take(43, 2),
     thirdLengths: take(44, 2),
     thirdGains: take(45, 1),
+    bandMap: take(60, 1),
+    band: { steps: take(61, 1), upper: take(62, 4), lower: new Int16Array() },
   };
   const wrong = checkAnswers(answers);
   if (wrong !== "") throw new AnswersError(wrong);

@@ -7,6 +7,8 @@ import { type AnswerSizes, sizesOf } from "./answer_sizes";
 const MOST_OF_ANYTHING = 2 ** 28;
 const MOST_HANDLES = 10_000;
 const MOST_DEGREE = 1000;
+/** 16 tissues and Poisson's ratio. */
+const MOST_BAND_VARIABLES = 17;
 
 /** What is wrong with answers that come from outside, one line; "" when nothing is: sizes fit, numbers are finite, indices are indices. */
 export function checkAnswers(answers: PreparedColumns): string {
@@ -16,6 +18,7 @@ export function checkAnswers(answers: PreparedColumns): string {
   if (answers.version < 2 && answers.thirdLengths.length > 0) return "a section belongs to a later version";
   const { model } = answers.numbers;
   const sizes = sizesOf(answers);
+  if (!bandFits(answers, sizes)) return "the band's sizes do not fit";
   if (!hasNothingElse(answers)) return "a section belongs to another model";
   if (model === AnswerModel.GRADIENT_FIELD && !expansionFits(answers, sizes)) return "the expansion's sizes do not fit";
   if (model === AnswerModel.NEO_HOOKEAN) {
@@ -43,7 +46,7 @@ function numbersAreInRange(numbers: AnswerNumbers): boolean {
 }
 
 function allAreFinite(answers: PreparedColumns): boolean {
-  const lists = Object.values({ ...answers, steps: answers.columns.steps, mapSteps: answers.clusterMap.steps });
+  const lists = Object.values({ ...answers, steps: answers.columns.steps, bandSteps: answers.band.steps, mapSteps: answers.clusterMap.steps });
   return lists.every((list) => {
     if (!(list instanceof Float64Array || list instanceof Float32Array)) return true;
     // Sums of finite numbers may overflow, but one that is not finite times 0 is never 0.
@@ -112,6 +115,18 @@ function expansionFits(answers: PreparedColumns, sizes: AnswerSizes): boolean {
     answers.nodes.length === sizes.nodes * handles &&
     answers.interpolation.length === sizes.nodes * sizes.nodes &&
     answers.simplexLow.length === handles
+  );
+}
+
+/** Only where there are columns of elasticity. */
+function bandFits({ numbers, band, bandMap }: PreparedColumns, { free, bandVariables }: AnswerSizes): boolean {
+  if (band.steps.length === 0) return bandMap.length === 0 && band.upper.length === 0;
+  return (
+    numbers.model !== AnswerModel.GRADIENT_FIELD &&
+    bandMap.length === 12 * numbers.handles * band.steps.length &&
+    bandVariables <= MOST_BAND_VARIABLES &&
+    (free === 0 || bandVariables > 0) &&
+    isPacked(band, 3 * free * bandVariables, band.steps.length)
   );
 }
 

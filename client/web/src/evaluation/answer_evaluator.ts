@@ -2,11 +2,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Pose } from "../geometry/pose";
+import { AnswerBand } from "./answer_band";
 import { AnswerModel, FIXED, FREE, type PreparedColumns } from "./answer_bytes";
 import { CompressionError, HeldError, areCovered, areLegal } from "./answer_errors";
 import { type AnswerSizes, sizesOf } from "./answer_sizes";
 import { type ColumnKernel, javascriptKernel } from "./column_kernel";
-import { ColumnMatrix, unpack, wholeOf } from "./column_matrix";
+import { ColumnMatrix, partsOf, unpack, wholeOf } from "./column_matrix";
 import { Motion } from "./motion";
 import { type PoseFactors, makePoseFactors } from "./pose_factors";
 
@@ -20,6 +21,8 @@ export interface Evaluation {
   errorBoundMm: number;
   /** Of neo_hookean the error is an estimate and no bound. */
   isEstimate: boolean;
+  /** Of every vertex the band in mm, with columns of it; the evaluator's own array. */
+  uncertainty: Float32Array | null;
 }
 
 const ORIGIN = new Float64Array(3);
@@ -41,6 +44,7 @@ export class AnswerEvaluator {
   private readonly matrices: ColumnMatrix[];
   private readonly firstColumns: number[];
   private readonly places: Places;
+  private readonly band: AnswerBand | null;
   private readonly motions: Motion[];
   private readonly result: Evaluation;
 
@@ -55,13 +59,14 @@ export class AnswerEvaluator {
     this.compressionError = new CompressionError(answers);
     this.map = this.isClustered ? unpackedMap(answers, this.sizes) : answers.map;
     this.mapped = new Float64Array(this.sizes.columns * this.sizes.width);
-    this.firstColumns = [];
-    this.matrices = this.isClustered ? this.clusterMatrices() : [new ColumnMatrix(kernel, wholeOf(answers.columns, this.sizes.rows), this.sizes.width)];
-    if (!this.isClustered) this.firstColumns.push(0);
+    const parts = partsOf(answers, this.sizes.rows);
+    this.matrices = parts.map((part) => new ColumnMatrix(kernel, part, this.sizes.width));
+    this.firstColumns = parts.map((part) => part.firstColumn);
     this.places = placesOf(answers);
+    this.band = this.sizes.bandVariables > 0 ? new AnswerBand(answers, this.places.free, kernel) : null;
     this.motions = Array.from({ length: answers.numbers.handles }, () => new Motion());
     const positions = restPositions(answers, this.places);
-    this.result = { positions, coverage: "covered", errorBoundMm: 0, isEstimate: this.isClustered };
+    this.result = { positions, coverage: "covered", errorBoundMm: 0, isEstimate: this.isClustered, uncertainty: null };
   }
 
   /** How long one evaluation takes here, in ms: the median of a few at rest. */
@@ -80,7 +85,7 @@ export class AnswerEvaluator {
   }
 
   /** `poses`: one for every handle, in their order. The object that is returned is the same every time. */
-  evaluate(poses: readonly Pose[]): Evaluation {
+  evaluate(poses: readonly Pose[], withBand = true): Evaluation {
     const { result } = this;
     result.errorBoundMm = areLegal(this.answers, poses) ? this.multiplyMap(poses) : Infinity;
     result.coverage = result.errorBoundMm < Infinity && areCovered(this.answers, poses, result.errorBoundMm) ? "covered" : "beyond";
@@ -89,6 +94,7 @@ export class AnswerEvaluator {
     if (this.isClustered) this.placeClusters();
     else this.placeFree();
     this.placeHandles(poses);
+    result.uncertainty = withBand && this.band !== null ? this.band.evaluate(poses) : null;
     return result;
   }
 
@@ -111,22 +117,6 @@ export class AnswerEvaluator {
     }
     const compression = this.isClustered ? 0 : this.compressionError.of(factors, mapped);
     return Math.max(this.factors.modelErrorMm + compression, this.heldError.of(poses));
-  }
-
-  private clusterMatrices(): ColumnMatrix[] {
-    const { clusters, columns: packed } = this.answers;
-    const matrices: ColumnMatrix[] = [];
-    let [firstColumn, firstUpper, firstLower] = [0, 0, 0];
-    for (let k = 0; k < clusters.length; k += 3) {
-      const [vertices, columns, full] = clusters.subarray(k, k + 3);
-      const part = { packed, rows: 3 * vertices, columns, full, firstColumn, firstUpper, firstLower };
-      matrices.push(new ColumnMatrix(this.kernel, part, 1));
-      this.firstColumns.push(firstColumn);
-      firstColumn += columns;
-      firstUpper += 3 * vertices * columns;
-      firstLower += 3 * vertices * full;
-    }
-    return matrices;
   }
 
   private placeFree(): void {

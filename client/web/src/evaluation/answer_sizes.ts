@@ -17,6 +17,8 @@ export interface AnswerSizes {
   nodes: number;
   pairs: number;
   triples: number;
+  /** Of the band of uncertainty. */
+  bandVariables: number;
 }
 
 export function sizesOf(answers: PreparedColumns): AnswerSizes {
@@ -35,5 +37,6 @@ export function sizesOf(answers: PreparedColumns): AnswerSizes {
     nodes: isGradient ? answers.nodes.length / handles : 0,
     pairs,
     triples,
+    bandVariables: free > 0 && answers.band.steps.length > 0 ? Math.floor(answers.band.upper.length / answers.band.steps.length / (3 * free)) : 0,
   };
 }

@@ -1,11 +1,16 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-/** Rows and columns are padded to multiples of this, so that products have no rest. */
-export const BLOCK = 4;
+/** Rows and columns are padded to multiples of these, so that products have no rest. */
+const ROW_BLOCK = 16;
+const COLUMN_BLOCK = 4;
 
-export function padded(count: number): number {
-  return Math.ceil(count / BLOCK) * BLOCK;
+export function paddedRows(rows: number): number {
+  return Math.ceil(rows / ROW_BLOCK) * ROW_BLOCK;
+}
+
+export function paddedColumns(columns: number): number {
+  return Math.ceil(columns / COLUMN_BLOCK) * COLUMN_BLOCK;
 }
 
 /** Who multiplies columns. Arrays that it is given come from its own `floats`. */
@@ -26,7 +31,7 @@ export const javascriptKernel: ColumnKernel = {
   floats: (count) => new Float32Array(count),
   multiply: (columns, rows, count, factors, width, sums) => {
     sums.fill(0);
-    for (let c = 0; c < count; c += BLOCK) {
+    for (let c = 0; c < count; c += COLUMN_BLOCK) {
       if (width === 3) addToThree(columns, rows, count, c, factors, sums);
       else addToOne(columns, rows, c, factors, sums);
     }

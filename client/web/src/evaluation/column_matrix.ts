@@ -1,10 +1,13 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import type { PackedColumns } from "./answer_bytes";
-import { type ColumnKernel, padded } from "./column_kernel";
+import { AnswerModel, type PackedColumns, type PreparedColumns } from "./answer_bytes";
+import { type AnswerSizes, sizesOf } from "./answer_sizes";
+import { type ColumnKernel, paddedColumns, paddedRows } from "./column_kernel";
 
 const UPPER = 65536;
+/** For the alignment of a part's arrays. */
+const SLACK = 64;
 
 /** A part of packed columns, from these places on. */
 export interface PackedPart {
@@ -21,6 +24,34 @@ export interface PackedPart {
 export function wholeOf(packed: PackedColumns, rows: number): PackedPart {
   const full = rows > 0 ? packed.lower.length / rows : 0;
   return { packed, rows, columns: packed.steps.length, full, firstColumn: 0, firstUpper: 0, firstLower: 0 };
+}
+
+/** Parts whose rows are the free vertices': all columns, or of neo_hookean those of each cluster in turn. */
+export function partsOf({ numbers, clusters, columns: packed }: PreparedColumns, rows: number): PackedPart[] {
+  if (numbers.model !== AnswerModel.NEO_HOOKEAN) return [wholeOf(packed, rows)];
+  const parts: PackedPart[] = [];
+  let [firstColumn, firstUpper, firstLower] = [0, 0, 0];
+  for (let k = 0; k < clusters.length; k += 3) {
+    const [vertices, columns, full] = clusters.subarray(k, k + 3);
+    parts.push({ packed, rows: 3 * vertices, columns, full, firstColumn, firstUpper, firstLower });
+    firstColumn += columns;
+    firstUpper += 3 * vertices * columns;
+    firstLower += 3 * vertices * full;
+  }
+  return parts;
+}
+
+/** That of the band: rows of all variables one after the other. */
+export function bandPartOf(answers: PreparedColumns, { free, bandVariables }: AnswerSizes): PackedPart {
+  return wholeOf(answers.band, 3 * free * bandVariables);
+}
+
+/** How many numbers a kernel needs for the columns of these answers, with what they are multiplied by and what they give. */
+export function floatsOf(answers: PreparedColumns): number {
+  const sizes = sizesOf(answers);
+  const parts = [...partsOf(answers, sizes.rows), bandPartOf(answers, sizes)];
+  const ofPart = ({ rows, columns }: PackedPart) => (paddedRows(rows) + sizes.width) * paddedColumns(columns) + sizes.width * paddedRows(rows) + SLACK;
+  return parts.reduce((sum, part) => sum + ofPart(part), 0);
 }
 
 /** Calls `take` with every entry's row, column and value. */
@@ -53,9 +84,9 @@ export class ColumnMatrix {
     part: PackedPart,
     private readonly width: number,
   ) {
-    this.stride = padded(part.rows);
+    this.stride = paddedRows(part.rows);
     this.count = part.columns;
-    this.paddedCount = padded(part.columns);
+    this.paddedCount = paddedColumns(part.columns);
     const columns = kernel.floats(this.stride * this.paddedCount);
     unpack(part, (row, column, value) => (columns[column * this.stride + row] = value));
     this.columns = columns;

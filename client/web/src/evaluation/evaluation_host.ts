@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Pose } from "../geometry/pose";
-import { AnswersError, readAnswers } from "./answer_bytes";
-import { AnswerEvaluator, type Evaluation } from "./answer_evaluator";
+import { AnswersError } from "./answer_bytes";
+import type { AnswerEvaluator, Evaluation } from "./answer_evaluator";
 import type { FromWorker, ToWorker } from "./evaluation_service";
 import { makeEvaluator } from "./evaluator";
 
@@ -44,7 +44,7 @@ export async function makeHost(bytes: Uint8Array, sha256: string, onEvaluation: 
   if (worker === null || ready === null) return new PageHost(await makeEvaluator(bytes, { sha256 }), onEvaluation);
   if (ready.medianMs > PAGE_BUDGET_MS) return new WorkerHost(worker, ready.kernel, onEvaluation);
   worker.terminate();
-  return new PageHost(new AnswerEvaluator(readAnswers(bytes)), onEvaluation);
+  return new PageHost(await makeEvaluator(bytes), onEvaluation);
 }
 
 /** Null where the worker does not run at all. */

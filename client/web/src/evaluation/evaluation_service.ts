@@ -12,7 +12,7 @@ export type ToWorker = { kind: "load"; bytes: Uint8Array; sha256: string } | { k
 export type FromWorker =
   | { kind: "ready"; medianMs: number; kernel: string }
   | { kind: "failed"; message: string }
-  | { kind: "evaluated"; positions: Float32Array; coverage: "covered" | "beyond"; errorBoundMm: number; isEstimate: boolean };
+  | { kind: "evaluated"; positions: Float32Array; coverage: "covered" | "beyond"; errorBoundMm: number; isEstimate: boolean; uncertainty: Float32Array | null };
 
 /** The worker's side, for whoever has a `post`. */
 export class EvaluationService {
@@ -37,9 +37,10 @@ export class EvaluationService {
 
   private evaluate(poses: Pose[]): void {
     if (this.evaluator === null) return;
-    const { positions, ...rest } = this.evaluator.evaluate(poses);
-    // The evaluator's own array stays here.
+    const { positions, uncertainty, ...rest } = this.evaluator.evaluate(poses);
+    // The evaluator's own arrays stay here.
     const sent = positions.slice();
-    this.post({ kind: "evaluated", positions: sent, ...rest }, [sent.buffer]);
+    const band = uncertainty?.slice() ?? null;
+    this.post({ kind: "evaluated", positions: sent, uncertainty: band, ...rest }, band === null ? [sent.buffer] : [sent.buffer, band.buffer]);
   }
 }

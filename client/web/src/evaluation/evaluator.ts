@@ -3,12 +3,15 @@
 
 import { AnswersError, MOST_ANSWER_BYTES, readAnswers } from "./answer_bytes";
 import { AnswerEvaluator } from "./answer_evaluator";
-import type { ColumnKernel } from "./column_kernel";
+import { type ColumnKernel, javascriptKernel } from "./column_kernel";
+import { floatsOf } from "./column_matrix";
+import { webassemblyKernel } from "./webassembly_kernel";
 
 export interface EvaluatorOptions {
   /** The bytes' SHA-256 as 64 hexadecimal digits. Not compared where it is left out, nor on a page without WebCrypto (not opened by https). */
   sha256?: string;
   mostBytes?: number;
+  /** WebAssembly where the browser has it, else JavaScript. */
   kernel?: ColumnKernel;
 }
 
@@ -19,7 +22,8 @@ export async function makeEvaluator(bytes: Uint8Array, options: EvaluatorOptions
   if (isCompared && (await sha256Of(bytes)) !== sha256.toLowerCase()) {
     throw new AnswersError("prepared answers have another SHA-256 than was told; fetch them again");
   }
-  return new AnswerEvaluator(readAnswers(bytes, mostBytes), kernel);
+  const answers = readAnswers(bytes, mostBytes);
+  return new AnswerEvaluator(answers, kernel ?? (await webassemblyKernel(floatsOf(answers))) ?? javascriptKernel);
 }
 
 async function sha256Of(bytes: Uint8Array): Promise<string> {

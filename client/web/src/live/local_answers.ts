@@ -99,6 +99,11 @@ export class LocalAnswers {
     this.host?.ask(poses, this.asked);
   }
 
+  /** The columns that the page answers by, as they travel; null where it has none. */
+  get heldColumns(): Uint8Array<ArrayBuffer> | null {
+    return this.columns === null ? null : this.columns.bytes.slice();
+  }
+
   /** How many poses have been asked for since the one whose answer the page has shown; infinite where it has shown none. */
   get posesSinceTold(): number {
     return this.asked - this.told;

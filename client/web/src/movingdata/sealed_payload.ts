@@ -26,11 +26,12 @@ export const KEY_ROUNDS = 600_000;
 const MOST_ROUNDS = 10_000_000;
 const SALT_BYTES = 16;
 const NONCE_BYTES = 12;
-/** What a hostile file could make of a few bytes. */
+/** Before they are compressed: a few bytes could become more than a browser has. */
 const MOST_DATA_BYTES = 256 << 20;
 
-/** Without a password: only compressed. */
+/** Without a password: only compressed. Rejects with an Error where there is more than a page takes. */
 export async function seal(data: Uint8Array<ArrayBuffer>, password: string): Promise<Sealed> {
+  if (data.length > MOST_DATA_BYTES) throw new Error(`the file that moves would hold ${data.length} bytes, and may hold ${MOST_DATA_BYTES}`);
   const packed = await collect(new Blob([data]).stream().pipeThrough(new CompressionStream("gzip")));
   if (password === "") return { envelope: await envelopeOf(packed), payload: packed };
   const salt = crypto.getRandomValues(new Uint8Array(SALT_BYTES));

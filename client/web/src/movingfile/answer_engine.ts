@@ -15,13 +15,18 @@ export interface Answer {
   uncertainty: Float32Array | null;
 }
 
-/** One pose for each handle; null where the answers do not reach. */
-export type Evaluation = (poses: Pose[]) => Answer | null;
+export interface OpenAnswers {
+  /** One pose for each handle; null where the answers do not reach. */
+  evaluate(poses: Pose[]): Answer | null;
+  /** By the browser's vectors, not by JavaScript alone. */
+  isFast: boolean;
+}
 
-export async function openAnswers(bytes: Uint8Array<ArrayBuffer>): Promise<Evaluation> {
+export async function openAnswers(bytes: Uint8Array<ArrayBuffer>): Promise<OpenAnswers> {
   const evaluator = await makeEvaluator(bytes);
-  return (poses) => {
-    const { positions, coverage, errorBoundMm, isEstimate } = evaluator.evaluate(poses);
-    return coverage === "beyond" ? null : { positions, errorBoundMm, isEstimate, uncertainty: null };
+  const evaluate = (poses: Pose[]) => {
+    const { coverage, ...answer } = evaluator.evaluate(poses);
+    return coverage === "beyond" ? null : answer;
   };
+  return { evaluate, isFast: evaluator.kernel.name === "webassembly" };
 }

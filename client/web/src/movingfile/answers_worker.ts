@@ -2,21 +2,21 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Pose } from "../geometry/pose";
-import { type Answer, type Evaluation, openAnswers } from "./answer_engine";
+import { type Answer, type OpenAnswers, openAnswers } from "./answer_engine";
 
 // Runs as a classic worker, from text that lies in the page: a file that was opened from disk may have no other.
 
-/** What the page says; of each the worker answers with one Reply. */
+/** What the page says: the answers first, then poses. Of each the worker answers with one Reply. */
 export type Request = { bytes: Uint8Array<ArrayBuffer> } | { poses: Pose[] };
-export type Reply = { answer: Answer | null } | { problem: string };
+export type Reply = { isFast: boolean } | { answer: Answer | null } | { problem: string };
 
-let evaluation: Promise<Evaluation> | null = null;
+let open: OpenAnswers | null = null;
 
 async function reply(request: Request): Promise<Reply> {
   try {
-    if ("bytes" in request) evaluation = openAnswers(request.bytes);
-    const open = await evaluation;
-    return { answer: "poses" in request && open !== null ? open(request.poses) : null };
+    if ("poses" in request) return { answer: open?.evaluate(request.poses) ?? null };
+    open = await openAnswers(request.bytes);
+    return { isFast: open.isFast };
   } catch (thrown) {
     return { problem: String(thrown) };
   }

@@ -11,6 +11,8 @@ export interface Engine {
   ask(poses: Pose[]): Promise<Answer | null>;
   /** Beside the page, so that it never waits. */
   isInWorker: boolean;
+  /** By WebAssembly. */
+  isFast: boolean;
 }
 
 /** `bytes` stay the caller's. In the page itself where the browser has no workers. */
@@ -18,26 +20,29 @@ export async function startEngine(bytes: Uint8Array<ArrayBuffer>): Promise<Engin
   try {
     return await startWorker(bytes);
   } catch {
-    const evaluation = await openAnswers(bytes);
-    return { ask: async (poses) => evaluation(poses), isInWorker: false };
+    const { evaluate, isFast } = await openAnswers(bytes);
+    return { ask: async (poses) => evaluate(poses), isInWorker: false, isFast };
   }
 }
 
 async function startWorker(bytes: Uint8Array<ArrayBuffer>): Promise<Engine> {
   if (typeof Worker === "undefined") throw new Error("no workers");
   const worker = new AnswersWorker();
-  const waiting: { accept: (answer: Answer | null) => void; reject: (error: Error) => void }[] = [];
+  const waiting: { accept: (reply: Reply) => void; reject: (error: Error) => void }[] = [];
   worker.onerror = () => waiting.splice(0).forEach(({ reject }) => reject(new Error("the worker has ended")));
   worker.onmessage = ({ data }: MessageEvent<Reply>) => {
-    const next = waiting.shift();
-    if ("problem" in data) next?.reject(new Error(data.problem));
-    else next?.accept(data.answer);
+    if ("problem" in data) waiting.shift()?.reject(new Error(data.problem));
+    else waiting.shift()?.accept(data);
   };
   const send = (request: Request) =>
-    new Promise<Answer | null>((accept, reject) => {
+    new Promise<Reply>((accept, reject) => {
       waiting.push({ accept, reject });
       worker.postMessage(request);
     });
-  await send({ bytes });
-  return { ask: (poses) => send({ poses }), isInWorker: true };
+  const opened = await send({ bytes });
+  const ask = async (poses: Pose[]) => {
+    const reply = await send({ poses });
+    return "answer" in reply ? reply.answer : null;
+  };
+  return { ask, isInWorker: true, isFast: "isFast" in opened && opened.isFast };
 }

@@ -102,7 +102,8 @@ function numbersPanel(data: MovingData, head: MovingHead): { element: HTMLElemen
   const beyond = el("p", { class: "warning", attributes: { role: "status" } });
   const largest = el("p");
   const exactness = el("p", { class: "quiet" });
-  const slow = head.isInWorker ? null : el("p", { class: "quiet", text: "This browser gives the file no thread of its own: it moves more slowly." });
+  const lacks = [head.isInWorker ? "" : "no thread of its own", head.isFast ? "" : "no WebAssembly"].filter((lack) => lack !== "");
+  const slow = lacks.length === 0 ? null : el("p", { class: "quiet", text: `This browser gives the file ${lacks.join(" and ")}: it moves more slowly.` });
   const element = section("Prediction", [
     beyond,
     largest,

@@ -6,6 +6,7 @@ import { download, toPly, toPng, toStl } from "../exports/files";
 import { exportedSurfaces, planDocument, provenanceLines } from "../exports/plan_export";
 import type { Workbench } from "../workbench/workbench";
 import { button, el, section } from "./dom";
+import { movingFilePart } from "./moving_file_part";
 
 /** What is shown, as files. Names of files hold nothing of the patient. */
 export function exportPanel(bench: Workbench): HTMLElement {
@@ -33,5 +34,6 @@ export function exportPanel(bench: Workbench): HTMLElement {
       button("Plan JSON", tell(() => save("tissueform-plan.json", "application/json", planDocument(bench)))),
     ]),
     el("p", { class: "quiet", text: "In mm, LPS, as it is shown. Every file says: not a medical device." }),
+    movingFilePart(bench),
   ]);
 }

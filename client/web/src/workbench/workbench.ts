@@ -5,6 +5,7 @@ import { sentenceOf } from "../calls/call_error";
 import type { Gateway } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
 import type { SurfaceKind } from "../case/manifest";
+import type { Evaluation } from "../evaluation/answer_evaluator";
 import type { SolveSummary } from "../generated/tissueform/v1/deform_service_pb";
 import type { Measure } from "../generated/tissueform/v1/export_service_pb";
 import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
@@ -126,7 +127,7 @@ export class Workbench implements ShownFace {
     this.model.value = models.find((model) => model.name === file.manifest.model)?.model ?? file.sessionRequest.model;
     this.local = new LocalAnswers(gateway, {
       onState: (state) => (this.localState.value = state),
-      onEvaluation: ({ positions }) => this.showLocal(positions),
+      onEvaluation: (evaluation) => this.showLocal(evaluation),
     });
     this.live = new LiveSession(gateway, file, caseName, {
       onConnection: (connection) => (this.connection.value = connection),
@@ -339,8 +340,9 @@ export class Workbench implements ShownFace {
   }
 
   /** The page's own answer, in the picture that shows the bone there. */
-  private showLocal(positions: Float32Array): void {
+  private showLocal({ positions, uncertainty }: Evaluation): void {
     if (positions.length !== this.rest.length) return this.local.drop();
+    if (uncertainty !== null) this.uncertainty = uncertainty;
     subtractInto(positions, this.rest, this.displacements);
     if (this.comparison.value === null) this.lay(this.displacements);
   }

@@ -7,13 +7,15 @@ import type { Pose } from "../../src/geometry/pose";
 
 const FOLDER = fileURLToPath(new URL("../../../../tests/data/prepared_answers/", import.meta.url));
 
-export const GOLDEN = ["gradient_field", "linear_elastic", "neo_hookean", "neo_hookean_third_order"] as const;
+export const GOLDEN = ["gradient_field", "linear_elastic", "linear_elastic_band", "neo_hookean", "neo_hookean_third_order"] as const;
 
 export interface GoldenCase {
   poses: Pose[];
   isCovered: boolean;
   errorMm: number;
   positionsMm: number[];
+  /** Where the bytes have columns of the band. */
+  bandMm: number[] | null;
 }
 
 export function goldenBytes(name: string): Uint8Array {
@@ -32,5 +34,6 @@ export function goldenCases(name: string): GoldenCase[] {
     isCovered: one.covered,
     errorMm: one.error_mm,
     positionsMm: one.positions_mm,
+    bandMm: one.band_mm ?? null,
   }));
 }

@@ -111,6 +111,11 @@ TEST(SealedPayloadTest, SaltAndNonceAreNewEveryTime) {
   EXPECT_NE(first.payload, second.payload);
 }
 
+TEST(SealedPayloadTest, MoreThanAPageTakesIsRefused) {
+  EXPECT_THAT(SealPayload(std::string(kMostMovingDataBytes + 1, 'x'), ""),
+              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("fewer triangles")));
+}
+
 class PasswordFileTest : public CliTest {};
 
 TEST_F(PasswordFileTest, ItsLineIsThePasswordHoweverItEnds) {

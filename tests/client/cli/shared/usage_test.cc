@@ -50,7 +50,7 @@ TEST_F(UsageTest, HelpTeachesByExamples) {
   EXPECT_THAT(Run({"--help"}).out, AllOf(HasSubstr("deform"), HasSubstr("not a medical device")));
   const std::vector<std::vector<std::string>> commands = {
       {"mesh", "check"}, {"mesh", "generate"}, {"plan", "check"}, {"plan", "fit"},
-      {"case", "pack"},  {"deform"},           {"compare"}};
+      {"case", "pack"},  {"export"},           {"deform"},        {"compare"}};
   for (std::vector<std::string> command : commands) {
     command.emplace_back("--help");
     const ProcessResult result = Run(command);

@@ -1,0 +1,56 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import type { CaseFile } from "../case/case_file";
+import type { HandleEntry } from "../case/manifest";
+import type { Pose } from "../geometry/pose";
+import type { Vector } from "../geometry/rotation";
+import { type MovingData, writeMovingData } from "../movingdata/moving_data";
+import { TEMPLATE_FILE, fillTemplate } from "../movingdata/page_template";
+import { seal } from "../movingdata/sealed_payload";
+
+export const LEAST_PASSWORD_LETTERS = 8;
+
+/** What the file shows as planned, and by what it moves. */
+export interface MovingPlan {
+  /** By handle. */
+  poses: ReadonlyMap<string, Pose>;
+  /** By its name in plans. */
+  model: string;
+  /** Prepared answers of CaseFile.followed. */
+  answers: Uint8Array<ArrayBuffer>;
+}
+
+/** The same as tissueform export takes of a plan: nothing that names anybody. */
+export function movingDataOf(file: CaseFile, { poses, model, answers }: MovingPlan): MovingData {
+  const { manifest } = file;
+  // Answers know handles by their order in the session.
+  const names = file.sessionRequest.handles.map(({ name }) => name);
+  const handles = names.flatMap((name) => manifest.handles.filter((handle) => handle.name === name));
+  return {
+    title: "",
+    software: manifest.provenance.software ?? "",
+    model,
+    headFrame: manifest.headFrame,
+    handles: handles.map((handle) => ({ ...handle, pose: poseEntry(poses.get(handle.name), handle), isFree: true })),
+    surfaces: file.surfaces.map(({ entry, positions, triangles, follows }) => ({ name: entry.name, kind: entry.kind, handle: entry.handle, positions, triangles, follows })),
+    answers,
+  };
+}
+
+function poseEntry(pose: Pose | undefined, handle: HandleEntry): HandleEntry["pose"] {
+  if (pose === undefined) return handle.pose;
+  const degrees = pose.rotationVector.map((part) => (part * 180) / Math.PI) as Vector;
+  return { rotationVectorDeg: degrees, pivotMm: pose.pivotMm, translationMm: pose.translationMm, scale: pose.scale };
+}
+
+/** `password`: "" for none. Rejects with an Error where the gateway does not have the page. */
+export async function movingFile(file: CaseFile, plan: MovingPlan, password: string): Promise<Blob> {
+  if (password !== "" && Array.from(password).length < LEAST_PASSWORD_LETTERS) {
+    throw new Error(`a password of the file that moves has at least ${LEAST_PASSWORD_LETTERS} letters: better four words than one`);
+  }
+  const reply = await fetch(new URL(TEMPLATE_FILE, document.baseURI));
+  if (!reply.ok) throw new Error(`the gateway does not have the page of files that move (${TEMPLATE_FILE}): build the planner anew by deploy/build_web.sh`);
+  const template = await reply.text();
+  return new Blob([fillTemplate(template, await seal(writeMovingData(movingDataOf(file, plan)), password))], { type: "text/html" });
+}

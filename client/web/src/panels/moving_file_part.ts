@@ -1,0 +1,33 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { sentenceOf } from "../calls/call_error";
+import { download } from "../exports/files";
+import { LEAST_PASSWORD_LETTERS, movingFile } from "../exports/moving_export";
+import type { Workbench } from "../workbench/workbench";
+import { button, el, newId, whileBusy } from "./dom";
+
+/** One page in which the face moves without a server, with the plan as it is and under a password if one is typed. */
+export function movingFilePart(bench: Workbench): HTMLElement {
+  const id = newId("password");
+  const password = el("input", {
+    id,
+    attributes: { type: "password", autocomplete: "new-password", maxlength: "256", placeholder: `none, or at least ${LEAST_PASSWORD_LETTERS} letters` },
+  });
+  const make = async () => {
+    const answers = bench.local.heldColumns;
+    if (answers === null) throw new Error("a file that moves needs the columns of the model in this page: choose a model that has them, and wait until they have come");
+    const model = bench.modelInfo(bench.model.value)?.name ?? "";
+    const poses = bench.posesByHandle(bench.plan.poses());
+    download("tissueform-moves.html", await movingFile(bench.file, { poses, model, answers }, password.value));
+    password.value = "";
+  };
+  const save: HTMLButtonElement = button("File that moves", () => {
+    void whileBusy(save, make, (thrown) => (bench.notice.value = sentenceOf(thrown)));
+  });
+  return el("div", { class: "moving-part" }, [
+    el("div", { class: "field" }, [el("label", { text: "Password", attributes: { for: id } }), password]),
+    save,
+    el("p", { class: "quiet", text: "One page that moves without a server, with this plan. A face identifies: treat it like a photograph of the patient; with a password nobody else opens it." }),
+  ]);
+}

@@ -1,0 +1,107 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { createHash } from "node:crypto";
+import { expect, test } from "vitest";
+import { type Evaluation } from "../../src/evaluation/answer_evaluator";
+import { type WorkerLike, makeHost } from "../../src/evaluation/evaluation_host";
+import { EvaluationService, type FromWorker, type ToWorker } from "../../src/evaluation/evaluation_service";
+import { goldenBytes, goldenCases } from "./golden_answers";
+
+const BYTES = goldenBytes("neo_hookean");
+const SHA256 = createHash("sha256").update(BYTES).digest("hex");
+const CASES = goldenCases("neo_hookean");
+
+/** A worker in this process; `medianMs`: what it says its evaluations take. Answers wait until they are let out. */
+class FakeWorker implements WorkerLike {
+  onmessage: Worker["onmessage"] = null;
+  onerror: Worker["onerror"] = null;
+  isTerminated = false;
+  readonly taken: ToWorker[] = [];
+  private readonly waiting: FromWorker[] = [];
+  private readonly service = new EvaluationService((message) => this.answer(message));
+
+  constructor(private readonly medianMs: number) {}
+
+  postMessage(message: ToWorker): void {
+    this.taken.push(message);
+    void this.service.take(message);
+  }
+
+  terminate(): void {
+    this.isTerminated = true;
+  }
+
+  letOut(): void {
+    this.waiting.splice(0).forEach((message) => this.tell(message));
+  }
+
+  private answer(message: FromWorker): void {
+    if (message.kind === "evaluated") this.waiting.push(message);
+    else this.tell(message.kind === "ready" ? { ...message, medianMs: this.medianMs } : message);
+  }
+
+  private tell(data: FromWorker): void {
+    this.onmessage?.call(this as never, { data } as MessageEvent);
+  }
+}
+
+function listener() {
+  const told: { number: number; coverage: string; first: number }[] = [];
+  const onEvaluation = ({ coverage, positions }: Evaluation, number: number) => told.push({ number, coverage, first: positions[0] });
+  return { told, onEvaluation };
+}
+
+test("what is fast is evaluated in the page, before the question returns", async () => {
+  const worker = new FakeWorker(0.5);
+  const { told, onEvaluation } = listener();
+  const host = await makeHost(BYTES, SHA256, onEvaluation, () => worker);
+  expect(host.place).toBe("page");
+  expect(worker.isTerminated).toBe(true);
+  host.ask(CASES[1].poses, 7);
+  expect(told).toHaveLength(1);
+  expect(told[0]).toMatchObject({ number: 7, coverage: "covered" });
+  expect(told[0].first).toBeCloseTo(CASES[1].positionsMm[0], 4);
+});
+
+test("what is slow is evaluated by the worker, the newest question only", async () => {
+  const worker = new FakeWorker(20);
+  const { told, onEvaluation } = listener();
+  const host = await makeHost(BYTES, SHA256, onEvaluation, () => worker);
+  expect(host.place).toBe("worker");
+  [1, 2, 3].forEach((number) => host.ask(CASES[number].poses, number));
+  expect(told).toEqual([]);
+  worker.letOut();
+  worker.letOut();
+  expect(told.map(({ number }) => number)).toEqual([1, 3]);
+  expect(told[1].first).toBeCloseTo(CASES[3].positionsMm[0], 4);
+  host.close();
+  host.ask(CASES[2].poses, 4);
+  worker.letOut();
+  expect(told).toHaveLength(2);
+});
+
+test("a browser without workers evaluates in the page", async () => {
+  const { told, onEvaluation } = listener();
+  const host = await makeHost(BYTES, SHA256, onEvaluation, () => null);
+  host.ask(CASES[7].poses, 1);
+  expect(host.place).toBe("page");
+  expect(told[0].coverage).toBe("beyond");
+});
+
+test("a worker that does not start is done without", async () => {
+  const worker = new FakeWorker(0);
+  worker.postMessage = () => worker.onerror?.call(worker as never, {} as ErrorEvent);
+  const host = await makeHost(BYTES, SHA256, listener().onEvaluation, () => worker);
+  expect(host.place).toBe("page");
+});
+
+test.each([
+  ["cut off", BYTES.slice(0, 5000), createHash("sha256").update(BYTES.slice(0, 5000)).digest("hex"), "cut off or damaged"],
+  ["of another hash", BYTES, SHA256.replace(/^../, "zz"), "another SHA-256"],
+])("bytes that are %s are refused, by a worker and without", async (_what, bytes, sha256, words) => {
+  const worker = new FakeWorker(0);
+  await expect(makeHost(bytes, sha256, listener().onEvaluation, () => worker)).rejects.toThrow(words);
+  expect(worker.isTerminated).toBe(true);
+  await expect(makeHost(bytes, sha256, listener().onEvaluation, () => null)).rejects.toThrow(words);
+});

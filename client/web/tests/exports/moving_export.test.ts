@@ -1,0 +1,42 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { afterEach, expect, test, vi } from "vitest";
+import { openCase } from "../../src/case/case_file";
+import { movingDataOf, movingFile } from "../../src/exports/moving_export";
+import { readMovingData, writeMovingData } from "../../src/movingdata/moving_data";
+import { smallCase, sourceOf } from "../testing/small_case";
+
+const answers = new Uint8Array([1, 2, 3]);
+const file = () => openCase(sourceOf(smallCase()));
+const plan = { poses: new Map(), model: "linear_elastic", answers };
+
+afterEach(() => vi.unstubAllGlobals());
+
+test("what is exported is the case's surfaces, the plan's poses and nothing that names anybody", async () => {
+  const pose = { rotationVector: [0, 0, Math.PI / 6] as [number, number, number], pivotMm: [1, 2, 3] as [number, number, number], translationMm: [0, -4, 0] as [number, number, number], scale: 1 };
+  const opened = await file();
+  const data = movingDataOf(opened, { ...plan, poses: new Map([["mandible", pose]]) });
+  expect(data.handles.map(({ name, isFree }) => [name, isFree])).toEqual([["mandible", true]]);
+  expect(data.handles[0].pose.rotationVectorDeg[2]).toBeCloseTo(30, 9);
+  expect(data.handles[0].pose.translationMm).toEqual([0, -4, 0]);
+  const back = readMovingData(writeMovingData(data));
+  expect(back.surfaces.map(({ name }) => name)).toEqual(["skin", "mandible", "skull"]);
+  expect(back.surfaces[0].positions).toEqual(opened.surfaces[0].positions);
+  expect(Array.from(back.answers)).toEqual([1, 2, 3]);
+  const text = new TextDecoder().decode(writeMovingData(data));
+  for (const secret of ["meshes/", "small", "2026-01-01", "plan_sha256", "pogonion"]) expect(text).not.toContain(secret);
+});
+
+test("a short password is refused before anything is fetched", async () => {
+  const fetched = vi.fn();
+  vi.stubGlobal("fetch", fetched);
+  await expect(movingFile(await file(), plan, "short")).rejects.toThrow("at least 8 letters");
+  expect(fetched).not.toHaveBeenCalled();
+});
+
+test("a gateway without the page is said to have none", async () => {
+  vi.stubGlobal("document", { baseURI: "http://127.0.0.1/" });
+  vi.stubGlobal("fetch", async () => new Response("", { status: 404 }));
+  await expect(movingFile(await file(), plan, "")).rejects.toThrow("moving-file.html");
+});

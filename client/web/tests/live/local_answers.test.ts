@@ -1,0 +1,161 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { create } from "@bufbuild/protobuf";
+import { createHash } from "node:crypto";
+import { expect, test } from "vitest";
+import { CallError, Code } from "../../src/calls/call_error";
+import type { Gateway } from "../../src/calls/gateway";
+import { makeHost } from "../../src/evaluation/evaluation_host";
+import { type DeformConfiguration, DeformConfigurationSchema, type GetPreparedAnswersRequest, PreparedAnswersSchema } from "../../src/generated/tissueform/v1/deform_service_pb";
+import { fetchColumns } from "../../src/live/column_fetch";
+import { LocalAnswers, type LocalState } from "../../src/live/local_answers";
+import { goldenBytes, goldenCases } from "../evaluation/golden_answers";
+
+const CHUNK = 7000;
+const CASES = goldenCases("linear_elastic");
+const sha256Of = (bytes: Uint8Array) => createHash("sha256").update(bytes).digest("hex");
+
+/** A server that sends these bytes; `faults` is asked before every chunk, and throws. */
+function server(bytes: () => Uint8Array, faults: (offset: number) => void = () => {}) {
+  const offsets: number[] = [];
+  async function* getPreparedAnswers(request: GetPreparedAnswersRequest, options: { signal: AbortSignal }) {
+    const all = bytes();
+    offsets.push(Number(request.readOffset));
+    yield { message: { case: "header" as const, value: { totalBytes: BigInt(all.length), sha256: sha256Of(all) } } };
+    for (let at = Number(request.readOffset); at < all.length; at += CHUNK) {
+      faults(at);
+      if (options.signal.aborted) throw new CallError(Code.Canceled, "cancelled");
+      yield { message: { case: "chunk" as const, value: { offset: BigInt(at), data: all.subarray(at, at + CHUNK) } } };
+    }
+  }
+  return { gateway: { deform: { getPreparedAnswers } } as unknown as Pick<Gateway, "deform">, offsets };
+}
+
+function configuration(session = "sessions/a", isPrepared = true): DeformConfiguration {
+  return create(DeformConfigurationSchema, { session, model: 2, prepared: isPrepared ? create(PreparedAnswersSchema, {}) : undefined });
+}
+
+const options = (known = "") => ({ known, onProgress: () => {}, signal: new AbortController().signal, wait: async () => {} });
+
+test("columns that break off go on where they did", async () => {
+  const bytes = goldenBytes("linear_elastic");
+  let faults = 2;
+  const { gateway, offsets } = server(() => bytes, (at) => {
+    if (at > CHUNK && faults-- > 0) throw new CallError(Code.Unavailable, "the line broke off");
+  });
+  const columns = await fetchColumns(gateway, configuration(), options());
+  expect(columns?.bytes).toEqual(bytes);
+  expect(offsets).toEqual([0, 2 * CHUNK, 2 * CHUNK]);
+});
+
+test("columns that changed meanwhile are fetched from their beginning", async () => {
+  let bytes = goldenBytes("linear_elastic");
+  const { gateway } = server(() => bytes, (at) => {
+    if (at === 0 || bytes.length !== 38432) return;
+    bytes = goldenBytes("gradient_field");
+    throw new CallError(Code.Unavailable, "the line broke off");
+  });
+  expect((await fetchColumns(gateway, configuration(), options()))?.bytes).toEqual(goldenBytes("gradient_field"));
+});
+
+test("columns that the page has are not fetched again", async () => {
+  const bytes = goldenBytes("linear_elastic");
+  const { gateway } = server(() => bytes, () => {
+    throw new Error("was read");
+  });
+  expect(await fetchColumns(gateway, configuration(), options(sha256Of(bytes)))).toBeNull();
+});
+
+test("a line that brings nothing is given up, what is refused at once", async () => {
+  const broken = server(() => goldenBytes("linear_elastic"), () => {
+    throw new CallError(Code.Unavailable, "the line broke off");
+  });
+  await expect(fetchColumns(broken.gateway, configuration(), options())).rejects.toThrow("broke off");
+  expect(broken.offsets).toHaveLength(6);
+  const refused = server(() => goldenBytes("linear_elastic"), () => {
+    throw new CallError(Code.ResourceExhausted, "more bytes than are sent");
+  });
+  await expect(fetchColumns(refused.gateway, configuration(), options())).rejects.toThrow("more bytes");
+  expect(refused.offsets).toHaveLength(1);
+});
+
+function local(bytes: () => Uint8Array = () => goldenBytes("linear_elastic")) {
+  const states: LocalState[] = [];
+  const firsts: number[] = [];
+  const { gateway, offsets } = server(bytes);
+  const answers = new LocalAnswers(
+    gateway,
+    { onState: (state) => states.push(state), onEvaluation: ({ positions }) => firsts.push(positions[0]) },
+    (data, sha256, onEvaluation) => makeHost(data, sha256, onEvaluation, () => null),
+  );
+  return { answers, states, firsts, offsets, last: () => states[states.length - 1] };
+}
+
+test("a pose is answered before the question returns, once the columns are there", async () => {
+  const { answers, firsts, last } = local();
+  answers.ask(CASES[1].poses);
+  expect(answers.posesSinceTold).toBe(Infinity);
+  await answers.follow(configuration());
+  expect(firsts).toHaveLength(1);
+  answers.ask(CASES[2].poses);
+  expect(firsts).toHaveLength(2);
+  expect(firsts[1]).toBeCloseTo(CASES[2].positionsMm[0], 4);
+  expect(answers.posesSinceTold).toBe(0);
+  expect(last()).toMatchObject({ kind: "ready", coverage: "covered" });
+});
+
+test("beyond the range nothing is told, and how old the last answer is", async () => {
+  const { answers, firsts, last } = local();
+  await answers.follow(configuration());
+  answers.ask(CASES[1].poses);
+  answers.ask(CASES[7].poses);
+  expect(firsts).toHaveLength(1);
+  expect(answers.posesSinceTold).toBe(1);
+  expect(last()).toMatchObject({ kind: "ready", coverage: "beyond" });
+});
+
+test("the same columns stay through a break of the line, others of an updated session replace them", async () => {
+  let bytes = goldenBytes("linear_elastic");
+  const { answers, firsts, offsets } = local(() => bytes);
+  await answers.follow(configuration());
+  await answers.follow(configuration());
+  answers.ask(CASES[1].poses);
+  expect(firsts).toHaveLength(1);
+  bytes = goldenBytes("linear_elastic_band");
+  await answers.follow(configuration());
+  expect(offsets).toHaveLength(3);
+  answers.drop();
+  answers.ask(CASES[1].poses);
+  expect(firsts).toHaveLength(1);
+});
+
+test("a model without prepared answers, and another session, leave the server to answer", async () => {
+  const { answers, firsts, last } = local();
+  await answers.follow(configuration());
+  await answers.follow(configuration("sessions/a", false));
+  answers.ask(CASES[1].poses);
+  expect(firsts).toEqual([]);
+  expect(last()).toEqual({ kind: "none" });
+  expect(answers.posesSinceTold).toBe(Infinity);
+});
+
+test("who stops it is answered by the server until it is resumed", async () => {
+  const { answers, firsts, last } = local();
+  await answers.follow(configuration());
+  answers.stop();
+  await answers.follow(configuration());
+  answers.ask(CASES[1].poses);
+  expect(firsts).toEqual([]);
+  expect(last()).toEqual({ kind: "stopped" });
+  answers.resume();
+  await expect.poll(() => firsts.length).toBe(1);
+});
+
+test("damaged columns are told in a sentence, and the server answers", async () => {
+  const { answers, firsts, last } = local(() => goldenBytes("linear_elastic").slice(0, 20_000));
+  await answers.follow(configuration());
+  answers.ask(CASES[1].poses);
+  expect(firsts).toEqual([]);
+  expect(last()).toMatchObject({ kind: "failed", text: expect.stringContaining("cut off or damaged") });
+});
