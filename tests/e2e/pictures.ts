@@ -5,6 +5,7 @@ import { join } from "node:path";
 import type { Page } from "playwright-core";
 import { IdentityProvider, enterName } from "./identity_provider";
 import { type Hook, Planner, live, moved, openCase, openPage, state, takeSegment, typeMove } from "./planner";
+import { SlowLine } from "./slow_line";
 
 // The pictures of docs/planner.md, of a case of a whole head:
 //
@@ -134,5 +135,22 @@ test("frames of an animation: the lower jaw 8 mm forward and back", async () => 
     await page.evaluate(() => new Promise<void>((done) => (globalThis as unknown as Hook).tissueform.view.stage.invalidate(done)));
     await page.waitForTimeout(150);
     await page.screenshot({ path: join(FOLDER, `drag-${String(step).padStart(2, "0")}.png`), clip: { x: 150, y: 90, width: 1130, height: 510 } });
+  }
+});
+
+test("the page's own answer while the server's is 150 ms away", async () => {
+  const line = await SlowLine.open(planner.url, 75);
+  try {
+    const { page } = await openPage(await planner.browse(), line.url);
+    await page.setInputFiles("input[type=file]", planner.casePath);
+    await live(page);
+    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.localState.value.kind === "ready");
+    await takeSegment(page, "Lower jaw");
+    await typeMove(page, "Forward", "5");
+    await page.getByText("This page answers at once").scrollIntoViewIfNeeded();
+    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.waitingMs === 0);
+    await picture(page, "own-answer");
+  } finally {
+    line.close();
   }
 });
