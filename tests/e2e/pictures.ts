@@ -6,6 +6,7 @@ import { pathToFileURL } from "node:url";
 import type { Page } from "playwright-core";
 import { IdentityProvider, enterName } from "./identity_provider";
 import { type Hook, Planner, live, moved, openCase, openPage, state, takeSegment, typeMove } from "./planner";
+import { SlowLine } from "./slow_line";
 
 // The pictures of docs/planner.md, of a case of a whole head:
 //
@@ -150,4 +151,21 @@ test("a file that moves, opened from disk", async () => {
   await page.getByRole("checkbox").check();
   await page.waitForTimeout(1500);
   await page.screenshot({ path: join(FOLDER, "file-that-moves.jpg"), type: "jpeg", quality: 90 });
+});
+
+test("the page's own answer while the server's is 150 ms away", async () => {
+  const line = await SlowLine.open(planner.url, 75);
+  try {
+    const { page } = await openPage(await planner.browse(), line.url);
+    await page.setInputFiles("input[type=file]", planner.casePath);
+    await live(page);
+    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.localState.value.kind === "ready");
+    await takeSegment(page, "Lower jaw");
+    await typeMove(page, "Forward", "5");
+    await page.getByText("This page answers at once").scrollIntoViewIfNeeded();
+    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.waitingMs === 0);
+    await picture(page, "own-answer");
+  } finally {
+    line.close();
+  }
 });

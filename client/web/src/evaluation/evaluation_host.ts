@@ -9,9 +9,9 @@ import { makeEvaluator } from "./evaluator";
 
 /**
  * An evaluation in the page itself is shown in the same picture as the pose; from a worker it comes a picture later. So long, in
- * ms, the page does it: a quarter of a picture.
+ * ms, the page does it: half a picture.
  */
-const PAGE_BUDGET_MS = 4;
+const PAGE_BUDGET_MS = 8;
 
 /** `number`: that of the question. */
 export type OnEvaluation = (evaluation: Evaluation, number: number) => void;
