@@ -98,7 +98,7 @@ export function suggestLandmarks(file: CaseFile, book: LandmarkBook): Map<string
   }
   for (const jaw of ["upper", "lower"]) {
     const incisor = positions.get(`${jaw}_incisor`);
-    if (incisor !== undefined) positions.set(`${jaw}_midline`, incisor);
+    if (incisor !== undefined && !positions.has(`${jaw}_midline`)) positions.set(`${jaw}_midline`, incisor);
   }
   const found = new Map<string, Anchor>();
   for (const landmark of FACE_LANDMARKS) {
