@@ -36,6 +36,7 @@ describe("the hand-made face", () => {
     await open(page, "Measures");
     await page.getByText("needs Nose tip, Upper lip, Soft pogonion").waitFor();
     await page.getByRole("button", { name: "Confirm all" }).click();
+    await expect.poll(() => numbers(page, "e_line_upper_lip")).not.toBeNull();
     for (const [name, value] of Object.entries(ITS_MEASURES)) {
       const [before, after] = (await numbers(page, name)) ?? expect.fail(name);
       expect([name, before]).toEqual([name, Number(value.toFixed(1))]);
@@ -65,13 +66,13 @@ describe("the hand-made face", () => {
     // The middle of the picture lies upon the strip.
     await canvas.press("Enter");
     await page.locator(".picking").waitFor({ state: "hidden" });
-    expect(await numbers(page, "e_line_upper_lip")).not.toBeNull();
+    await expect.poll(() => numbers(page, "e_line_upper_lip")).not.toBeNull();
     await page.getByRole("button", { name: "Undo landmark" }).click();
     await page.getByRole("button", { name: "Undo landmark" }).click();
     await page.reload();
     await live(page);
     await open(page, "Measures");
-    expect(await numbers(page, "e_line_upper_lip")).not.toBeNull();
+    await expect.poll(() => numbers(page, "e_line_upper_lip")).not.toBeNull();
     expect((await numbers(page, "facial_convexity"))?.[0]).toBe(Number(ITS_MEASURES.facial_convexity.toFixed(1)));
   });
 
