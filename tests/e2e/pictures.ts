@@ -79,8 +79,13 @@ test("six pictures", async () => {
 test("measures, a wish, the band and the bite", async () => {
   const { page } = await openCase(await planner.browse(), planner);
   const open = (title: string) => page.locator("summary").getByText(title, { exact: true }).click();
+  const toTop = (title: string) =>
+    page.locator(`aside > details[aria-label="${title}"]`).evaluate((part) => {
+      const panel = part.closest("aside") as HTMLElement;
+      panel.scrollTop += part.getBoundingClientRect().top - panel.getBoundingClientRect().top;
+    });
   await page.emulateMedia({ colorScheme: "light" });
-  await page.setViewportSize({ width: 1280, height: 1060 });
+  await page.setViewportSize({ width: 1280, height: 1430 });
   await page.getByRole("button", { name: "Left", exact: true }).click();
   await takeSegment(page, "Lower jaw");
   await typeMove(page, "Forward", "6");
@@ -88,17 +93,17 @@ test("measures, a wish, the band and the bite", async () => {
   await open("Measures");
   await page.getByRole("button", { name: "Confirm all" }).click();
   await open("Profile");
-  await page.locator(".profile").scrollIntoViewIfNeeded();
-  await page.locator(".measures").evaluate((table) => table.closest("details")?.scrollIntoView());
+  await toTop("Measures");
   await picture(page, "measures");
   await open("Profile");
+  await page.setViewportSize({ width: 1280, height: 800 });
 
   await page.getByText("Linear elastic", { exact: true }).click();
   await page.locator("[data-measure=e_line_lower_lip] .band").waitFor();
   await page.getByLabel("Colours show").selectOption({ label: "Band of uncertainty" });
   await page.locator(".legend").waitFor({ state: "visible" });
   await page.getByRole("button", { name: "3/4" }).click();
-  await page.locator(".measures").evaluate((table) => table.closest("details")?.scrollIntoView());
+  await toTop("Measures");
   await picture(page, "band");
   await page.getByLabel("Colours show").selectOption({ label: "Skin as it looks" });
   await open("Measures");
@@ -108,24 +113,23 @@ test("measures, a wish, the band and the bite", async () => {
   await page.getByRole("button", { name: "Left", exact: true }).click();
   await open("Wished-for face");
   await page.getByLabel("or a place").selectOption({ label: "Chin" });
-  const forward = page.getByRole("textbox", { name: "forward" });
+  const forward = page.getByRole("textbox", { name: "forward", exact: true });
   await forward.fill("6");
   await forward.press("Enter");
   await page.getByText(/Chin: reached/).waitFor();
   await moved(page, 4, 10);
-  await page.getByText("Wished-for face", { exact: true }).scrollIntoViewIfNeeded();
-  await page.locator(".wishes").evaluate((list) => list.closest("details")?.scrollIntoView());
+  await toTop("Wished-for face");
   await picture(page, "wished-for-chin");
   await page.getByRole("button", { name: "Accept", exact: true }).click();
   await open("Wished-for face");
   await page.getByRole("button", { name: "Rest shape" }).click();
 
   await open("Jaw and bite");
-  await typeMove(page, "Up", "4");
+  await page.getByRole("button", { name: "3/4" }).click();
   await page.getByRole("button", { name: "Show the bite" }).click();
   await page.getByText(/Contact on about|No contact/).waitFor();
-  await page.evaluate(() => (globalThis as unknown as Hook).tissueform.view.stage.zoom(0.45));
-  await page.getByRole("button", { name: "Show the bite" }).evaluate((button) => button.closest("details")?.scrollIntoView());
+  await page.evaluate(() => (globalThis as unknown as Hook).tissueform.view.stage.zoom(0.75));
+  await toTop("Jaw and bite");
   await picture(page, "bite");
 });
 

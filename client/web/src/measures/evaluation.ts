@@ -38,11 +38,11 @@ const STEP_MM = 0.01;
 const AXES = ["left", "forward", "up"] as const;
 
 /**
- * As if every landmark were off by all of its band in the direction that changes the measure most: at least as wide as the
+ * Null of bone alone, which goes where it is put. As if every landmark were off by all of its band in the direction that changes the measure most: at least as wide as the
  * measure's own band, for errors of landmarks may cancel and are taken not to. Slopes are central differences.
  */
 function bandOf(definition: MeasureDefinition, points: readonly FacePoint[], bandsMm: MeasuredFace["bandsMm"]): Band | null {
-  if (bandsMm === null) return null;
+  if (bandsMm === null || !definition.landmarks.some((name) => bandsMm.has(name))) return null;
   const value = definition.of(points);
   let half = 0;
   definition.landmarks.forEach((name, index) => {
