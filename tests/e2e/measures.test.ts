@@ -185,6 +185,14 @@ describe("the bundled head", () => {
       return Math.max(...bench.bandOf(skin));
     });
     expect(widths).toBeGreaterThan(0.05);
+    await open(page, "Report");
+    await page.getByRole("button", { name: "Open the report" }).click();
+    await page.getByRole("row", { name: "Lower lip to E-line" }).getByText(/ to /).waitFor();
+    expect(await page.locator(".report img").evaluateAll((pictures) => pictures.map((picture) => (picture as HTMLImageElement).naturalWidth))).toEqual([480, 480, 480]);
+    const pdf = (await page.pdf({ preferCSSPageSize: true })).toString("latin1");
+    expect(pdf.match(/\/Type\s*\/Page\b/g)?.length).toBe(1);
+    await page.emulateMedia({ colorScheme: "dark" });
+    expect(await seriousFindings(page)).toEqual([]);
     expect(faults).toEqual([]);
   });
 });

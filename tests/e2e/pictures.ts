@@ -120,11 +120,13 @@ test("measures, a wish, the band and the bite", async () => {
   await moved(page, 4, 10);
   await toTop("Wished-for face");
   await picture(page, "wished-for-chin");
-  await page.getByRole("button", { name: "Accept", exact: true }).click();
+  await page.getByRole("button", { name: "Reject", exact: true }).click();
   await open("Wished-for face");
   await page.getByRole("button", { name: "Rest shape" }).click();
 
   await open("Jaw and bite");
+  await typeMove(page, "Forward", "6");
+  await typeMove(page, "Up", "3");
   await page.getByRole("button", { name: "3/4" }).click();
   await page.getByRole("button", { name: "Show the bite" }).click();
   await page.getByText(/Contact on about|No contact/).waitFor();

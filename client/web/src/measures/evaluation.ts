@@ -38,8 +38,9 @@ const STEP_MM = 0.01;
 const AXES = ["left", "forward", "up"] as const;
 
 /**
- * Null of bone alone, which goes where it is put. As if every landmark were off by all of its band in the direction that changes the measure most: at least as wide as the
- * measure's own band, for errors of landmarks may cancel and are taken not to. Slopes are central differences.
+ * As if every landmark were off by all of its band in the direction that changes the measure most: at least as wide as the
+ * measure's own band, for errors of landmarks may cancel and are taken not to. Slopes are central differences. Null where none
+ * of the landmarks is of the skin: bone goes where it is put.
  */
 function bandOf(definition: MeasureDefinition, points: readonly FacePoint[], bandsMm: MeasuredFace["bandsMm"]): Band | null {
   if (bandsMm === null || !definition.landmarks.some((name) => bandsMm.has(name))) return null;
