@@ -134,12 +134,31 @@ async function openReport(page: Page, html: string): Promise<{ page: Page; fault
   return { page: opened, faults };
 }
 
+function forwardOf(page: Page, place: string) {
+  return page.getByRole("group", { name: `Wish for ${place}` }).getByRole("textbox", { name: "forward" });
+}
+
+/** The arrow that points forward, which goes to the left as the head is seen from its left, by so many pixels. */
+async function pullForward(page: Page, pixels: number): Promise<void> {
+  const at = await page.evaluate(async () => {
+    const { view, bench } = (globalThis as unknown as Hook).tissueform;
+    await new Promise<void>((done) => view.stage.invalidate(done));
+    const box = view.stage.canvas.getBoundingClientRect();
+    const point = view.head.toWorld(bench.wishes.wishes.value[0].place.drawnMm).project(view.stage.camera);
+    return { x: box.left + ((point.x + 1) / 2) * box.width, y: box.top + ((1 - point.y) / 2) * box.height };
+  });
+  await page.mouse.move(at.x - 40, at.y);
+  await page.mouse.down();
+  await page.mouse.move(at.x - 40 - pixels, at.y, { steps: 6 });
+  await page.mouse.up();
+}
+
 describe("the bundled head", () => {
   test("is pulled to a wished-for chin, told what cannot be reached, and takes the bone as one step", async () => {
     const { page, faults } = await openCase(await planner.browse(), planner);
     await open(page, "Wished-for face");
     await page.getByLabel("or a place").selectOption({ label: "Chin" });
-    const forward = page.getByRole("group", { name: "Wish for Chin" }).getByRole("textbox", { name: "forward" });
+    const forward = forwardOf(page, "Chin");
     await forward.fill("5");
     await forward.press("Enter");
     await moved(page, 4, 9);
@@ -151,13 +170,12 @@ describe("the bundled head", () => {
     expect(await seriousFindings(page)).toEqual([]);
     await page.getByRole("button", { name: "Reject" }).click();
     await moved(page, 0, 0.05);
+    await page.getByRole("button", { name: "Left", exact: true }).click();
     await page.getByLabel("or a place").selectOption({ label: "Lower lip" });
-    const lip = page.getByRole("group", { name: "Wish for Lower lip" }).getByRole("textbox", { name: "forward" });
-    for (const mm of ["1", "2", "3"]) {
-      await lip.fill(mm);
-      await lip.press("Enter");
-    }
-    await moved(page, 2.5, 7);
+    await pullForward(page, 24);
+    await moved(page, 2.5, 15);
+    await forwardOf(page, "Lower lip").fill("3");
+    await forwardOf(page, "Lower lip").press("Enter");
     await page.getByText(/Lower lip: reached/).waitFor();
     await page.getByRole("button", { name: "Accept" }).click();
     await moved(page, 2.5, 7);
