@@ -181,6 +181,11 @@ describe("the bundled head", () => {
     await moved(page, 2.5, 7);
     await page.keyboard.press("Control+z");
     await moved(page, 0, 0.05);
+    // This case has the scanner's axes alone.
+    await open(page, "Measures");
+    await page.getByText("In the axes of the scanner").waitFor();
+    await open(page, "Profile");
+    await expect.poll(() => page.locator(".profile path").last().getAttribute("d")).toMatch(/^M[\d.]+ [\d.]+L/);
     expect(faults).toEqual([]);
   });
 
