@@ -55,11 +55,13 @@ export function labelOf(book: LandmarkBook, name: string): string {
 /** Of each landmark; bone goes where it is put. Null where no band is known. */
 export function bandsMm(face: ShownFace): Map<string, number> | null {
   const bands = new Map<string, number>();
+  const ofSurfaces = new Map<number, Float32Array>();
   for (const [name, anchor] of face.landmarks.placed) {
     const surface = face.file.surfaces[anchor.surface];
     if (surface.entry.kind !== "skin") continue;
-    const band = face.bandOf(anchor.surface);
+    const band = ofSurfaces.get(anchor.surface) ?? face.bandOf(anchor.surface);
     if (band === null) return null;
+    ofSurfaces.set(anchor.surface, band);
     bands.set(name, anchorNumber(band, surface.triangles, anchor));
   }
   return bands.size === 0 ? null : bands;
