@@ -25,7 +25,7 @@ export function wishAnswer(bench: Workbench): HTMLElement {
     const lines = sentences(bench, response);
     if (fit.problem.value !== null) lines.unshift(`This cannot be asked: ${sentenceOf(fit.problem.value)}`);
     else if (response === null) lines.unshift("The server prepares answers for these points …");
-    else lines.push(`Found in ${Math.max(1, Math.round(milliseconds))} ms; bone moves ${formatNumber(response.movementMm)} mm from rest.`);
+    else lines.push(`Searched for ${Math.max(1, Math.round(1000 * response.searchSeconds))} ms, answered after ${Math.max(1, Math.round(milliseconds))}; bone moves ${formatNumber(response.movementMm)} mm from rest.`);
     told.replaceChildren(...lines.map((text) => el("p", { text })));
     rows.replaceChildren(...(response?.numbers ?? []).map((number) => numberRow(bench, number)));
   };
