@@ -83,6 +83,65 @@ test("seven pictures", async () => {
   await live(page);
 });
 
+test("measures, a wish, the band and the bite", async () => {
+  const { page } = await openCase(await planner.browse(), planner);
+  const open = (title: string) => page.locator("summary").getByText(title, { exact: true }).click();
+  const toTop = (title: string) =>
+    page.locator(`aside > details[aria-label="${title}"]`).evaluate((part) => {
+      const panel = part.closest("aside") as HTMLElement;
+      panel.scrollTop += part.getBoundingClientRect().top - panel.getBoundingClientRect().top;
+    });
+  await page.emulateMedia({ colorScheme: "light" });
+  await page.setViewportSize({ width: 1280, height: 1430 });
+  await page.getByRole("button", { name: "Left", exact: true }).click();
+  await takeSegment(page, "Lower jaw");
+  await typeMove(page, "Forward", "6");
+  await moved(page, 4, 9);
+  await open("Measures");
+  await page.getByRole("button", { name: "Confirm all" }).click();
+  await open("Profile");
+  await toTop("Measures");
+  await picture(page, "measures");
+  await open("Profile");
+  await page.setViewportSize({ width: 1280, height: 800 });
+
+  await page.getByText("Linear elastic", { exact: true }).click();
+  await page.locator("[data-measure=e_line_lower_lip] .band").waitFor();
+  await page.getByLabel("Colours show").selectOption({ label: "Band of uncertainty" });
+  await page.locator(".legend").waitFor({ state: "visible" });
+  await page.getByRole("button", { name: "3/4" }).click();
+  await toTop("Measures");
+  await picture(page, "band");
+  await page.getByLabel("Colours show").selectOption({ label: "Skin as it looks" });
+  await open("Measures");
+
+  await page.getByRole("button", { name: "Reset" }).click();
+  await page.getByRole("button", { name: "Rest shape" }).click();
+  await page.getByRole("button", { name: "Left", exact: true }).click();
+  await open("Wished-for face");
+  await page.getByLabel("or a place").selectOption({ label: "Chin" });
+  const forward = page.getByRole("textbox", { name: "forward", exact: true });
+  await forward.fill("6");
+  await forward.press("Enter");
+  await page.getByText(/Chin: reached/).waitFor();
+  await moved(page, 4, 10);
+  await toTop("Wished-for face");
+  await picture(page, "wished-for-chin");
+  await page.getByRole("button", { name: "Reject", exact: true }).click();
+  await open("Wished-for face");
+  await page.getByRole("button", { name: "Rest shape" }).click();
+
+  await open("Jaw and bite");
+  await typeMove(page, "Forward", "6");
+  await typeMove(page, "Up", "3");
+  await page.getByRole("button", { name: "3/4" }).click();
+  await page.getByRole("button", { name: "Show the bite" }).click();
+  await page.getByText(/Contact on about|No contact/).waitFor();
+  await page.evaluate(() => (globalThis as unknown as Hook).tissueform.view.stage.zoom(0.75));
+  await toTop("Jaw and bite");
+  await picture(page, "bite");
+});
+
 test("the login", async () => {
   const provider = await IdentityProvider.start();
   const house = await Planner.start(process.env.TISSUEFORM_CASE, { gateway: provider.gatewayOptions, server: provider.serverOptions });

@@ -1,12 +1,12 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { movedPoint } from "../geometry/pose";
+import { type HeadFrame, type Pose, movedPoint } from "../geometry/pose";
 import { pointAt } from "../geometry/rigid_fit";
 import { anchorPoint } from "../measures/anchor";
 import { FACE_LANDMARKS } from "../measures/face_landmarks";
 import { type ShownFace, shownPoint } from "../measures/face_measures";
-import { toFacePoint } from "../measures/face_point";
+import { faceFrame, toFacePoint } from "../measures/face_point";
 import { type ProfileLine, type ProfilePoint, cutProfile, nearMiddle } from "../measures/profile";
 import { NOTICE } from "./files";
 
@@ -25,18 +25,19 @@ type Points = ReadonlyMap<string, ProfilePoint>;
 export class ProfileDrawing {
   private readonly parts: { surface: number; triangles: Uint32Array }[];
   private readonly before: ProfileLine[];
+  private readonly frame: HeadFrame;
 
   constructor(private readonly face: ShownFace) {
-    const { surfaces, manifest } = face.file;
+    const { surfaces } = face.file;
+    this.frame = faceFrame(face.file);
     this.parts = surfaces
-      .map((source, surface) => ({ surface, kind: source.entry.kind, triangles: nearMiddle(source, manifest.headFrame, REACH_MM) }))
+      .map((source, surface) => ({ surface, kind: source.entry.kind, triangles: nearMiddle(source, this.frame, REACH_MM) }))
       .filter(({ kind, triangles }) => kind !== "bone" && triangles.length > 0);
-    this.before = this.skins.flatMap(({ surface, triangles }) => cutProfile({ positions: surfaces[surface].positions, triangles }, manifest.headFrame));
+    this.before = this.skins.flatMap(({ surface, triangles }) => cutProfile({ positions: surfaces[surface].positions, triangles }, this.frame));
   }
 
   /** As the face is shown now; the nose to the right unless told. */
   draw(isNoseLeft = false): SVGSVGElement {
-    const { headFrame } = this.face.file.manifest;
     const points = (at: (name: string) => ProfilePoint | null): Points =>
       new Map(FACE_LANDMARKS.flatMap(({ name }): [string, ProfilePoint][] => {
         const point = at(name);
@@ -45,11 +46,11 @@ export class ProfileDrawing {
     const { landmarks, file } = this.face;
     const before = points((name) => {
       const anchor = landmarks.placed.get(name);
-      return anchor === undefined ? null : toFacePoint(anchorPoint(file.surfaces[anchor.surface], anchor), headFrame);
+      return anchor === undefined ? null : toFacePoint(anchorPoint(file.surfaces[anchor.surface], anchor), this.frame);
     });
     const after = points((name) => {
       const anchor = landmarks.placed.get(name);
-      return anchor === undefined ? null : toFacePoint(shownPoint(this.face, anchor), headFrame);
+      return anchor === undefined ? null : toFacePoint(shownPoint(this.face, anchor), this.frame);
     });
     const isSkin = (surface: number) => this.skins.some((skin) => skin.surface === surface);
     const bone = this.parts.filter(({ surface }) => !isSkin(surface)).flatMap((part) => this.cut(part));
@@ -66,11 +67,11 @@ export class ProfileDrawing {
     const positions = this.face.positionsOf(surface);
     const pose = entry.handle === "" ? undefined : this.face.shownPoses.get(entry.handle);
     const posed = pose === undefined ? positions : movedAll(positions, pose);
-    return cutProfile({ positions: posed, triangles }, this.face.file.manifest.headFrame);
+    return cutProfile({ positions: posed, triangles }, this.frame);
   }
 }
 
-function movedAll(positions: Float32Array, pose: Parameters<typeof movedPoint>[0]): Float32Array {
+function movedAll(positions: Float32Array, pose: Pose): Float32Array {
   const moved = new Float32Array(positions.length);
   for (let v = 0; v < positions.length / 3; ++v) moved.set(movedPoint(pose, pointAt(positions, v)), 3 * v);
   return moved;
@@ -98,7 +99,7 @@ function frameOf(before: readonly ProfileLine[], points: Points, isNoseLeft: boo
   const middle = points.get("subnasale")?.up ?? all.reduce((sum, { up }) => sum + up, 0) / Math.max(1, all.length);
   const high = Math.max(points.get("soft_glabella")?.up ?? middle, middle) + SIZE_MM.above * 0.6;
   const low = Math.min(points.get("soft_menton")?.up ?? middle - 60, middle - 30) - SIZE_MM.below * 0.6;
-  const foremost = all.filter(({ up }) => up > low && up < high).reduce((most, { forward }) => Math.max(most, forward), -Infinity) + 28;
+  const foremost = all.filter(({ up }) => up > low && up < high).reduce((most, { forward }) => Math.max(most, forward), -1000) + 28;
   const outwards = isNoseLeft ? -1 : 1;
   return {
     x: ({ forward }) => (isNoseLeft ? foremost - forward : forward - foremost + SIZE_MM.width),
@@ -115,9 +116,9 @@ function picture(lines: { before: ProfileLine[]; bone: ProfileLine[]; skin: Prof
   return svg("svg", { xmlns: "http://www.w3.org/2000/svg", viewBox: `0 0 ${width} ${height.toFixed(1)}`, width: `${width}mm`, height: `${height.toFixed(1)}mm`, "font-family": "sans-serif", role: "img", "aria-label": "Profile before and after" }, [
     svg("title", {}, [`Profile before and after, ${NOTICE}`]),
     svg("rect", { width, height, fill: COLORS.ground }),
-    ...lines.bone.map((line) => curve(line, frame, COLORS.bone, 0.3)),
-    ...lines.before.map((line) => curve(line, frame, COLORS.before, 0.4)),
-    ...lines.skin.map((line) => curve(line, frame, COLORS.after, 0.7)),
+    ...lines.bone.flatMap((line) => curve(line, frame, COLORS.bone, 0.3)),
+    ...lines.before.flatMap((line) => curve(line, frame, COLORS.before, 0.4)),
+    ...lines.skin.flatMap((line) => curve(line, frame, COLORS.after, 0.7)),
     ...estheticLine(before, frame, COLORS.before),
     ...estheticLine(after, frame, COLORS.after),
     ...marks(after, frame),
@@ -126,8 +127,8 @@ function picture(lines: { before: ProfileLine[]; bone: ProfileLine[]; skin: Prof
   ]);
 }
 
-/** In pieces, where it leaves the picture and comes back. */
-function curve(line: ProfileLine, frame: Frame, stroke: string, width: number): SVGPathElement {
+/** In pieces, where it leaves the picture and comes back; none where it never comes into it. */
+function curve(line: ProfileLine, frame: Frame, stroke: string, width: number): SVGPathElement[] {
   const isInside = (point: ProfilePoint) => frame.x(point) >= 0 && frame.x(point) <= frame.width && frame.y(point) >= 0 && frame.y(point) <= frame.height;
   let d = "";
   let isDrawing = false;
@@ -136,7 +137,7 @@ function curve(line: ProfileLine, frame: Frame, stroke: string, width: number): 
     if (isIn) d += `${isDrawing ? "L" : "M"}${frame.x(point).toFixed(2)} ${frame.y(point).toFixed(2)}`;
     isDrawing = isIn;
   }
-  return svg("path", { d, fill: "none", stroke, "stroke-width": width, "stroke-linejoin": "round" });
+  return d === "" ? [] : [svg("path", { d, fill: "none", stroke, "stroke-width": width, "stroke-linejoin": "round" })];
 }
 
 function estheticLine(points: Points, frame: Frame, stroke: string): SVGElement[] {

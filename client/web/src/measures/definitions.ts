@@ -19,6 +19,8 @@ export interface MeasureDefinition {
   unit: MeasureUnit;
   landmarks: readonly string[];
   norm: Norm | null;
+  /** It is a distance from the midsagittal plane. */
+  isFromMiddle?: boolean;
   /** What is wrong with the points, in a sentence; null where they make a number. */
   problem: (points: readonly FacePoint[]) => string | null;
   of: (points: readonly FacePoint[]) => number;
@@ -71,7 +73,7 @@ function vertical(name: string, title: string, upper: string, lower: string, nor
 }
 
 function midline(name: string, title: string, landmark: string): MeasureDefinition {
-  return { name, title, unit: "mm", landmarks: [landmark], norm: null, problem: fine, of: ([point]) => point.left };
+  return { name, title, unit: "mm", landmarks: [landmark], norm: null, isFromMiddle: true, problem: fine, of: ([point]) => point.left };
 }
 
 function profileAngle(name: string, title: string, landmarks: readonly string[], norm: Norm | null): MeasureDefinition {

@@ -22,6 +22,8 @@ export interface MeasuredFace {
   before: FacePoints;
   after: FacePoints;
   bandsMm: ReadonlyMap<string, number> | null;
+  /** Where the midsagittal plane lies. */
+  isMiddleKnown: boolean;
 }
 
 export function evaluate(definition: MeasureDefinition, face: MeasuredFace): MeasureResult {
@@ -29,6 +31,7 @@ export function evaluate(definition: MeasureDefinition, face: MeasuredFace): Mea
   if (missing.length > 0) return { definition, kind: "missing", landmarks: missing };
   const points = (of: FacePoints) => definition.landmarks.map((name) => of.get(name) as FacePoint);
   const [before, after] = [points(face.before), points(face.after)];
+  if (definition.isFromMiddle === true && !face.isMiddleKnown) return { definition, kind: "impossible", text: "where the midsagittal plane lies is not known of this case" };
   const text = definition.problem(before) ?? definition.problem(after);
   if (text !== null) return { definition, kind: "impossible", text };
   return { definition, kind: "value", before: definition.of(before), after: definition.of(after), band: bandOf(definition, after, face.bandsMm) };
@@ -39,10 +42,11 @@ const AXES = ["left", "forward", "up"] as const;
 
 /**
  * As if every landmark were off by all of its band in the direction that changes the measure most: at least as wide as the
- * measure's own band, for errors of landmarks may cancel and are taken not to. Slopes are central differences.
+ * measure's own band, for errors of landmarks may cancel and are taken not to. Slopes are central differences. Null where none
+ * of the landmarks is of the skin: bone goes where it is put.
  */
 function bandOf(definition: MeasureDefinition, points: readonly FacePoint[], bandsMm: MeasuredFace["bandsMm"]): Band | null {
-  if (bandsMm === null) return null;
+  if (bandsMm === null || !definition.landmarks.some((name) => bandsMm.has(name))) return null;
   const value = definition.of(points);
   let half = 0;
   definition.landmarks.forEach((name, index) => {

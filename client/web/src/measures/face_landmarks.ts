@@ -48,8 +48,9 @@ export const FACE_LANDMARKS: readonly FaceLandmark[] = [
 /** Further than this from the midsagittal plane lies no landmark of the middle. */
 const MOST_OFF_MIDDLE_MM = 15;
 
-/** Why this point cannot be the landmark, in a sentence; "" where it can. */
-export function sideProblem({ label, side }: FaceLandmark, { left }: FacePoint): string {
+/** Why this point cannot be the landmark, in a sentence; "" where it can. `isMiddleKnown`: where the midsagittal plane lies. */
+export function sideProblem({ label, side }: FaceLandmark, { left }: FacePoint, isMiddleKnown: boolean): string {
+  if (!isMiddleKnown) return "";
   if (side === "left" && left <= 0) return `${label}: this is the patient’s right side; choose a point on the left.`;
   if (side === "right" && left >= 0) return `${label}: this is the patient’s left side; choose a point on the right.`;
   if (side === "middle" && Math.abs(left) > MOST_OFF_MIDDLE_MM) {

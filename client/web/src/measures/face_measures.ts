@@ -9,7 +9,7 @@ import { type Anchor, anchorNumber, anchorPoint } from "./anchor";
 import { MEASURES } from "./definitions";
 import { type MeasureResult, evaluate } from "./evaluation";
 import { FACE_LANDMARKS } from "./face_landmarks";
-import { type FacePoint, toFacePoint } from "./face_point";
+import { type FacePoint, faceFrame, hasHeadFrame, toFacePoint } from "./face_point";
 import type { LandmarkBook } from "./landmark_book";
 import { ownDefinition } from "./own_measures";
 import { cutProfile, outline } from "./profile";
@@ -38,12 +38,13 @@ export function shownPoint(face: ShownFace, anchor: Anchor) {
 
 /** All measures with what they are made of, as the face is shown. */
 export function measureFace(face: ShownFace): MeasureResult[] {
-  const { surfaces, manifest } = face.file;
+  const { surfaces } = face.file;
+  const frame = faceFrame(face.file);
   const points = (at: (anchor: Anchor) => FacePoint) => new Map(Array.from(face.landmarks.placed, ([name, anchor]) => [name, at(anchor)]));
-  const before = points((anchor) => toFacePoint(anchorPoint(surfaces[anchor.surface], anchor), manifest.headFrame));
-  const after = points((anchor) => toFacePoint(shownPoint(face, anchor), manifest.headFrame));
+  const before = points((anchor) => toFacePoint(anchorPoint(surfaces[anchor.surface], anchor), frame));
+  const after = points((anchor) => toFacePoint(shownPoint(face, anchor), frame));
   const own = face.landmarks.own.map((measure, index) => ownDefinition(measure, index, (name) => labelOf(face.landmarks, name)));
-  const measured = { before, after, bandsMm: bandsMm(face) };
+  const measured = { before, after, bandsMm: bandsMm(face), isMiddleKnown: hasHeadFrame(face.file) };
   return [...MEASURES, ...own].map((definition) => evaluate(definition, measured));
 }
 
@@ -54,11 +55,13 @@ export function labelOf(book: LandmarkBook, name: string): string {
 /** Of each landmark; bone goes where it is put. Null where no band is known. */
 export function bandsMm(face: ShownFace): Map<string, number> | null {
   const bands = new Map<string, number>();
+  const ofSurfaces = new Map<number, Float32Array>();
   for (const [name, anchor] of face.landmarks.placed) {
     const surface = face.file.surfaces[anchor.surface];
     if (surface.entry.kind !== "skin") continue;
-    const band = face.bandOf(anchor.surface);
+    const band = ofSurfaces.get(anchor.surface) ?? face.bandOf(anchor.surface);
     if (band === null) return null;
+    ofSurfaces.set(anchor.surface, band);
     bands.set(name, anchorNumber(band, surface.triangles, anchor));
   }
   return bands.size === 0 ? null : bands;
@@ -85,7 +88,8 @@ function clip(title: string): string {
 
 /** What the case's landmarks and its profile at rest suggest; each lies on a surface, within 2 mm of what was found. */
 export function suggestLandmarks(file: CaseFile, book: LandmarkBook): Map<string, Anchor> {
-  const { landmarks, headFrame } = file.manifest;
+  const { landmarks } = file.manifest;
+  const headFrame = faceFrame(file);
   const positions = new Map(landmarks.map(({ name, positionMm }) => [name, positionMm]));
   const known = new Map(Array.from(positions, ([name, point]) => [name, toFacePoint(point, headFrame)]));
   const skin = file.surfaces.find(({ entry }) => entry.kind === "skin");
@@ -98,7 +102,7 @@ export function suggestLandmarks(file: CaseFile, book: LandmarkBook): Map<string
   }
   for (const jaw of ["upper", "lower"]) {
     const incisor = positions.get(`${jaw}_incisor`);
-    if (incisor !== undefined) positions.set(`${jaw}_midline`, incisor);
+    if (incisor !== undefined && !positions.has(`${jaw}_midline`)) positions.set(`${jaw}_midline`, incisor);
   }
   const found = new Map<string, Anchor>();
   for (const landmark of FACE_LANDMARKS) {

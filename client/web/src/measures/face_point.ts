@@ -1,6 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+import type { CaseFile } from "../case/case_file";
 import { type HeadFrame, headAxes } from "../geometry/pose";
 import { type Vector, apply, subtract } from "../geometry/rotation";
 
@@ -14,6 +15,32 @@ export interface FacePoint {
 export function toFacePoint(point: Vector, frame: HeadFrame): FacePoint {
   const [left, posterior, up] = apply(headAxes(frame), subtract(point, frame.originMm));
   return { left, forward: -posterior, up };
+}
+
+const scannerFrames = new WeakMap<CaseFile, HeadFrame>();
+
+/** Whether the frame is the head's: else the axes are the scanner's, and where the midsagittal plane lies is not known. */
+export function hasHeadFrame(file: CaseFile): boolean {
+  return file.manifest.headFrame.source !== "scanner";
+}
+
+/** In which the face is measured: the head frame, or where there is none the scanner's axes about the middle of the skin. */
+export function faceFrame(file: CaseFile): HeadFrame {
+  const { headFrame } = file.manifest;
+  const skin = file.surfaces.find(({ entry }) => entry.kind === "skin");
+  if (hasHeadFrame(file) || skin === undefined) return headFrame;
+  const known = scannerFrames.get(file);
+  if (known !== undefined) return known;
+  const ends = [0, 1, 2].map((axis) => endsOf(skin.positions, axis));
+  const frame = { ...headFrame, originMm: ends.map(([low, high]) => (low + high) / 2) as Vector };
+  scannerFrames.set(file, frame);
+  return frame;
+}
+
+function endsOf(positions: Float32Array, axis: number): [number, number] {
+  let [low, high] = [Infinity, -Infinity];
+  for (let i = axis; i < positions.length; i += 3) [low, high] = [Math.min(low, positions[i]), Math.max(high, positions[i])];
+  return [low, high];
 }
 
 /** What measures are made of, by name. */

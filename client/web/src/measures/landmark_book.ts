@@ -6,7 +6,7 @@ import type { Vector } from "../geometry/rotation";
 import { History } from "../planning/history";
 import { type Anchor, anchorPoint, nearestAnchor, readAnchor } from "./anchor";
 import { FACE_LANDMARKS, type FaceLandmark, sideProblem } from "./face_landmarks";
-import { toFacePoint } from "./face_point";
+import { faceFrame, hasHeadFrame, toFacePoint } from "./face_point";
 import { type OwnMeasure, readOwnMeasures } from "./own_measures";
 
 /** Placed by hand or confirmed ones count; a suggestion does not until it is confirmed. */
@@ -147,7 +147,7 @@ export class LandmarkBook {
     const surface = this.file.surfaces[anchor.surface];
     if (!landmark.kinds.includes(surface.entry.kind)) return `${landmark.label}: this is ${surface.entry.name}; choose a point on ${kindText(landmark)}.`;
     if (!this.isOfJaw(landmark.name, anchor.surface)) return `${landmark.label}: this is ${surface.entry.name}, which moves with another segment; choose a point on its own.`;
-    return sideProblem(landmark, toFacePoint(anchorPoint(surface, anchor), this.file.manifest.headFrame));
+    return sideProblem(landmark, toFacePoint(anchorPoint(surface, anchor), faceFrame(this.file)), hasHeadFrame(this.file));
   }
 
   /** Where the case says which segment the landmark is on, no other one holds it. */

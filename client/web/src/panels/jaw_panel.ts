@@ -16,20 +16,20 @@ export function jawPanel(bench: Workbench): HTMLElement {
   return collapsible("Jaw and bite", [openingPart(bench), bite.element], (isOpen) => {
     bench.view.setPoints("axis", isOpen ? axisPoints(bench) : []);
     if (!isOpen) bite.off();
-    if (!isOpen && bench.opening.value !== 0) bench.open(0);
+    if (!isOpen && bench.jaw.degrees !== 0) bench.open(0);
   });
 }
 
 const AXIS_POINTS = 40;
 
-function axisPoints({ hinge }: Workbench): Vector[] {
+function axisPoints({ jaw: { hinge } }: Workbench): Vector[] {
   if (hinge === null) return [];
   const { left, right } = hinge;
   return Array.from({ length: AXIS_POINTS + 1 }, (_, i) => add(right, scaled(subtract(left, right), i / AXIS_POINTS)));
 }
 
 function openingPart(bench: Workbench): HTMLElement {
-  const { hinge } = bench;
+  const { hinge } = bench.jaw;
   if (hinge === null || lowerJawHandles(bench.file).length === 0) {
     return el("p", { class: "quiet", text: "The case has no segment of the lower jaw, or nothing that tells where its condyles are." });
   }
@@ -37,11 +37,11 @@ function openingPart(bench: Workbench): HTMLElement {
   const control = slider("Opening of the jaw", { least: 0, most: MOST_OPENING_DEG, step: 0.5, value: 0 }, (value) => bench.open(value));
   const show = () => {
     const mm = incisorDistanceMm(bench.file, bench.shownPoses);
-    const degrees = bench.opening.value;
+    const { degrees } = bench.jaw;
     told.textContent = `${degrees === 0 ? "Closed as planned" : `Open by ${formatNumber(degrees)}°`}${mm === null ? "" : `, ${formatNumber(mm)} mm between the incisors`}.`;
+    control.value = String(degrees);
     control.setAttribute("aria-valuetext", `${formatNumber(degrees)} degrees`);
   };
-  bench.opening.watch((degrees) => (control.value = String(degrees)));
   bench.shown.watch(onceAPicture(show));
   show();
   const how = hinge.source === "landmarks" ? "the case’s landmarks of the condyles" : "the upper back ends of the lower jaw, for the case names no condyles";

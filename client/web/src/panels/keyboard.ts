@@ -32,6 +32,7 @@ const HELP: readonly [string, string][] = [
   ["I K · U O · J L", "pitch · roll · yaw, by 0.5°"],
   ["Shift", "with these: by 0.1"],
   ["N", "the next segment"],
+  ["Enter, Escape", "where a point is asked for: takes the one in the picture’s middle; leaves it"],
   ["G", "the gizmo turns or shifts"],
   ["Arrows, + −", "look from elsewhere, nearer, farther"],
   ["1 … 5", "front, left, right, 3/4, below"],

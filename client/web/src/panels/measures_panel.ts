@@ -1,6 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+import { hasHeadFrame } from "../measures/face_point";
 import { labelOf, measureFace } from "../measures/face_measures";
 import type { MeasureResult } from "../measures/evaluation";
 import { bandText, normText, unitText, valueTexts, whyNot } from "../measures/texts";
@@ -34,7 +35,7 @@ export function measuresPanel(bench: Workbench): HTMLElement {
 function captionOf(bench: Workbench, results: readonly MeasureResult[]): string {
   const hasBand = results.some((result) => result.kind === "value" && result.band !== null);
   return [
-    "In the head frame; forward, up and the patient’s left are positive.",
+    `In the ${hasHeadFrame(bench.file) ? "head frame" : "axes of the scanner, for no head frame was found"}; forward, up and the patient’s left are positive.`,
     hasBand ? "Below “after”: where it stays in 95 of 100 cases if nothing but the material is in doubt." : "",
     bench.showsPlan ? "" : "The face that is shown is not the plan’s.",
   ].filter((text) => text !== "").join(" ");

@@ -14,7 +14,7 @@ export function ownMeasuresPart(bench: Workbench): HTMLElement {
     { value: "", label: isOptional ? "none: a distance" : "choose" },
     ...Array.from(book.placed.keys(), (name) => ({ value: name, label: labelOf(book, name) })),
   ];
-  const fields = ["From", "To, or the angle at", "And to"].map((label, index) =>
+  const fields = ["First", "Second, angles at it", "Third"].map((label, index) =>
     select<string>(label, choices(index === 2), (value) => {
       chosen[index] = value;
       update();

@@ -10,7 +10,7 @@ import { button, collapsible, el } from "./dom";
 /** What becomes of the wishes: reached or missed, what holds back, how well each number is told; and to accept or reject it. */
 export function wishAnswer(bench: Workbench): HTMLElement {
   const fit = bench.wishes;
-  const told = el("ul", { class: "wish-told", attributes: { role: "status" } });
+  const told = el("div", { class: "wish-told", attributes: { role: "status" } });
   const rows = el("tbody");
   const heads = ["Number", "Value", "Told by wishes", "Per mm"].map((text) => el("th", { text, attributes: { scope: "col" } }));
   const caption = el("caption", { text: "Axes of the scanner. What the wishes do not tell is moved least; per mm: by how much it would differ were all wishes off by 1 mm." });
@@ -25,8 +25,8 @@ export function wishAnswer(bench: Workbench): HTMLElement {
     const lines = sentences(bench, response);
     if (fit.problem.value !== null) lines.unshift(`This cannot be asked: ${sentenceOf(fit.problem.value)}`);
     else if (response === null) lines.unshift("The server prepares answers for these points …");
-    else lines.push(`Found in ${Math.max(1, Math.round(milliseconds))} ms; bone moves ${formatNumber(response.movementMm)} mm from rest.`);
-    told.replaceChildren(...lines.map((text) => el("li", { text })));
+    else lines.push(`Searched for ${Math.max(1, Math.round(1000 * response.searchSeconds))} ms, answered after ${Math.max(1, Math.round(milliseconds))}; bone moves ${formatNumber(response.movementMm)} mm from rest.`);
+    told.replaceChildren(...lines.map((text) => el("p", { text })));
     rows.replaceChildren(...(response?.numbers ?? []).map((number) => numberRow(bench, number)));
   };
   const box = el("div", { class: "wish-answer", attributes: { role: "group", "aria-label": "Answer to the wishes" } }, [told, details, el("div", { class: "buttons" }, [accept, reject])]);

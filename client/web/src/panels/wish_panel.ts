@@ -37,7 +37,7 @@ export function wishPanel(bench: Workbench): HTMLElement {
     if (number !== 0) addWish(label, placeOfRegion(bench.file, number));
     region.set([{ value: 0, label: "choose" }, ...regions], 0);
   });
-  const list = el("ul", { class: "wishes" });
+  const list = el("div", { class: "wishes" });
   fit.wishes.watch((wishes) => {
     // What is being typed into keeps its field: its number is what was typed.
     if (list.contains(document.activeElement) && list.children.length === wishes.length) return;
@@ -116,7 +116,7 @@ function wishItem(bench: Workbench, puller: Puller, index: number): HTMLElement 
   along.checked = wish().isAlong;
   const others = () => bench.wishes.wishes.value.filter((_, k) => k !== index);
   const { label } = wish();
-  return el("li", { attributes: { role: "group", "aria-label": `Wish for ${label}` } }, [
+  return el("div", { attributes: { role: "group", "aria-label": `Wish for ${label}` } }, [
     el("div", { class: "wish-head" }, [
       el("strong", { text: label }),
       button("Pull", () => puller.take(index), { attributes: { "aria-label": `Pull ${label}` } }),

@@ -65,6 +65,26 @@ export function opened(pose: Pose, { left, right }: HingeAxis, degrees: number):
   return { ...pose, rotationVector: toRotationVector(rotation), translationMm: subtract(moved, pose.pivotMm) };
 }
 
+/** The jaw of one case, which may be open: a look at it, no part of the plan. */
+export class JawOpening {
+  /** Null where the case has no hinge. */
+  readonly hinge: HingeAxis | null;
+  degrees = 0;
+  private readonly lower: readonly string[];
+
+  constructor(private readonly file: CaseFile) {
+    this.hinge = hingeAxis(file);
+    this.lower = lowerJawHandles(file);
+  }
+
+  /** `poses` of the case's handles, with the jaw open. */
+  apply(poses: readonly Pose[]): Pose[] {
+    const { hinge, degrees } = this;
+    if (hinge === null || degrees === 0) return [...poses];
+    return poses.map((pose, index) => (this.lower.includes(this.file.manifest.handles[index].name) ? opened(pose, hinge, degrees) : pose));
+  }
+}
+
 /** Between the edges of upper and lower incisor, in mm, under these poses; null where the case does not know them. */
 export function incisorDistanceMm({ manifest }: CaseFile, poses: ReadonlyMap<string, Pose>): number | null {
   const now = ["upper_incisor", "lower_incisor"].map((name) => {

@@ -8,21 +8,13 @@ const SHOWN: readonly ViewName[] = ["front", "left", "threeQuarter"];
 const WIDTH_PX = 480;
 const HEIGHT_PX = 560;
 
-/** The head from three sides as it is shown; none where the browser draws no pictures. The camera is where it was afterwards. */
+/** The head from three sides as it is shown; none where the browser draws no pictures. */
 export async function reportPictures({ view }: Workbench): Promise<HTMLElement[]> {
-  const { camera, controls } = view.stage;
-  const [position, target] = [camera.position.clone(), controls.target.clone()];
   const figures: HTMLElement[] = [];
   for (const name of SHOWN) {
-    view.look(name);
-    const canvas = view.stage.snapshot();
-    if (canvas === null) break;
-    figures.push(figure(canvas, VIEWS[name].label));
+    const picture = view.portrait(name);
+    if (picture !== null) figures.push(figure(picture, VIEWS[name].label));
   }
-  camera.position.copy(position);
-  controls.target.copy(target);
-  controls.update();
-  view.stage.invalidate();
   await Promise.all(figures.map((element) => element.querySelector("img")?.decode()));
   return figures;
 }

@@ -33,7 +33,7 @@ export async function reportSheet(bench: Workbench): Promise<HTMLElement> {
   const pictures = await reportPictures(bench);
   const model = bench.modelInfo(bench.model.value)?.name ?? "unknown";
   return node("article", [
-    node("header", [node("h1", ["Surgical plan and predicted face"]), node("p", [`${NOTICE[0].toUpperCase()}${NOTICE.slice(1)}: a prediction by a model, not for diagnosis or treatment.`], "notice")]),
+    node("header", [node("h1", ["Surgical plan and predicted face"]), node("p", [`${NOTICE[0].toUpperCase()}${NOTICE.slice(1)}: a prediction by a model, not for diagnosis or treatment.`], "report-notice")]),
     node("section", [node("h2", ["Plan"]), planTable(bench)]),
     node("section", [node("h2", ["Measures"]), measureTable(bench)], "wide"),
     node("section", [node("h2", ["Profile"]), new ProfileDrawing(bench).draw()]),
@@ -52,7 +52,7 @@ function measureTable(bench: Workbench): HTMLElement {
     const why = whyNot(result, (name) => labelOf(bench.landmarks, name));
     const [before, after, change] = valueTexts(result);
     const band = result.kind === "value" ? bandText(result.band) : "";
-    return [`${result.definition.title}, ${unitText(result)}`, before, why === "" ? after : why, band, change, normText(result.definition.norm)];
+    return [`${result.definition.title}, ${unitText(result)}`, before, why === "" ? after : why, band, change, normText(result.definition.norm).replace("norm ", "")];
   });
   return table(["Measure", "Before", "After", "95 of 100", "Change", "Norm"], rows);
 }

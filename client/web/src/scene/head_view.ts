@@ -90,6 +90,23 @@ export class HeadView {
     return { surface, triangle, weights };
   }
 
+  /** The head from there, without points and arrows; null where nothing can be drawn. The camera is where it was afterwards; the picture is good until the next one. */
+  portrait(from: ViewName): HTMLCanvasElement | null {
+    const { scene, camera, controls } = this.stage;
+    const [position, target] = [camera.position.clone(), controls.target.clone()];
+    const marks = [...scene.children.filter((object) => object !== this.head.group && !(object instanceof three.Light)), ...this.points.values()];
+    const hidden = marks.filter(({ visible }) => visible);
+    hidden.forEach((object) => (object.visible = false));
+    this.look(from);
+    const picture = this.stage.snapshot();
+    hidden.forEach((object) => (object.visible = true));
+    camera.position.copy(position);
+    controls.target.copy(target);
+    controls.update();
+    this.stage.invalidate();
+    return picture;
+  }
+
   private hitAt(x: number, y: number, wanted: (surface: DrawnSurface) => boolean): three.Intersection | undefined {
     const { clientWidth, clientHeight } = this.stage.canvas;
     const ray = new three.Raycaster();

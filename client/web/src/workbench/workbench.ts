@@ -20,7 +20,7 @@ import { LocalAnswers, type LocalState } from "../live/local_answers";
 import type { Anchor } from "../measures/anchor";
 import { type ShownFace, collectMeasures, suggestLandmarks } from "../measures/face_measures";
 import { LandmarkBook } from "../measures/landmark_book";
-import { type HingeAxis, hingeAxis, lowerJawHandles, opened } from "../planning/jaw_opening";
+import { JawOpening } from "../planning/jaw_opening";
 import { Plan } from "../planning/plan";
 import { Gizmo } from "../scene/gizmo";
 import type { HeadView } from "../scene/head_view";
@@ -67,6 +67,7 @@ export class Workbench implements ShownFace {
   readonly answers: Answers;
   readonly live: LiveSession;
   readonly landmarks: LandmarkBook;
+  readonly jaw: JawOpening;
   readonly wishes: WishFit;
   readonly pacs: PacsExports;
   readonly local: LocalAnswers;
@@ -85,8 +86,6 @@ export class Workbench implements ShownFace {
   readonly penetrations = new Signal<Penetration[]>([]);
   /** What the next click upon the picture is for; null: for nothing but looking and taking a segment. */
   readonly picking = new Signal<Picking | null>(null);
-  /** Degrees by which the lower jaw is open; a look at it, no part of the plan. */
-  readonly opening = new Signal(0);
   /** The face or the bone on the stage changed. */
   readonly shown = new Signal(0);
 
@@ -94,7 +93,6 @@ export class Workbench implements ShownFace {
   private readonly colors: FaceColors;
   private readonly rest: Float32Array;
   private readonly displacements: Float32Array;
-  private foundHinge: { axis: HingeAxis | null } | null = null;
   private readonly penetrationTest: PenetrationTest;
   private uncertainty: Float32Array | null = null;
   private other: Float32Array | null = null;
@@ -111,6 +109,7 @@ export class Workbench implements ShownFace {
   ) {
     this.plan = new Plan(file);
     this.landmarks = new LandmarkBook(file);
+    this.jaw = new JawOpening(file);
     this.rest = followedRest(file);
     this.displacements = new Float32Array(this.rest.length);
     this.colors = new FaceColors(view.head);
@@ -247,26 +246,12 @@ export class Workbench implements ShownFace {
   }
 
   get showsPlan(): boolean {
-    return this.comparison.value === null && this.opening.value === 0;
-  }
-
-  /** The hinge of the lower jaw at rest; null where the case has none. */
-  get hinge(): HingeAxis | null {
-    return (this.foundHinge ??= { axis: hingeAxis(this.file) }).axis;
+    return this.comparison.value === null && this.jaw.degrees === 0;
   }
 
   open(degrees: number): void {
-    this.opening.value = degrees;
+    this.jaw.degrees = degrees;
     this.planChanged(degrees === 0);
-  }
-
-  /** The plan's, with the jaw open. */
-  private openedPoses(): Pose[] {
-    const poses = this.plan.poses();
-    const { hinge } = this;
-    if (this.opening.value === 0 || hinge === null) return poses;
-    const lower = lowerJawHandles(this.file);
-    return poses.map((pose, index) => (lower.includes(this.plan.handles[index].name) ? opened(pose, hinge, this.opening.value) : pose));
   }
 
   posesByHandle(poses: readonly Pose[]): Map<string, Pose> {
@@ -296,9 +281,9 @@ export class Workbench implements ShownFace {
   }
 
   private planChanged(isFinal: boolean): void {
-    const poses = this.openedPoses();
+    const poses = this.jaw.apply(this.plan.poses());
     // What the server keeps is the plan.
-    this.live.sendPoses(poses, isFinal && this.opening.value === 0);
+    this.live.sendPoses(poses, isFinal && this.jaw.degrees === 0);
     this.waitingFrom ??= performance.now();
     if (this.comparison.value === null) this.setPoses(poses);
     this.local.ask(poses);
@@ -384,7 +369,7 @@ export class Workbench implements ShownFace {
 
   private async redraw(): Promise<void> {
     const comparison = this.comparison.value;
-    const planned = { displacements: this.displacements, poses: this.openedPoses() };
+    const planned = { displacements: this.displacements, poses: this.jaw.apply(this.plan.poses()) };
     const shape = comparison === null ? planned : await this.comparer.between(comparison, planned);
     // Another comparison may have been chosen meanwhile.
     if (comparison !== this.comparison.value) return;

@@ -5,6 +5,7 @@ import { beforeEach, expect, test } from "vitest";
 import { type CaseFile, openCase } from "../../src/case/case_file";
 import { type ShownFace, collectMeasures, measureFace, shownPoint } from "../../src/measures/face_measures";
 import { type Anchor, nearestAnchor, readAnchor } from "../../src/measures/anchor";
+import { faceFrame } from "../../src/measures/face_point";
 import { LandmarkBook } from "../../src/measures/landmark_book";
 import { cutProfile, outline } from "../../src/measures/profile";
 import { suggestFromProfile } from "../../src/measures/suggestions";
@@ -57,6 +58,13 @@ test("what is not on a surface, on another kind or on the wrong side is refused 
   expect(book.placed.size).toBe(0);
   expect(book.canUndo).toBe(false);
   expect(book.place("pronasale", middle(SKIN))).toBe("");
+});
+
+test("where the frame is the scanner's the face is measured about the middle of its skin, and no side is refused", async () => {
+  file = await openCase(sourceOf(smallCase({ json: ({ extensions }) => (extensions.TISSUEFORM_case.head_frame.source = "scanner") })));
+  expect(faceFrame(file).originMm).toEqual([5, 5, 0]);
+  expect(new LandmarkBook(file).place("upper_molar_right", middle(SEGMENT))).toBe("");
+  expect(faceFrame((file = await openCase(sourceOf(smallCase())))).originMm).toEqual([0, 0, 0]);
 });
 
 test("a landmark whose segment the case knows lies on no other one", async () => {

@@ -22,7 +22,7 @@ function changed(changes: Record<string, Partial<FacePoint> | null>): Map<string
 }
 
 function measure(name: string, face: Partial<MeasuredFace> = {}): MeasureResult {
-  return evaluate(definition(name), { before: HAND_MADE_FACE, after: HAND_MADE_FACE, bandsMm: null, ...face });
+  return evaluate(definition(name), { before: HAND_MADE_FACE, after: HAND_MADE_FACE, bandsMm: null, isMiddleKnown: true, ...face });
 }
 
 function valueAfter(name: string, face: Partial<MeasuredFace>): number {
@@ -70,16 +70,21 @@ test.each<[string, Record<string, Partial<FacePoint>>, string]>([
   expect(result).toMatchObject({ kind: "impossible", text: expect.stringContaining(text) });
 });
 
+test("midlines need a midsagittal plane, other measures do not", () => {
+  expect(measure("chin_midline", { isMiddleKnown: false })).toMatchObject({ kind: "impossible", text: expect.stringContaining("midsagittal plane") });
+  expect(measure("overjet", { isMiddleKnown: false }).kind).toBe("value");
+});
+
 test("a band is the bands of the landmarks by their slopes, and none where none is known", () => {
   const bandsMm = new Map([["subnasale", 0.3], ["soft_menton", 0.5]]);
   expect(measure("lower_face_height", { bandsMm })).toMatchObject({ band: { lowest: expect.closeTo(49.2, 9), highest: expect.closeTo(50.8, 9) } });
-  expect(measure("overjet", { bandsMm })).toMatchObject({ band: { lowest: 3, highest: 3 } });
+  expect(measure("overjet", { bandsMm })).toMatchObject({ band: null });
   expect(measure("lower_face_height")).toMatchObject({ band: null });
 });
 
 test("distances and angles of one's own are in space", () => {
   const label = (name: string) => name;
-  const face = { before: HAND_MADE_FACE, after: HAND_MADE_FACE, bandsMm: null };
+  const face = { before: HAND_MADE_FACE, after: HAND_MADE_FACE, bandsMm: null, isMiddleKnown: true };
   const distance = ownDefinition({ landmarks: ["upper_molar_left", "upper_molar_right"] }, 0, label);
   expect(evaluate(distance, face)).toMatchObject({ kind: "value", after: expect.closeTo(Math.hypot(40, 2), 12) });
   expect([distance.name, distance.unit]).toEqual(["own_1", "mm"]);
@@ -91,8 +96,9 @@ test("distances and angles of one's own are in space", () => {
 test("a landmark on the wrong side is refused in a sentence", () => {
   const of = (name: string) => FACE_LANDMARKS.find((landmark) => landmark.name === name) ?? expect.fail(name);
   const at = (left: number) => ({ left, forward: 0, up: 0 });
-  expect(sideProblem(of("upper_molar_left"), at(-20))).toMatch(/the patient’s right side/);
-  expect(sideProblem(of("upper_molar_right"), at(20))).toMatch(/the patient’s left side/);
-  expect(sideProblem(of("pronasale"), at(40))).toMatch(/40 mm off the midsagittal plane/);
-  expect(sideProblem(of("pronasale"), at(-4))).toBe("");
+  expect(sideProblem(of("upper_molar_left"), at(-20), true)).toMatch(/the patient’s right side/);
+  expect(sideProblem(of("upper_molar_right"), at(20), true)).toMatch(/the patient’s left side/);
+  expect(sideProblem(of("pronasale"), at(40), true)).toMatch(/40 mm off the midsagittal plane/);
+  expect(sideProblem(of("pronasale"), at(-4), true)).toBe("");
+  expect(sideProblem(of("pronasale"), at(40), false)).toBe("");
 });

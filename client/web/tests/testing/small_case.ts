@@ -66,7 +66,8 @@ export function container(json: string, bin: Uint8Array): Uint8Array<ArrayBuffer
   return out;
 }
 
-function layOut(chunks: ArrayBufferView[]): { views: { buffer: number; byteOffset: number; byteLength: number }[]; bin: Uint8Array } {
+/** Where each lies in a BIN chunk that holds them all. */
+export function layOut(chunks: ArrayBufferView[]): { views: { buffer: number; byteOffset: number; byteLength: number }[]; bin: Uint8Array } {
   const views: { buffer: number; byteOffset: number; byteLength: number }[] = [];
   let end = 0;
   for (const chunk of chunks) {
@@ -125,7 +126,7 @@ function caseJson(views: unknown[], binBytes: number): unknown {
   };
 }
 
-function concat(arrays: ArrayBufferView[]): Uint8Array {
+export function concat(arrays: ArrayBufferView[]): Uint8Array {
   const out = new Uint8Array(arrays.reduce((sum, array) => sum + array.byteLength, 0));
   let at = 0;
   for (const array of arrays) {

@@ -1,0 +1,221 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { readFileSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+import type { Page } from "playwright-core";
+import { handMadeCase } from "../../client/web/tests/testing/hand_made_case";
+import { ITS_MEASURES } from "../../client/web/tests/testing/hand_made_face";
+import { type Hook, Planner, live, moved, openCase, seriousFindings, state, takeSegment, typeMove } from "./planner";
+
+let planner: Planner;
+beforeAll(async () => (planner = await Planner.start()));
+afterAll(() => planner.stop());
+
+async function open(page: Page, title: string): Promise<void> {
+  await page.locator("summary").getByText(title, { exact: true }).click();
+}
+
+/** Before and after of a measure, as the table has them; null where it has none. */
+async function numbers(page: Page, name: string): Promise<[number, number] | null> {
+  const cells = await page.locator(`[data-measure=${name}] td`).evaluateAll((all) => all.map((cell) => (cell.firstChild?.textContent ?? "").replace("−", "-")));
+  return cells.length < 3 ? null : [Number(cells[0]), Number(cells[1])];
+}
+
+describe("the hand-made face", () => {
+  let opened: Awaited<ReturnType<typeof openCase>>;
+  beforeAll(async () => {
+    const path = join(planner.folder, "hand-made.tfcase");
+    writeFileSync(path, handMadeCase());
+    opened = await openCase(await planner.browse(), planner, path);
+  });
+  afterEach(() => expect(opened.faults).toEqual([]));
+
+  test("tells which landmarks are missing, and all its measures once suggestions are confirmed", async () => {
+    const { page } = opened;
+    await open(page, "Measures");
+    await page.getByText("needs Nose tip, Upper lip, Soft pogonion").waitFor();
+    await page.getByRole("button", { name: "Confirm all" }).click();
+    await expect.poll(() => numbers(page, "e_line_upper_lip")).not.toBeNull();
+    for (const [name, value] of Object.entries(ITS_MEASURES)) {
+      const [before, after] = (await numbers(page, name)) ?? expect.fail(name);
+      expect([name, before]).toEqual([name, Number(value.toFixed(1))]);
+      expect(Math.abs(after - value)).toBeLessThan(0.15);
+    }
+  });
+
+  test("changes in its teeth by just what the jaw moves", async () => {
+    const { page } = opened;
+    await typeMove(page, "Forward", "2");
+    await typeMove(page, "Left", "1");
+    await expect.poll(() => numbers(page, "overjet")).toEqual([3, 1]);
+    expect(await numbers(page, "lower_midline")).toEqual([-1.5, -0.5]);
+    expect(await numbers(page, "upper_midline")).toEqual([0.5, 0.5]);
+  });
+
+  test("takes a landmark from the hand, refuses what is no skin, and keeps landmarks over a reload", async () => {
+    const { page } = opened;
+    await open(page, "Landmarks");
+    await page.getByRole("button", { name: "Remove Nose tip" }).click();
+    await page.getByText("needs Nose tip").first().waitFor();
+    await page.getByRole("button", { name: "Front", exact: true }).click();
+    await page.getByRole("button", { name: "Place Nose tip" }).click();
+    const canvas = page.locator(".picture canvas").first();
+    await canvas.click({ position: { x: 20, y: 300 } });
+    await page.getByText("Nose tip: there is no skin there; choose a point on it.").waitFor();
+    // The middle of the picture lies upon the strip.
+    await canvas.press("Enter");
+    await page.locator(".picking").waitFor({ state: "hidden" });
+    await expect.poll(() => numbers(page, "e_line_upper_lip")).not.toBeNull();
+    await page.getByRole("button", { name: "Undo landmark" }).click();
+    await page.getByRole("button", { name: "Undo landmark" }).click();
+    await page.reload();
+    await live(page);
+    await open(page, "Measures");
+    await expect.poll(() => numbers(page, "e_line_upper_lip")).not.toBeNull();
+    expect((await numbers(page, "facial_convexity"))?.[0]).toBe(Number(ITS_MEASURES.facial_convexity.toFixed(1)));
+  });
+
+  test("opens its jaw by one slider, and keeps the plan closed", async () => {
+    const { page } = opened;
+    await open(page, "Jaw and bite");
+    const before = (await state(page)).moves;
+    await page.getByLabel("Opening of the jaw").fill("20");
+    await page.getByText(/Open by 20\.0°, 1\d\.\d mm between the incisors/).waitFor();
+    expect((await state(page)).moves).toEqual(before);
+    await page.getByRole("button", { name: "Show the bite" }).click();
+    await page.getByText("The teeth lie more than 6 mm from each other.").waitFor();
+    await page.getByRole("button", { name: "Close", exact: true }).click();
+    await page.getByText("Closed as planned").waitFor();
+    await open(page, "Jaw and bite");
+  });
+
+  test("is exported as plan, profile and report, which name nobody and load nothing", async () => {
+    const { page } = opened;
+    const save = async (button: string, file: string) => {
+      const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: button }).click()]);
+      expect(download.suggestedFilename()).toBe(file);
+      const path = join(planner.folder, file);
+      await download.saveAs(path);
+      return readFileSync(path);
+    };
+    const plan = JSON.parse((await save("Plan JSON", "tissueform-plan.json")).toString());
+    expect(plan.measures.find(({ name }: { name: string }) => name === "overjet")).toMatchObject({ unit: "mm", before: 3, after: 1 });
+    expect(plan.measurement_landmarks.placed.length).toBe(17);
+    await open(page, "Profile");
+    expect((await save("Profile SVG", "tissueform-profile.svg")).toString()).toMatch(/<svg[^]*Upper lip[^]*not a medical device/);
+    expect((await save("Profile PNG", "tissueform-profile.png")).subarray(1, 4).toString()).toBe("PNG");
+    await open(page, "Report");
+    await page.getByRole("button", { name: "Open the report" }).click();
+    await page.locator(".report").waitFor();
+    expect(await seriousFindings(page)).toEqual([]);
+    const pdf = await page.pdf();
+    expect(pdf.subarray(0, 5).toString()).toBe("%PDF-");
+    expect(pdf.toString("latin1").match(/\/Type\s*\/Page\b/g)?.length).toBe(1);
+    const html = (await save("Report HTML", "tissueform-report.html")).toString();
+    expect(html).toContain("default-src 'none'");
+    expect(html).toMatch(/not a medical device/i);
+    expect(html).not.toMatch(/Hand-made face|<script|https?:\/\/(?!www\.w3\.org)/);
+    await page.getByRole("button", { name: "Back to the plan" }).click();
+    const { page: kept, faults } = await openReport(page, html);
+    expect(await kept.locator(".report th").first().evaluate((cell) => getComputedStyle(cell).fontWeight)).toBe("600");
+    expect(faults).toEqual([]);
+  });
+});
+
+/** The file as a page of its own, with what its policy has refused. */
+async function openReport(page: Page, html: string): Promise<{ page: Page; faults: string[] }> {
+  const path = join(planner.folder, "opened-report.html");
+  writeFileSync(path, html);
+  const opened = await page.context().newPage();
+  const faults: string[] = [];
+  opened.on("console", (message) => faults.push(message.text()));
+  await opened.goto(`file://${path}`);
+  return { page: opened, faults };
+}
+
+function forwardOf(page: Page, place: string) {
+  return page.getByRole("group", { name: `Wish for ${place}` }).getByRole("textbox", { name: "forward" });
+}
+
+/** The arrow that points forward, which goes to the left as the head is seen from its left, by so many pixels. */
+async function pullForward(page: Page, pixels: number): Promise<void> {
+  const at = await page.evaluate(async () => {
+    const { view, bench } = (globalThis as unknown as Hook).tissueform;
+    await new Promise<void>((done) => view.stage.invalidate(done));
+    const box = view.stage.canvas.getBoundingClientRect();
+    const point = view.head.toWorld(bench.wishes.wishes.value[0].place.drawnMm).project(view.stage.camera);
+    return { x: box.left + ((point.x + 1) / 2) * box.width, y: box.top + ((1 - point.y) / 2) * box.height };
+  });
+  await page.mouse.move(at.x - 40, at.y);
+  await page.mouse.down();
+  await page.mouse.move(at.x - 40 - pixels, at.y, { steps: 6 });
+  await page.mouse.up();
+}
+
+describe("the bundled head", () => {
+  test("is pulled to a wished-for chin, told what cannot be reached, and takes the bone as one step", async () => {
+    const { page, faults } = await openCase(await planner.browse(), planner);
+    await open(page, "Wished-for face");
+    await page.getByLabel("or a place").selectOption({ label: "Chin" });
+    const forward = forwardOf(page, "Chin");
+    await forward.fill("5");
+    await forward.press("Enter");
+    await moved(page, 4, 9);
+    await page.getByText(/Chin: reached, within 0\.\d\d mm/).waitFor();
+    await forward.fill("60");
+    await forward.press("Enter");
+    await page.getByText(/Chin: cannot be reached; \d+\.\d mm are missing\./).waitFor();
+    await page.getByText(/Held by its limit: /).waitFor();
+    expect(await seriousFindings(page)).toEqual([]);
+    await page.getByRole("button", { name: "Reject" }).click();
+    await moved(page, 0, 0.05);
+    await page.getByRole("button", { name: "Left", exact: true }).click();
+    await page.getByLabel("or a place").selectOption({ label: "Lower lip" });
+    await pullForward(page, 24);
+    await moved(page, 2.5, 15);
+    await forwardOf(page, "Lower lip").fill("3");
+    await forwardOf(page, "Lower lip").press("Enter");
+    await page.getByText(/Lower lip: reached/).waitFor();
+    await page.getByRole("button", { name: "Accept" }).click();
+    await moved(page, 2.5, 7);
+    await page.keyboard.press("Control+z");
+    await moved(page, 0, 0.05);
+    // This case has the scanner's axes alone.
+    await open(page, "Measures");
+    await page.getByText("In the axes of the scanner").waitFor();
+    await open(page, "Profile");
+    await expect.poll(() => page.locator(".profile path").last().getAttribute("d")).toMatch(/^M[\d.]+ [\d.]+L/);
+    expect(faults).toEqual([]);
+  });
+
+  test("shows a band beside every number of the skin once the model knows one", async () => {
+    const { page, faults } = await openCase(await planner.browse(), planner, planner.packWholeHead());
+    await takeSegment(page, "Lower jaw");
+    await typeMove(page, "Forward", "8");
+    await moved(page, 6, 10);
+    await open(page, "Measures");
+    await page.getByRole("button", { name: "Confirm all" }).click();
+    expect(await page.locator(".band").count()).toBe(0);
+    await page.getByText("Linear elastic", { exact: true }).click();
+    await page.locator("[data-measure=e_line_lower_lip] .band").waitFor();
+    await expect.poll(() => page.locator("[data-measure=e_line_lower_lip] .band").innerText()).toMatch(/^−?\d+\.\d to −?\d+\.\d$/);
+    const row = page.getByRole("row", { name: "Soft pogonion" }).first();
+    expect(await row.locator(".band").innerText()).toMatch(/^\d+\.\d to \d+\.\d$/);
+    const widths = await page.evaluate(() => {
+      const { bench } = (globalThis as unknown as Hook).tissueform;
+      const skin = bench.file.surfaces.findIndex(({ entry }: any) => entry.kind === "skin");
+      return Math.max(...bench.bandOf(skin));
+    });
+    expect(widths).toBeGreaterThan(0.05);
+    await open(page, "Report");
+    await page.getByRole("button", { name: "Open the report" }).click();
+    await page.getByRole("row", { name: "Lower lip to E-line" }).getByText(/\d to /).waitFor();
+    expect(await page.locator(".report img").evaluateAll((pictures) => pictures.map((picture) => (picture as HTMLImageElement).naturalWidth))).toEqual([480, 480, 480]);
+    const pdf = (await page.pdf({ preferCSSPageSize: true })).toString("latin1");
+    expect(pdf.match(/\/Type\s*\/Page\b/g)?.length).toBe(1);
+    await page.emulateMedia({ colorScheme: "dark" });
+    expect(await seriousFindings(page)).toEqual([]);
+    expect(faults).toEqual([]);
+  });
+});
