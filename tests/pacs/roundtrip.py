@@ -131,6 +131,23 @@ def errors_of(path):
     return [line for line in (run.stdout + run.stderr).splitlines() if line.startswith("Error")]
 
 
+def terms(item):
+    """What the report names, with its numbers."""
+    for child in item.get("ContentSequence", []):
+        name = child.get("ConceptNameCodeSequence")
+        number = child.get("MeasuredValueSequence")
+        yield (name[0].CodeValue if name else "", number[0] if number else None)
+        yield from terms(child)
+
+
+def check_report(report):
+    found = list(terms(report))
+    names = {name for name, _ in found}
+    check("the report tells poses, movements of places and their band", {"MOVEMENT", "BAND"} <= names, str(sorted(names)))
+    check("its numbers are mm, degrees or counts by UCUM",
+          all(number.MeasurementUnitsCodeSequence[0].CodingSchemeDesignator == "UCUM" for _, number in found if number is not None))
+
+
 def check_models(objects, original, written):
     models = [item for _, _, item in objects.values() if item.SOPClassUID == STL]
     check("there are models of skin and bone", len(models) >= 3, str(len(models)))
@@ -173,6 +190,9 @@ def check_objects(programs, study, ct_folder, written):
         check(f"patient and study of the {tags['Modality']} are the CT's", all(item.get(name) == original.get(name) for name in copied))
         if "NumberOfFrames" in item and item.Modality != "CT":
             check_capture(programs, path, int(item.NumberOfFrames))
+    for _, _, item in objects.values():
+        if item.Modality == "SR":
+            check_report(item)
     kinds = {tags["Modality"] for _, tags, _ in objects.values()}
     check("there are models, a capture and a report", {"M3D", "SR"} <= kinds and len(kinds) >= 3, str(kinds))
     check_models(objects, original, written)

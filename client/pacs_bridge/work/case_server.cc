@@ -10,6 +10,7 @@
 
 #include "client/cpp/server_channel.h"
 #include "client/cpp/tissueform_client.h"
+#include "client/pacs_bridge/work/material_band.h"
 #include "core/base/mutex.h"
 #include "core/base/status_macros.h"
 #include "core/case_file/case_reader.h"
@@ -93,6 +94,12 @@ class ConnectedCaseServer final : public CaseServer {
     TF_ASSIGN_OR_RETURN(prediction.description, client->predictions().Get(name));
     TF_ASSIGN_OR_RETURN(prediction.positions, client->predictions().ReadPositions(name));
     return prediction;
+  }
+
+  absl::StatusOr<std::vector<double>> ReadBand(const CaseFile& contents,
+                                               const v1::Prediction& prediction) override {
+    TF_ASSIGN_OR_RETURN(TissueformClient* const client, Client());
+    return AskMaterialBand(client, contents, prediction);
   }
 
   absl::StatusOr<v1::Export> GetExport(const std::string& name) override {

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -13,6 +14,7 @@
 #include "client/cpp/connection_options.h"
 #include "core/base/cancellation.h"
 #include "core/base/types.h"
+#include "core/case_file/case_file.h"
 #include "tissueform/v1/export_service.pb.h"
 #include "tissueform/v1/prediction_service.pb.h"
 
@@ -37,6 +39,9 @@ class CaseServer {
                                               const std::string& title) = 0;
   virtual absl::StatusOr<std::string> ReadCase(const std::string& name) = 0;
   virtual absl::StatusOr<ServedPrediction> ReadPrediction(const std::string& name) = 0;
+  // AskMaterialBand.
+  virtual absl::StatusOr<std::vector<double>> ReadBand(const CaseFile& contents,
+                                                       const v1::Prediction& prediction) = 0;
 
   virtual absl::StatusOr<v1::Export> GetExport(const std::string& name) = 0;
   virtual absl::Status UpdateExport(const std::string& name, v1::ExportState state,

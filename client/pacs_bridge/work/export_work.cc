@@ -4,8 +4,11 @@
 #include "client/pacs_bridge/work/export_work.h"
 
 #include <algorithm>
+#include <cstring>
 #include <ctime>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <system_error>
 
 #include "absl/strings/match.h"
@@ -192,7 +195,30 @@ absl::Status ExportWork::Draw(const QueuedExport& queued) {
   const std::string pictures = queue_->object_folder(queued.key) + "/pictures";
   if (fs::exists(pictures, failed)) return absl::OkStatus();
   TF_ASSIGN_OR_RETURN(const ExportMaterial material, Gather(queued));
-  return writer_->Draw(material, pictures);
+  TF_RETURN_IF_ERROR(writer_->Draw(material, pictures));
+  return BandOf(queued, material).status();
+}
+
+absl::StatusOr<std::vector<double>> ExportWork::BandOf(const QueuedExport& queued,
+                                                       const ExportMaterial& material) {
+  const std::string path = queue_->object_folder(queued.key) + "/band.f64";
+  const size_t vertices = static_cast<size_t>(material.prediction.positions.rows());
+  std::ifstream file(path, std::ios::binary);
+  if (file) {
+    const std::string kept{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    std::vector<double> band(kept.size() / sizeof(double));
+    if (!band.empty()) std::memcpy(band.data(), kept.data(), band.size() * sizeof(double));
+    if (band.empty() || band.size() == vertices) return band;
+  }
+  absl::StatusOr<std::vector<double>> band =
+      server_->ReadBand(material.case_file, material.prediction.description);
+  if (!band.ok() && MayCome(band.status())) return band.status();
+  // The report then has no band, as where none is known.
+  if (!band.ok() || band->size() != vertices) band = std::vector<double>();
+  TF_RETURN_IF_ERROR(
+      WriteDurably(path, {absl::string_view(reinterpret_cast<const char*>(band->data()),
+                                            band->size() * sizeof(double))}));
+  return band;
 }
 
 absl::Status ExportWork::Write(QueuedExport* queued) {
@@ -201,6 +227,7 @@ absl::Status ExportWork::Write(QueuedExport* queued) {
   if (!fs::exists(material.pictures, failed)) {
     TF_RETURN_IF_ERROR(writer_->Draw(material, material.pictures));
   }
+  TF_ASSIGN_OR_RETURN(material.band_mm, BandOf(*queued, material));
   TF_ASSIGN_OR_RETURN(const std::vector<std::string> keys, writer_->KeysOf(material));
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedObject> objects,
                       rows_.EnsureObjects(queued->name, keys, NewDicomUid));

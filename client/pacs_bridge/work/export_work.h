@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 
@@ -63,6 +64,9 @@ class ExportWork {
   absl::Status RunStep(QueuedExport* queued);
   absl::Status Fetch(QueuedExport* queued);
   absl::StatusOr<ExportMaterial> Gather(const QueuedExport& queued);
+  // Kept beside the pictures: a restart writes the same. Empty, too, where the server has no room.
+  absl::StatusOr<std::vector<double>> BandOf(const QueuedExport& queued,
+                                             const ExportMaterial& material);
   absl::Status Write(QueuedExport* queued);
   absl::Status Send(QueuedExport* queued);
   absl::Status SendMissing(const QueuedExport& queued, std::vector<QueuedObject>* objects);

@@ -24,6 +24,7 @@ struct ExportMaterial {
   std::string case_path = {};
   CaseFile case_file = {};
   ServedPrediction prediction = {};
+  std::vector<double> band_mm = {};              // PredictionObjectsInput::band_mm
   v1::Export asked = {};                         // with its measures
   std::map<std::string, std::string> uids = {};  // by key: of objects and of their series
   std::string pictures = {};                     // folder of what Draw has drawn

@@ -45,6 +45,7 @@ PredictionObjectsInput InputOf(const ExportMaterial& material) {
   input.contents = material.case_file;
   input.prediction = material.prediction.description;
   input.deformed = material.prediction.positions;
+  input.band_mm = material.band_mm;
   input.measures.assign(material.asked.measures().begin(), material.asked.measures().end());
   input.uids = material.uids;
   // Of the wish, not of this moment: the same again writes the same bytes.

@@ -53,6 +53,9 @@ class FolderCaseServer final : public CaseServer {
     prediction.description.set_name(name);
     return prediction;
   }
+  absl::StatusOr<std::vector<double>> ReadBand(const CaseFile&, const v1::Prediction&) override {
+    return std::vector<double>();
+  }
   absl::StatusOr<v1::Export> GetExport(const std::string& name) override {
     v1::Export found;
     found.set_name(name);

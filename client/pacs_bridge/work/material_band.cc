@@ -1,0 +1,61 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/work/material_band.h"
+
+#include <memory>
+#include <optional>
+
+#include "absl/cleanup/cleanup.h"
+
+#include "client/cpp/prepared_evaluator.h"
+#include "core/base/status_macros.h"
+#include "proto/conversion/geometry_conversion.h"
+#include "tissueform/v1/session_service.pb.h"
+
+namespace tissueform {
+namespace {
+
+bool TellsOfMaterial(v1::DeformationModel model) {
+  return model == v1::DEFORMATION_MODEL_LINEAR_ELASTIC ||
+         model == v1::DEFORMATION_MODEL_NEO_HOOKEAN;
+}
+
+bool IsOfTheCase(const v1::Prediction& prediction, const v1::CreateSessionRequest& request) {
+  return prediction.mesh() == request.mesh() &&
+         prediction.stiffness().SerializeAsString() == request.stiffness().SerializeAsString();
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<double>> AskMaterialBand(TissueformClient* client,
+                                                    const CaseFile& contents,
+                                                    const v1::Prediction& prediction) {
+  if (!contents.material_ranges || !TellsOfMaterial(prediction.model())) {
+    return std::vector<double>();
+  }
+  v1::PrepareSessionRequest request;
+  v1::PreparedAnswers prepared;
+  if (!request.mutable_create()->ParseFromString(contents.session_request) ||
+      !prepared.mutable_ranges()->ParseFromString(*contents.material_ranges)) {
+    return absl::DataLossError("the case's session request or ranges of the material are damaged");
+  }
+  if (!IsOfTheCase(prediction, request.create())) return std::vector<double>();
+  // Linear elasticity tells the band of either model, and its columns are the cheaper ones.
+  request.mutable_create()->set_model(v1::DEFORMATION_MODEL_LINEAR_ELASTIC);
+  TF_ASSIGN_OR_RETURN(const v1::Session session, client->PrepareSession(request, {}));
+  const auto end = absl::MakeCleanup(
+      [client, &session] { client->DeleteSession(session.name()).IgnoreError(); });
+  DeformStream::Options options;
+  options.prepared = prepared;
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<PreparedEvaluator> evaluator,
+                      client->FetchPreparedAnswers(session, options));
+  std::vector<NamedPose> poses;
+  poses.reserve(static_cast<size_t>(prediction.poses_size()));
+  for (const v1::HandlePose& pose : prediction.poses()) poses.push_back(ToNamedPose(pose));
+  TF_ASSIGN_OR_RETURN(const std::optional<EvaluatedAnswer> answer, evaluator->Evaluate(poses));
+  if (!answer) return std::vector<double>();
+  return std::vector<double>(answer->band_mm.begin(), answer->band_mm.end());
+}
+
+}  // namespace tissueform
