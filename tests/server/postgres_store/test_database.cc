@@ -1,0 +1,76 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "tests/server/postgres_store/test_database.h"
+
+#include <cstdlib>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+#include "tests/server/store/stores_case.h"
+
+namespace tissueform::testing {
+namespace {
+
+std::string Environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+PostgresConnection& AdministratorsConnection() {
+  static const auto* const connection = new std::unique_ptr<PostgresConnection>(
+      *PostgresConnection::Open(*TargetOf(TestDatabaseOptions())));
+  return **connection;
+}
+
+}  // namespace
+
+bool HasTestDatabase() { return !Environment("PGPORT").empty(); }
+
+PostgresOptions TestDatabaseOptions(const std::string& name) {
+  return {.url = absl::StrCat("postgresql://", Environment("PGUSER"), "@", Environment("PGHOST"),
+                              ":", Environment("PGPORT"), "/", name),
+          .password = Environment("PGPASSWORD")};
+}
+
+PostgresRows RunSql(const std::string& sql) {
+  PostgresRows rows;
+  PostgresOutcome outcome = PostgresOutcome::kFailed;
+  const absl::Status status = AdministratorsConnection().Transact(
+      [&](PostgresTransaction& transaction) -> absl::Status {
+        if (sql.find(';') != std::string::npos) return transaction.Execute(sql);
+        absl::StatusOr<PostgresRows> found = transaction.Query(sql.c_str(), {});
+        if (found.ok()) rows = *std::move(found);
+        return found.status();
+      },
+      &outcome);
+  if (!status.ok()) {
+    absl::FPrintF(stderr, "%s: %s\n", sql, status.ToString());
+    std::abort();
+  }
+  return rows;
+}
+
+void EmptyTestDatabase() { RunSql("DROP SCHEMA public CASCADE; CREATE SCHEMA public;"); }
+
+std::unique_ptr<PostgresStores> OpenTestStores(UnixClock clock, const PostgresOptions& options) {
+  return *PostgresStores::Open({.database = options, .clock = std::move(clock)});
+}
+
+}  // namespace tissueform::testing
+
+namespace tissueform {
+
+// What the contract's tests of tests/server/store are run with here.
+std::vector<StoresCase> AllStores() {
+  if (!testing::HasTestDatabase()) return {};
+  return {{"Postgres", [](UnixClock clock) {
+             testing::EmptyTestDatabase();
+             return testing::OpenTestStores(std::move(clock));
+           }}};
+}
+
+}  // namespace tissueform
