@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "core/base/status_macros.h"
 #include "tests/server/store/stores_case.h"
 
 namespace tissueform::testing {
@@ -42,9 +43,8 @@ PostgresRows RunSql(const std::string& sql) {
   const absl::Status status = AdministratorsConnection().Transact(
       [&](PostgresTransaction& transaction) -> absl::Status {
         if (sql.find(';') != std::string::npos) return transaction.Execute(sql);
-        absl::StatusOr<PostgresRows> found = transaction.Query(sql.c_str(), {});
-        if (found.ok()) rows = *std::move(found);
-        return found.status();
+        TF_ASSIGN_OR_RETURN(rows, transaction.Query(sql.c_str(), {}));
+        return absl::OkStatus();
       },
       &outcome);
   if (!status.ok()) {
