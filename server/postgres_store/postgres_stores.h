@@ -9,9 +9,10 @@
 #include "absl/status/statusor.h"
 
 #include "server/access_store/access_store.h"
-#include "server/postgres_store/postgres_blob_stores.h"
 #include "server/postgres_store/postgres_case_store.h"
+#include "server/postgres_store/postgres_mesh_store.h"
 #include "server/postgres_store/postgres_pool.h"
+#include "server/postgres_store/postgres_prediction_store.h"
 #include "server/postgres_store/postgres_session_store.h"
 #include "server/store/stores.h"
 

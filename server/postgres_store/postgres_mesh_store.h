@@ -9,12 +9,10 @@
 
 #include "server/postgres_store/postgres_pool.h"
 #include "server/store/mesh_store.h"
-#include "server/store/prediction_store.h"
 
 namespace tissueform {
 
-// Meshes and predictions in a PostgreSQL database. `pool` must outlive them.
-
+// Meshes in a PostgreSQL database. `pool` must outlive it.
 class PostgresMeshStore final : public MeshStore {
  public:
   explicit PostgresMeshStore(PostgresPool* pool) : pool_(pool) {}
@@ -26,20 +24,6 @@ class PostgresMeshStore final : public MeshStore {
   absl::Status Delete(const std::string& sha256) override;
   absl::Status Touch(const std::vector<std::string>& sha256s, int64_t now_s) override;
   absl::StatusOr<std::vector<MeshRecord>> ListUnused(int64_t before_s, int limit) override;
-
- private:
-  PostgresPool* const pool_;
-};
-
-class PostgresPredictionStore final : public PredictionStore {
- public:
-  explicit PostgresPredictionStore(PostgresPool* pool) : pool_(pool) {}
-
-  absl::Status Create(const PredictionRecord& record, const std::string& positions) override;
-  absl::StatusOr<PredictionRecord> Get(const std::string& id) override;
-  absl::StatusOr<std::string> Positions(const std::string& id) override;
-  absl::StatusOr<Page> List(const ListRequest& request) override;
-  absl::Status Delete(const std::string& id) override;
 
  private:
   PostgresPool* const pool_;
