@@ -34,7 +34,8 @@ StoreChange ParseStoreChange(const std::string& notice) {
       {"mesh_deleted", StoreChange::Kind::kMeshDeleted},
       {"case_deleted", StoreChange::Kind::kCaseDeleted},
       {"prediction_deleted", StoreChange::Kind::kPredictionDeleted},
-      {"access_changed", StoreChange::Kind::kAccessChanged}};
+      {"access_changed", StoreChange::Kind::kAccessChanged},
+      {"exports_changed", StoreChange::Kind::kExportsChanged}};
   const size_t space = notice.find(' ');
   if (space == std::string::npos) return {};
   const auto found = kinds->find(notice.substr(0, space));

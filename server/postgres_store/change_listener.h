@@ -26,7 +26,8 @@ struct StoreChange {
     kCaseDeleted,
     kPredictionDeleted,
     kAccessChanged,  // shares, links or rights: no name; load them again
-    kMissed,         // the connection was lost: anything may have changed
+    kExportsChanged,
+    kMissed,  // the connection was lost: anything may have changed
   };
 
   Kind kind = Kind::kMissed;

@@ -41,7 +41,7 @@ absl::StatusOr<LeaseAnswer> LeaseKeeper::Acquire(const std::string& session) {
     }
     if (answer->mine) held_[session] = answer->lease;
   }
-  TellLost(std::move(lost));
+  TellLost(lost);
   return answer;
 }
 
@@ -94,7 +94,7 @@ absl::Status LeaseKeeper::Renew() {
       lost = TakeOutEnded();
     }
   }
-  TellLost(std::move(lost));
+  TellLost(lost);
   return status;
 }
 
@@ -125,7 +125,7 @@ std::map<std::string, SessionLease> LeaseKeeper::TakeOutEnded() {
   return lost;
 }
 
-void LeaseKeeper::TellLost(std::map<std::string, SessionLease> lost) {
+void LeaseKeeper::TellLost(const std::map<std::string, SessionLease>& lost) {
   for (const auto& [session, lease] : lost) lost_(lease);
 }
 

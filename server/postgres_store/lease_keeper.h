@@ -63,7 +63,7 @@ class LeaseKeeper {
   std::map<std::string, SessionLease> TakeOver(const std::vector<SessionLease>& renewed,
                                                std::vector<SessionLease>* strays);
   std::map<std::string, SessionLease> TakeOutEnded();
-  void TellLost(std::map<std::string, SessionLease> lost);
+  void TellLost(const std::map<std::string, SessionLease>& lost);
 
   SessionLeases* const leases_;
   const Options options_;

@@ -14,17 +14,13 @@
 
 #include "core/base/status_macros.h"
 #include "server/postgres_store/postgres_blobs.h"
+#include "server/postgres_store/postgres_case_rows.h"
 #include "server/postgres_store/postgres_pages.h"
 #include "server/store/durable_file.h"
 #include "server/store/store_errors.h"
-#include "server/store/store_records.h"
-#include "server/store/store_rows.h"
 
 namespace tissueform {
 namespace {
-
-// Whoever adds a case counts those that are there: one after the other.
-constexpr char kCountAlone[] = "SELECT pg_advisory_xact_lock(6073473466130133613)";
 
 absl::StatusOr<OpenFile> OpenNamelessFile() {
   static std::atomic<unsigned> counter = 0;
@@ -36,64 +32,6 @@ absl::StatusOr<OpenFile> OpenNamelessFile() {
   TF_ASSIGN_OR_RETURN(OpenFile file, OpenFile::Open(path, O_RDWR | O_CREAT | O_EXCL));
   unlink(path.c_str());
   return file;
-}
-
-absl::StatusOr<CaseRecord> ReadCase(const PostgresRows& rows, size_t row) {
-  return CaseOf({.sha256 = rows.Text(row, 0),
-                 .owner = rows.Text(row, 1),
-                 .record = rows.Text(row, 2),
-                 .last_used_s = rows.Integer(row, 3)});
-}
-
-absl::StatusOr<CaseRecord> FindCaseRow(PostgresTransaction& transaction, const CaseKey& key) {
-  TF_ASSIGN_OR_RETURN(
-      const PostgresRows rows,
-      transaction.Query("SELECT sha256, owner, record, last_used_s FROM cases WHERE sha256 = $1 "
-                        "AND owner = $2",
-                        {key.sha256, key.owner}));
-  if (rows.empty()) return NoCase(key.sha256);
-  return ReadCase(rows, 0);
-}
-
-absl::Status TouchCaseRow(PostgresTransaction& transaction, const CaseKey& key, int64_t now_s) {
-  return transaction.Run(
-      "UPDATE cases SET last_used_s = $1 WHERE last_used_s < $1 AND sha256 = $2 AND owner = $3",
-      {now_s, key.sha256, key.owner});
-}
-
-absl::Status CheckCaseRoom(PostgresTransaction& transaction, int most) {
-  TF_ASSIGN_OR_RETURN(const PostgresRows rows, transaction.Query("SELECT count(*) FROM cases", {}));
-  return rows.Integer(0, 0) < most ? absl::OkStatus() : TooManyCases(most);
-}
-
-// The row as it is then: of one that was there only last_used_s rises.
-absl::StatusOr<CaseRecord> KeepCase(PostgresTransaction& transaction, const CaseRecord& record,
-                                    int most) {
-  TF_RETURN_IF_ERROR(transaction.Execute(kCountAlone));
-  const absl::StatusOr<CaseRecord> found = FindCaseRow(transaction, record.key());
-  if (found.ok()) {
-    TF_RETURN_IF_ERROR(TouchCaseRow(transaction, record.key(), record.last_used_s));
-    return FindCaseRow(transaction, record.key());
-  }
-  if (!absl::IsNotFound(found.status()) && !absl::IsDataLoss(found.status())) return found;
-  TF_RETURN_IF_ERROR(CheckCaseRoom(transaction, most));
-  const std::string bytes = Seal(SerializeCaseRecord(record));
-  // In place of a row that cannot be read.
-  TF_RETURN_IF_ERROR(transaction.Run(
-      "INSERT INTO cases (sha256, owner, record, last_used_s) VALUES ($1, $2, $3, $4) ON CONFLICT "
-      "(sha256, owner) DO UPDATE SET record = excluded.record, last_used_s = excluded.last_used_s",
-      {record.sha256, record.owner, bytes, record.last_used_s}));
-  return record;
-}
-
-absl::Status DeleteCase(PostgresTransaction& transaction, const CaseKey& key) {
-  TF_RETURN_IF_ERROR(LockBlob(transaction, key.sha256));
-  TF_ASSIGN_OR_RETURN(
-      const PostgresRows rows,
-      transaction.Query("DELETE FROM cases WHERE sha256 = $1 AND owner = $2 RETURNING key",
-                        {key.sha256, key.owner}));
-  if (rows.empty()) return NoCase(key.sha256);
-  return RemoveUnclaimedBlob(transaction, key.sha256);
 }
 
 // As SQL puts a key into words.
@@ -121,7 +59,7 @@ class PostgresCaseWriter final : public CaseWriter {
           TF_RETURN_IF_ERROR(
               PutBlob(transaction, record().sha256, bytes_,
                       [this](int64_t offset, int64_t size) { return file_.ReadAt(offset, size); }));
-          return KeepCase(transaction, record(), most_);
+          return KeepCaseRow(transaction, record(), most_);
         });
   }
 
@@ -205,12 +143,13 @@ absl::StatusOr<CaseStore::Page> PostgresCaseStore::List(const ListRequest& reque
             "ANY (string_to_array($4, chr(31)))) ORDER BY sha256, owner LIMIT $5",
             {request.after, int64_t{!request.owner.has_value()}, request.owner.value_or(""), also,
              RowsOfPage(request.limit)}));
-    return ReadPostgresPage<Page>(rows, request.limit, 0, ReadCase);
+    return ReadPostgresPage<Page>(rows, request.limit, 0, ReadCaseColumns);
   });
 }
 
 absl::Status PostgresCaseStore::Delete(const CaseKey& key) {
-  return pool_->Run([&](PostgresTransaction& transaction) { return DeleteCase(transaction, key); });
+  return pool_->Run(
+      [&](PostgresTransaction& transaction) { return DeleteCaseRow(transaction, key); });
 }
 
 absl::Status PostgresCaseStore::Touch(const CaseKey& key, int64_t now_s) {
@@ -238,7 +177,7 @@ absl::StatusOr<std::vector<CaseKey>> PostgresCaseStore::RemoveUnused(
           transaction.Query("SELECT 1 FROM cases WHERE sha256 = $1 AND owner = $2 AND "
                             "last_used_s < $3 FOR UPDATE",
                             {key.sha256, key.owner, before_s}));
-      return still.empty() ? NoCase(key.sha256) : DeleteCase(transaction, key);
+      return still.empty() ? NoCase(key.sha256) : DeleteCaseRow(transaction, key);
     });
     if (absl::IsNotFound(status)) continue;
     TF_RETURN_IF_ERROR(status);

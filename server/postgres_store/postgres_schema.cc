@@ -17,8 +17,6 @@ namespace {
 constexpr char kTakeTurns[] = "SELECT pg_advisory_xact_lock(6073473466130133612)";
 
 // The first version that a PostgreSQL database has had.
-constexpr int64_t kFirstVersion = 4;
-
 constexpr char kTablesOfVersion4[] = R"sql(
 CREATE TABLE tissueform_version (version bigint NOT NULL);
 CREATE FUNCTION tissueform_now() RETURNS timestamptz VOLATILE LANGUAGE sql
@@ -89,6 +87,13 @@ CREATE TRIGGER tell_changed AFTER INSERT OR UPDATE OR DELETE ON mesh_rights FOR 
 INSERT INTO tissueform_version VALUES (4);
 )sql";
 
+constexpr char kVersion5[] = R"sql(
+CREATE TABLE exports (key bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
+  name text COLLATE "C" NOT NULL UNIQUE, record bytea NOT NULL);
+CREATE TRIGGER tell_changed AFTER INSERT OR UPDATE OR DELETE ON exports FOR EACH STATEMENT
+  EXECUTE FUNCTION tissueform_tell('exports_changed');
+)sql";
+
 absl::Status ChangeSchema(const std::string& name, PostgresTransaction& transaction) {
   TF_RETURN_IF_ERROR(transaction.Execute(kTakeTurns));
   TF_ASSIGN_OR_RETURN(const int64_t version, PostgresSchemaVersion(transaction));
@@ -98,7 +103,8 @@ absl::Status ChangeSchema(const std::string& name, PostgresTransaction& transact
         ", this one knows ", kSchemaVersion, "); start that one, or name another --store"));
   }
   if (version == kSchemaVersion) return absl::OkStatus();
-  if (version < kFirstVersion) TF_RETURN_IF_ERROR(transaction.Execute(kTablesOfVersion4));
+  if (version < 4) TF_RETURN_IF_ERROR(transaction.Execute(kTablesOfVersion4));
+  if (version < 5) TF_RETURN_IF_ERROR(transaction.Execute(kVersion5));
   return transaction.Run("UPDATE tissueform_version SET version = $1", {kSchemaVersion});
 }
 

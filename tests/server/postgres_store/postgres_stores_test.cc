@@ -17,6 +17,7 @@
 
 #include "server/postgres_store/postgres_access_store.h"
 #include "server/postgres_store/postgres_blobs.h"
+#include "server/postgres_store/postgres_export_store.h"
 #include "server/postgres_store/postgres_schema.h"
 #include "server/store/store_schema.h"
 #include "tests/server/postgres_store/test_database.h"
@@ -190,6 +191,18 @@ TEST_F(PostgresStoresTest, TablesOfANewerServerAreLeftAlone) {
                        AllOf(HasSubstr("newer server (version 99"), HasSubstr("--store"))));
 }
 
+TEST_F(PostgresStoresTest, TablesOfTheVersionBeforeAreBroughtUpToDateWithWhatTheyHold) {
+  ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1)), IsOk());
+  const std::string mesh = PutMesh(1);
+  stores_.reset();
+  RunSql("DROP TABLE exports; UPDATE tissueform_version SET version = 4;");
+  stores_ = OpenTestStores();
+  EXPECT_EQ(RunSql("SELECT version FROM tissueform_version").Integer(0, 0), kSchemaVersion);
+  EXPECT_EQ(Count("exports"), 0);
+  EXPECT_THAT(GetSession(stores_->sessions(), "s"), IsOk());
+  EXPECT_THAT(stores_->meshes().Read(mesh), IsOk());
+}
+
 TEST_F(PostgresStoresTest, AWrongPasswordIsToldAtTheStartWithoutIt) {
   PostgresOptions options = TestDatabaseOptions();
   options.password = "hush-hush";
@@ -227,6 +240,29 @@ TEST_F(PostgresStoresTest, CallsGoOnWhenTheDatabaseHasEndedTheirConnections) {
         "'tissueform-server' AND pid <> pg_backend_pid()");
     EXPECT_THAT(CommitPoses(stores_->sessions(), "s", SamplePoses(round)), IsOk());
   }
+}
+
+TEST_F(PostgresStoresTest, ACallWaitsForADatabaseThatComesBackAndNotForever) {
+  // A database of its own, whose door the administrator shuts.
+  RunOutsideTransaction("DROP DATABASE IF EXISTS away WITH (FORCE)");
+  RunOutsideTransaction("CREATE DATABASE away");
+  PostgresOptions options = TestDatabaseOptions("away");
+  options.patience = std::chrono::milliseconds(150);
+  const auto hasty = OpenTestStores(SystemUnixSeconds, options);
+  options.patience = std::chrono::seconds(30);
+  const auto patient = OpenTestStores(SystemUnixSeconds, options);
+  ASSERT_THAT(CreateSession(hasty->sessions(), SampleSession("s", 1)), IsOk());
+  RunOutsideTransaction("ALTER DATABASE away ALLOW_CONNECTIONS false");
+  RunSql("SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE datname = 'away'");
+  std::promise<absl::Status> answer;
+  patient->sessions().CommitPoses("s", SamplePoses(5), 1,
+                                  [&](const absl::Status& status) { answer.set_value(status); });
+  EXPECT_THAT(CommitPoses(hasty->sessions(), "s", SamplePoses(4)),
+              StatusIs(Code::kUnavailable, HasSubstr("away")));
+  RunOutsideTransaction("ALTER DATABASE away ALLOW_CONNECTIONS true");
+  EXPECT_THAT(answer.get_future().get(), IsOk());
+  ASSERT_OK_AND_ASSIGN(const SessionRecord found, GetSession(patient->sessions(), "s"));
+  EXPECT_EQ(SerializePoses(found.last_poses), SerializePoses(SamplePoses(5)));
 }
 
 TEST_F(PostgresStoresTest, WhoFindsAllConnectionsInUseIsToldSoWhenItsTimeIsOver) {
@@ -306,6 +342,25 @@ TEST_F(PostgresStoresTest, AccessRowsAreKeptAsTheyWerePutLastAndDamagedOnesGiveN
   ASSERT_OK_AND_ASSIGN(rows, store.Load());
   EXPECT_THAT(rows.shares, IsEmpty());
   EXPECT_THAT(rows.mesh_rights, ElementsAre(right));
+}
+
+TEST_F(PostgresStoresTest, ExportsAreKeptAsTheyWerePutLastAndDamagedOnesPassedOver) {
+  PostgresExportStore store(stores_->pool());
+  const ExportRecord a = {.id = "a", .prediction = "p", .owner = "ann", .detail = "1"};
+  ExportRecord b = {.id = "b", .prediction = "q", .owner = "bob", .measures = "m"};
+  ASSERT_THAT(store.Put(b), IsOk());
+  ASSERT_THAT(store.Put(a), IsOk());
+  b.state = ExportState::kStored;
+  b.version = 2;
+  ASSERT_THAT(store.Put(b), IsOk());
+  ASSERT_OK_AND_ASSIGN(std::vector<ExportRecord> records, store.Load());
+  EXPECT_THAT(records, ElementsAre(a, b));
+  ASSERT_THAT(store.Erase({"a", "nothing"}), IsOk());
+  ASSERT_OK_AND_ASSIGN(records, store.Load());
+  EXPECT_THAT(records, ElementsAre(b));
+  RunSql("UPDATE exports SET record = set_byte(record, 40, 255 - get_byte(record, 40));");
+  ASSERT_OK_AND_ASSIGN(records, store.Load());
+  EXPECT_THAT(records, IsEmpty());
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include "tests/server/postgres_store/test_database.h"
 
 #include <cstdlib>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -27,6 +28,15 @@ PostgresConnection& AdministratorsConnection() {
   return **connection;
 }
 
+void RunOrEnd(const std::string& sql,
+              const std::function<absl::Status(PostgresTransaction&)>& work) {
+  PostgresOutcome outcome = PostgresOutcome::kFailed;
+  const absl::Status status = AdministratorsConnection().Transact(work, &outcome);
+  if (status.ok()) return;
+  absl::FPrintF(stderr, "%s: %s\n", sql, status.ToString());
+  std::abort();
+}
+
 }  // namespace
 
 bool HasTestDatabase() { return !Environment("PGPORT").empty(); }
@@ -39,19 +49,19 @@ PostgresOptions TestDatabaseOptions(const std::string& name) {
 
 PostgresRows RunSql(const std::string& sql) {
   PostgresRows rows;
-  PostgresOutcome outcome = PostgresOutcome::kFailed;
-  const absl::Status status = AdministratorsConnection().Transact(
-      [&](PostgresTransaction& transaction) -> absl::Status {
-        if (sql.find(';') != std::string::npos) return transaction.Execute(sql);
-        TF_ASSIGN_OR_RETURN(rows, transaction.Query(sql.c_str(), {}));
-        return absl::OkStatus();
-      },
-      &outcome);
-  if (!status.ok()) {
-    absl::FPrintF(stderr, "%s: %s\n", sql, status.ToString());
-    std::abort();
-  }
+  RunOrEnd(sql, [&](PostgresTransaction& transaction) -> absl::Status {
+    if (sql.find(';') != std::string::npos) return transaction.Execute(sql);
+    TF_ASSIGN_OR_RETURN(rows, transaction.Query(sql.c_str(), {}));
+    return absl::OkStatus();
+  });
   return rows;
+}
+
+void RunOutsideTransaction(const std::string& sql) {
+  RunOrEnd(sql, [&](PostgresTransaction& transaction) -> absl::Status {
+    TF_RETURN_IF_ERROR(transaction.Execute("COMMIT"));
+    return transaction.Execute(sql);
+  });
 }
 
 void EmptyTestDatabase() { RunSql("DROP SCHEMA public CASCADE; CREATE SCHEMA public;"); }

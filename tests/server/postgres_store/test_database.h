@@ -33,6 +33,9 @@ void EmptyTestDatabase();
 // One or more statements in a transaction of their own; a test that cannot do so ends.
 PostgresRows RunSql(const std::string& sql);
 
+// One statement that may not be in a transaction: CREATE DATABASE.
+void RunOutsideTransaction(const std::string& sql);
+
 std::unique_ptr<PostgresStores> OpenTestStores(
     UnixClock clock = SystemUnixSeconds, const PostgresOptions& options = TestDatabaseOptions());
 
