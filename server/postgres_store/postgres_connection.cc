@@ -3,11 +3,16 @@
 
 #include "server/postgres_store/postgres_connection.h"
 
+#include <atomic>
+#include <fcntl.h>
+#include <optional>
+#include <unistd.h>
 #include <utility>
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include <pqxx/pqxx>
+#include <sys/socket.h>
 
 #include "server/postgres_store/postgres_errors.h"
 
@@ -45,15 +50,33 @@ PostgresRows ToRows(const pqxx::result& result) {
   return PostgresRows(std::move(rows));
 }
 
+using Ticks = std::chrono::steady_clock::rep;
+
+// While it lives somebody waits for the database.
+class WaitForAnswer {
+ public:
+  explicit WaitForAnswer(std::atomic<Ticks>* since) : since_(since) {
+    *since_ = std::chrono::steady_clock::now().time_since_epoch().count();
+  }
+  ~WaitForAnswer() { *since_ = 0; }
+  WaitForAnswer(const WaitForAnswer&) = delete;
+  WaitForAnswer& operator=(const WaitForAnswer&) = delete;
+
+ private:
+  std::atomic<Ticks>* const since_;
+};
+
 class LibraryTransaction final : public PostgresTransaction {
  public:
-  LibraryTransaction(const std::string& name, pqxx::work* work) : name_(name), work_(work) {}
+  LibraryTransaction(const std::string& name, pqxx::work* work, std::atomic<Ticks>* waits_since)
+      : name_(name), work_(work), waits_since_(waits_since) {}
 
   absl::StatusOr<PostgresRows> Query(const char* sql,
                                      std::initializer_list<PostgresValue> values) override {
     std::vector<pqxx::binarystring> parameters;
     parameters.reserve(values.size());
     for (const PostgresValue& value : values) parameters.push_back(ToBinary(value));
+    const WaitForAnswer wait(waits_since_);
     try {
       return ToRows(work_->exec_params(sql, pqxx::prepare::make_dynamic_params(parameters)));
     } catch (...) {
@@ -62,6 +85,7 @@ class LibraryTransaction final : public PostgresTransaction {
   }
 
   absl::Status Execute(const std::string& sql) override {
+    const WaitForAnswer wait(waits_since_);
     try {
       work_->exec(sql);
       return absl::OkStatus();
@@ -81,6 +105,7 @@ class LibraryTransaction final : public PostgresTransaction {
 
   const std::string& name_;
   pqxx::work* const work_;
+  std::atomic<Ticks>* const waits_since_;
   PostgresFailure failure_;
 };
 
@@ -107,11 +132,26 @@ class QuietHandler final : public pqxx::errorhandler {
 
 struct PostgresConnection::Library {
   explicit Library(const PostgresTarget& target)
-      : name(target.name), connection(target.connection), quiet(connection) {}
+      : name(target.name), connection(target.connection), quiet(connection) {
+    // One that is lost is replaced as a whole, by the pool.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wdeprecated-declarations"
+    connection.inhibit_reactivation(true);
+#pragma GCC diagnostic pop
+    socket = fcntl(connection.sock(), F_DUPFD_CLOEXEC, 0);
+  }
+  ~Library() {
+    if (socket >= 0) close(socket);
+  }
+  Library(const Library&) = delete;
+  Library& operator=(const Library&) = delete;
 
   const std::string name;
   pqxx::connection connection;
   QuietHandler quiet;
+  // A descriptor of ours of its socket, so that its number is never another file's.
+  int socket = -1;
+  std::atomic<Ticks> waits_since = 0;  // 0: nobody does
   std::vector<std::string> notices;
   std::unique_ptr<NoticeReceiver> receiver;  // before the connection's end
 };
@@ -143,13 +183,18 @@ absl::Status PostgresConnection::Transact(
     return failure.status;
   };
   try {
-    pqxx::work begun(library_->connection);
-    LibraryTransaction transaction(library_->name, &begun);
+    std::optional<pqxx::work> begun;
+    {
+      const WaitForAnswer wait(&library_->waits_since);
+      begun.emplace(library_->connection);
+    }
+    LibraryTransaction transaction(library_->name, &*begun, &library_->waits_since);
     const absl::Status status = work(transaction);
     if (!transaction.failure().status.ok()) return fail(transaction.failure());
     *outcome = PostgresOutcome::kFailed;
     if (!status.ok()) return status;
-    begun.commit();
+    const WaitForAnswer wait(&library_->waits_since);
+    begun->commit();
     *outcome = PostgresOutcome::kCommitted;
     return absl::OkStatus();
   } catch (const pqxx::in_doubt_error&) {
@@ -162,6 +207,13 @@ absl::Status PostgresConnection::Transact(
   } catch (...) {
     return fail(FailureOfCaught(library_->name));
   }
+}
+
+void PostgresConnection::GiveUp(std::chrono::milliseconds unanswered) {
+  const Ticks since = library_->waits_since;
+  if (since == 0) return;
+  const std::chrono::steady_clock::time_point begin{std::chrono::steady_clock::duration(since)};
+  if (std::chrono::steady_clock::now() - begin >= unanswered) shutdown(library_->socket, SHUT_RDWR);
 }
 
 absl::Status PostgresConnection::Listen(const std::string& channel) {

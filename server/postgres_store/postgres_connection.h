@@ -65,7 +65,7 @@ class PostgresTransaction {
 };
 
 // One connection to a PostgreSQL database, and the only place that knows libpqxx. One thread at a
-// time.
+// time, but for GiveUp.
 //
 // Errors of all: ResourceExhausted (the database's disk is full), FailedPrecondition (a read-only
 // replica; the password is refused), InvalidArgument (text that is no UTF-8), Unavailable (not
@@ -81,6 +81,10 @@ class PostgresConnection {
   // Runs `work` in a transaction, which is committed when it is OK.
   absl::Status Transact(const std::function<absl::Status(PostgresTransaction&)>& work,
                         PostgresOutcome* outcome);
+
+  // Any thread: where a statement has waited for its answer for so long its connection is cut, and
+  // it fails as one whose connection was lost.
+  void GiveUp(std::chrono::milliseconds unanswered);
 
   // False when it is of no use any longer.
   bool usable() const { return usable_; }

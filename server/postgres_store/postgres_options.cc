@@ -100,7 +100,7 @@ void AddSettings(const PostgresOptions& options, Keywords* keywords) {
 absl::StatusOr<PostgresTarget> TargetOf(const PostgresOptions& options) {
   if (options.max_connections < 1 || options.connect_timeout.count() < 1 ||
       options.statement_timeout.count() < 1 || options.lock_timeout.count() < 1 ||
-      options.patience.count() < 1) {
+      options.unanswered_timeout.count() < 1 || options.patience.count() < 1) {
     return absl::InvalidArgumentError(
         "connections and timeouts of the store's database must be at least 1");
   }

@@ -23,6 +23,9 @@ struct PostgresOptions {
   std::chrono::milliseconds statement_timeout{20'000};
   // The database ends a statement that waits longer for what another one has locked.
   std::chrono::milliseconds lock_timeout{10'000};
+  // Without any answer to a statement for so long the connection is given up: the database ends
+  // what takes too long, so it, or what lies between, is gone. Longer than the other two.
+  std::chrono::milliseconds unanswered_timeout{25'000};
   // What a call waits for a free connection, and for a database that is not there: then it is
   // answered UNAVAILABLE.
   std::chrono::milliseconds patience{30'000};

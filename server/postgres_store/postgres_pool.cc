@@ -16,6 +16,7 @@ namespace {
 // Between tries; doubled every time.
 constexpr std::chrono::milliseconds kFirstPause{20};
 constexpr std::chrono::milliseconds kLongestPause{1000};
+constexpr std::chrono::milliseconds kShortestWatch{10};
 
 absl::Status CheckDatabase(const std::string& name, PostgresTransaction& transaction) {
   TF_ASSIGN_OR_RETURN(
@@ -55,10 +56,13 @@ absl::StatusOr<std::unique_ptr<PostgresPool>> PostgresPool::Open(const PostgresO
 }
 
 PostgresPool::~PostgresPool() {
-  MutexLock lock(mutex_);
-  ending_ = true;
-  changed_.NotifyAll();
-  while (in_use_ > 0) changed_.Wait(mutex_);
+  {
+    MutexLock lock(mutex_);
+    ending_ = true;
+    changed_.NotifyAll();
+    while (in_use_ > 0) changed_.Wait(mutex_);
+  }
+  watch_.join();
 }
 
 absl::Status PostgresPool::Run(const Work& work, Clock::time_point deadline) {
@@ -95,7 +99,13 @@ absl::Status PostgresPool::Try(const Work& work, Clock::time_point deadline,
       *outcome = PostgresOutcome::kTransient;
     }
   }
-  if (connection != nullptr) status = connection->Transact(work, outcome);
+  if (connection != nullptr) {
+    {
+      MutexLock lock(mutex_);
+      busy_.insert(connection.get());
+    }
+    status = connection->Transact(work, outcome);
+  }
   GiveBack(std::move(connection));
   return status;
 }
@@ -120,8 +130,20 @@ absl::StatusOr<std::unique_ptr<PostgresConnection>> PostgresPool::Take(Clock::ti
 void PostgresPool::GiveBack(std::unique_ptr<PostgresConnection> connection) {
   MutexLock lock(mutex_);
   --in_use_;
+  busy_.erase(connection.get());
   if (connection != nullptr && connection->usable()) idle_.push_back(std::move(connection));
   changed_.NotifyAll();
+}
+
+void PostgresPool::Watch() {
+  const std::chrono::milliseconds often =
+      std::clamp(options_.unanswered_timeout / 4, kShortestWatch, kLongestPause);
+  MutexLock lock(mutex_);
+  // To the last call's end: that may be what is not answered.
+  while (!ending_ || in_use_ > 0) {
+    changed_.WaitUntil(mutex_, Clock::now() + often);
+    for (PostgresConnection* connection : busy_) connection->GiveUp(options_.unanswered_timeout);
+  }
 }
 
 bool PostgresPool::Pause(std::chrono::milliseconds pause) {

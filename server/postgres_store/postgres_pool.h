@@ -6,7 +6,9 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -50,13 +52,15 @@ class PostgresPool {
 
  private:
   PostgresPool(PostgresOptions options, PostgresTarget target)
-      : options_(std::move(options)), target_(std::move(target)) {}
+      : options_(std::move(options)), target_(std::move(target)), watch_([this] { Watch(); }) {}
 
   absl::Status TryUntil(const Work& work, Clock::time_point deadline);
   absl::Status Try(const Work& work, Clock::time_point deadline, PostgresOutcome* outcome);
   // A place, with a connection or none.
   absl::StatusOr<std::unique_ptr<PostgresConnection>> Take(Clock::time_point deadline);
   void GiveBack(std::unique_ptr<PostgresConnection> connection);
+  // Gives up connections that are not answered.
+  void Watch();
   // False at the pool's end.
   bool Pause(std::chrono::milliseconds pause);
 
@@ -67,8 +71,11 @@ class PostgresPool {
   Mutex mutex_;
   ConditionVariable changed_;
   std::vector<std::unique_ptr<PostgresConnection>> idle_ ABSL_GUARDED_BY(mutex_);
+  std::set<PostgresConnection*> busy_ ABSL_GUARDED_BY(mutex_);
   int in_use_ ABSL_GUARDED_BY(mutex_) = 0;
   bool ending_ ABSL_GUARDED_BY(mutex_) = false;
+
+  std::thread watch_;  // last: it uses the others
 };
 
 // What `work` finds.

@@ -20,6 +20,7 @@
 #include "server/postgres_store/postgres_export_store.h"
 #include "server/postgres_store/postgres_schema.h"
 #include "server/store/store_schema.h"
+#include "tests/server/postgres_store/frozen_proxy.h"
 #include "tests/server/postgres_store/test_database.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/waiting_calls.h"
@@ -263,6 +264,39 @@ TEST_F(PostgresStoresTest, ACallWaitsForADatabaseThatComesBackAndNotForever) {
   EXPECT_THAT(answer.get_future().get(), IsOk());
   ASSERT_OK_AND_ASSIGN(const SessionRecord found, GetSession(patient->sessions(), "s"));
   EXPECT_EQ(SerializePoses(found.last_poses), SerializePoses(SamplePoses(5)));
+}
+
+TEST_F(PostgresStoresTest, AConnectionThroughWhichNothingComesIsGivenUpAndTheCallGoesOnOnAnother) {
+  FrozenProxy proxy(TestDatabasePort());
+  PostgresOptions options = TestDatabaseOptions();
+  options.url = absl::StrCat("postgresql://postgres@127.0.0.1:", proxy.port(), "/postgres");
+  options.unanswered_timeout = std::chrono::milliseconds(300);
+  const auto stores = OpenTestStores(SystemUnixSeconds, options);
+  ASSERT_THAT(CreateSession(stores->sessions(), SampleSession("s", 1)), IsOk());
+  const int before = proxy.accepted();
+  proxy.Freeze();
+  EXPECT_THAT(CommitPoses(stores->sessions(), "s", SamplePoses(7)), IsOk());
+  EXPECT_GT(proxy.accepted(), before);
+  ASSERT_OK_AND_ASSIGN(const SessionRecord found, GetSession(stores_->sessions(), "s"));
+  EXPECT_EQ(SerializePoses(found.last_poses), SerializePoses(SamplePoses(7)));
+}
+
+TEST_F(PostgresStoresTest, OfACommitThatIsNotAnsweredNobodyClaimsToKnow) {
+  FrozenProxy proxy(TestDatabasePort());
+  PostgresOptions options = TestDatabaseOptions();
+  options.url = absl::StrCat("postgresql://postgres@127.0.0.1:", proxy.port(), "/postgres");
+  options.unanswered_timeout = std::chrono::milliseconds(300);
+  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
+  int calls = 0;
+  EXPECT_THAT(pool->Run([&](PostgresTransaction& transaction) {
+    ++calls;
+    const absl::Status status =
+        transaction.Execute("INSERT INTO blobs (sha256, bytes) VALUES ('x', 1)");
+    proxy.Freeze();
+    return status;
+  }),
+              StatusIs(Code::kUnavailable, HasSubstr("may have been kept")));
+  EXPECT_EQ(calls, 1) << "it is not tried again";
 }
 
 TEST_F(PostgresStoresTest, WhoFindsAllConnectionsInUseIsToldSoWhenItsTimeIsOver) {

@@ -41,6 +41,8 @@ void RunOrEnd(const std::string& sql,
 
 bool HasTestDatabase() { return !Environment("PGPORT").empty(); }
 
+int TestDatabasePort() { return std::atoi(Environment("PGPORT").c_str()); }
+
 PostgresOptions TestDatabaseOptions(const std::string& name) {
   return {.url = absl::StrCat("postgresql://", Environment("PGUSER"), "@", Environment("PGHOST"),
                               ":", Environment("PGPORT"), "/", name),

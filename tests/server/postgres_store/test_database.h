@@ -27,6 +27,8 @@ bool HasTestDatabase();
 // Of its database "postgres", or that of the name.
 PostgresOptions TestDatabaseOptions(const std::string& name = "postgres");
 
+int TestDatabasePort();
+
 // Empties the database: no table of ours is left.
 void EmptyTestDatabase();
 
