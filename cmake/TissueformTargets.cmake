@@ -147,6 +147,9 @@ endfunction()
 # One test program a folder, named core_mesh_test; ctest sees every test of it by itself. The targets tests-server
 # and tests-inputs build the programs with these labels: the server; what reads from outside. FIXTURE: what ctest makes
 # before (tests/client/web).
+#
+# WHOLE PROGRAM ARGUMENTS: the test program is run once, as a whole, by that program, which makes what all its tests need;
+# where it is not installed without it: tests that need it are skipped then.
 function(tissueform_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT;PRECOMPILED;FIXTURE" "SOURCES;DEPS;LABELS;WHOLE" ${ARGN})
   if(NOT ARG_PRECOMPILED)

@@ -4,7 +4,6 @@
 #include "server/postgres_store/change_listener.h"
 
 #include <chrono>
-#include <map>
 #include <utility>
 #include <vector>
 
@@ -26,22 +25,6 @@ absl::StatusOr<std::unique_ptr<PostgresConnection>> ConnectAndListen(const Postg
 }
 
 }  // namespace
-
-StoreChange ParseStoreChange(const std::string& notice) {
-  static const auto* const kinds = new std::map<std::string, StoreChange::Kind>{
-      {"session_deleted", StoreChange::Kind::kSessionDeleted},
-      {"session_changed", StoreChange::Kind::kSessionChanged},
-      {"mesh_deleted", StoreChange::Kind::kMeshDeleted},
-      {"case_deleted", StoreChange::Kind::kCaseDeleted},
-      {"prediction_deleted", StoreChange::Kind::kPredictionDeleted},
-      {"access_changed", StoreChange::Kind::kAccessChanged},
-      {"exports_changed", StoreChange::Kind::kExportsChanged}};
-  const size_t space = notice.find(' ');
-  if (space == std::string::npos) return {};
-  const auto found = kinds->find(notice.substr(0, space));
-  if (found == kinds->end()) return {};
-  return {.kind = found->second, .name = notice.substr(space + 1)};
-}
 
 absl::StatusOr<std::unique_ptr<ChangeListener>> ChangeListener::Start(
     const PostgresOptions& options, Callback told) {

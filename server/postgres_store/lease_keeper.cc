@@ -6,8 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "core/base/status_macros.h"
-
 namespace tissueform {
 
 LeaseKeeper::LeaseKeeper(SessionLeases* leases, Options options, LostCallback lost)
@@ -27,19 +25,13 @@ void LeaseKeeper::Start() {
 }
 
 absl::StatusOr<LeaseAnswer> LeaseKeeper::Acquire(const std::string& session) {
-  std::map<std::string, SessionLease> lost;
+  std::vector<SessionLease> lost;
   absl::StatusOr<LeaseAnswer> answer;
   {
     MutexLock calls(calls_);
     answer = leases_->Acquire(session);
     if (!answer.ok()) return answer;
-    MutexLock lock(mutex_);
-    const auto found = held_.find(session);
-    // Another epoch: what was made under the one before has been somebody else's in between.
-    if (found != held_.end() && (!answer->mine || found->second.epoch != answer->lease.epoch)) {
-      lost.insert(held_.extract(found));
-    }
-    if (answer->mine) held_[session] = answer->lease;
+    lost = held_.Acquired(session, *answer);
   }
   TellLost(lost);
   return answer;
@@ -47,86 +39,39 @@ absl::StatusOr<LeaseAnswer> LeaseKeeper::Acquire(const std::string& session) {
 
 absl::Status LeaseKeeper::Release(const std::string& session) {
   MutexLock calls(calls_);
-  SessionLease lease;
-  {
-    MutexLock lock(mutex_);
-    const auto found = held_.find(session);
-    if (found == held_.end()) return absl::OkStatus();
-    lease = found->second;
-    held_.erase(found);
-  }
-  return leases_->Release(session, lease.epoch);
+  const std::optional<SessionLease> lease = held_.Take(session);
+  return lease.has_value() ? leases_->Release(session, lease->epoch) : absl::OkStatus();
 }
 
 absl::Status LeaseKeeper::ReleaseAll() {
-  std::vector<std::string> sessions;
-  {
-    MutexLock lock(mutex_);
-    for (const auto& [session, lease] : held_) sessions.push_back(session);
-  }
   absl::Status first;
-  for (const std::string& session : sessions) first.Update(Release(session));
+  for (const std::string& session : held_.Sessions()) first.Update(Release(session));
   return first;
 }
 
 std::optional<int64_t> LeaseKeeper::EpochOf(const std::string& session) {
-  const auto now = options_.clock();
-  MutexLock lock(mutex_);
-  const auto found = held_.find(session);
-  if (found == held_.end() || now >= found->second.answers_until) return std::nullopt;
-  return found->second.epoch;
+  return held_.EpochOf(session, options_.clock());
 }
 
 absl::Status LeaseKeeper::Renew() {
-  std::map<std::string, SessionLease> lost;
+  std::vector<SessionLease> lost;
   absl::Status status;
   {
     MutexLock calls(calls_);
     const absl::StatusOr<std::vector<SessionLease>> renewed = leases_->Renew();
     status = renewed.status();
-    if (status.ok()) {
-      std::vector<SessionLease> strays;
-      lost = TakeOver(*renewed, &strays);
-      for (const SessionLease& stray : strays) {
-        status.Update(leases_->Release(stray.session, stray.epoch));
-      }
-    } else {
-      lost = TakeOutEnded();
+    std::vector<SessionLease> strays;
+    lost = renewed.ok() ? held_.Renewed(*renewed, &strays) : held_.TakeEnded(options_.clock());
+    for (const SessionLease& stray : strays) {
+      status.Update(leases_->Release(stray.session, stray.epoch));
     }
   }
   TellLost(lost);
   return status;
 }
 
-std::map<std::string, SessionLease> LeaseKeeper::TakeOver(const std::vector<SessionLease>& renewed,
-                                                          std::vector<SessionLease>* strays) {
-  MutexLock lock(mutex_);
-  std::map<std::string, SessionLease> lost = std::exchange(held_, {});
-  for (const SessionLease& lease : renewed) {
-    const auto found = lost.find(lease.session);
-    if (found == lost.end() || found->second.epoch != lease.epoch) {
-      strays->push_back(lease);
-      continue;
-    }
-    lost.erase(found);
-    held_.emplace(lease.session, lease);
-  }
-  return lost;
-}
-
-std::map<std::string, SessionLease> LeaseKeeper::TakeOutEnded() {
-  const auto now = options_.clock();
-  std::map<std::string, SessionLease> lost;
-  MutexLock lock(mutex_);
-  for (auto next = held_.begin(); next != held_.end();) {
-    const auto lease = next++;
-    if (now >= lease->second.answers_until) lost.insert(held_.extract(lease));
-  }
-  return lost;
-}
-
-void LeaseKeeper::TellLost(const std::map<std::string, SessionLease>& lost) {
-  for (const auto& [session, lease] : lost) lost_(lease);
+void LeaseKeeper::TellLost(const std::vector<SessionLease>& lost) {
+  for (const SessionLease& lease : lost) lost_(lease);
 }
 
 void LeaseKeeper::Loop() {

@@ -5,7 +5,6 @@
 
 #include <chrono>
 #include <functional>
-#include <map>
 #include <optional>
 #include <string>
 #include <thread>
@@ -15,6 +14,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/mutex.h"
+#include "server/postgres_store/held_leases.h"
 #include "server/postgres_store/session_leases.h"
 
 namespace tissueform {
@@ -58,12 +58,7 @@ class LeaseKeeper {
 
  private:
   void Loop();
-  // Holds what was renewed; returns what is held no longer. Strays were acquired by a call whose
-  // answer was lost: nobody knows of them.
-  std::map<std::string, SessionLease> TakeOver(const std::vector<SessionLease>& renewed,
-                                               std::vector<SessionLease>* strays);
-  std::map<std::string, SessionLease> TakeOutEnded();
-  void TellLost(const std::map<std::string, SessionLease>& lost);
+  void TellLost(const std::vector<SessionLease>& lost);
 
   SessionLeases* const leases_;
   const Options options_;
@@ -71,9 +66,10 @@ class LeaseKeeper {
 
   // One call to the store at a time: what it says of all is newer than what is known of any.
   Mutex calls_;
+  HeldLeases held_;
+
   Mutex mutex_;
   ConditionVariable changed_;
-  std::map<std::string, SessionLease> held_ ABSL_GUARDED_BY(mutex_);
   bool ending_ ABSL_GUARDED_BY(mutex_) = false;
 
   std::thread thread_;

@@ -9,7 +9,6 @@
 #include <unistd.h>
 #include <utility>
 
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include <pqxx/pqxx>
 #include <sys/socket.h>
@@ -18,37 +17,6 @@
 
 namespace tissueform {
 namespace {
-
-constexpr pqxx::oid kByteaType = 17;
-
-pqxx::binarystring ToBinary(const PostgresValue& value) {
-  if (const auto* text = std::get_if<absl::string_view>(&value)) {
-    return pqxx::binarystring(text->data(), text->size());
-  }
-  auto number = static_cast<uint64_t>(std::get<int64_t>(value));
-  std::string bytes(sizeof(number), '\0');
-  for (size_t i = bytes.size(); i-- > 0; number >>= 8) bytes[i] = static_cast<char>(number & 0xff);
-  return pqxx::binarystring(bytes);
-}
-
-PostgresRows ToRows(const pqxx::result& result) {
-  std::vector<PostgresRows::Row> rows;
-  rows.reserve(result.size());
-  for (const pqxx::row& from : result) {
-    PostgresRows::Row row;
-    row.reserve(from.size());
-    for (const pqxx::field& field : from) {
-      if (field.type() == kByteaType && !field.is_null()) {
-        const pqxx::binarystring bytes(field);
-        row.emplace_back(bytes.get(), bytes.size());
-      } else {
-        row.emplace_back(field.c_str(), field.size());
-      }
-    }
-    rows.push_back(std::move(row));
-  }
-  return PostgresRows(std::move(rows));
-}
 
 using Ticks = std::chrono::steady_clock::rep;
 
@@ -73,9 +41,7 @@ class LibraryTransaction final : public PostgresTransaction {
 
   absl::StatusOr<PostgresRows> Query(const char* sql,
                                      std::initializer_list<PostgresValue> values) override {
-    std::vector<pqxx::binarystring> parameters;
-    parameters.reserve(values.size());
-    for (const PostgresValue& value : values) parameters.push_back(ToBinary(value));
+    const std::vector<pqxx::binarystring> parameters = ToParameters(values);
     const WaitForAnswer wait(waits_since_);
     try {
       return ToRows(work_->exec_params(sql, pqxx::prepare::make_dynamic_params(parameters)));
@@ -155,11 +121,6 @@ struct PostgresConnection::Library {
   std::vector<std::string> notices;
   std::unique_ptr<NoticeReceiver> receiver;  // before the connection's end
 };
-
-int64_t PostgresRows::Integer(size_t row, size_t column) const {
-  int64_t number = 0;
-  return absl::SimpleAtoi(rows_[row][column], &number) ? number : 0;
-}
 
 PostgresConnection::PostgresConnection(std::unique_ptr<Library> library)
     : library_(std::move(library)) {}

@@ -4,42 +4,19 @@
 #pragma once
 
 #include <chrono>
-#include <cstdint>
 #include <functional>
 #include <initializer_list>
 #include <memory>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/strings/string_view.h"
 
 #include "server/postgres_store/postgres_options.h"
+#include "server/postgres_store/postgres_rows.h"
 
 namespace tissueform {
-
-// A parameter of a statement, sent in binary: a bigint; text or bytea.
-using PostgresValue = std::variant<int64_t, absl::string_view>;
-
-// What a statement has answered: rows and columns from 0.
-class PostgresRows {
- public:
-  using Row = std::vector<std::string>;  // as text; bytea as its bytes; NULL as nothing
-
-  PostgresRows() = default;
-  explicit PostgresRows(std::vector<Row> rows) : rows_(std::move(rows)) {}
-
-  size_t size() const { return rows_.size(); }
-  bool empty() const { return rows_.empty(); }
-  absl::string_view Text(size_t row, size_t column) const { return rows_[row][column]; }
-  // 0 for what is no number.
-  int64_t Integer(size_t row, size_t column) const;
-
- private:
-  std::vector<Row> rows_;
-};
 
 // How a transaction has ended.
 enum class PostgresOutcome {

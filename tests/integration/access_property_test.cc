@@ -82,7 +82,8 @@ class AccessPropertyTest : public ServiceTest {
     if (OneIn(5) && !links_.empty()) {
       return {.name = "link", .link = OneIn(8) ? "tfl_" + std::string(43, 'x') : Any(links_)};
     }
-    return {.name = Any(std::vector<std::string>{"ANN", "ANN", "BOB", "BOB", "vic", "BRIDGE"}), .link = ""};
+    return {.name = Any(std::vector<std::string>{"ANN", "ANN", "BOB", "BOB", "vic", "BRIDGE"}),
+            .link = ""};
   }
   Caller AnyPrincipal() {
     Caller caller = AnyCaller();
@@ -93,7 +94,8 @@ class AccessPropertyTest : public ServiceTest {
     std::string digits;
     const size_t count = kind == Kind::kSession || kind == Kind::kPrediction ? 32 : 64;
     for (size_t i = 0; i < count; ++i) digits += "0123456789abcdef"[Below(16)];
-    if (kind == Kind::kExport) return PrefixOf(kind) + digits.substr(0, 12) + "-" + digits.substr(32);
+    if (kind == Kind::kExport)
+      return PrefixOf(kind) + digits.substr(0, 12) + "-" + digits.substr(32);
     return PrefixOf(kind) + digits;
   }
   static std::string PrefixOf(Kind kind) {
@@ -186,9 +188,8 @@ class AccessPropertyTest : public ServiceTest {
   }
 
   void ListSomething() {
-    const Kind kind =
-        Any(std::vector<Kind>{Kind::kSession, Kind::kPrediction, Kind::kCase, Kind::kMesh,
-                              Kind::kExport});
+    const Kind kind = Any(std::vector<Kind>{Kind::kSession, Kind::kPrediction, Kind::kCase,
+                                            Kind::kMesh, Kind::kExport});
     const Caller caller = AnyCaller();
     std::vector<std::string> names;
     const Answer answer = ListNames(*stubs_, caller, kind, &names);

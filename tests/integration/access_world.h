@@ -48,11 +48,13 @@ struct AccessWorld {
   std::set<std::string> meshes;                                      // that the server has
   std::set<std::pair<std::string, std::string>> senders;             // of a mesh: name, principal
   std::map<std::tuple<std::string, std::string, std::string>, Level>
-      shares;                         // owner, resource, principal
-  std::map<std::string, Link> links;  // by token
+      shares;                                  // owner, resource, principal
+  std::map<std::string, Link> links;           // by token
   std::map<std::string, std::string> exports;  // of which prediction
 
-  static bool IsBridge(const Caller& caller) { return caller.link.empty() && caller.name == "BRIDGE"; }
+  static bool IsBridge(const Caller& caller) {
+    return caller.link.empty() && caller.name == "BRIDGE";
+  }
 
   bool IsGood(const std::string& link) const;
   Level Of(const Caller& caller, Kind kind, const std::string& name) const;

@@ -268,9 +268,8 @@ TEST(DurableExportsTest, AfterAKillAllIsThereThatWasAcknowledged) {
   ASSERT_OK_AND_ASSIGN(const auto kept, client->exports().List());
   ASSERT_THAT(kept, SizeIs(1));
   EXPECT_EQ(kept[0].DebugString(), changed.DebugString());
-  ASSERT_OK_AND_ASSIGN(
-      const v1::Export again,
-      client->exports().Create(first.prediction(), {SomeMeasure()}, "one"));
+  ASSERT_OK_AND_ASSIGN(const v1::Export again,
+                       client->exports().Create(first.prediction(), {SomeMeasure()}, "one"));
   EXPECT_EQ(again.name(), first.name());
 }
 

@@ -122,9 +122,8 @@ TEST_P(PreparedEvaluatorOfModelTest, AThousandPosesGiveWhatTheServerGives) {
     ASSERT_OK_AND_ASSIGN(const auto answer, evaluator->Evaluate(TopPose(pose)));
     if (!frame->summary().prepared() || !answer.has_value()) continue;
     ++prepared;
-    ASSERT_OK_AND_ASSIGN(
-        const Positions expected,
-        DecodePositions(frame->positions(), stream->started().vertex_count()));
+    ASSERT_OK_AND_ASSIGN(const Positions expected,
+                         DecodePositions(frame->positions(), stream->started().vertex_count()));
     ASSERT_EQ(answer->positions.size(), static_cast<size_t>(expected.size()));
     const Eigen::Map<const FloatPositions> positions(answer->positions.data(), expected.rows(), 3);
     ASSERT_LE((positions.cast<double>() - expected).cwiseAbs().maxCoeff(),
@@ -136,16 +135,15 @@ TEST_P(PreparedEvaluatorOfModelTest, AThousandPosesGiveWhatTheServerGives) {
 
 INSTANTIATE_TEST_SUITE_P(
     Models, PreparedEvaluatorOfModelTest,
-    ::testing::Values(
-        EvaluatedModel{"gradient_field", v1::DEFORMATION_MODEL_GRADIENT_FIELD},
-        EvaluatedModel{"linear_elastic", v1::DEFORMATION_MODEL_LINEAR_ELASTIC},
-        EvaluatedModel{"neo_hookean", v1::DEFORMATION_MODEL_NEO_HOOKEAN}),
+    ::testing::Values(EvaluatedModel{"gradient_field", v1::DEFORMATION_MODEL_GRADIENT_FIELD},
+                      EvaluatedModel{"linear_elastic", v1::DEFORMATION_MODEL_LINEAR_ELASTIC},
+                      EvaluatedModel{"neo_hookean", v1::DEFORMATION_MODEL_NEO_HOOKEAN}),
     [](const auto& test) { return test.param.name; });
 
 TEST_F(PreparedEvaluatorTest, BeyondTheRangeItSaysSo) {
-  ASSERT_OK_AND_ASSIGN(const auto evaluator,
-                       client_->FetchPreparedAnswers(
-                           session_, OptionsOf(v1::DEFORMATION_MODEL_GRADIENT_FIELD)));
+  ASSERT_OK_AND_ASSIGN(
+      const auto evaluator,
+      client_->FetchPreparedAnswers(session_, OptionsOf(v1::DEFORMATION_MODEL_GRADIENT_FIELD)));
   HandlePose far;
   far.rotation_vector.x() = 0.5;
   ASSERT_OK_AND_ASSIGN(const auto answer, evaluator->Evaluate(TopPose(far)));

@@ -150,8 +150,7 @@ TEST_F(ExportBookTest, IdsRiseThoughTheClockGoesBack) {
   }
   EXPECT_EQ(Predictions({}), wanted);
   const ExportBook::Page page = book_->List({.limit = 3});
-  EXPECT_EQ(Predictions({.after = page.next, .limit = 2}),
-            std::vector<std::string>({"d", "e"}));
+  EXPECT_EQ(Predictions({.after = page.next, .limit = 2}), std::vector<std::string>({"d", "e"}));
 }
 
 TEST_F(ExportBookTest, OneOwnersWaitingOnesLeaveRoomForOthers) {

@@ -1,8 +1,6 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/exports/export_store.h"
-
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -11,6 +9,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "server/exports/export_store.h"
 #include "server/store/data_folder.h"
 #include "server/store/database.h"
 #include "server/store/durable_store.h"

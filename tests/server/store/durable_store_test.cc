@@ -1,7 +1,6 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/store/commit_thread.h"
 #include "server/store/durable_store.h"
 
 #include <atomic>
@@ -20,6 +19,7 @@
 #include "gtest/gtest.h"
 
 #include "core/mesh_payload/sha256.h"
+#include "server/store/commit_thread.h"
 #include "server/store/database.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/store_workload.h"
@@ -447,10 +447,13 @@ TEST_F(DurableStoreTest, AFolderFromBeforeThereWereExportsKeepsAllAndTakesExport
   ASSERT_THAT(Open(), IsOk());
   EXPECT_THAT(store_->damaged(), IsEmpty());
   EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
-  ASSERT_THAT(store_->commit_thread()->Run({.work = [](Database& database) {
-    return database.Execute("INSERT INTO exports (name, record) VALUES ('a', x'00')");
-  }}),
-              IsOk());
+  ASSERT_THAT(
+      store_->commit_thread()->Run(
+          {.work =
+               [](Database& database) {
+                 return database.Execute("INSERT INTO exports (name, record) VALUES ('a', x'00')");
+               }}),
+      IsOk());
   ASSERT_THAT(Open(), IsOk());
   EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
 }

@@ -34,9 +34,8 @@ TEST(PageTemplateTest, EnvelopeAndPayloadStandWhereTheMarksWere) {
 TEST(PageTemplateTest, APageWithoutItsMarksIsRefused) {
   for (const char* page : {"", "@TISSUEFORM-ENVELOPE@", "@TISSUEFORM-PAYLOAD@@TISSUEFORM-ENVELOPE@",
                            "@TISSUEFORM-ENVELOPE@@TISSUEFORM-ENVELOPE@@TISSUEFORM-PAYLOAD@"}) {
-    EXPECT_THAT(
-        FillPageTemplate(page, {.envelope = "{}", .payload = "face"}),
-        StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("moving-file.html")));
+    EXPECT_THAT(FillPageTemplate(page, {.envelope = "{}", .payload = "face"}),
+                StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("moving-file.html")));
   }
 }
 

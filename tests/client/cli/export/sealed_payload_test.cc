@@ -7,13 +7,13 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <zlib.h>
 
 #include "absl/strings/escaping.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
 #include <openssl/evp.h>
-#include <zlib.h>
 
 #include "core/mesh_payload/sha256.h"
 #include "tests/testing/run_tissueform.h"
