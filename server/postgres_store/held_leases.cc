@@ -59,6 +59,7 @@ std::vector<SessionLease> HeldLeases::Renewed(const std::vector<SessionLease>& r
     before.erase(found);
     leases_.emplace(lease.session, lease);
   }
+  lost.reserve(before.size());
   for (auto& [session, lease] : before) lost.push_back(std::move(lease));
   return lost;
 }

@@ -89,7 +89,8 @@ absl::Status ConnectError(const std::string& name, absl::string_view what) {
   if (absl::StrContains(what, "password authentication failed") ||
       absl::StrContains(what, "no password supplied")) {
     return absl::FailedPreconditionError(absl::StrCat(
-        "database ", name, ": it refuses the user or the password; see --store-password-file"));
+        "database ", name,
+        ": it refuses the user or the password; mend its address or the password file"));
   }
   // libpq tells of every address that it has tried; the last words of the first are the reason.
   return absl::UnavailableError(absl::StrCat("database ", name, ": ", FirstLine(what)));

@@ -100,7 +100,7 @@ absl::Status ChangeSchema(const std::string& name, PostgresTransaction& transact
   if (version > kSchemaVersion) {
     return absl::FailedPreconditionError(absl::StrCat(
         "database ", name, " has been written by a newer server (version ", version,
-        ", this one knows ", kSchemaVersion, "); start that one, or name another --store"));
+        ", this one knows ", kSchemaVersion, "); start that one, or name another database"));
   }
   if (version == kSchemaVersion) return absl::OkStatus();
   if (version < 4) TF_RETURN_IF_ERROR(transaction.Execute(kTablesOfVersion4));

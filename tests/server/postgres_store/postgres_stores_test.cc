@@ -188,8 +188,8 @@ TEST_F(PostgresStoresTest, ServersThatStartAtOnceMakeItsTablesOnce) {
 TEST_F(PostgresStoresTest, TablesOfANewerServerAreLeftAlone) {
   RunSql("UPDATE tissueform_version SET version = 99;");
   EXPECT_THAT(PostgresStores::Open({.database = TestDatabaseOptions()}).status(),
-              StatusIs(Code::kFailedPrecondition,
-                       AllOf(HasSubstr("newer server (version 99"), HasSubstr("--store"))));
+              StatusIs(Code::kFailedPrecondition, AllOf(HasSubstr("newer server (version 99"),
+                                                        HasSubstr("another database"))));
 }
 
 TEST_F(PostgresStoresTest, TablesOfTheVersionBeforeAreBroughtUpToDateWithWhatTheyHold) {
@@ -209,7 +209,7 @@ TEST_F(PostgresStoresTest, AWrongPasswordIsToldAtTheStartWithoutIt) {
   options.password = "hush-hush";
   EXPECT_THAT(PostgresStores::Open({.database = options}).status(),
               StatusIs(Code::kFailedPrecondition,
-                       AllOf(HasSubstr("--store-password-file"), Not(HasSubstr("hush")))));
+                       AllOf(HasSubstr("the password file"), Not(HasSubstr("hush")))));
 }
 
 TEST_F(PostgresStoresTest, ADatabaseThatIsNotThereIsUnavailable) {
