@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "gtest/gtest.h"
 
 #include "core/base/status_macros.h"
 #include "tests/server/store/stores_case.h"
@@ -75,6 +76,12 @@ std::unique_ptr<PostgresStores> OpenTestStores(UnixClock clock, const PostgresOp
 }  // namespace tissueform::testing
 
 namespace tissueform {
+
+// Where there is no database there are no stores to instantiate them with.
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(CaseStoreContractTest);
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(MeshStoreContractTest);
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(PredictionStoreContractTest);
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(SessionStoreContractTest);
 
 // What the contract's tests of tests/server/store are run with here.
 std::vector<StoresCase> AllStores() {
