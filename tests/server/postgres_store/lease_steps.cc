@@ -61,7 +61,8 @@ LeaseServers::LeaseServers(LeaseWorld* world) : world_(world) {
 }
 
 std::string LeaseServers::Take(const LeaseStep& step) {
-  return absl::StrCat(ToWords(step), ": ", TakeOne(step), MayAnswer(0) ? " A" : " -",
+  const std::string answer = TakeOne(step);  // before it is asked who may answer
+  return absl::StrCat(ToWords(step), ": ", answer, MayAnswer(0) ? " A" : " -",
                       MayAnswer(1) ? "B" : "-");
 }
 
