@@ -355,6 +355,46 @@ TEST_F(PostgresStoresTest, NothingOfAWorkThatFailsIsKept) {
               StatusIs(Code::kInternal, HasSubstr("SQLSTATE 42703")));
 }
 
+struct DatabaseError {
+  const char* name;
+  const char* sqlstate;
+  Code code;
+  const char* told;
+  int calls;  // of the work: more where another try may do better
+};
+
+class PostgresErrorTest : public PostgresStoresTest,
+                          public ::testing::WithParamInterface<DatabaseError> {};
+
+TEST_P(PostgresErrorTest, WhatTheDatabaseSaysIsOneLineWithItsCodeAndWithoutValues) {
+  const DatabaseError& error = GetParam();
+  int calls = 0;
+  const absl::Status status = stores_->pool()->Run([&](PostgresTransaction& transaction) {
+    if (++calls == 2) return absl::OkStatus();
+    return transaction.Execute(absl::StrCat("DO $$ BEGIN RAISE EXCEPTION 'no' USING ERRCODE = '",
+                                            error.sqlstate, "', DETAIL = 'hush'; END $$"));
+  });
+  EXPECT_EQ(calls, error.calls);
+  EXPECT_EQ(status.code(), error.code) << status;
+  EXPECT_THAT(std::string(status.message()),
+              AllOf(HasSubstr(error.told), Not(HasSubstr("hush")), Not(HasSubstr("\n"))));
+  EXPECT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1)), IsOk()) << "calls go on";
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Errors, PostgresErrorTest,
+    ::testing::Values(DatabaseError{"DiskFull", "53100", Code::kResourceExhausted, "make room", 1},
+                      DatabaseError{"ReadOnly", "25006", Code::kFailedPrecondition,
+                                    "read-only replica", 1},
+                      DatabaseError{"NoText", "22021", Code::kInvalidArgument, "UTF-8", 1},
+                      DatabaseError{"TooLong", "57014", Code::kUnavailable, "took too long", 1},
+                      DatabaseError{"Locked", "55P03", Code::kUnavailable, "others hold", 1},
+                      DatabaseError{"Deadlock", "40P01", Code::kOk, "", 2},
+                      DatabaseError{"ShuttingDown", "57P01", Code::kOk, "", 2},
+                      DatabaseError{"ConnectionLost", "08006", Code::kOk, "", 2},
+                      DatabaseError{"AnyOther", "XX000", Code::kInternal, "SQLSTATE XX000", 1}),
+    [](const auto& of) { return of.param.name; });
+
 TEST_F(PostgresStoresTest, AccessRowsAreKeptAsTheyWerePutLastAndDamagedOnesGiveNothing) {
   PostgresAccessStore store(stores_->pool());
   const ShareRow share = {
