@@ -73,6 +73,11 @@ absl::Status PostgresPool::Run(const Work& work, Clock::time_point deadline) {
 }
 
 absl::Status PostgresPool::TryUntil(const Work& work, Clock::time_point deadline) {
+  // Of what has waited behind others for too long.
+  if (Clock::now() >= deadline) {
+    return absl::UnavailableError(
+        absl::StrCat("database ", target_.name, ": it did not answer in time; try again later"));
+  }
   for (std::chrono::milliseconds pause = kFirstPause;; pause = std::min(2 * pause, kLongestPause)) {
     PostgresOutcome outcome = PostgresOutcome::kFailed;
     absl::Status status = Try(work, deadline, &outcome);

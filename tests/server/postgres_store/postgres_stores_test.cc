@@ -30,6 +30,7 @@ namespace tissueform::testing {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::AnyOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -320,6 +321,25 @@ TEST_F(PostgresStoresTest, WhoFindsAllConnectionsInUseIsToldSoWhenItsTimeIsOver)
   released.set_value();
   holder.join();
   EXPECT_THAT(pool->Run([](PostgresTransaction&) { return absl::OkStatus(); }), IsOk());
+}
+
+TEST_F(PostgresStoresTest, WhatHasWaitedForTooLongIsNotBegun) {
+  bool called = false;
+  EXPECT_THAT(stores_->pool()->Run(
+                  [&](PostgresTransaction&) {
+                    called = true;
+                    return absl::OkStatus();
+                  },
+                  PostgresPool::Clock::now() - std::chrono::milliseconds(1)),
+              StatusIs(Code::kUnavailable, HasSubstr("in time")));
+  EXPECT_FALSE(called);
+}
+
+TEST_F(PostgresStoresTest, ADatabaseWithoutTlsIsNotTalkedToWhereTlsIsAskedFor) {
+  PostgresOptions options = TestDatabaseOptions();
+  absl::StrAppend(&options.url, "?sslmode=verify-full&sslrootcert=/nowhere.pem");
+  EXPECT_THAT(PostgresStores::Open({.database = options}).status(),
+              StatusIs(Code::kUnavailable, AnyOf(HasSubstr("SSL"), HasSubstr("certificate"))));
 }
 
 TEST_F(PostgresStoresTest, WhatOthersLockOrWhatTakesTooLongIsEnded) {
