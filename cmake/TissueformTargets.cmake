@@ -147,8 +147,11 @@ endfunction()
 # One test program a folder, named core_mesh_test; ctest sees every test of it by itself. The targets tests-server
 # and tests-inputs build the programs with these labels: the server; what reads from outside. FIXTURE: what ctest makes
 # before (tests/client/web).
+#
+# WHOLE PROGRAM ARGUMENTS: the test program is run once, as a whole, by that program, which makes what all its tests need;
+# where it is not installed without it: tests that need it are skipped then.
 function(tissueform_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT;PRECOMPILED;FIXTURE" "SOURCES;DEPS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT;PRECOMPILED;FIXTURE" "SOURCES;DEPS;LABELS;WHOLE" ${ARGN})
   if(NOT ARG_PRECOMPILED)
     set(ARG_PRECOMPILED test)
   endif()
@@ -182,9 +185,25 @@ function(tissueform_test name)
     endif()
     add_dependencies(tests-${label} ${target})
   endforeach()
+  if(ARG_WHOLE)
+    _tissueform_whole_test(${name} "${ARG_WHOLE}" ${properties})
+    return()
+  endif()
   # A parameter is called by its generator's name: its "pretty value" is the bytes of a struct, with addresses.
   gtest_discover_tests(${target} TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST NO_PRETTY_VALUES
                        DISCOVERY_TIMEOUT 60 PROPERTIES ${properties})
+endfunction()
+
+function(_tissueform_whole_test name whole)
+  list(POP_FRONT whole program)
+  find_program(TISSUEFORM_${program} ${program})
+  set(command "$<TARGET_FILE:${name}_test>")
+  if(TISSUEFORM_${program})
+    set(command "${TISSUEFORM_${program}}" ${whole} "${command}")
+  endif()
+  add_test(NAME ${name} COMMAND ${command})
+  # Where every test that needs the program was skipped.
+  set_tests_properties(${name} PROPERTIES ${ARGN} SKIP_REGULAR_EXPRESSION "this program with ${program}")
 endfunction()
 
 function(_tissueform_resolve out)

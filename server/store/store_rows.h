@@ -3,11 +3,13 @@
 
 #pragma once
 
+#include <cstdint>
 #include <set>
 #include <string>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 
 #include "server/store/blob_store.h"
 #include "server/store/database.h"
@@ -25,6 +27,40 @@ namespace tissueform {
 #define TF_SELECT_PREDICTIONS \
   "SELECT key, id, owner, session, positions_sha256, record, case_sha256 FROM predictions "
 #define TF_SELECT_CASES "SELECT key, sha256, owner, record, last_used_s FROM cases "
+
+// What stands in a row, of whatever database: views that live as long as it. Bytes are sealed, and
+// must agree with the columns beside them.
+struct SessionRow {
+  absl::string_view id = {};
+  absl::string_view owner = {};
+  absl::string_view record = {};
+  absl::string_view etag = {};
+  int64_t epoch = 0;
+  int64_t handles = 0;
+  absl::string_view poses = {};
+  int64_t created_s = 0;
+  int64_t last_used_s = 0;
+};
+struct PredictionColumns {
+  absl::string_view id = {};
+  absl::string_view owner = {};
+  absl::string_view session = {};
+  absl::string_view positions_sha256 = {};
+  absl::string_view record = {};
+  absl::string_view case_sha256 = {};
+};
+struct CaseRow {
+  absl::string_view sha256 = {};
+  absl::string_view owner = {};
+  absl::string_view record = {};
+  int64_t last_used_s = 0;
+};
+absl::StatusOr<SessionRecord> SessionAtRestOf(const SessionRow& row);
+absl::StatusOr<SessionRecord> SessionOf(const SessionRow& row);
+absl::StatusOr<MeshRecord> MeshOf(absl::string_view sha256, absl::string_view record,
+                                  int64_t last_used_s);
+absl::StatusOr<PredictionRow> PredictionOf(const PredictionColumns& row);
+absl::StatusOr<CaseRecord> CaseOf(const CaseRow& row);
 
 // At rest: without its poses, which may be damaged alone.
 absl::StatusOr<SessionRecord> ReadSessionAtRest(const Database::Query& row);

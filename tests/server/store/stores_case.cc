@@ -5,36 +5,10 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <utility>
 
 #include "gtest/gtest.h"
 
-#include "server/store/data_folder.h"
-#include "server/store/durable_store.h"
-#include "server/store/in_memory_stores.h"
-
 namespace tissueform {
-namespace {
-
-// A durable store in a folder that goes with it.
-class ScratchDurableStore final : public Stores {
- public:
-  explicit ScratchDurableStore(UnixClock clock)
-      : store_(*DurableStore::Open(*DataFolder::Open(folder_ / "data"),
-                                   {.clock = std::move(clock)})) {}
-
-  SessionStore& sessions() override { return store_->sessions(); }
-  MeshStore& meshes() override { return store_->meshes(); }
-  UploadStore& uploads() override { return store_->uploads(); }
-  PredictionStore& predictions() override { return store_->predictions(); }
-  CaseStore& cases() override { return store_->cases(); }
-
- private:
-  const ScratchFolder folder_;
-  const std::unique_ptr<DurableStore> store_;
-};
-
-}  // namespace
 
 ScratchFolder::ScratchFolder() : ScratchFolder("") {}
 
@@ -47,13 +21,6 @@ ScratchFolder::ScratchFolder(const std::string& parent)
 ScratchFolder::~ScratchFolder() {
   std::error_code ignored;
   std::filesystem::remove_all(path_, ignored);
-}
-
-std::vector<StoresCase> AllStores() {
-  return {{"InMemory", [](UnixClock clock) { return *OpenInMemoryStores(std::move(clock)); }},
-          {"Durable", [](UnixClock clock) {
-             return std::make_unique<ScratchDurableStore>(std::move(clock));
-           }}};
 }
 
 }  // namespace tissueform

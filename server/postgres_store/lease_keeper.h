@@ -1,0 +1,78 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/base/mutex.h"
+#include "server/postgres_store/held_leases.h"
+#include "server/postgres_store/session_leases.h"
+
+namespace tissueform {
+
+// The sessions that this server holds: renews their leases, and knows at any time whether it may
+// answer. A server that cannot renew stops answering before its leases end.
+//
+// Thread-safe.
+class LeaseKeeper {
+ public:
+  struct Options {
+    std::chrono::milliseconds renew_every{3'000};
+    SteadyClock clock = std::chrono::steady_clock::now;
+  };
+  // A session is held no longer: its streams end (SESSION_MOVED), its memory is free. Called once
+  // for each lease that is lost, without a lock held.
+  using LostCallback = std::function<void(const SessionLease&)>;
+
+  // `leases` must outlive it, and be used by nobody else.
+  LeaseKeeper(SessionLeases* leases, Options options, LostCallback lost);
+  // Ends renewing. Leases are not released: see ReleaseAll.
+  ~LeaseKeeper();
+  LeaseKeeper(const LeaseKeeper&) = delete;
+  LeaseKeeper& operator=(const LeaseKeeper&) = delete;
+
+  // A thread renews from now on. Once.
+  void Start();
+
+  // As SessionLeases::Acquire; where it is mine it is kept.
+  absl::StatusOr<LeaseAnswer> Acquire(const std::string& session);
+  absl::Status Release(const std::string& session);
+  // So that others go on at once: at the end of a drain. Errors: the first; tries all.
+  absl::Status ReleaseAll();
+
+  // The epoch to write under; none when the session may not be answered (any longer). Fast.
+  std::optional<int64_t> EpochOf(const std::string& session);
+
+  // What the thread does every `renew_every`. Errors: why nothing was renewed; what ran out
+  // meanwhile is lost all the same.
+  absl::Status Renew();
+
+ private:
+  void Loop();
+  void TellLost(const std::vector<SessionLease>& lost);
+
+  SessionLeases* const leases_;
+  const Options options_;
+  const LostCallback lost_;
+
+  // One call to the store at a time: what it says of all is newer than what is known of any.
+  Mutex calls_;
+  HeldLeases held_;
+
+  Mutex mutex_;
+  ConditionVariable changed_;
+  bool ending_ ABSL_GUARDED_BY(mutex_) = false;
+
+  std::thread thread_;
+};
+
+}  // namespace tissueform

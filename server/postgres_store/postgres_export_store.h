@@ -1,0 +1,27 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/exports/export_store.h"
+#include "server/postgres_store/postgres_pool.h"
+
+namespace tissueform {
+
+// Exports in a PostgreSQL database. `pool` must outlive it.
+class PostgresExportStore final : public ExportStore {
+ public:
+  explicit PostgresExportStore(PostgresPool* pool) : pool_(pool) {}
+
+  absl::StatusOr<std::vector<ExportRecord>> Load() override;
+  absl::Status Put(const ExportRecord& record) override;
+  absl::Status Erase(const std::vector<std::string>& ids) override;
+
+ private:
+  PostgresPool* const pool_;
+};
+
+}  // namespace tissueform

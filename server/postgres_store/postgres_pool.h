@@ -1,0 +1,93 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/base/duration_histogram.h"
+#include "core/base/mutex.h"
+#include "server/postgres_store/postgres_connection.h"
+
+namespace tissueform {
+
+// A few connections to one database, made when they are needed.
+//
+// Thread-safe; must outlive its calls.
+class PostgresPool {
+ public:
+  using Clock = std::chrono::steady_clock;
+  // Reads and writes rows. Called again when another try may do better, so what it leaves outside
+  // the database must be what its last call left.
+  using Work = std::function<absl::Status(PostgresTransaction&)>;
+
+  // Connects once, so that what an operator must change is told at the start: errors are those of
+  // TargetOf and PostgresConnection; FailedPrecondition when the database is a read-only replica,
+  // holds text that is no UTF-8, or answers before it has written (synchronous_commit).
+  static absl::StatusOr<std::unique_ptr<PostgresPool>> Open(const PostgresOptions& options);
+  // Calls that wait are answered UNAVAILABLE.
+  ~PostgresPool();
+
+  // Runs `work` in a transaction. A database that is not there is tried again until `deadline`; a
+  // commit of which nobody knows whether it was kept is not.
+  //
+  // Errors: what `work` says, those of PostgresConnection, and Unavailable (all connections are in
+  // use until then; the database is not there until then, for whatever reason).
+  absl::Status Run(const Work& work) { return Run(work, Clock::now() + options_.patience); }
+  absl::Status Run(const Work& work, Clock::time_point deadline);
+
+  const PostgresOptions& options() const { return options_; }
+  const PostgresTarget& target() const { return target_; }
+  // Of each call of Run.
+  const DurationHistogram& latency() const { return latency_; }
+
+ private:
+  PostgresPool(PostgresOptions options, PostgresTarget target)
+      : options_(std::move(options)), target_(std::move(target)), watch_([this] { Watch(); }) {}
+
+  absl::Status TryUntil(const Work& work, Clock::time_point deadline);
+  absl::Status Try(const Work& work, Clock::time_point deadline, PostgresOutcome* outcome);
+  // A place, with a connection or none.
+  absl::StatusOr<std::unique_ptr<PostgresConnection>> Take(Clock::time_point deadline);
+  void GiveBack(std::unique_ptr<PostgresConnection> connection);
+  // Gives up connections that are not answered.
+  void Watch();
+  // False at the pool's end.
+  bool Pause(std::chrono::milliseconds pause);
+
+  const PostgresOptions options_;
+  const PostgresTarget target_;
+  DurationHistogram latency_;
+
+  Mutex mutex_;
+  ConditionVariable changed_;
+  std::vector<std::unique_ptr<PostgresConnection>> idle_ ABSL_GUARDED_BY(mutex_);
+  std::set<PostgresConnection*> busy_ ABSL_GUARDED_BY(mutex_);
+  int in_use_ ABSL_GUARDED_BY(mutex_) = 0;
+  bool ending_ ABSL_GUARDED_BY(mutex_) = false;
+
+  std::thread watch_;  // last: it uses the others
+};
+
+// What `work` finds.
+template <typename Result>
+absl::StatusOr<Result> AskPool(
+    PostgresPool* pool, const std::function<absl::StatusOr<Result>(PostgresTransaction&)>& work) {
+  absl::StatusOr<Result> result;
+  const absl::Status status = pool->Run([&](PostgresTransaction& transaction) {
+    result = work(transaction);
+    return result.status();
+  });
+  return status.ok() ? std::move(result) : status;
+}
+
+}  // namespace tissueform

@@ -1,0 +1,111 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/postgres_store/postgres_session_leases.h"
+
+#include <array>
+#include <cstdlib>
+#include <utility>
+
+#include "absl/strings/escaping.h"
+#include <sys/random.h>
+
+#include "core/base/status_macros.h"
+#include "server/store/store_errors.h"
+
+namespace tissueform {
+namespace {
+
+std::string RandomHolder() {
+  std::array<char, 16> bytes{};
+  if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) std::abort();
+  return absl::BytesToHexString({bytes.data(), bytes.size()});
+}
+
+}  // namespace
+
+PostgresSessionLeases::PostgresSessionLeases(PostgresPool* pool, std::string node,
+                                             LeaseOptions options, SteadyClock clock)
+    : pool_(pool),
+      node_(std::move(node)),
+      holder_(RandomHolder()),
+      options_(options),
+      clock_(std::move(clock)) {}
+
+// From before it was asked: the database's lease began later, and ends later.
+SessionLease PostgresSessionLeases::LeaseFrom(std::chrono::steady_clock::time_point asked,
+                                              std::string session, int64_t epoch) const {
+  return {.session = std::move(session),
+          .epoch = epoch,
+          .answers_until = asked + options_.duration - options_.margin};
+}
+
+absl::Status PostgresSessionLeases::Run(const PostgresPool::Work& work) {
+  return pool_->Run(work, PostgresPool::Clock::now() + options_.patience);
+}
+
+absl::StatusOr<LeaseAnswer> PostgresSessionLeases::Acquire(const std::string& session) {
+  const auto asked = clock_();
+  LeaseAnswer answer;
+  TF_RETURN_IF_ERROR(Run([&](PostgresTransaction& transaction) -> absl::Status {
+    TF_ASSIGN_OR_RETURN(
+        const PostgresRows taken,
+        transaction.Query(
+            "UPDATE session_states SET epoch = CASE WHEN holder = $2 AND lease_until > "
+            "tissueform_now() THEN epoch ELSE epoch + 1 END, holder = $2, node = $3, lease_until = "
+            "tissueform_now() + $4::bigint * interval '1 millisecond' WHERE key = (SELECT key FROM "
+            "sessions WHERE id = $1) AND (holder = $2 OR lease_until <= tissueform_now()) "
+            "RETURNING "
+            "epoch",
+            {session, holder_, node_, int64_t{options_.duration.count()}}));
+    answer = {};
+    if (!taken.empty()) {
+      answer.mine = true;
+      answer.lease = LeaseFrom(asked, session, taken.Integer(0, 0));
+      return absl::OkStatus();
+    }
+    TF_ASSIGN_OR_RETURN(
+        const PostgresRows held,
+        transaction.Query("SELECT node FROM session_states JOIN sessions ON sessions.key = "
+                          "session_states.key WHERE id = $1",
+                          {session}));
+    if (held.empty()) return NoSession(session);
+    answer.node = std::string(held.Text(0, 0));
+    return absl::OkStatus();
+  }));
+  return answer;
+}
+
+absl::StatusOr<std::vector<SessionLease>> PostgresSessionLeases::Renew() {
+  const auto asked = clock_();
+  std::vector<SessionLease> leases;
+  TF_RETURN_IF_ERROR(Run([&](PostgresTransaction& transaction) -> absl::Status {
+    leases.clear();
+    // Rows are locked by key, rising, as where they are touched.
+    TF_ASSIGN_OR_RETURN(
+        const PostgresRows rows,
+        transaction.Query(
+            "WITH mine AS (SELECT key FROM session_states WHERE holder = $1 AND lease_until > "
+            "tissueform_now() ORDER BY key FOR UPDATE) UPDATE session_states SET lease_until = "
+            "tissueform_now() + $2::bigint * interval '1 millisecond' FROM mine, sessions WHERE "
+            "session_states.key = mine.key AND sessions.key = mine.key RETURNING id, epoch",
+            {holder_, int64_t{options_.duration.count()}}));
+    leases.reserve(rows.size());
+    for (size_t row = 0; row < rows.size(); ++row) {
+      leases.push_back(LeaseFrom(asked, std::string(rows.Text(row, 0)), rows.Integer(row, 1)));
+    }
+    return absl::OkStatus();
+  }));
+  return leases;
+}
+
+absl::Status PostgresSessionLeases::Release(const std::string& session, int64_t epoch) {
+  return Run([&](PostgresTransaction& transaction) {
+    return transaction.Run(
+        "UPDATE session_states SET lease_until = '-infinity' WHERE key = (SELECT key FROM sessions "
+        "WHERE id = $1) AND holder = $2 AND epoch = $3",
+        {session, holder_, epoch});
+  });
+}
+
+}  // namespace tissueform

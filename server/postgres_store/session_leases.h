@@ -1,0 +1,66 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+namespace tissueform {
+
+// Where a server takes the time from that its leases run by. Any thread may call it.
+using SteadyClock = std::function<std::chrono::steady_clock::time_point()>;
+
+struct LeaseOptions {
+  std::chrono::milliseconds duration{10'000};
+  // So long before a lease ends its holder answers no more: for clocks that run apart and for
+  // answers on their way.
+  std::chrono::milliseconds margin{1'000};
+  // What a call waits for the store: less than `duration`, so that there is another try.
+  std::chrono::milliseconds patience{2'000};
+};
+
+// That a session is held, and until when its holder may answer.
+struct SessionLease {
+  std::string session = {};
+  int64_t epoch = 0;  // under which it is written
+  std::chrono::steady_clock::time_point answers_until = {};
+};
+
+// What became of an Acquire.
+struct LeaseAnswer {
+  bool mine = false;
+  SessionLease lease = {};  // where it is mine
+  std::string node = {};    // who holds it otherwise: where clients find the session
+};
+
+// Who of several servers holds a session: one at a time, by a lease on the store's clock. An epoch
+// belongs to one holder: whoever takes a session over gets the next one, and the store refuses
+// writes under any before. A lease that has run out is lost even when nobody has taken the session
+// over; whoever wants it acquires it again.
+//
+// An object of this kind is one holder. Calls block; thread-safe. Errors: what the store says,
+// Unavailable above all; then nothing is known, and Acquire and Renew may be called again: who
+// holds a session already keeps its epoch.
+class SessionLeases {
+ public:
+  virtual ~SessionLeases() = default;
+
+  // Takes a session that nobody holds, or whose lease has run out, under the next epoch; of one
+  // that this holds already the lease begins anew. Errors: NotFound.
+  virtual absl::StatusOr<LeaseAnswer> Acquire(const std::string& session) = 0;
+
+  // The leases of all sessions that this still holds begin anew; returns those. Others are lost.
+  virtual absl::StatusOr<std::vector<SessionLease>> Renew() = 0;
+
+  // Others may take it at once. Nothing happens when it is not held under this epoch any longer.
+  virtual absl::Status Release(const std::string& session, int64_t epoch) = 0;
+};
+
+}  // namespace tissueform

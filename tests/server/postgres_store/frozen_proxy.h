@@ -1,0 +1,44 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <atomic>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/base/mutex.h"
+
+namespace tissueform::testing {
+
+// Stands between a server and a database. Once frozen the connections that there are stay open and
+// nothing comes through them any more; new ones are forwarded.
+class FrozenProxy {
+ public:
+  // To 127.0.0.1 and this port; on a port of its own.
+  explicit FrozenProxy(int port);
+  ~FrozenProxy();
+  FrozenProxy(const FrozenProxy&) = delete;
+  FrozenProxy& operator=(const FrozenProxy&) = delete;
+
+  int port() const { return port_; }
+  void Freeze();
+  int accepted() const { return accepted_; }
+
+ private:
+  void Accept();
+  void Forward(int client, int generation);
+
+  const int database_port_;
+  int listener_ = -1;
+  int port_ = 0;
+  std::atomic<int> generation_ = 0;
+  std::atomic<int> accepted_ = 0;
+  std::atomic<bool> ending_ = false;
+  Mutex mutex_;
+  std::vector<std::thread> threads_ ABSL_GUARDED_BY(mutex_);
+  std::thread accepting_;
+};
+
+}  // namespace tissueform::testing

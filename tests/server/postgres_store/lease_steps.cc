@@ -1,0 +1,132 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "tests/server/postgres_store/lease_steps.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+
+namespace tissueform::testing {
+namespace {
+
+const char* NameOf(LeaseAction action) {
+  switch (action) {
+    case LeaseAction::kAcquire:
+      return "acquires";
+    case LeaseAction::kRenew:
+      return "renews";
+    case LeaseAction::kRelease:
+      return "releases";
+    case LeaseAction::kCommit:
+      return "commits";
+    case LeaseAction::kCommitOld:
+      return "commits under its last epoch";
+    case LeaseAction::kWait:
+      return "time passes";
+  }
+  return "";
+}
+
+std::string ToWords(const LeaseStep& step) {
+  if (step.action == LeaseAction::kWait) return NameOf(step.action);
+  return absl::StrCat(step.server == 0 ? "A " : "B ", NameOf(step.action));
+}
+
+}  // namespace
+
+LeaseSteps AllLeaseSteps() {
+  LeaseSteps steps = {{LeaseAction::kWait, 0}};
+  for (const LeaseAction action :
+       {LeaseAction::kAcquire, LeaseAction::kRenew, LeaseAction::kRelease, LeaseAction::kCommit,
+        LeaseAction::kCommitOld}) {
+    for (const int server : {0, 1}) steps.push_back({action, server});
+  }
+  return steps;
+}
+
+std::string ToString(const LeaseSteps& steps) {
+  std::string words;
+  for (const LeaseStep& step : steps) absl::StrAppend(&words, ToWords(step), "; ");
+  return words;
+}
+
+LeaseServers::LeaseServers(LeaseWorld* world) : world_(world) {
+  for (size_t server : {0, 1}) {
+    keepers_[server] = std::make_unique<LeaseKeeper>(
+        world->leases(static_cast<int>(server)),
+        LeaseKeeper::Options{.clock = [world] { return world->Now(); }},
+        [this, server](const SessionLease&) { until_[server].reset(); });
+  }
+}
+
+std::string LeaseServers::Take(const LeaseStep& step) {
+  const std::string answer = TakeOne(step);  // before it is asked who may answer
+  return absl::StrCat(ToWords(step), ": ", answer, MayAnswer(0) ? " A" : " -",
+                      MayAnswer(1) ? "B" : "-");
+}
+
+std::string LeaseServers::TakeOne(const LeaseStep& step) {
+  const auto server = static_cast<size_t>(step.server);
+  switch (step.action) {
+    case LeaseAction::kAcquire:
+      return Acquire(server);
+    case LeaseAction::kRenew: {
+      const absl::Status status = keepers_[server]->Renew();
+      if (until_[server].has_value()) {
+        until_[server] = world_->Now() + LeaseOptions().duration - LeaseOptions().margin;
+      }
+      return status.ToString();
+    }
+    case LeaseAction::kRelease:
+      until_[server].reset();
+      return keepers_[server]->Release(world_->session()).ToString();
+    case LeaseAction::kCommit:
+      return Commit(step.server, EpochOf(step.server));
+    case LeaseAction::kCommitOld:
+      if (last_epochs_[server] == 0) return "has none";
+      return Commit(step.server, last_epochs_[server]);
+    case LeaseAction::kWait:
+      world_->Wait(kLeaseWait);
+      return "";
+  }
+  return "";
+}
+
+std::string LeaseServers::Acquire(size_t server) {
+  const absl::StatusOr<LeaseAnswer> answer = keepers_[server]->Acquire(world_->session());
+  if (!answer.ok()) return answer.status().ToString();
+  if (!answer->mine) return absl::StrCat("held by ", answer->node);
+  last_epochs_[server] = answer->lease.epoch;
+  until_[server] = answer->lease.answers_until;
+  return absl::StrCat("epoch ", answer->lease.epoch);
+}
+
+std::string LeaseServers::Commit(int server, std::optional<int64_t> epoch) {
+  if (!epoch.has_value()) return "may not";
+  if (!world_->Commit(*epoch)) return absl::StrCat("refused under ", *epoch);
+  commits_.emplace_back(server, *epoch);
+  return absl::StrCat("kept under ", *epoch);
+}
+
+std::string LeaseServers::Knowledge(int64_t epoch,
+                                    std::chrono::steady_clock::time_point now) const {
+  std::string words;
+  for (const size_t server : {0, 1}) {
+    // An old epoch is as bad as an older one.
+    const char* behind = last_epochs_[server] == 0       ? "none"
+                         : last_epochs_[server] == epoch ? "newest"
+                                                         : "old";
+    const int64_t left =
+        !until_[server].has_value()
+            ? -99
+            : std::max<int64_t>(
+                  std::chrono::milliseconds((*until_[server] - now) / std::chrono::milliseconds(1))
+                      .count(),
+                  -1);
+    absl::StrAppend(&words, behind, " ", left, " ");
+  }
+  return words;
+}
+
+}  // namespace tissueform::testing

@@ -1,0 +1,103 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/postgres_store/lease_keeper.h"
+#include "server/postgres_store/session_leases.h"
+#include "tests/server/postgres_store/model_leases.h"
+
+// Two servers that want one session, and everything that they may do with it, in any order.
+namespace tissueform::testing {
+
+enum class LeaseAction {
+  kAcquire,
+  kRenew,
+  kRelease,
+  kCommit,     // as a server does that may answer
+  kCommitOld,  // as one that was stopped goes on with, under the epoch that it had last
+  kWait,
+};
+
+struct LeaseStep {
+  LeaseAction action = LeaseAction::kWait;
+  int server = 0;  // 0 or 1; for kWait nobody's
+};
+using LeaseSteps = std::vector<LeaseStep>;
+
+// Each that there is.
+LeaseSteps AllLeaseSteps();
+std::string ToString(const LeaseSteps& steps);
+
+// After two of them a holder answers no more, but its lease has not run out; after three it has.
+inline constexpr std::chrono::milliseconds kLeaseWait{4'750};
+
+// A store with one session and a clock.
+class LeaseWorld {
+ public:
+  virtual ~LeaseWorld() = default;
+  virtual SessionLeases* leases(int server) = 0;
+  virtual std::string session() const = 0;
+  // Whether a write under this epoch was kept.
+  virtual bool Commit(int64_t epoch) = 0;
+  virtual void Wait(std::chrono::milliseconds duration) = 0;
+  virtual std::chrono::steady_clock::time_point Now() const = 0;
+};
+
+class ModelLeaseWorld final : public LeaseWorld {
+ public:
+  ModelLeaseWorld() { store_.sessions["s"] = {}; }
+
+  SessionLeases* leases(int server) override { return &leases_[static_cast<size_t>(server)]; }
+  std::string session() const override { return "s"; }
+  bool Commit(int64_t epoch) override { return store_.Commits("s", epoch); }
+  void Wait(std::chrono::milliseconds duration) override { store_.now += duration; }
+  std::chrono::steady_clock::time_point Now() const override { return store_.now; }
+
+  const ModelStore::Session& row() const { return store_.sessions.at("s"); }
+
+ private:
+  ModelStore store_;
+  std::array<ModelLeases, 2> leases_ = {ModelLeases(&store_, "A"), ModelLeases(&store_, "B")};
+};
+
+// The servers with what each of them knows.
+class LeaseServers {
+ public:
+  explicit LeaseServers(LeaseWorld* world);
+
+  // What is seen of a step from outside: answers, and who may answer poses then.
+  std::string Take(const LeaseStep& step);
+
+  bool MayAnswer(int server) { return EpochOf(server).has_value(); }
+  // Writes that were kept, as server and epoch, in their order.
+  const std::vector<std::pair<int, int64_t>>& commits() const { return commits_; }
+  // What the servers know, with epochs and times as they differ from these.
+  std::string Knowledge(int64_t epoch, std::chrono::steady_clock::time_point now) const;
+
+ private:
+  std::optional<int64_t> EpochOf(int server) {
+    return keepers_[static_cast<size_t>(server)]->EpochOf(world_->session());
+  }
+  std::string TakeOne(const LeaseStep& step);
+  std::string Acquire(size_t server);
+  std::string Commit(int server, std::optional<int64_t> epoch);
+
+  LeaseWorld* const world_;
+  std::array<std::unique_ptr<LeaseKeeper>, 2> keepers_;
+  std::array<int64_t, 2> last_epochs_ = {0, 0};
+  // Until when each has its lease in mind; nothing when it has none.
+  std::array<std::optional<std::chrono::steady_clock::time_point>, 2> until_ = {};
+  std::vector<std::pair<int, int64_t>> commits_;
+};
+
+}  // namespace tissueform::testing

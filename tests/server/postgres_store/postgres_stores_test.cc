@@ -1,0 +1,461 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/postgres_store/postgres_stores.h"
+
+#include <chrono>
+#include <future>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "server/postgres_store/postgres_access_store.h"
+#include "server/postgres_store/postgres_blobs.h"
+#include "server/postgres_store/postgres_export_store.h"
+#include "server/postgres_store/postgres_schema.h"
+#include "server/store/store_schema.h"
+#include "tests/server/postgres_store/frozen_proxy.h"
+#include "tests/server/postgres_store/test_database.h"
+#include "tests/server/store/store_samples.h"
+#include "tests/server/store/waiting_calls.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform::testing {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::AnyOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using Code = absl::StatusCode;
+
+class PostgresStoresTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    TF_SKIP_WITHOUT_DATABASE();
+    EmptyTestDatabase();
+    stores_ = OpenTestStores();
+  }
+
+  static int64_t Count(const std::string& what) {
+    return RunSql(absl::StrCat("SELECT count(*) FROM ", what)).Integer(0, 0);
+  }
+  // One mesh, of several pieces when it is asked for.
+  std::string PutMesh(int number, int num_vertices = 50) {
+    const MeshPayload payload = SamplePayload(number, num_vertices);
+    const MeshRecord record = RecordOf(payload);
+    EXPECT_THAT(stores_->meshes().Put(record, payload.View()), IsOk());
+    return record.sha256;
+  }
+
+  std::unique_ptr<PostgresStores> stores_;
+};
+
+TEST_F(PostgresStoresTest, WhatOneServerKeepsAnotherFinds) {
+  const auto other = OpenTestStores();
+  ASSERT_OK_AND_ASSIGN(const SessionRecord made,
+                       CreateSession(stores_->sessions(), SampleSession("s", 1)));
+  ASSERT_THAT(CommitPoses(stores_->sessions(), "s", SamplePoses(2)), IsOk());
+  ASSERT_OK_AND_ASSIGN(const SessionRecord found, GetSession(other->sessions(), "s"));
+  EXPECT_EQ(found.etag, made.etag);
+  EXPECT_EQ(SerializePoses(found.last_poses), SerializePoses(SamplePoses(2)));
+  const std::string mesh = PutMesh(1);
+  ASSERT_OK_AND_ASSIGN(const MeshPayload payload, other->meshes().Read(mesh));
+  EXPECT_EQ(payload.View().Sha256(), mesh);
+}
+
+TEST_F(PostgresStoresTest, ALargeBlobIsManyRowsAndIsReadAsItWas) {
+  const std::string mesh = PutMesh(1, 100'000);
+  EXPECT_GT(Count("blob_pieces"), 2);
+  EXPECT_EQ(Count(absl::StrCat("blob_pieces WHERE length(bytes) > ", kBlobPieceBytes)), 0);
+  ASSERT_OK_AND_ASSIGN(const MeshPayload payload, stores_->meshes().Read(mesh));
+  EXPECT_EQ(payload.View().Sha256(), mesh);
+  ASSERT_THAT(stores_->meshes().Delete(mesh), IsOk());
+  EXPECT_EQ(Count("blobs"), 0);
+  EXPECT_EQ(Count("blob_pieces"), 0);
+}
+
+TEST_F(PostgresStoresTest, PiecesThatAreMissingAreWrittenWhenItsBlobComesAgain) {
+  const std::string mesh = PutMesh(1, 100'000);
+  RunSql("DELETE FROM blob_pieces WHERE number = 1;");
+  EXPECT_EQ(PutMesh(1, 100'000), mesh);
+  EXPECT_THAT(stores_->meshes().Read(mesh), IsOk());
+}
+
+struct Damage {
+  const char* name;
+  const char* sql;
+};
+
+class PostgresDamageTest : public PostgresStoresTest,
+                           public ::testing::WithParamInterface<Damage> {};
+
+TEST_P(PostgresDamageTest, ADamagedBlobIsToldOnceSetAsideAndCanComeAgain) {
+  const std::string mesh = PutMesh(1, 100'000);
+  const std::string positions = SamplePositions(1, 200'000);
+  ASSERT_THAT(
+      stores_->predictions().Create(SamplePrediction("p", "planner", "s", 200'000), positions),
+      IsOk());
+  const std::string bytes = SampleCase(1, 3'000'000);
+  const CaseRecord record = CaseRecordOf(bytes);
+  ASSERT_THAT(KeepCase(stores_->cases(), record, bytes), IsOk());
+  RunSql(GetParam().sql);
+  EXPECT_THAT(stores_->meshes().Read(mesh), StatusIs(Code::kDataLoss));
+  EXPECT_THAT(stores_->meshes().Read(mesh), StatusIs(Code::kNotFound));
+  EXPECT_THAT(stores_->predictions().Positions("p"), StatusIs(Code::kDataLoss));
+  EXPECT_THAT(stores_->predictions().Positions("p"), StatusIs(Code::kNotFound));
+  EXPECT_THAT(stores_->cases().Open(record.key(), 0).status(), StatusIs(Code::kDataLoss));
+  EXPECT_THAT(stores_->cases().Open(record.key(), 0).status(), StatusIs(Code::kNotFound));
+  EXPECT_EQ(Count("blobs WHERE sha256 LIKE 'damaged %'"), 3) << "what is left of them stays";
+  EXPECT_EQ(PutMesh(1, 100'000), mesh);
+  EXPECT_THAT(stores_->meshes().Read(mesh), IsOk());
+  ASSERT_THAT(KeepCase(stores_->cases(), record, bytes), IsOk());
+  EXPECT_THAT(ReadWholeCase(stores_->cases(), record.sha256), IsOk());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Damages, PostgresDamageTest,
+    ::testing::Values(
+        Damage{"AFlippedByte",
+               "UPDATE blob_pieces SET bytes = set_byte(bytes, 77, (get_byte(bytes, "
+               "77) + 1) % 256) WHERE number = 1;"},
+        Damage{"AnotherHashToo",
+               "UPDATE blob_pieces SET bytes = set_byte(bytes, 7, 255 - get_byte(bytes, 7)) WHERE "
+               "number = 1; UPDATE blob_pieces SET sha256 = encode(sha256(bytes), 'hex');"},
+        Damage{"APieceIsGone", "DELETE FROM blob_pieces WHERE number = 1;"},
+        Damage{"APieceIsShorter",
+               "UPDATE blob_pieces SET bytes = substr(bytes, 1, 99) WHERE number "
+               "= 0;"},
+        Damage{"PiecesAreExchanged",
+               "UPDATE blob_pieces SET number = 1 - number + 100 WHERE number < 2; UPDATE "
+               "blob_pieces SET number = number - 100 WHERE number > 98;"}),
+    [](const auto& of) { return of.param.name; });
+
+TEST_F(PostgresStoresTest, ADamagedRecordIsToldAndLeftOutOfLists) {
+  ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("a", 1)), IsOk());
+  ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("b", 2)), IsOk());
+  ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("c", 3)), IsOk());
+  RunSql(
+      "UPDATE sessions SET record = set_byte(record, 40, 255 - get_byte(record, 40)) WHERE id = "
+      "'b';");
+  EXPECT_THAT(GetSession(stores_->sessions(), "b"), StatusIs(Code::kDataLoss));
+  SessionStore::ListRequest request{.limit = 1};
+  std::vector<std::string> ids;
+  do {
+    ASSERT_OK_AND_ASSIGN(const SessionStore::Page page, ListSessions(stores_->sessions(), request));
+    for (const SessionRecord& record : page.records) ids.push_back(record.id);
+    request.after = page.next;
+  } while (!request.after.empty());
+  EXPECT_THAT(ids, ElementsAre("a", "c"));
+  RunSql("UPDATE sessions SET owner = 'mallory' WHERE id = 'a';");
+  EXPECT_THAT(GetSession(stores_->sessions(), "a"), StatusIs(Code::kDataLoss))
+      << "a row of another's record is nobody's";
+}
+
+TEST_F(PostgresStoresTest, NamesThatAreNoTextAreRefusedAndOddOnesKept) {
+  EXPECT_THAT(CreateSession(stores_->sessions(), SampleSession(std::string("a\0b", 3), 1)),
+              StatusIs(Code::kInvalidArgument, HasSubstr("UTF-8")));
+  EXPECT_THAT(CreateSession(stores_->sessions(), SampleSession("a\xff", 1)),
+              StatusIs(Code::kInvalidArgument, HasSubstr("UTF-8")));
+  for (const char* odd : {"'; DROP TABLE sessions; --", "Zoë \\ \"", "$1", "%"}) {
+    ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession(odd, 1)), IsOk());
+    ASSERT_OK_AND_ASSIGN(const SessionRecord found, GetSession(stores_->sessions(), odd));
+    EXPECT_EQ(found.id, odd);
+  }
+}
+
+TEST_F(PostgresStoresTest, ServersThatStartAtOnceMakeItsTablesOnce) {
+  stores_.reset();
+  EmptyTestDatabase();
+  std::vector<std::thread> threads;
+  threads.reserve(4);
+  for (int i = 0; i < 4; ++i) {
+    threads.emplace_back([] {
+      EXPECT_THAT(PostgresStores::Open({.database = TestDatabaseOptions()}).status(), IsOk());
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(RunSql("SELECT version FROM tissueform_version").Integer(0, 0), kSchemaVersion);
+}
+
+TEST_F(PostgresStoresTest, TablesOfANewerServerAreLeftAlone) {
+  RunSql("UPDATE tissueform_version SET version = 99;");
+  EXPECT_THAT(PostgresStores::Open({.database = TestDatabaseOptions()}).status(),
+              StatusIs(Code::kFailedPrecondition, AllOf(HasSubstr("newer server (version 99"),
+                                                        HasSubstr("another database"))));
+}
+
+TEST_F(PostgresStoresTest, TablesOfTheVersionBeforeAreBroughtUpToDateWithWhatTheyHold) {
+  ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1)), IsOk());
+  const std::string mesh = PutMesh(1);
+  stores_.reset();
+  RunSql("DROP TABLE exports; UPDATE tissueform_version SET version = 4;");
+  stores_ = OpenTestStores();
+  EXPECT_EQ(RunSql("SELECT version FROM tissueform_version").Integer(0, 0), kSchemaVersion);
+  EXPECT_EQ(Count("exports"), 0);
+  EXPECT_THAT(GetSession(stores_->sessions(), "s"), IsOk());
+  EXPECT_THAT(stores_->meshes().Read(mesh), IsOk());
+}
+
+TEST_F(PostgresStoresTest, AWrongPasswordIsToldAtTheStartWithoutIt) {
+  PostgresOptions options = TestDatabaseOptions();
+  options.password = "hush-hush";
+  EXPECT_THAT(PostgresStores::Open({.database = options}).status(),
+              StatusIs(Code::kFailedPrecondition,
+                       AllOf(HasSubstr("the password file"), Not(HasSubstr("hush")))));
+}
+
+TEST_F(PostgresStoresTest, ADatabaseThatIsNotThereIsUnavailable) {
+  EXPECT_THAT(PostgresStores::Open({.database = TestDatabaseOptions("nowhere")}).status(),
+              StatusIs(Code::kUnavailable, HasSubstr("nowhere")));
+  PostgresOptions options = TestDatabaseOptions();
+  options.url = "postgresql://postgres@127.0.0.1:1/postgres";
+  EXPECT_THAT(PostgresStores::Open({.database = options}).status(),
+              StatusIs(Code::kUnavailable, HasSubstr("postgresql://127.0.0.1:1/postgres")));
+}
+
+TEST_F(PostgresStoresTest, WhatMayNotBeWrittenIsToldToBeReadOnly) {
+  RunSql("ALTER DATABASE postgres SET default_transaction_read_only = on;");
+  auto read_only = PostgresStores::Open({.database = TestDatabaseOptions()});
+  absl::Status status = read_only.status();
+  if (read_only.ok()) {
+    status = CreateSession((*read_only)->sessions(), SampleSession("s", 1)).status();
+  }
+  RunSql(
+      "SET TRANSACTION READ WRITE; ALTER DATABASE postgres RESET default_transaction_read_only;");
+  EXPECT_THAT(status, StatusIs(Code::kFailedPrecondition, HasSubstr("read-only")));
+}
+
+TEST_F(PostgresStoresTest, CallsGoOnWhenTheDatabaseHasEndedTheirConnections) {
+  ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1)), IsOk());
+  for (int round = 0; round < 3; ++round) {
+    RunSql(
+        "SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE application_name = "
+        "'tissueform-server' AND pid <> pg_backend_pid()");
+    EXPECT_THAT(CommitPoses(stores_->sessions(), "s", SamplePoses(round)), IsOk());
+  }
+}
+
+TEST_F(PostgresStoresTest, ACallWaitsForADatabaseThatComesBackAndNotForever) {
+  // A database of its own, whose door the administrator shuts.
+  RunOutsideTransaction("DROP DATABASE IF EXISTS away WITH (FORCE)");
+  RunOutsideTransaction("CREATE DATABASE away");
+  PostgresOptions options = TestDatabaseOptions("away");
+  options.patience = std::chrono::milliseconds(150);
+  const auto hasty = OpenTestStores(SystemUnixSeconds, options);
+  options.patience = std::chrono::seconds(30);
+  const auto patient = OpenTestStores(SystemUnixSeconds, options);
+  ASSERT_THAT(CreateSession(hasty->sessions(), SampleSession("s", 1)), IsOk());
+  RunOutsideTransaction("ALTER DATABASE away ALLOW_CONNECTIONS false");
+  RunSql("SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE datname = 'away'");
+  std::promise<absl::Status> answer;
+  patient->sessions().CommitPoses("s", SamplePoses(5), 1,
+                                  [&](const absl::Status& status) { answer.set_value(status); });
+  EXPECT_THAT(CommitPoses(hasty->sessions(), "s", SamplePoses(4)),
+              StatusIs(Code::kUnavailable, HasSubstr("away")));
+  RunOutsideTransaction("ALTER DATABASE away ALLOW_CONNECTIONS true");
+  EXPECT_THAT(answer.get_future().get(), IsOk());
+  ASSERT_OK_AND_ASSIGN(const SessionRecord found, GetSession(patient->sessions(), "s"));
+  EXPECT_EQ(SerializePoses(found.last_poses), SerializePoses(SamplePoses(5)));
+}
+
+TEST_F(PostgresStoresTest, AConnectionThroughWhichNothingComesIsGivenUpAndTheCallGoesOnOnAnother) {
+  FrozenProxy proxy(TestDatabasePort());
+  PostgresOptions options = TestDatabaseOptions();
+  options.url = absl::StrCat("postgresql://postgres@127.0.0.1:", proxy.port(), "/postgres");
+  options.unanswered_timeout = std::chrono::milliseconds(300);
+  const auto stores = OpenTestStores(SystemUnixSeconds, options);
+  ASSERT_THAT(CreateSession(stores->sessions(), SampleSession("s", 1)), IsOk());
+  const int before = proxy.accepted();
+  proxy.Freeze();
+  EXPECT_THAT(CommitPoses(stores->sessions(), "s", SamplePoses(7)), IsOk());
+  EXPECT_GT(proxy.accepted(), before);
+  ASSERT_OK_AND_ASSIGN(const SessionRecord found, GetSession(stores_->sessions(), "s"));
+  EXPECT_EQ(SerializePoses(found.last_poses), SerializePoses(SamplePoses(7)));
+}
+
+TEST_F(PostgresStoresTest, OfACommitThatIsNotAnsweredNobodyClaimsToKnow) {
+  FrozenProxy proxy(TestDatabasePort());
+  PostgresOptions options = TestDatabaseOptions();
+  options.url = absl::StrCat("postgresql://postgres@127.0.0.1:", proxy.port(), "/postgres");
+  options.unanswered_timeout = std::chrono::milliseconds(300);
+  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
+  int calls = 0;
+  EXPECT_THAT(pool->Run([&](PostgresTransaction& transaction) {
+    ++calls;
+    const absl::Status status =
+        transaction.Execute("INSERT INTO blobs (sha256, bytes) VALUES ('x', 1)");
+    proxy.Freeze();
+    return status;
+  }),
+              StatusIs(Code::kUnavailable, HasSubstr("may have been kept")));
+  EXPECT_EQ(calls, 1) << "it is not tried again";
+}
+
+TEST_F(PostgresStoresTest, WhoFindsAllConnectionsInUseIsToldSoWhenItsTimeIsOver) {
+  PostgresOptions options = TestDatabaseOptions();
+  options.max_connections = 1;
+  options.patience = std::chrono::milliseconds(200);
+  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
+  std::promise<void> begun;
+  std::promise<void> released;
+  std::thread holder([&] {
+    EXPECT_THAT(pool->Run([&](PostgresTransaction&) {
+      begun.set_value();
+      released.get_future().wait();
+      return absl::OkStatus();
+    }),
+                IsOk());
+  });
+  begun.get_future().wait();
+  EXPECT_THAT(pool->Run([](PostgresTransaction&) { return absl::OkStatus(); }),
+              StatusIs(Code::kUnavailable, HasSubstr("all 1 connections")));
+  released.set_value();
+  holder.join();
+  EXPECT_THAT(pool->Run([](PostgresTransaction&) { return absl::OkStatus(); }), IsOk());
+}
+
+TEST_F(PostgresStoresTest, WhatHasWaitedForTooLongIsNotBegun) {
+  bool called = false;
+  EXPECT_THAT(stores_->pool()->Run(
+                  [&](PostgresTransaction&) {
+                    called = true;
+                    return absl::OkStatus();
+                  },
+                  PostgresPool::Clock::now() - std::chrono::milliseconds(1)),
+              StatusIs(Code::kUnavailable, HasSubstr("in time")));
+  EXPECT_FALSE(called);
+}
+
+TEST_F(PostgresStoresTest, ADatabaseWithoutTlsIsNotTalkedToWhereTlsIsAskedFor) {
+  PostgresOptions options = TestDatabaseOptions();
+  absl::StrAppend(&options.url, "?sslmode=verify-full&sslrootcert=/nowhere.pem");
+  EXPECT_THAT(PostgresStores::Open({.database = options}).status(),
+              StatusIs(Code::kUnavailable, AnyOf(HasSubstr("SSL"), HasSubstr("certificate"))));
+}
+
+TEST_F(PostgresStoresTest, WhatOthersLockOrWhatTakesTooLongIsEnded) {
+  PostgresOptions options = TestDatabaseOptions();
+  options.lock_timeout = std::chrono::milliseconds(50);
+  options.statement_timeout = std::chrono::milliseconds(100);
+  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
+  EXPECT_THAT(pool->Run([](PostgresTransaction& transaction) {
+    return transaction.Execute("SELECT pg_sleep(30)");
+  }),
+              StatusIs(Code::kUnavailable, HasSubstr("took too long")));
+  ASSERT_THAT(stores_->pool()->Run([&](PostgresTransaction& transaction) {
+    EXPECT_THAT(transaction.Execute("LOCK TABLE sessions"), IsOk());
+    EXPECT_THAT(pool->Run([](PostgresTransaction& other) {
+      return other.Run("SELECT count(*) FROM sessions", {});
+    }),
+                StatusIs(Code::kUnavailable, HasSubstr("hold the same rows")));
+    return absl::OkStatus();
+  }),
+              IsOk());
+}
+
+TEST_F(PostgresStoresTest, NothingOfAWorkThatFailsIsKept) {
+  EXPECT_THAT(stores_->pool()->Run([](PostgresTransaction& transaction) {
+    EXPECT_THAT(transaction.Execute("INSERT INTO blobs (sha256, bytes) VALUES ('x', 1)"), IsOk());
+    return absl::CancelledError("no");
+  }),
+              StatusIs(Code::kCancelled));
+  EXPECT_EQ(Count("blobs"), 0);
+  EXPECT_THAT(stores_->pool()->Run([](PostgresTransaction& transaction) {
+    return transaction.Run("SELECT nothing", {});
+  }),
+              StatusIs(Code::kInternal, HasSubstr("SQLSTATE 42703")));
+}
+
+struct DatabaseError {
+  const char* name;
+  const char* sqlstate;
+  Code code;
+  const char* told;
+  int calls;  // of the work: more where another try may do better
+};
+
+class PostgresErrorTest : public PostgresStoresTest,
+                          public ::testing::WithParamInterface<DatabaseError> {};
+
+TEST_P(PostgresErrorTest, WhatTheDatabaseSaysIsOneLineWithItsCodeAndWithoutValues) {
+  const DatabaseError& error = GetParam();
+  int calls = 0;
+  const absl::Status status = stores_->pool()->Run([&](PostgresTransaction& transaction) {
+    if (++calls == 2) return absl::OkStatus();
+    return transaction.Execute(absl::StrCat("DO $$ BEGIN RAISE EXCEPTION 'no' USING ERRCODE = '",
+                                            error.sqlstate, "', DETAIL = 'hush'; END $$"));
+  });
+  EXPECT_EQ(calls, error.calls);
+  EXPECT_EQ(status.code(), error.code) << status;
+  EXPECT_THAT(std::string(status.message()),
+              AllOf(HasSubstr(error.told), Not(HasSubstr("hush")), Not(HasSubstr("\n"))));
+  EXPECT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1)), IsOk()) << "calls go on";
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Errors, PostgresErrorTest,
+    ::testing::Values(DatabaseError{"DiskFull", "53100", Code::kResourceExhausted, "make room", 1},
+                      DatabaseError{"ReadOnly", "25006", Code::kFailedPrecondition,
+                                    "read-only replica", 1},
+                      DatabaseError{"NoText", "22021", Code::kInvalidArgument, "UTF-8", 1},
+                      DatabaseError{"TooLong", "57014", Code::kUnavailable, "took too long", 1},
+                      DatabaseError{"Locked", "55P03", Code::kUnavailable, "others hold", 1},
+                      DatabaseError{"Deadlock", "40P01", Code::kOk, "", 2},
+                      DatabaseError{"ShuttingDown", "57P01", Code::kOk, "", 2},
+                      DatabaseError{"ConnectionLost", "08006", Code::kOk, "", 2},
+                      DatabaseError{"AnyOther", "XX000", Code::kInternal, "SQLSTATE XX000", 1}),
+    [](const auto& of) { return of.param.name; });
+
+TEST_F(PostgresStoresTest, AccessRowsAreKeptAsTheyWerePutLastAndDamagedOnesGiveNothing) {
+  PostgresAccessStore store(stores_->pool());
+  const ShareRow share = {
+      .resource = "sessions/a", .owner = "ann", .principal = "bob", .role = ShareRole::kPlanner};
+  ShareRow viewer = share;
+  viewer.role = ShareRole::kViewer;
+  const FollowLinkRow link = {.digest = std::string(64, 'd'), .session = "a", .maker = "ann"};
+  const MeshRight right = {.principal = "ann", .sha256 = std::string(64, 'e'), .bytes = 12};
+  const auto change = [&](AccessRows erase, AccessRows put) {
+    return WaitFor<absl::Status>([&](auto done) { store.Change(erase, put, done); });
+  };
+  ASSERT_THAT(change({}, {.shares = {viewer}, .links = {link}, .mesh_rights = {right}}), IsOk());
+  ASSERT_THAT(change({.links = {link}}, {.shares = {share}}), IsOk());
+  ASSERT_OK_AND_ASSIGN(AccessRows rows, store.Load());
+  EXPECT_THAT(rows.shares, ElementsAre(share));
+  EXPECT_THAT(rows.links, IsEmpty());
+  EXPECT_THAT(rows.mesh_rights, ElementsAre(right));
+  RunSql("UPDATE shares SET record = set_byte(record, 40, 255 - get_byte(record, 40));");
+  ASSERT_OK_AND_ASSIGN(rows, store.Load());
+  EXPECT_THAT(rows.shares, IsEmpty());
+  EXPECT_THAT(rows.mesh_rights, ElementsAre(right));
+}
+
+TEST_F(PostgresStoresTest, ExportsAreKeptAsTheyWerePutLastAndDamagedOnesPassedOver) {
+  PostgresExportStore store(stores_->pool());
+  const ExportRecord a = {.id = "a", .prediction = "p", .owner = "ann", .detail = "1"};
+  ExportRecord b = {.id = "b", .prediction = "q", .owner = "bob", .measures = "m"};
+  ASSERT_THAT(store.Put(b), IsOk());
+  ASSERT_THAT(store.Put(a), IsOk());
+  b.state = ExportState::kStored;
+  b.version = 2;
+  ASSERT_THAT(store.Put(b), IsOk());
+  ASSERT_OK_AND_ASSIGN(std::vector<ExportRecord> records, store.Load());
+  EXPECT_THAT(records, ElementsAre(a, b));
+  ASSERT_THAT(store.Erase({"a", "nothing"}), IsOk());
+  ASSERT_OK_AND_ASSIGN(records, store.Load());
+  EXPECT_THAT(records, ElementsAre(b));
+  RunSql("UPDATE exports SET record = set_byte(record, 40, 255 - get_byte(record, 40));");
+  ASSERT_OK_AND_ASSIGN(records, store.Load());
+  EXPECT_THAT(records, IsEmpty());
+}
+
+}  // namespace
+}  // namespace tissueform::testing
