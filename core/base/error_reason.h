@@ -51,6 +51,8 @@ enum class ErrorReason {
   kAuditNotWritten,
   kExportNotFound,
   kTooManyExports,
+  kSessionMoved,
+  kWrongNode,
   // Of a code, where nothing more was said.
   kInvalidRequest,
   kNotFound,

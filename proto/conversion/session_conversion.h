@@ -19,6 +19,9 @@ namespace tissueform {
 
 // The header by which a proxy sends the calls of one session to one server: the session's id.
 inline constexpr char kSessionHeader[] = "x-tissueform-session";
+// The header by which a server of a cluster says its name in every reply, and a client has a proxy
+// send the calls of a session to the server that holds it.
+inline constexpr char kNodeHeader[] = "x-tissueform-node";
 
 // "sessions/{id}" from the id and back. Errors: InvalidArgument.
 std::string SessionName(absl::string_view id);
