@@ -15,6 +15,7 @@
 
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
+#include "proto/conversion/session_conversion.h"
 #include "server/auth/identity.h"
 #include "server/calls/client_address.h"
 #include "server/calls/status_conversion.h"
@@ -46,6 +47,22 @@ Credentials CredentialsOf(const grpc::CallbackServerContext* context) {
     credentials.certificate_names.emplace_back(name.data(), name.size());
   }
   return credentials;
+}
+
+// Says in the reply which server of the cluster answers. Errors: a call that is meant for another
+// one; what it names goes nowhere from here.
+absl::Status MeetNode(const std::string& node_name, grpc::CallbackServerContext* context) {
+  if (node_name.empty() || context == nullptr) return absl::OkStatus();
+  context->AddInitialMetadata(kNodeHeader, node_name);
+  context->AddTrailingMetadata(kNodeHeader, node_name);
+  const auto [begin, end] = context->client_metadata().equal_range(kNodeHeader);
+  if (std::all_of(begin, end, [&](const auto& header) { return header.second == node_name; })) {
+    return absl::OkStatus();
+  }
+  return WithReason(
+      absl::UnavailableError(
+          absl::StrCat("the header ", kNodeHeader, " names another server; call again without it")),
+      ErrorReason::kWrongNode);
 }
 
 // As the W3C has it: "00-", 32 hexadecimal digits, "-", 16, "-", 2. Others go to no log.
@@ -98,8 +115,8 @@ std::string RequestIdOr(std::string_view from_client) {
   return well_formed ? std::string(from_client) : RandomId();
 }
 
-CallScope::CallScope(const grpc::CallbackServerContext* context, std::string_view method,
-                     CallKind kind, ServiceGate* gate)
+CallScope::CallScope(grpc::CallbackServerContext* context, std::string_view method, CallKind kind,
+                     ServiceGate* gate)
     : method_(method),
       kind_(kind),
       gate_(gate),
@@ -110,8 +127,9 @@ CallScope::CallScope(const grpc::CallbackServerContext* context, std::string_vie
       traceparent_(TraceparentOr(Header(context, "traceparent"))),
       admission_(Admit(context)) {}
 
-absl::Status CallScope::Admit(const grpc::CallbackServerContext* context) {
+absl::Status CallScope::Admit(grpc::CallbackServerContext* context) {
   gate_->Enter();
+  TF_RETURN_IF_ERROR(MeetNode(gate_->checks().node_name, context));
   if (gate_->checks().authenticator != nullptr) {
     TF_ASSIGN_OR_RETURN(authenticated_,
                         gate_->checks().authenticator->Authenticate(CredentialsOf(context)));

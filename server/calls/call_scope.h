@@ -30,6 +30,8 @@ struct CallChecks {
   CallObserver* observer = nullptr;
   CallQuotas* quotas = nullptr;   // not of who is anonymous
   std::string gateway_name = {};  // see ClientAddress
+  // What this server is called in its cluster (kNodeHeader); empty: there is none.
+  std::string node_name = {};
 };
 
 // What stands before every call: who makes it, who is told of it, how many a principal may make,
@@ -78,19 +80,22 @@ inline constexpr std::chrono::milliseconds kStandingPeriod{500};
 //
 // Logs method, code, duration and request id, and nothing else that came from the client: names and
 // messages may identify a patient. One thread at a time.
+//
+// In a cluster it says the server's name in initial and trailing metadata of every reply, and
+// refuses a call that is meant for another server, before anything else is asked of it.
 class CallScope {
  public:
-  // `method` ("MeshService.GetMesh") and `gate` must outlive the scope. `context` is read here and
-  // not kept; null where there is no network: a call without headers.
-  CallScope(const grpc::CallbackServerContext* context, std::string_view method, CallKind kind,
+  // `method` ("MeshService.GetMesh") and `gate` must outlive the scope. `context` is read and given
+  // metadata here and not kept; null where there is no network: a call without headers.
+  CallScope(grpc::CallbackServerContext* context, std::string_view method, CallKind kind,
             ServiceGate* gate);
   // Of a scope that was not ended: the call is over all the same, and the log says so.
   ~CallScope();
   CallScope(CallScope&& other) noexcept;
   CallScope& operator=(CallScope&&) = delete;
 
-  // OK, or why the call is not served: Unavailable, Unauthenticated, ResourceExhausted (a quota),
-  // or what the gate's may_call and the observer say.
+  // OK, or why the call is not served: Unavailable (WRONG_NODE, draining), Unauthenticated,
+  // ResourceExhausted (a quota), or what the gate's may_call and the observer say.
   const absl::Status& admission() const { return admission_; }
   const Principal& principal() const { return *authenticated_.principal; }
   const Authenticated& authenticated() const { return authenticated_; }
@@ -118,7 +123,7 @@ class CallScope {
  private:
   ObservedCall Observed() const;
   void TellEnd(const absl::Status& outcome);
-  absl::Status Admit(const grpc::CallbackServerContext* context);
+  absl::Status Admit(grpc::CallbackServerContext* context);
 
   std::string_view method_;
   CallKind kind_;
