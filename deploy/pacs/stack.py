@@ -305,10 +305,11 @@ backend orthanc
         """Names of the cases that the server has."""
         return re.findall(r"cases/[0-9a-f]{64}", self.tissueform("case", "list").stdout)
 
-    def predict(self, case, title="Jaw forward"):
-        """A prediction of the case at the plan's own poses, as the planner makes one; its name."""
+    def predict(self, case, title="Jaw forward", model=None):
+        """A prediction of the case at the plan's own poses, by the plan's model or another, as the planner makes one; its name."""
         plan = next((self.folder / "bridge").rglob("plan.json"))
-        made = self.tissueform("prediction", "create", plan, "--case", case, "--title", title)
+        chosen = [] if model is None else ["--model", model]
+        made = self.tissueform("prediction", "create", plan, "--case", case, "--title", title, *chosen)
         found = re.search(r"^predictions/\S+", made.stdout, re.MULTILINE)
         if found is None:
             raise SystemExit(f"no prediction: {made.stdout}{made.stderr}")

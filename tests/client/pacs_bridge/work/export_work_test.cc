@@ -54,8 +54,9 @@ class BridgeWorkTest : public ::testing::Test {
     fs::create_directories(root_ / "pacs");
     server_ = std::make_unique<testing::FolderCaseServer>(root_ / "server");
     pacs_ = std::make_unique<testing::FolderPacs>(root_ / "pacs");
-    work_ = std::make_unique<ExportWork>(queue_.get(), server_.get(), pacs_.get(), &writer_,
-                                         ExportWorkOptions());
+    ExportWorkOptions work;
+    work.warn = [this](const std::string& line) { warnings_.push_back(line); };
+    work_ = std::make_unique<ExportWork>(queue_.get(), server_.get(), pacs_.get(), &writer_, work);
     SeriesIntakeOptions options;
     options.rules = {SmallRule()};
     options.quiet = std::chrono::seconds(30);
@@ -145,6 +146,7 @@ class BridgeWorkTest : public ::testing::Test {
   std::unique_ptr<testing::FolderCaseServer> server_;
   std::unique_ptr<testing::FolderPacs> pacs_;
   testing::HeaderWriter writer_;
+  std::vector<std::string> warnings_;
   std::unique_ptr<ExportWork> work_;
   std::chrono::steady_clock::time_point now_ = std::chrono::steady_clock::now();
   int64_t count_ = -1;  // what the PACS counts; -1: it cannot be asked
@@ -220,6 +222,16 @@ TEST_F(BridgeWorkTest, TheChoiceWaitsForAllSeriesOfTheStudy) {
   EXPECT_EQ(StateOf(second), SeriesState::kChosen);
 }
 
+TEST_F(BridgeWorkTest, AChoiceIsToldOnce) {
+  const testing::CtSeries series = Receive("a");
+  WaitQuietly();
+  ASSERT_OK_AND_ASSIGN(const std::vector<std::string> changed, intake_->Settle());
+  ASSERT_EQ(StateOf(series), SeriesState::kChosen);
+  EXPECT_EQ(changed.size(), 1);
+  ASSERT_OK_AND_ASSIGN(const std::vector<std::string> again, intake_->Settle());
+  EXPECT_TRUE(again.empty());
+}
+
 TEST_F(BridgeWorkTest, TwoPatientsOfOneSeriesAreNobodys) {
   testing::CtSeriesOptions one;
   one.study_uid = "1.2.840.1";
@@ -255,6 +267,63 @@ TEST_F(BridgeWorkTest, AnExportGoesToThePacsAfterAPersonsWord) {
   EXPECT_EQ(Stored().size(), 4);
   EXPECT_THAT(Updates(), Contains("exports/1 EXPORT_STATE_STORED 4 "));
   EXPECT_FALSE(fs::exists(queue_->object_folder(exports_.Get("exports/1")->key)));
+}
+
+TEST_F(BridgeWorkTest, ABandThatCannotBeToldIsSaidAndTheReportGoesWithoutIt) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  server_->band = absl::InvalidArgumentError("ranges: 3 tets of 16");
+  Ask("exports/1", series);
+  Confirm("exports/1");
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kTold);
+  EXPECT_THAT(warnings_, ::testing::ElementsAre(
+                             HasSubstr("without its band of uncertainty: ranges: 3 tets of 16")));
+}
+
+TEST_F(BridgeWorkTest, ABandThatIsNotKnownIsNoReasonToWarn) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  Ask("exports/1", series);
+  Confirm("exports/1");
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_TRUE(warnings_.empty());
+}
+
+TEST_F(BridgeWorkTest, AServerWithoutRoomForABandIsAskedSomeTimesAndNotForever) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  server_->band = absl::ResourceExhaustedError("no memory");
+  Ask("exports/1", series);
+  Confirm("exports/1");
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_THAT(Work("exports/1"), StatusIs(absl::StatusCode::kResourceExhausted));
+  }
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kTold);
+  EXPECT_THAT(warnings_, ::testing::ElementsAre(HasSubstr("no memory")));
+}
+
+TEST_F(BridgeWorkTest, APredictionOfAnotherMeshIsRefused) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  server_->mesh = "meshes/another";
+  Ask("exports/1", series);
+  Confirm("exports/1");
+  EXPECT_THAT(Work("exports/1"),
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("another mesh")));
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kFailed);
+  EXPECT_TRUE(Stored().empty());
+  EXPECT_THAT(Updates(), Contains(HasSubstr("FAILED 0 the prediction is of another mesh")));
+}
+
+TEST_F(BridgeWorkTest, WhatIsDrawnOfAnExportThatHasFailedMeanwhileIsRemoved) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  Ask("exports/1", series);
+  const QueuedExport asked = *exports_.Get("exports/1");
+  Confirm("exports/1");
+  pacs_->headers.clear();
+  EXPECT_FALSE(Work("exports/1").ok());
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_THAT(work_->Draw(asked), IsOk());
+  EXPECT_FALSE(fs::exists(queue_->object_folder(asked.key)));
 }
 
 TEST_F(BridgeWorkTest, ACaseOfAnotherBridgeIsLeftToIt) {
