@@ -18,8 +18,8 @@ namespace {
 
 PacsPeer PeerOf(const BridgeOptions& options) {
   PacsPeer peer = options.pacs;
-  peer.name = "the PACS";
   peer.kind = peer.url.empty() ? PacsPeer::Kind::kDimse : PacsPeer::Kind::kDicomWeb;
+  peer.name = peer.url.empty() ? peer.ae_title : "DICOMweb";
   peer.own_ae_title = options.receiver.ae_title;
   const bool web_with_files = !peer.url.empty() && !options.tls.authorities.empty();
   if (peer.tls.has_value() || web_with_files) peer.tls = options.tls;

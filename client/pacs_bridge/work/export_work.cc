@@ -214,8 +214,10 @@ absl::Status ExportWork::Draw(const QueuedExport& queued) {
   absl::Status status;
   {
     MutexLock lock(drawing_);
-    status = EnsurePictures(material);
-    status.Update(BandOf(queued, material).status());
+    // The band first: who sees the pictures may confirm at once, and then nothing is left to wait
+    // for.
+    status = BandOf(queued, material).status();
+    status.Update(EnsurePictures(material));
   }
   // It may have failed meanwhile, and whoever told so has removed the folder.
   const absl::StatusOr<QueuedExport> now = rows_.Get(queued.name);
