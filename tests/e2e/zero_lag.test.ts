@@ -118,7 +118,7 @@ describe("on a line with delay", () => {
           const told = owner[name];
           owner[name] = (...words: unknown[]) => {
             told(...words);
-            if (wanted(words[0])) done(Array.from(bench.displacements as Float32Array));
+            if (wanted(words[0])) done(Array.from(bench.newest.displacements as Float32Array));
           };
         });
       const sent = () => bench.local.posesSinceTold === 0;
