@@ -211,6 +211,15 @@ describe("the bundled head", () => {
       return Math.max(...bench.bandOf(skin));
     });
     expect(widths).toBeGreaterThan(0.05);
+    await page.locator(".store button").click();
+    await page.getByRole("button", { name: /^Compare / }).click();
+    await page.getByText("The face that is shown is not the plan’s.").waitFor();
+    const stored = page.locator("[data-measure=e_line_lower_lip] .band");
+    await expect.poll(() => stored.innerText()).toMatch(/ to /);
+    await page.getByLabel("From one to the other").fill("0.5");
+    await page.getByText("no band of it is known").waitFor();
+    await page.getByText("Back to the plan").click();
+    await stored.waitFor();
     await open(page, "Report");
     await page.getByRole("button", { name: "Open the report" }).click();
     await page.getByRole("row", { name: "Lower lip to E-line" }).getByText(/\d to /).waitFor();

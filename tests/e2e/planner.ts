@@ -227,7 +227,7 @@ export function state(page: Page) {
       drawn: view.stage.drawnCount as number,
       session: bench.live.session as string,
       followers: bench.followers.value as number,
-      legend: bench.legend.value as { title: string; mostMm: number; largestMm: number } | null,
+      legend: bench.map.legend.value as { title: string; mostMm: number; largestMm: number } | null,
       matrix: Array.from(view.head.surfaces.find((s: any) => s.source.entry.handle === "mandible").mesh.matrix.elements) as number[],
     };
   });

@@ -99,6 +99,11 @@ export class LocalAnswers {
     this.host?.ask(poses, this.asked);
   }
 
+  /** The band of other poses than those of the hand, of every vertex, mm; null where the columns know none. */
+  bandAt(poses: readonly Pose[]): Promise<Float32Array | null> {
+    return this.host?.bandAt(poses) ?? Promise.resolve(null);
+  }
+
   /** The columns that the page answers by, as they travel; null where it has none. */
   get heldColumns(): Uint8Array<ArrayBuffer> | null {
     return this.columns === null ? null : this.columns.bytes.slice();
