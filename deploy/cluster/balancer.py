@@ -85,12 +85,14 @@ def view(cluster):
     return {row["svname"]: row["status"] for row in rows if row["svname"] not in ("FRONTEND", "BACKEND")}
 
 
-def wait_until_routing(cluster):
-    """Until it holds all servers and gateways that run for up."""
-    end = time.monotonic() + PATIENCE_S
+def wait_until_routing(cluster, patience_s=PATIENCE_S, needed=None):
+    """Until it holds all servers and gateways for up, or `needed` servers."""
+    end = time.monotonic() + patience_s
     while time.monotonic() < end:
         seen = view(cluster)
-        if all(seen.get(name, "").startswith("UP") for name in (*cluster.nodes, *cluster.gateways)):
+        wanted = (*cluster.nodes, *cluster.gateways) if needed is None else cluster.nodes
+        up = [name for name in wanted if seen.get(name, "").startswith("UP")]
+        if len(up) >= (len(wanted) if needed is None else needed):
             return
-        time.sleep(0.1)
+        time.sleep(0.05)
     raise SystemExit(f"HAProxy does not find all servers: {view(cluster)}; see {cluster.log(stack.HAPROXY)}")
