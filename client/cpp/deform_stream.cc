@@ -47,6 +47,7 @@ absl::Status DeformStream::Start(v1::DeformService::Stub* stub, const std::strin
         "the stream did not begin with `started`; the server speaks another version");
   }
   started_ = std::move(*response.mutable_started());
+  node_ = NodeOf(context_);
   if (token != nullptr) {
     renewal_ = std::make_unique<TokenRenewal>(token, std::move(used), [this](const auto& renewed) {
       v1::DeformRequest renewal;

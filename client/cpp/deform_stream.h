@@ -49,6 +49,9 @@ class DeformStream {
   // What the server said when the stream began: number of vertices a frame, and which.
   const v1::DeformStarted& started() const { return started_; }
 
+  // The server of a cluster that answers; empty: it is of none.
+  const std::string& node() const { return node_; }
+
   // `sequence` must rise from call to call. With `commit` the server keeps the poses, and a notice
   // says when it has. An error means that the stream has ended; Finish says why.
   absl::Status SendPoses(uint64_t sequence, absl::Span<const NamedPose> poses, bool commit = false);
@@ -93,6 +96,7 @@ class DeformStream {
   // Constant after Start.
   std::function<void(const v1::DeformNotice&)> on_notice_;
   v1::DeformStarted started_;
+  std::string node_;
   std::unique_ptr<Call> call_;
 
   Mutex send_mutex_;

@@ -108,6 +108,7 @@ absl::Status ReattachingStream::Reattach(absl::Status why) {
 void ReattachingStream::Adopt(std::unique_ptr<DeformStream> stream) {
   MutexLock lock(mutex_);
   stream_ = std::move(stream);
+  node_ = stream_->node();
   // In their order; the last one sent is the newest.
   if (uncommitted_.has_value() && uncommitted_->sequence < newest_->sequence) {
     stream_->SendPoses(uncommitted_->sequence, uncommitted_->poses, true).IgnoreError();
@@ -129,6 +130,11 @@ absl::Status ReattachingStream::Finish() {
 std::optional<uint64_t> ReattachingStream::last_committed() const {
   MutexLock lock(mutex_);
   return last_committed_;
+}
+
+std::string ReattachingStream::node() const {
+  MutexLock lock(mutex_);
+  return node_;
 }
 
 }  // namespace tissueform

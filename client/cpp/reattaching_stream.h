@@ -65,6 +65,8 @@ class ReattachingStream {
   // Of the poses that are committed the last one; empty: none.
   std::optional<uint64_t> last_committed() const;
   int reattachments() const { return reattachments_; }
+  // The server of a cluster that answers now, or did last.
+  std::string node() const;
 
  private:
   struct SentPose {
@@ -99,6 +101,7 @@ class ReattachingStream {
   mutable Mutex mutex_;
   // Replaced by the receiving thread alone, which reads from it without the lock.
   std::shared_ptr<DeformStream> stream_ ABSL_GUARDED_BY(mutex_);
+  std::string node_ ABSL_GUARDED_BY(mutex_);
   std::optional<SentPose> newest_ ABSL_GUARDED_BY(mutex_);
   std::optional<SentPose> uncommitted_ ABSL_GUARDED_BY(mutex_);  // the newest that waits for it
   std::optional<uint64_t> last_committed_ ABSL_GUARDED_BY(mutex_);

@@ -36,6 +36,7 @@ absl::Status WatchStream::Start(const std::string& session) {
         "the watch did not begin with `started`; the server speaks another version");
   }
   name_ = response.started().watch();
+  node_ = NodeOf(context_);
   form_ = std::move(*response.mutable_started()->mutable_form());
   return absl::OkStatus();
 }

@@ -36,6 +36,8 @@ class WatchStream {
   // (DecodePositions of geometry_conversion.h reads them). Of the receiving thread.
   const v1::WatchForm& form() const { return form_; }
   const std::string& name() const { return name_; }
+  // The server of a cluster that answers; empty: it is of none.
+  const std::string& node() const { return node_; }
 
   // Blocks until the next frame; the first one is there at once. Empty when the watch has ended;
   // Finish says how.
@@ -64,7 +66,8 @@ class WatchStream {
   const Options options_;
   grpc::ClientContext context_;  // self-synchronised
   std::unique_ptr<grpc::ClientReader<v1::WatchResponse>> call_;
-  std::string name_;  // constant after Start
+  std::string name_;  // constant after Start, as the next
+  std::string node_;
   v1::WatchForm form_;
   bool finished_ = false;
 };
