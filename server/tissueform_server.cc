@@ -217,6 +217,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
   SetBlasThreads(1);  // the pool's workers share the cores already
   registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
     telemetry_->session_events().Count(event);
+    streams_.OnSessionEvent(id, event);
     watches_.OnSessionEvent(id, event);
   });
   catalog_.set_on_removed(
