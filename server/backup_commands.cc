@@ -11,26 +11,30 @@
 #include "core/base/status_macros.h"
 #include "server/backup/back_up.h"
 #include "server/backup/restore_backup.h"
-#include "server/store/data_folder.h"
+#include "server/open_stores.h"
 
 namespace tissueform {
 namespace {
 
-absl::StatusOr<std::string> DataFolderOf(const ServerOptions& options) {
+absl::StatusOr<std::string> FolderToBackUp(const ServerOptions& options) {
   if (options.in_memory) {
     return absl::InvalidArgumentError("with --in-memory nothing is kept: name a --data-dir");
   }
-  if (!options.data_dir.empty()) return options.data_dir;
-  return DefaultDataFolder();
+  if (options.cluster.enabled()) {
+    return absl::InvalidArgumentError(
+        "this is for data folders; back a --store up with pg_dump --format=custom, and restore it "
+        "with pg_restore");
+  }
+  return DataFolderOf(options);
 }
 
 absl::StatusOr<BackupSummary> BackUpAll(const ServerOptions& options, const std::string& backup) {
-  TF_ASSIGN_OR_RETURN(const std::string folder, DataFolderOf(options));
+  TF_ASSIGN_OR_RETURN(const std::string folder, FolderToBackUp(options));
   return BackUp(folder, backup);
 }
 
 absl::StatusOr<BackupSummary> RestoreAll(const ServerOptions& options, const std::string& backup) {
-  TF_ASSIGN_OR_RETURN(const std::string folder, DataFolderOf(options));
+  TF_ASSIGN_OR_RETURN(const std::string folder, FolderToBackUp(options));
   return RestoreBackup(backup, folder);
 }
 

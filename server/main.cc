@@ -18,6 +18,7 @@
 
 #include "core/base/freed_memory.h"
 #include "server/backup_commands.h"
+#include "server/migrate_command.h"
 #include "server/monitoring/log_lines.h"
 #include "server/program/program_options.h"
 #include "server/program/systemd_notices.h"
@@ -89,8 +90,10 @@ int main(int argc, char** argv) {
   tissueform::ServerOptions options = tissueform::ServerOptions::Defaults();
   tissueform::AddServerOptions(app, &options);
   const tissueform::BackupCommands commands(app, &options);
+  const tissueform::MigrateCommand migrate(app);
   if (const std::optional<int> end = tissueform::ParseProgramOptions(app, argc, argv)) return *end;
   if (const std::optional<int> end = commands.Run()) return *end;
+  if (const std::optional<int> end = migrate.Run()) return *end;
   spdlog::set_default_logger(spdlog::stderr_color_mt("tissueform"));
   spdlog::set_level(spdlog::level::from_str(options.log_level));
   tissueform::SetLogFormat(options.telemetry.log_format);

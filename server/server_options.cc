@@ -161,12 +161,14 @@ void AddServerOptions(CLI::App& app, ServerOptions* options) {
   options->in_memory = false;
   CLI::Option* in_memory = app.add_flag("--in-memory", options->in_memory,
                                         "keep nothing: meshes and sessions end with the server");
-  app.add_option(
-         "--data-dir", options->data_dir,
-         "folder of its own in which the server keeps what it has acknowledged, on a disk of "
-         "this machine (default: $XDG_STATE_HOME/tissueform, or ~/.local/state/tissueform)")
-      ->type_name("DIR")
-      ->excludes(in_memory);
+  CLI::Option* data_dir =
+      app.add_option(
+             "--data-dir", options->data_dir,
+             "folder of its own in which the server keeps what it has acknowledged, on a disk of "
+             "this machine (default: $XDG_STATE_HOME/tissueform, or ~/.local/state/tissueform)")
+          ->type_name("DIR")
+          ->excludes(in_memory);
+  AddClusterOptions(app, &options->cluster, data_dir, in_memory);
   AddTokenOptions(app, &options->tokens);
   AddLimits(app, options);
   AddQuotas(app, &options->quotas);

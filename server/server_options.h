@@ -11,6 +11,7 @@
 
 #include "server/access/access_options.h"
 #include "server/auth/token_options.h"
+#include "server/cluster/cluster_options.h"
 #include "server/exports/export_book.h"
 #include "server/session/limits.h"
 #include "server/session/quotas.h"
@@ -36,6 +37,7 @@ struct ServerOptions {
   // it is told otherwise.
   bool in_memory = true;
   std::string data_dir;  // empty: DefaultDataFolder
+  ClusterOptions cluster = {};
   std::string log_level = "info";
   TokenOptions tokens = {};
   TelemetryOptions telemetry = {};

@@ -21,9 +21,6 @@
 #include "server/access/access_watch_stores.h"
 #include "server/library_logs.h"
 #include "server/monitoring/process_metrics.h"
-#include "server/store/data_folder.h"
-#include "server/store/durable_store.h"
-#include "server/store/in_memory_stores.h"
 #include "server/telemetry/server_metrics.h"
 #include "server/transport/network_address.h"
 #include "server/transport/tls_credentials.h"
@@ -96,8 +93,8 @@ int64_t MemoryQuota(const ServerOptions& options) {
 NamedLimits LimitsOf(const ServerOptions& options) {
   const auto& [host, port, tls, memory_budget_bytes, workers, service, quotas,
                max_calls_per_connection, max_connections, max_connections_per_address,
-               drain_deadline, in_memory, data_dir, log_level, tokens, telemetry, access, exports] =
-      options;
+               drain_deadline, in_memory, data_dir, cluster, log_level, tokens, telemetry, access,
+               exports] = options;
   NamedLimits limits = ToNamedLimits(service);
   limits["quota_calls_per_second"] = quotas.calls_per_second;
   limits["quota_waiting_calls"] = quotas.waiting_calls;
@@ -123,22 +120,6 @@ NamedLimits LimitsOf(const ServerOptions& options) {
   return limits;
 }
 
-absl::StatusOr<std::unique_ptr<Stores>> OpenStores(const ServerOptions& options) {
-  if (options.in_memory) return OpenInMemoryStores();
-  std::string path = options.data_dir;
-  if (path.empty()) {
-    TF_ASSIGN_OR_RETURN(path, DefaultDataFolder());
-  }
-  TF_ASSIGN_OR_RETURN(DataFolder folder, DataFolder::Open(path));
-  TF_ASSIGN_OR_RETURN(std::unique_ptr<DurableStore> store, DurableStore::Open(std::move(folder)));
-  for (const DamagedItem& item : store->damaged()) {
-    spdlog::error(
-        "damaged: {}: {}; {}", item.what, item.why,
-        item.set_aside.empty() ? "nothing of it is left" : "set aside as " + item.set_aside);
-  }
-  return store;
-}
-
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
@@ -152,7 +133,7 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
     TF_ASSIGN_OR_RETURN(parts.tokens, TokenAuthenticator::Start(options.tokens));
   }
   parts.authenticator = authenticator != nullptr ? authenticator : parts.tokens.get();
-  TF_ASSIGN_OR_RETURN(parts.stores, OpenStores(options));
+  TF_ASSIGN_OR_RETURN(parts.opened, OpenStores(options));
   std::unique_ptr<TissueformServer> server(new TissueformServer(options, std::move(parts)));
   if (server->is_exposed()) {
     spdlog::warn("INSECURE: {}, and strangers may reach it (--insecure)",
@@ -175,9 +156,9 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       tls_files_(std::move(parts.tls_files)),
       tokens_(std::move(parts.tokens)),
       quotas_(options.quotas),
-      access_store_(OpenAccessStore(parts.stores.get())),
+      access_store_(std::move(parts.opened.access)),
       access_changes_(options.access, access_store_.get(), &access_),
-      export_store_(OpenExportStore(parts.stores.get())),
+      export_store_(std::move(parts.opened.exports)),
       exports_(options.exports, export_store_.get()),
       export_watches_(options.exports.max_watches),
       authenticator_(parts.authenticator == nullptr
@@ -189,7 +170,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
              .quotas = &quotas_,
              .gateway_name = options.tls.gateway_name}),
       budget_(options.memory_budget_bytes),
-      stores_(WatchStores(std::move(parts.stores), &access_changes_)),
+      stores_(WatchStores(std::move(parts.opened.stores), &access_changes_)),
       catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),
       uploads_(options.limits, &catalog_, &stores_->uploads()),
       pool_(std::make_unique<WorkerPool>(options.workers)),
@@ -217,6 +198,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
   SetBlasThreads(1);  // the pool's workers share the cores already
   registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
     telemetry_->session_events().Count(event);
+    streams_.OnSessionEvent(id, event);
     watches_.OnSessionEvent(id, event);
   });
   catalog_.set_on_removed(

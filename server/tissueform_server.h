@@ -21,6 +21,7 @@
 #include "server/calls/call_scope.h"
 #include "server/exports/export_book.h"
 #include "server/exports/export_store.h"
+#include "server/open_stores.h"
 #include "server/rpc/access_service.h"
 #include "server/rpc/case_service.h"
 #include "server/rpc/deform_service.h"
@@ -54,7 +55,7 @@ class TissueformServer {
   // Listens when it returns. Several servers may live in one process.
   //
   // Errors: Unavailable, naming the address, when it cannot be listened on; those of CheckExposure,
-  // LoadServerFiles, TokenAuthenticator::Start, DataFolder::Open and DurableStore::Open.
+  // LoadServerFiles, TokenAuthenticator::Start and OpenStores.
   //
   // `authenticator`, which must outlive the server, says who calls; null: what the options say.
   static absl::StatusOr<std::unique_ptr<TissueformServer>> Start(
@@ -100,7 +101,7 @@ class TissueformServer {
     std::unique_ptr<RotatedFiles> tls_files;     // null without TLS
     std::unique_ptr<TokenAuthenticator> tokens;  // null: none are configured
     Authenticator* authenticator = nullptr;      // null: nobody logs in
-    std::unique_ptr<Stores> stores;
+    OpenedStores opened;
   };
 
   TissueformServer(const ServerOptions& options, Parts parts);

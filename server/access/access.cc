@@ -144,7 +144,34 @@ Access::Level Access::MeshLevel(const Principal& caller, const std::string& sha2
   return Level::kNothing;
 }
 
+bool Access::Knows(const Unknown& what) const {
+  switch (what.kind) {
+    case Unknown::Kind::kSession:
+      return index_.FindSession(what.name) != nullptr;
+    case Unknown::Kind::kPrediction:
+      return index_.FindPrediction(what.name) != nullptr;
+    case Unknown::Kind::kCase:
+      return index_.FindCase({.sha256 = what.name, .owner = what.owner}) != nullptr;
+    case Unknown::Kind::kMesh:
+      return table_.HasMesh(what.owner, what.name);
+    case Unknown::Kind::kLink:
+      return table_.FindLink(what.name) != nullptr;
+  }
+  return true;
+}
+
+void Access::LookFor(Unknown::Kind kind, const std::string& name, const std::string& owner) const {
+  if (!on_unknown_) return;
+  const Unknown what = {.kind = kind, .name = name, .owner = owner};
+  {
+    MutexLock lock(mutex_);
+    if (Knows(what)) return;
+  }
+  on_unknown_(what);
+}
+
 absl::Status Access::MaySession(const Principal& caller, const std::string& id, Need need) const {
+  LookFor(Unknown::Kind::kSession, id);
   MutexLock lock(mutex_);
   if (caller.only_session == SessionResource(id) && !HasGoodLink(id)) return LinkHasEnded();
   return Judge(SessionLevel(caller, id), need, NoSuchSession(id));
@@ -152,14 +179,21 @@ absl::Status Access::MaySession(const Principal& caller, const std::string& id, 
 
 absl::Status Access::MayPrediction(const Principal& caller, const std::string& id,
                                    Need need) const {
+  LookFor(Unknown::Kind::kPrediction, id);
   MutexLock lock(mutex_);
   return Judge(PredictionLevel(caller, id), need, NoPrediction(id));
 }
 
 absl::StatusOr<CaseKey> Access::MayCase(const Principal& caller, const std::string& sha256,
                                         Need need) const {
-  MutexLock lock(mutex_);
-  return IsLink(caller) ? CaseOfLink(caller, sha256) : FindCase(caller, sha256, need);
+  const auto found = [&] {
+    MutexLock lock(mutex_);
+    return IsLink(caller) ? CaseOfLink(caller, sha256) : FindCase(caller, sha256, need);
+  };
+  absl::StatusOr<CaseKey> first = found();
+  if (first.ok() || IsLink(caller)) return first;
+  LookFor(Unknown::Kind::kCase, sha256, caller.name);
+  return found();
 }
 
 absl::StatusOr<CaseKey> Access::FindCase(const Principal& caller, const std::string& sha256,
@@ -202,8 +236,14 @@ absl::Status Access::MayExport(const Principal& caller, const std::string& owner
 }
 
 absl::Status Access::MayMesh(const Principal& caller, const std::string& sha256, Need need) const {
-  MutexLock lock(mutex_);
-  return Judge(MeshLevel(caller, sha256), need, NoSuchMesh());
+  const auto judged = [&] {
+    MutexLock lock(mutex_);
+    return Judge(MeshLevel(caller, sha256), need, NoSuchMesh());
+  };
+  const absl::Status first = judged();
+  if (first.ok() || IsLink(caller)) return first;
+  LookFor(Unknown::Kind::kMesh, sha256, caller.name);
+  return judged();
 }
 
 bool Access::OthersHoldMesh(const Principal& caller, const std::string& sha256) const {
@@ -270,6 +310,7 @@ bool Access::HasGoodLink(const std::string& session) const {
 }
 
 absl::StatusOr<FollowLinkRow> Access::FindLink(const std::string& digest) const {
+  LookFor(Unknown::Kind::kLink, digest);
   MutexLock lock(mutex_);
   const FollowLinkRow* link = table_.FindLink(digest);
   if (link == nullptr || !IsGood(*link)) return LinkHasEnded();
@@ -301,11 +342,13 @@ absl::Status Access::MayKeep(const Principal& caller, int64_t bytes) const {
 }
 
 bool Access::KnowsSession(const std::string& id) const {
+  LookFor(Unknown::Kind::kSession, id);
   MutexLock lock(mutex_);
   return index_.FindSession(id) != nullptr;
 }
 
 bool Access::KnowsPrediction(const std::string& id) const {
+  LookFor(Unknown::Kind::kPrediction, id);
   MutexLock lock(mutex_);
   return index_.FindPrediction(id) != nullptr;
 }

@@ -3,7 +3,9 @@
 
 #pragma once
 
+#include <compare>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -35,10 +37,30 @@ enum class Need {
 // PermissionDenied is for what may be looked at only. What nobody with a name owns is open to those
 // without a name, and to them alone.
 //
+// Where several servers use one store, another may have made a moment ago what is not known here:
+// then, and then only, somebody is asked who reads that one row (set_on_unknown), which may take a
+// while.
+//
 // Thread-safe. Its lock is held over nothing else.
 class Access {
  public:
   explicit Access(UnixClock clock = SystemUnixSeconds) : clock_(std::move(clock)) {}
+
+  // What is not known here.
+  struct Unknown {
+    enum class Kind { kSession, kPrediction, kCase, kMesh, kLink };
+
+    Kind kind = Kind::kSession;
+    std::string name = {};   // id, SHA-256 or digest
+    std::string owner = {};  // of a case or a right to a mesh
+
+    friend auto operator<=>(const Unknown&, const Unknown&) = default;
+  };
+  // Asked once for what a call names and nobody here knows, without a lock held, on the call's
+  // thread: tells AccessChanges of it where it is there. Call it before calls are served.
+  void set_on_unknown(std::function<void(const Unknown&)> on_unknown) {
+    on_unknown_ = std::move(on_unknown);
+  }
 
   // Whether the principal may call a method ("CaseService.UploadCase") at all: publishers publish,
   // and a follow link follows. Errors: PermissionDenied.
@@ -118,8 +140,14 @@ class Access {
   bool IsGood(const FollowLinkRow& link) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool HasGoodLink(const std::string& session) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
+  // Have it looked for where it is not known.
+  void LookFor(Unknown::Kind kind, const std::string& name, const std::string& owner = {}) const
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  bool Knows(const Unknown& what) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
   const UnixClock clock_;
-  int64_t most_bytes_ = 0;  // of one principal
+  int64_t most_bytes_ = 0;                          // of one principal
+  std::function<void(const Unknown&)> on_unknown_;  // empty: all that there is is known
 
   mutable Mutex mutex_;
   ResourceIndex index_ ABSL_GUARDED_BY(mutex_);

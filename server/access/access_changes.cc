@@ -37,6 +37,71 @@ absl::Status AccessChanges::Learn() {
   return absl::OkStatus();
 }
 
+absl::Status AccessChanges::LearnAgain() {
+  MutexLock learning(learning_);
+  {
+    MutexLock lock(access_.mutex_);
+    std::erase_if(unseen_, [](const auto& unseen) { return unseen->ended; });
+  }
+  TF_ASSIGN_OR_RETURN(const AccessRows rows, store_->Load());
+  {
+    ShareTable table;
+    table.Add(rows);
+    MutexLock lock(access_.mutex_);
+    for (const auto& unseen : unseen_) {
+      table.Remove(unseen->erased);
+      if (unseen->kept) table.Add(unseen->put);
+    }
+    access_.table_ = std::move(table);
+  }
+  on_revoked_();
+  return absl::OkStatus();
+}
+
+void AccessChanges::Heard(const AccessRows& rows) {
+  MutexLock lock(access_.mutex_);
+  access_.table_.Add(rows);
+}
+
+void AccessChanges::SessionGone(const std::string& id) {
+  MutexLock lock(access_.mutex_);
+  access_.index_.RemoveSession(id);
+}
+
+void AccessChanges::PredictionGone(const std::string& id) {
+  MutexLock lock(access_.mutex_);
+  access_.index_.RemovePrediction(id);
+}
+
+void AccessChanges::CaseGone(const CaseKey& key) {
+  MutexLock lock(access_.mutex_);
+  access_.index_.RemoveCase(key);
+}
+
+AccessChanges::Known AccessChanges::AllKnown() const {
+  Known known;
+  MutexLock lock(access_.mutex_);
+  for (const auto& [id, session] : access_.index_.sessions()) known.sessions.push_back(id);
+  for (const auto& [id, prediction] : access_.index_.predictions()) known.predictions.push_back(id);
+  for (const auto& [key, of_case] : access_.index_.cases()) known.cases.push_back(key);
+  return known;
+}
+
+std::shared_ptr<AccessChanges::Unseen> AccessChanges::Begin(AccessRows erased, AccessRows put) {
+  auto unseen = std::make_shared<Unseen>();
+  unseen->erased = std::move(erased);
+  unseen->put = std::move(put);
+  if (follows_) unseen_.push_back(unseen);
+  return unseen;
+}
+
+void AccessChanges::End(Unseen* unseen, bool kept) {
+  MutexLock lock(access_.mutex_);
+  unseen->ended = true;
+  unseen->kept = kept;
+  if (kept) access_.table_.Add(unseen->put);
+}
+
 absl::Status AccessChanges::MayOwn(const Principal& caller, const std::string& resource) const {
   absl::string_view name = resource;
   if (absl::ConsumePrefix(&name, kProjectsPrefix)) return CheckAccessName(name, "project");
@@ -229,23 +294,28 @@ void AccessChanges::Erase(AccessRows rows, const Done& done) {
     done(absl::OkStatus());
     return;
   }
+  std::shared_ptr<Unseen> unseen;
   {
     MutexLock lock(access_.mutex_);
     access_.table_.Remove(rows);
+    unseen = Begin(rows, {});
   }
-  store_->Change(std::move(rows), {}, done);
+  store_->Change(std::move(rows), {}, [this, unseen, done](const absl::Status& status) {
+    End(unseen.get(), false);
+    done(status);
+  });
 }
 
 void AccessChanges::Put(AccessRows rows, const Done& done) {
-  AccessRows kept = rows;
-  store_->Change({}, std::move(rows),
-                 [this, kept = std::move(kept), done](const absl::Status& status) {
-                   if (status.ok()) {
-                     MutexLock lock(access_.mutex_);
-                     access_.table_.Add(kept);
-                   }
-                   done(status);
-                 });
+  std::shared_ptr<Unseen> unseen;
+  {
+    MutexLock lock(access_.mutex_);
+    unseen = Begin({}, rows);
+  }
+  store_->Change({}, std::move(rows), [this, unseen, done](const absl::Status& status) {
+    End(unseen.get(), status.ok());
+    done(status);
+  });
 }
 
 }  // namespace tissueform

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,26 @@ class AccessChanges {
   // Reads what the store has. Call it before anything else; blocks. Errors: those of
   // AccessStore::Load.
   absl::Status Learn();
+
+  // Where others write to the store as well. Before anything else: from now on changes that are
+  // under way are not undone by what LearnAgain has read before them.
+  void FollowOthers() { follows_ = true; }
+  // Takes what the store has in place of what was known. Blocks. Errors: those of
+  // AccessStore::Load.
+  absl::Status LearnAgain();
+  // Rows that others have put there.
+  void Heard(const AccessRows& rows);
+  // What others have deleted: their rows go by LearnAgain.
+  void SessionGone(const std::string& id);
+  void PredictionGone(const std::string& id);
+  void CaseGone(const CaseKey& key);
+  // All that is known.
+  struct Known {
+    std::vector<std::string> sessions = {};
+    std::vector<std::string> predictions = {};
+    std::vector<CaseKey> cases = {};
+  };
+  Known AllKnown() const;
 
   // Shares a resource of the caller's own; again: with this role. Shares of a project may come
   // before the project.
@@ -96,12 +117,27 @@ class AccessChanges {
   // Into the store, then into memory.
   void Put(AccessRows rows, const Done& done) ABSL_LOCKS_EXCLUDED(access_.mutex_);
 
+  // A change of this server's that a Load under way may not have seen.
+  struct Unseen {
+    AccessRows erased = {};
+    AccessRows put = {};
+    bool ended = false;
+    bool kept = false;
+  };
+  std::shared_ptr<Unseen> Begin(AccessRows erased, AccessRows put)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(access_.mutex_);
+  void End(Unseen* unseen, bool kept) ABSL_LOCKS_EXCLUDED(access_.mutex_);
+
   // Constant.
   const AccessOptions options_;
   AccessStore* const store_;
+  bool follows_ = false;  // constant once calls are served
   Access& access_;
   std::function<void()> on_revoked_ = [] {};
   std::function<void(const std::string&)> on_prediction_removed_ = [](const std::string&) {};
+
+  Mutex learning_;                                                               // over LearnAgain
+  std::vector<std::shared_ptr<Unseen>> unseen_ ABSL_GUARDED_BY(access_.mutex_);  // in their order
 };
 
 }  // namespace tissueform

@@ -168,6 +168,7 @@ class WatchedStores final : public Stores {
   PredictionStore& predictions() override { return predictions_; }
   CaseStore& cases() override { return cases_; }
   CommitThread* commit_thread() override { return stores_->commit_thread(); }
+  bool keeps() const override { return stores_->keeps(); }
   const DurationHistogram* latency() const override { return stores_->latency(); }
   std::string folder() const override { return stores_->folder(); }
 

@@ -3,13 +3,17 @@
 
 #include "server/access_store/access_store.h"
 
+#include <cstdlib>
+
 #include "server/access_store/durable_access_store.h"
 #include "server/access_store/in_memory_access_store.h"
 
 namespace tissueform {
 
 std::unique_ptr<AccessStore> OpenAccessStore(Stores* stores) {
-  if (stores->commit_thread() == nullptr) return std::make_unique<InMemoryAccessStore>();
+  if (!stores->keeps()) return std::make_unique<InMemoryAccessStore>();
+  // In memory they would be lost in silence: such a store has rows of its own.
+  if (stores->commit_thread() == nullptr) std::abort();
   return std::make_unique<DurableAccessStore>(stores->commit_thread());
 }
 

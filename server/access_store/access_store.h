@@ -72,7 +72,8 @@ class AccessStore {
   virtual void Change(AccessRows erase, AccessRows put, std::function<void(absl::Status)> done) = 0;
 };
 
-// Beside the other rows of `stores`, which must outlive it; in memory where those are.
+// Beside the other rows of `stores`, which must outlive it; in memory where those are. REQUIRES:
+// stores that keep have a commit thread (those of PostgreSQL have a PostgresAccessStore).
 std::unique_ptr<AccessStore> OpenAccessStore(Stores* stores);
 
 }  // namespace tissueform

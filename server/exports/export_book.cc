@@ -27,12 +27,6 @@ absl::Status TooManyExports(absl::string_view what, int limit, absl::string_view
       ErrorReason::kTooManyExports, {{"limit", absl::StrCat(limit)}});
 }
 
-absl::Status StaleEtag(const std::string& id) {
-  return WithReason(absl::AbortedError(absl::StrCat(
-                        "export \"", id, "\" has changed in the meantime; get it and try again")),
-                    ErrorReason::kStaleEtag);
-}
-
 }  // namespace
 
 std::string ExportBook::EtagOf(const ExportRecord& record) { return absl::StrCat(record.version); }
@@ -55,6 +49,29 @@ absl::Status ExportBook::Learn(const std::function<bool(const std::string&)>& is
     on_exported_(record.prediction, true);
   }
   return orphans.empty() ? absl::OkStatus() : store_.Erase(orphans);
+}
+
+absl::Status ExportBook::LearnAgain() {
+  MutexLock writing(writing_);
+  return Refresh();
+}
+
+absl::Status ExportBook::Refresh() {
+  TF_ASSIGN_OR_RETURN(const std::vector<ExportRecord> kept, store_.Load());
+  std::vector<ExportRecord> changed;
+  std::set<std::string> gone;
+  {
+    MutexLock lock(mutex_);
+    for (const auto& [id, record] : records_) gone.insert(id);
+    for (const ExportRecord& record : kept) {
+      gone.erase(record.id);
+      const auto known = records_.find(record.id);
+      if (known == records_.end() || known->second != record) changed.push_back(record);
+    }
+  }
+  Drop({gone.begin(), gone.end()});
+  for (const ExportRecord& record : changed) Take(record);
+  return absl::OkStatus();
 }
 
 const ExportRecord* ExportBook::FindEarlier(const ExportRecord& wanted) const {
@@ -103,6 +120,8 @@ std::string ExportBook::NewId() {
 
 absl::StatusOr<ExportRecord> ExportBook::Create(ExportRecord wanted) {
   MutexLock writing(writing_);
+  // Another server may have had the same request.
+  if (on_unknown_) TF_RETURN_IF_ERROR(Refresh());
   {
     MutexLock lock(mutex_);
     if (const ExportRecord* earlier = FindEarlier(wanted); earlier != nullptr) {
@@ -126,6 +145,11 @@ absl::StatusOr<ExportRecord> ExportBook::Create(ExportRecord wanted) {
 
 absl::Status ExportBook::Keep(const ExportRecord& record) {
   TF_RETURN_IF_ERROR(store_.Put(record));
+  Take(record);
+  return absl::OkStatus();
+}
+
+void ExportBook::Take(const ExportRecord& record) {
   bool is_first = false;
   {
     MutexLock lock(mutex_);
@@ -137,10 +161,16 @@ absl::Status ExportBook::Keep(const ExportRecord& record) {
   }
   if (is_first) on_exported_(record.prediction, true);
   on_changed_(record);
-  return absl::OkStatus();
 }
 
 absl::StatusOr<ExportRecord> ExportBook::Find(const std::string& id) const {
+  absl::StatusOr<ExportRecord> found = FindKnown(id);
+  if (found.ok() || !on_unknown_) return found;
+  on_unknown_(id);
+  return FindKnown(id);
+}
+
+absl::StatusOr<ExportRecord> ExportBook::FindKnown(const std::string& id) const {
   MutexLock lock(mutex_);
   const auto found = records_.find(id);
   if (found == records_.end()) return NoExport(id);
@@ -177,8 +207,8 @@ int ExportBook::CountWaiting() const { return static_cast<int>(Waiting(std::null
 
 absl::StatusOr<ExportRecord> ExportBook::Update(const std::string& id, const Change& change) {
   MutexLock writing(writing_);
-  TF_ASSIGN_OR_RETURN(ExportRecord record, Find(id));
-  if (!change.etag.empty() && change.etag != EtagOf(record)) return StaleEtag(id);
+  TF_ASSIGN_OR_RETURN(ExportRecord record, FindKnown(id));
+  if (!change.etag.empty() && change.etag != EtagOf(record)) return StaleExport(id);
   if (!MayFollow(record.state, change.state)) {
     return absl::InvalidArgumentError(
         "the state does not follow the one that it has; it goes from waiting over confirmation and "
@@ -189,13 +219,16 @@ absl::StatusOr<ExportRecord> ExportBook::Update(const std::string& id, const Cha
   record.stored_objects = change.stored_objects;
   record.updated_s = clock_();
   ++record.version;
-  TF_RETURN_IF_ERROR(Keep(record));
+  const absl::Status kept = Keep(record);
+  // Another server was faster: who tries again sees what it has done.
+  if (absl::IsAborted(kept)) Refresh().IgnoreError();
+  TF_RETURN_IF_ERROR(kept);
   return record;
 }
 
 absl::Status ExportBook::Remove(const std::string& id) {
   MutexLock writing(writing_);
-  TF_RETURN_IF_ERROR(Find(id).status());
+  TF_RETURN_IF_ERROR(FindKnown(id).status());
   return Erase({id});
 }
 
@@ -226,6 +259,11 @@ absl::StatusOr<int> ExportBook::RemoveUnchanged(int64_t before_s, int most) {
 }
 
 absl::Status ExportBook::Erase(const std::vector<std::string>& ids) {
+  Drop(ids);
+  return store_.Erase(ids);
+}
+
+void ExportBook::Drop(const std::vector<std::string>& ids) {
   std::vector<std::string> unclaimed;  // predictions
   {
     // From memory at once: what is taken back opens nothing any more, whatever the disk says.
@@ -243,7 +281,6 @@ absl::Status ExportBook::Erase(const std::vector<std::string>& ids) {
     }
   }
   for (const std::string& prediction : unclaimed) on_exported_(prediction, false);
-  return store_.Erase(ids);
 }
 
 }  // namespace tissueform

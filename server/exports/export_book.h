@@ -48,11 +48,21 @@ class ExportBook {
     on_exported_ = std::move(told);
   }
 
+  // Where others write to the store as well: asked once for an id that is not known, without a lock
+  // held; calls LearnAgain where it is there.
+  void set_on_unknown(std::function<void(const std::string& id)> on_unknown) {
+    on_unknown_ = std::move(on_unknown);
+  }
+
   const ExportLimits& limits() const { return limits_; }
 
   // Reads what the store has; exports of predictions that are gone go. Before calls are served.
   // Errors: those of ExportStore.
   absl::Status Learn(const std::function<bool(const std::string& prediction)>& is_there);
+
+  // Where others write to the store as well: takes what it has in place of what was known, and
+  // tells what is new, has changed or has gone. Blocks. Errors: those of ExportStore.
+  absl::Status LearnAgain();
 
   // `wanted` without id, state, times and version. Returns the one of the same request_key, else
   // one of the same prediction that is not done, else a new one.
@@ -105,6 +115,12 @@ class ExportBook {
   absl::Status CheckRoom(const std::string& owner) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   std::string NewId() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
+  absl::StatusOr<ExportRecord> FindKnown(const std::string& id) const;
+  absl::Status Refresh() ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
+  // Into memory, and told.
+  void Take(const ExportRecord& record) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
+  // Out of memory, and told.
+  void Drop(const std::vector<std::string>& ids) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
   absl::Status Keep(const ExportRecord& record) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
   absl::Status Erase(const std::vector<std::string>& ids) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
 
@@ -114,6 +130,8 @@ class ExportBook {
   const UnixClock clock_;
   std::function<void(const ExportRecord&)> on_changed_ = [](const ExportRecord&) {};
   std::function<void(const std::string&, bool)> on_exported_ = [](const std::string&, bool) {};
+
+  std::function<void(const std::string&)> on_unknown_;  // empty: nobody else writes
 
   // Held over the store and over those who are told: changes come one after the other.
   Mutex writing_;

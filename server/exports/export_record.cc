@@ -57,6 +57,12 @@ bool MayFollow(ExportState before, ExportState after) {
   return before == after || (!IsDone(before) && after > before);
 }
 
+absl::Status StaleExport(absl::string_view id) {
+  return WithReason(absl::AbortedError(absl::StrCat(
+                        "export \"", id, "\" has changed in the meantime; get it and try again")),
+                    ErrorReason::kStaleEtag);
+}
+
 absl::Status NoExport(absl::string_view id) {
   return WithReason(absl::NotFoundError(absl::StrCat("no export \"", id, "\"")),
                     ErrorReason::kExportNotFound);

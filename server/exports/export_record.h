@@ -47,6 +47,8 @@ absl::StatusOr<ExportRecord> ParseExport(absl::string_view bytes);
 // that is not done.
 bool MayFollow(ExportState before, ExportState after);
 
+// Aborted (STALE_ETAG): somebody else has changed it.
+absl::Status StaleExport(absl::string_view id);
 absl::Status NoExport(absl::string_view id);  // NotFound
 
 }  // namespace tissueform

@@ -3,6 +3,7 @@
 
 #include "server/exports/export_store.h"
 
+#include <cstdlib>
 #include <map>
 #include <utility>
 
@@ -92,7 +93,9 @@ class DurableExportStore final : public ExportStore {
 }  // namespace
 
 std::unique_ptr<ExportStore> OpenExportStore(Stores* stores) {
-  if (stores->commit_thread() == nullptr) return std::make_unique<InMemoryExportStore>();
+  if (!stores->keeps()) return std::make_unique<InMemoryExportStore>();
+  // In memory they would be lost in silence: such a store has rows of its own.
+  if (stores->commit_thread() == nullptr) std::abort();
   return std::make_unique<DurableExportStore>(stores->commit_thread());
 }
 

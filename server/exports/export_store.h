@@ -25,15 +25,17 @@ class ExportStore {
   // All, by id, rising. Damaged ones are passed over. Errors: what the disk says.
   virtual absl::StatusOr<std::vector<ExportRecord>> Load() = 0;
 
-  // In place of the one with its id. Errors: ResourceExhausted (the disk is full), or what the disk
-  // says.
+  // In place of the one with its id. Errors: Aborted (STALE_ETAG: where several servers write, the
+  // one that is kept is not of the version before), ResourceExhausted (the disk is full), or what
+  // the disk says.
   virtual absl::Status Put(const ExportRecord& record) = 0;
 
   // All or none; one that is not there is none. Errors: what the disk says.
   virtual absl::Status Erase(const std::vector<std::string>& ids) = 0;
 };
 
-// Beside the other rows of `stores`, which must outlive it; in memory where those are.
+// Beside the other rows of `stores`, which must outlive it; in memory where those are. REQUIRES:
+// stores that keep have a commit thread (those of PostgreSQL have a PostgresExportStore).
 std::unique_ptr<ExportStore> OpenExportStore(Stores* stores);
 
 }  // namespace tissueform

@@ -52,6 +52,8 @@ class LeaseKeeper {
   // The epoch to write under; none when the session may not be answered (any longer). Fast.
   std::optional<int64_t> EpochOf(const std::string& session);
 
+  int CountHeld() { return static_cast<int>(held_.Sessions().size()); }
+
   // What the thread does every `renew_every`. Errors: why nothing was renewed; what ran out
   // meanwhile is lost all the same.
   absl::Status Renew();

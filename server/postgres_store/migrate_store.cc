@@ -143,7 +143,7 @@ absl::StatusOr<int64_t> MigrateAccess(Stores* from, PostgresPool* to) {
 absl::StatusOr<int64_t> MigrateExports(Stores* from, PostgresPool* to) {
   TF_ASSIGN_OR_RETURN(const std::vector<ExportRecord> records, OpenExportStore(from)->Load());
   PostgresExportStore store(to);
-  for (const ExportRecord& record : records) TF_RETURN_IF_ERROR(store.Put(record));
+  TF_RETURN_IF_ERROR(store.PutAll(records));
   return static_cast<int64_t>(records.size());
 }
 

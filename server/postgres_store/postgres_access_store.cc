@@ -56,7 +56,32 @@ absl::Status ChangeRows(PostgresTransaction& transaction, const Statements& stat
   return absl::OkStatus();
 }
 
+template <typename Row>
+absl::StatusOr<Row> FindRow(PostgresPool* pool, const char* select, const Row& wanted) {
+  const std::string key = KeyOf(wanted);
+  return AskPool<Row>(pool, [&](PostgresTransaction& transaction) -> absl::StatusOr<Row> {
+    TF_ASSIGN_OR_RETURN(const PostgresRows rows, transaction.Query(select, {key}));
+    if (rows.empty()) return absl::NotFoundError("no such row of who may do what");
+    TF_ASSIGN_OR_RETURN(const absl::string_view bytes, Unseal(rows.Text(0, 0)));
+    Row row;
+    TF_RETURN_IF_ERROR(ParseRow(bytes, &row));
+    if (KeyOf(row) != key) return absl::DataLossError("a row of who may do what is another's");
+    return row;
+  });
+}
+
 }  // namespace
+
+absl::StatusOr<FollowLinkRow> PostgresAccessStore::FindLink(const std::string& digest) {
+  return FindRow<FollowLinkRow>(pool_, "SELECT record FROM follow_links WHERE name = $1",
+                                {.digest = digest});
+}
+
+absl::StatusOr<MeshRight> PostgresAccessStore::FindMeshRight(const std::string& principal,
+                                                             const std::string& sha256) {
+  return FindRow<MeshRight>(pool_, "SELECT record FROM mesh_rights WHERE name = $1",
+                            {.principal = principal, .sha256 = sha256});
+}
 
 absl::StatusOr<AccessRows> PostgresAccessStore::Load() {
   return AskPool<AccessRows>(

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <functional>
+#include <string>
 
 #include "server/access_store/access_store.h"
 #include "server/postgres_store/ordered_jobs.h"
@@ -19,6 +20,10 @@ class PostgresAccessStore final : public AccessStore {
 
   absl::StatusOr<AccessRows> Load() override;
   void Change(AccessRows erase, AccessRows put, std::function<void(absl::Status)> done) override;
+
+  // One row. Errors: NotFound, DataLoss.
+  absl::StatusOr<FollowLinkRow> FindLink(const std::string& digest);
+  absl::StatusOr<MeshRight> FindMeshRight(const std::string& principal, const std::string& sha256);
 
  private:
   PostgresPool* const pool_;

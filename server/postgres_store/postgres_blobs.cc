@@ -121,7 +121,8 @@ absl::Status SetPostgresBlobAside(PostgresPool* pool, const std::string& sha256,
   const absl::Status status = pool->Run([&](PostgresTransaction& transaction) -> absl::Status {
     TF_RETURN_IF_ERROR(LockBlob(transaction, sha256));
     for (const char* statement :
-         {"DELETE FROM meshes WHERE sha256 = $1", "DELETE FROM cases WHERE sha256 = $1",
+         {"UPDATE sessions SET mesh = NULL WHERE mesh = $1", "DELETE FROM meshes WHERE sha256 = $1",
+          "DELETE FROM cases WHERE sha256 = $1",
           "DELETE FROM predictions WHERE positions_sha256 = $1",
           "UPDATE blobs SET sha256 = 'damaged ' || key || ' ' || sha256 WHERE sha256 = $1"}) {
       TF_RETURN_IF_ERROR(transaction.Run(statement, {sha256}));

@@ -11,13 +11,16 @@
 
 namespace tissueform {
 
-// Exports in a PostgreSQL database. `pool` must outlive it.
+// Exports in a PostgreSQL database, which several servers change: each version follows the one
+// before. `pool` must outlive it.
 class PostgresExportStore final : public ExportStore {
  public:
   explicit PostgresExportStore(PostgresPool* pool) : pool_(pool) {}
 
   absl::StatusOr<std::vector<ExportRecord>> Load() override;
   absl::Status Put(const ExportRecord& record) override;
+  // Of whatever version, into a store that has none of them.
+  absl::Status PutAll(const std::vector<ExportRecord>& records);
   absl::Status Erase(const std::vector<std::string>& ids) override;
 
  private:

@@ -53,6 +53,16 @@ absl::StatusOr<MeshPayload> ReadMeshBlob(PostgresTransaction& transaction,
   return Damaged(absl::StrCat("mesh ", record.sha256), "its bytes are another mesh's");
 }
 
+// No session of it is begun until the transaction's end.
+absl::Status CheckNoSessionHasMesh(PostgresTransaction& transaction, const std::string& sha256) {
+  TF_RETURN_IF_ERROR(
+      transaction.Run("SELECT 1 FROM meshes WHERE sha256 = $1 FOR UPDATE", {sha256}));
+  TF_ASSIGN_OR_RETURN(const PostgresRows rows,
+                      transaction.Query("SELECT count(*) FROM sessions WHERE mesh = $1", {sha256}));
+  const int64_t sessions = rows.Integer(0, 0);
+  return sessions == 0 ? absl::OkStatus() : MeshHasSessions(sessions);
+}
+
 }  // namespace
 
 absl::Status PostgresMeshStore::Put(const MeshRecord& record, const MeshPayloadView& payload) {
@@ -101,6 +111,7 @@ absl::StatusOr<MeshStore::Page> PostgresMeshStore::List(const std::string& after
 absl::Status PostgresMeshStore::Delete(const std::string& sha256) {
   return pool_->Run([&](PostgresTransaction& transaction) -> absl::Status {
     TF_RETURN_IF_ERROR(LockBlob(transaction, sha256));
+    TF_RETURN_IF_ERROR(CheckNoSessionHasMesh(transaction, sha256));
     TF_ASSIGN_OR_RETURN(
         const PostgresRows rows,
         transaction.Query("DELETE FROM meshes WHERE sha256 = $1 RETURNING key", {sha256}));

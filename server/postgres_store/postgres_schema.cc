@@ -23,7 +23,8 @@ CREATE FUNCTION tissueform_now() RETURNS timestamptz VOLATILE LANGUAGE sql
   AS 'SELECT clock_timestamp()';
 
 CREATE TABLE sessions (key bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
-  id text COLLATE "C" NOT NULL UNIQUE, owner text COLLATE "C" NOT NULL, record bytea NOT NULL);
+  id text COLLATE "C" NOT NULL UNIQUE, owner text COLLATE "C" NOT NULL, record bytea NOT NULL,
+  mesh text COLLATE "C");
 CREATE TABLE session_states (key bigint PRIMARY KEY REFERENCES sessions(key) ON DELETE CASCADE,
   etag text NOT NULL, epoch bigint NOT NULL, handles bigint NOT NULL, poses bytea NOT NULL,
   created_s bigint NOT NULL, last_used_s bigint NOT NULL,
@@ -40,6 +41,8 @@ ALTER TABLE blob_pieces ALTER COLUMN bytes SET STORAGE EXTERNAL;
 CREATE TABLE meshes (key bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
   sha256 text COLLATE "C" NOT NULL UNIQUE REFERENCES blobs(sha256),
   record bytea NOT NULL, last_used_s bigint NOT NULL);
+ALTER TABLE sessions ADD FOREIGN KEY (mesh) REFERENCES meshes(sha256);
+CREATE INDEX sessions_by_mesh ON sessions(mesh);
 CREATE TABLE predictions (key bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
   id text COLLATE "C" NOT NULL UNIQUE, owner text COLLATE "C" NOT NULL, session text NOT NULL,
   case_sha256 text NOT NULL,
@@ -59,8 +62,21 @@ CREATE FUNCTION tissueform_tell_row() RETURNS trigger LANGUAGE plpgsql AS $$
 DECLARE
   name text;
 BEGIN
-  EXECUTE format('SELECT left(($1).%I, 4000)', TG_ARGV[1]) INTO name USING OLD;
+  IF TG_OP = 'INSERT' THEN
+    EXECUTE format('SELECT left(($1).%I, 4000)', TG_ARGV[1]) INTO name USING NEW;
+  ELSE
+    EXECUTE format('SELECT left(($1).%I, 4000)', TG_ARGV[1]) INTO name USING OLD;
+  END IF;
   PERFORM pg_notify('tissueform_changes', TG_ARGV[0] || ' ' || name);
+  RETURN NULL;
+END $$;
+CREATE FUNCTION tissueform_tell_case() RETURNS trigger LANGUAGE plpgsql AS $$
+DECLARE
+  told record;
+BEGIN
+  IF TG_OP = 'INSERT' THEN told := NEW; ELSE told := OLD; END IF;
+  PERFORM pg_notify('tissueform_changes',
+    TG_ARGV[0] || ' ' || told.sha256 || ' ' || left(told.owner, 1000));
   RETURN NULL;
 END $$;
 CREATE FUNCTION tissueform_tell() RETURNS trigger LANGUAGE plpgsql AS $$
@@ -68,14 +84,20 @@ BEGIN
   PERFORM pg_notify('tissueform_changes', TG_ARGV[0] || ' ');
   RETURN NULL;
 END $$;
+CREATE TRIGGER tell_created AFTER INSERT ON sessions FOR EACH ROW
+  EXECUTE FUNCTION tissueform_tell_row('session_created', 'id');
 CREATE TRIGGER tell_deleted AFTER DELETE ON sessions FOR EACH ROW
   EXECUTE FUNCTION tissueform_tell_row('session_deleted', 'id');
 CREATE TRIGGER tell_changed AFTER UPDATE ON sessions FOR EACH ROW
   EXECUTE FUNCTION tissueform_tell_row('session_changed', 'id');
 CREATE TRIGGER tell_deleted AFTER DELETE ON meshes FOR EACH ROW
   EXECUTE FUNCTION tissueform_tell_row('mesh_deleted', 'sha256');
+CREATE TRIGGER tell_created AFTER INSERT ON cases FOR EACH ROW
+  EXECUTE FUNCTION tissueform_tell_case('case_created');
 CREATE TRIGGER tell_deleted AFTER DELETE ON cases FOR EACH ROW
-  EXECUTE FUNCTION tissueform_tell_row('case_deleted', 'sha256');
+  EXECUTE FUNCTION tissueform_tell_case('case_deleted');
+CREATE TRIGGER tell_created AFTER INSERT ON predictions FOR EACH ROW
+  EXECUTE FUNCTION tissueform_tell_row('prediction_created', 'id');
 CREATE TRIGGER tell_deleted AFTER DELETE ON predictions FOR EACH ROW
   EXECUTE FUNCTION tissueform_tell_row('prediction_deleted', 'id');
 CREATE TRIGGER tell_changed AFTER INSERT OR UPDATE OR DELETE ON shares FOR EACH STATEMENT
@@ -89,9 +111,11 @@ INSERT INTO tissueform_version VALUES (4);
 
 constexpr char kVersion5[] = R"sql(
 CREATE TABLE exports (key bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
-  name text COLLATE "C" NOT NULL UNIQUE, record bytea NOT NULL);
+  name text COLLATE "C" NOT NULL UNIQUE, record bytea NOT NULL, version bigint NOT NULL);
 CREATE TRIGGER tell_changed AFTER INSERT OR UPDATE OR DELETE ON exports FOR EACH STATEMENT
   EXECUTE FUNCTION tissueform_tell('exports_changed');
+CREATE TABLE nodes (holder text PRIMARY KEY, name text COLLATE "C" NOT NULL,
+  free_bytes bigint NOT NULL, draining boolean NOT NULL, seen timestamptz NOT NULL);
 )sql";
 
 absl::Status ChangeSchema(const std::string& name, PostgresTransaction& transaction) {

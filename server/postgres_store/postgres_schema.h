@@ -18,6 +18,9 @@ namespace tissueform {
 //   tissueform_version  one row: the version
 //   session_states      beside the rest who holds the session: holder, node, lease_until. The epoch
 //                       of the lease is that of the writes, so that one row decides.
+//   sessions            beside the rest the mesh that it is made from, which cannot be deleted
+//                       meanwhile; null when that was damaged and is gone
+//   nodes               servers that use the store now (node_table.h)
 //   blobs, blob_pieces  what a data folder keeps as files: rows of 1 MiB, each with its SHA-256
 //
 // tissueform_now() is the clock of leases. What is deleted or changed for others to know is told in

@@ -48,13 +48,21 @@ absl::StatusOr<LockedState> LockState(PostgresTransaction& transaction, const st
                      rows.Integer(0, 3), rows.Integer(0, 4),           rows.Integer(0, 5)};
 }
 
+absl::Status LockMeshOfSession(PostgresTransaction& transaction, const SessionRecord& record) {
+  TF_ASSIGN_OR_RETURN(const PostgresRows rows,
+                      transaction.Query("SELECT 1 FROM meshes WHERE sha256 = $1 FOR KEY SHARE",
+                                        {record.mesh_sha256}));
+  return rows.empty() ? NoMesh(record.mesh_sha256) : absl::OkStatus();
+}
+
 absl::Status InsertSession(PostgresTransaction& transaction, const SessionRecord& record) {
   const SealedSession sealed(record);
   TF_ASSIGN_OR_RETURN(
       const PostgresRows rows,
-      transaction.Query("INSERT INTO sessions (id, owner, record) VALUES ($1, $2, $3) ON CONFLICT "
+      transaction.Query("INSERT INTO sessions (id, owner, record, mesh) VALUES ($1, $2, $3, "
+                        "(SELECT sha256 FROM meshes WHERE sha256 = $4)) ON CONFLICT "
                         "(id) DO NOTHING RETURNING key",
-                        {record.id, record.owner, sealed.record}));
+                        {record.id, record.owner, sealed.record, record.mesh_sha256}));
   if (rows.empty()) return SessionExists(record.id);
   return transaction.Run(
       "INSERT INTO session_states (key, etag, epoch, handles, poses, created_s, last_used_s) "

@@ -36,7 +36,10 @@ struct LockedState {
 // Errors: NotFound.
 absl::StatusOr<LockedState> LockState(PostgresTransaction& transaction, const std::string& id);
 
-// Errors: AlreadyExists.
+// The mesh that it is made from is not deleted until the transaction's end. Errors: NotFound.
+absl::Status LockMeshOfSession(PostgresTransaction& transaction, const SessionRecord& record);
+
+// Its mesh cannot be deleted any longer, where it is there. Errors: AlreadyExists.
 absl::Status InsertSession(PostgresTransaction& transaction, const SessionRecord& record);
 
 absl::Status ReplaceSession(PostgresTransaction& transaction, int64_t key,

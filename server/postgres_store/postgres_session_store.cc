@@ -72,6 +72,7 @@ void PostgresSessionStore::Create(SessionRecord record, int64_t epoch, RecordCal
       id,
       [record =
            std::move(record)](PostgresTransaction& transaction) -> absl::StatusOr<SessionRecord> {
+        TF_RETURN_IF_ERROR(LockMeshOfSession(transaction, record));
         TF_RETURN_IF_ERROR(InsertSession(transaction, record));
         return record;
       },

@@ -39,6 +39,7 @@ class PostgresStores final : public Stores {
   PredictionStore& predictions() override { return predictions_; }
   CaseStore& cases() override { return cases_; }
   const DurationHistogram* latency() const override { return &pool_->latency(); }
+  bool keeps() const override { return true; }
 
   PostgresPool* pool() { return pool_.get(); }
 

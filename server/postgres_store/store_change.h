@@ -11,10 +11,13 @@ namespace tissueform {
 // database.
 struct StoreChange {
   enum class Kind {
+    kSessionCreated,
     kSessionDeleted,
     kSessionChanged,  // its record, not its poses
     kMeshDeleted,
+    kCaseCreated,
     kCaseDeleted,
+    kPredictionCreated,
     kPredictionDeleted,
     kAccessChanged,  // shares, links or rights: no name; load them again
     kExportsChanged,
@@ -22,13 +25,14 @@ struct StoreChange {
   };
 
   Kind kind = Kind::kMissed;
-  std::string name = {};  // id or SHA-256
+  std::string name = {};   // id or SHA-256
+  std::string owner = {};  // of a case
 
   friend bool operator==(const StoreChange&, const StoreChange&) = default;
 };
 
-// A change as the triggers tell it ("session_deleted ID"). One that is not known, which a newer
-// server may tell, is kMissed.
+// A change as the triggers tell it ("session_deleted ID", "case_created SHA256 OWNER"). One that is
+// not known, which a newer server may tell, is kMissed.
 StoreChange ParseStoreChange(const std::string& notice);
 
 }  // namespace tissueform

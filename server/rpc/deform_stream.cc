@@ -40,6 +40,10 @@ DeformStreamReactor::DeformStreamReactor(CallScope scope, const ServiceLimits& l
     admission = streams_->Add(this);
     registered_ = admission.ok();
   }
+  {
+    MutexLock lock(commit_word_->mutex);
+    commit_word_->stream = this;
+  }
   MutexLock lock(mutex_);
   if (admission.ok()) {
     deadline_ = timer_->Start(std::chrono::steady_clock::now() + limits_.configuration_deadline,
@@ -124,6 +128,10 @@ void DeformStreamReactor::EndUnlessConfigured() {
 }
 
 void DeformStreamReactor::OnDone() {
+  {
+    MutexLock lock(commit_word_->mutex);
+    commit_word_->stream = nullptr;
+  }
   if (registered_) {
     streams_->Remove(this);
     timer_->Cancel(deadline_);
@@ -190,6 +198,23 @@ void DeformStreamReactor::AskAgain() {
       access_.MaySession(scope_.principal(), stream_request_.session_id, Need::kDrag);
   if (!allowed.ok()) End(allowed);
   Advance();
+}
+
+void DeformStreamReactor::EndIfMoved(const std::string& session_id) {
+  {
+    MutexLock lock(mutex_);
+    if (configuration_ == nullptr || stream_request_.session_id != session_id) return;
+    Advance();
+    if (!moved_) return;
+  }
+  // It may wait for the session to be made again.
+  *cancelled_ = true;
+  registry_->CancelWait(cancelled_);
+}
+
+void DeformStreamReactor::EndUnlessHeld() {
+  if (outcome_.has_value() || configuration_ == nullptr) return;
+  if (const absl::Status held = configuration_->session->CheckHeld(); !held.ok()) End(held);
 }
 
 absl::Status DeformStreamReactor::Take() {
@@ -288,18 +313,28 @@ absl::Status DeformStreamReactor::TakePose(const v1::PoseUpdate& update) {
 void DeformStreamReactor::StartCommit() {
   committing_ = true;
   registry_->pool().Post(
-      Lane::kFrames, [this, session = configuration_->session,
+      Lane::kFrames, [registry = registry_, word = commit_word_, session = configuration_->session,
                       pose = *std::exchange(to_commit_, std::nullopt)]() mutable {
-        registry_->CommitPoses(session, std::move(pose.poses),
-                               [this, sequence = pose.sequence](const absl::Status& outcome) {
-                                 FinishCommit(sequence, outcome);
-                               });
+        registry->CommitPoses(session, std::move(pose.poses),
+                              [word, sequence = pose.sequence](const absl::Status& outcome) {
+                                word->Tell(sequence, outcome);
+                              });
       });
+}
+
+void DeformStreamReactor::CommitWord::Tell(uint64_t sequence, const absl::Status& outcome) {
+  MutexLock lock(mutex);
+  if (stream != nullptr) stream->FinishCommit(sequence, outcome);
 }
 
 void DeformStreamReactor::FinishCommit(uint64_t sequence, const absl::Status& outcome) {
   MutexLock lock(mutex_);
   committing_ = false;
+  if (HasReason(outcome, ErrorReason::kSessionMoved)) {
+    End(outcome);
+    Advance();
+    return;
+  }
   v1::CommittedNotice* notice = notices_.emplace_back().mutable_committed();
   notice->set_sequence(sequence);
   if (!outcome.ok()) notice->set_failure(MessageForClients(outcome));
@@ -309,6 +344,7 @@ void DeformStreamReactor::FinishCommit(uint64_t sequence, const absl::Status& ou
 void DeformStreamReactor::End(const absl::Status& outcome) {
   if (!outcome_.has_value()) {
     outcome_ = outcome;
+    moved_ = HasReason(outcome, ErrorReason::kSessionMoved);
   }
 }
 
@@ -316,6 +352,7 @@ void DeformStreamReactor::Advance() {
   if (finished_) {
     return;
   }
+  EndUnlessHeld();
   if (!outcome_.has_value() && flow_.has_value()) {
     WriteNext();
     if (to_commit_.has_value() && !committing_) StartCommit();
@@ -329,7 +366,8 @@ void DeformStreamReactor::Advance() {
       End(absl::OkStatus());
     }
   }
-  const bool busy = write_in_flight_ || committing_ || (flow_.has_value() && flow_->busy());
+  const bool waits_for_commit = committing_ && !moved_;
+  const bool busy = write_in_flight_ || waits_for_commit || (flow_.has_value() && flow_->busy());
   if (outcome_.has_value() && !busy) {
     finished_ = true;
     // Before the client hears of the end: who begins to watch then does not find a drag.

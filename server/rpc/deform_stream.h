@@ -33,10 +33,14 @@ namespace tissueform {
 // this, one commit of a pose at a time is on its way to the store. Deletes itself when gRPC is done
 // with it.
 //
-// Reactions come on gRPC's threads and compute nothing. Finish is called once, when no job, write
-// or commit is under way: whatever runs may use this object. Jobs hold the configuration
-// themselves; nothing that the mutex guards leaves it by pointer. The registry is never called
-// under the mutex, since it may answer before it returns: jobs in the lane of frames call it.
+// Reactions come on gRPC's threads and compute nothing. Finish is called once, when no job or write
+// is under way, since whatever runs may use this object, and no commit, unless the session has
+// moved to another server. Jobs hold the configuration themselves; nothing that the mutex guards
+// leaves it by pointer. The registry is never called under the mutex, since it may answer before it
+// returns: jobs in the lane of frames call it.
+//
+// Of a store that is shared with other servers: whether the session is held is asked before every
+// step, above all before every frame, and the stream ends with SESSION_MOVED where it is not.
 class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>,
                             private Dragger {
  public:
@@ -54,6 +58,8 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   void NotifyDraining(std::chrono::system_clock::time_point end);
   // Ends the stream where its caller may not drag the session any more. Any thread.
   void AskAgain();
+  // Ends the stream where it is of this session, and that is not held any more. Any thread.
+  void EndIfMoved(const std::string& session_id);
   // The name of who drags, however the token is renewed.
   const std::string& principal() const { return principal_; }
 
@@ -77,6 +83,8 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   absl::Status TakeConfiguration() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status TakePose(const v1::PoseUpdate& update) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
+  // No frame is written, and none begun, of a session that is not held.
+  void EndUnlessHeld() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Ends the stream with `outcome`; only the first one counts.
   void End(const absl::Status& outcome) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Starts whatever may start now: the next write, the next solve, the end.
@@ -96,6 +104,14 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   // On the session's making strand.
   void Prepare(const StreamConfiguration& configuration) ABSL_LOCKS_EXCLUDED(mutex_);
 
+  // A commit's way back to the stream, which may have ended: a store that does not answer is not
+  // waited for by a stream whose session goes on elsewhere.
+  struct CommitWord {
+    Mutex mutex;  // before that of the stream
+    DeformStreamReactor* stream ABSL_GUARDED_BY(mutex) = nullptr;
+
+    void Tell(uint64_t sequence, const absl::Status& outcome) ABSL_LOCKS_EXCLUDED(mutex);
+  };
   void StartCommit() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void FinishCommit(uint64_t sequence, const absl::Status& outcome) ABSL_LOCKS_EXCLUDED(mutex_);
   // On any worker.
@@ -129,6 +145,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   DeadlineTimer* const timer_;
   bool registered_ = false;
   DeadlineTimer::Id deadline_;  // of the configuration
+  const std::shared_ptr<CommitWord> commit_word_ = std::make_shared<CommitWord>();
   const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
 
   // gRPC's while an operation is under way.
@@ -155,6 +172,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   std::deque<v1::DeformNotice> notices_ ABSL_GUARDED_BY(mutex_);  // wait for their write
   std::optional<WaitingPose> to_commit_ ABSL_GUARDED_BY(mutex_);  // the newest that is to be kept
   bool committing_ ABSL_GUARDED_BY(mutex_) = false;
+  bool moved_ ABSL_GUARDED_BY(mutex_) = false;  // the outcome is SESSION_MOVED
   std::chrono::steady_clock::time_point estimated_at_ ABSL_GUARDED_BY(mutex_);
   DeadlineTimer::Id rest_ ABSL_GUARDED_BY(mutex_);      // Id(): nothing is waited for
   DeadlineTimer::Id standing_ ABSL_GUARDED_BY(mutex_);  // the next check; Id(): there is none

@@ -39,6 +39,12 @@ void DeformStreams::AskAgain() {
   for (DeformStreamReactor* stream : streams_) stream->AskAgain();
 }
 
+void DeformStreams::OnSessionEvent(const std::string& session_id, SessionEvent event) {
+  if (event != SessionEvent::kMoved) return;
+  MutexLock lock(mutex_);
+  for (DeformStreamReactor* stream : streams_) stream->EndIfMoved(session_id);
+}
+
 std::map<std::string, int64_t> DeformStreams::CountByPrincipal() const {
   std::map<std::string, int64_t> counts;
   MutexLock lock(mutex_);

@@ -13,6 +13,7 @@
 
 #include "core/base/mutex.h"
 #include "server/session/frame_flow.h"
+#include "server/session/session_endings.h"
 
 namespace tissueform {
 
@@ -33,6 +34,8 @@ class DeformStreams {
   void NotifyDraining(std::chrono::system_clock::time_point end);
   // Each whether it may still drag.
   void AskAgain();
+  // As the registry's observer.
+  void OnSessionEvent(const std::string& session_id, SessionEvent event);
   std::map<std::string, int64_t> CountByPrincipal() const;
   int size() const;
 

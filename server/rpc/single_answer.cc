@@ -87,7 +87,8 @@ class Search : public std::enable_shared_from_this<Search> {
     };
     TF_ASSIGN_OR_RETURN(answer_.deformation,
                         answer_.session->Deform(answer_.model, answer_.poses, control));
-    return answer_.deformation.summary.cancelled ? ClientHasCancelled() : absl::OkStatus();
+    if (answer_.deformation.summary.cancelled) return ClientHasCancelled();
+    return answer_.session->CheckHeld();
   }
 
   const AnswerQuestion question_;

@@ -113,6 +113,10 @@ void WatchStreamReactor::TakeSession(absl::StatusOr<std::shared_ptr<Session>> se
 
 void WatchStreamReactor::Join(const std::shared_ptr<Session>& session) {
   absl::StatusOr<SessionWatches::Joined> joined = watches_->Add(id_, session_id_, this, principal_);
+  {
+    MutexLock lock(mutex_);
+    hold_ = session->hold();
+  }
   // Once more: who was told between the two that less may be watched did not find this watch.
   absl::Status allowed = joined.status();
   if (allowed.ok()) {
@@ -255,6 +259,7 @@ void WatchStreamReactor::End(const absl::Status& outcome) {
 
 void WatchStreamReactor::Advance() {
   if (finished_) return;
+  if (const absl::Status held = CheckHold(hold_); !held.ok()) End(held);
   if (!outcome_.has_value() && writing_ == nullptr) {
     writing_ = NextMessage();
     if (writing_ != nullptr) {

@@ -31,8 +31,9 @@ namespace tissueform {
 //
 // It begins with: the session is opened, so that there is something to see; it joins the channel;
 // where that has no frame yet, one of the committed poses is made on the session's strand. Until
-// then `opening_` keeps it from finishing. Afterwards it holds no session: one may leave memory
-// while it is watched. The registry and the watches are never called under the mutex.
+// then `opening_` keeps it from finishing. Afterwards it has no session: one may leave memory
+// while it is watched. But it has the session's hold, and writes no frame where that is lost: it
+// ends with SESSION_MOVED then. The registry and the watches are never called under the mutex.
 class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
                            public CreditedWatcher {
  public:
@@ -89,6 +90,7 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
 
   Mutex mutex_;
   bool opening_ ABSL_GUARDED_BY(mutex_) = false;
+  SessionHoldPtr hold_ ABSL_GUARDED_BY(mutex_);  // from the opening on
   SharedBytes writing_ ABSL_GUARDED_BY(mutex_);  // null: no write is in flight
   std::shared_ptr<const WatchedFrame> newest_ ABSL_GUARDED_BY(mutex_);      // waits for its write
   std::shared_ptr<const v1::WatchForm> sent_form_ ABSL_GUARDED_BY(mutex_);  // null: not begun

@@ -245,6 +245,22 @@ MeshCatalog::Held MeshCatalog::CountHeld() const {
   return held;
 }
 
+void MeshCatalog::Forget(const std::string& sha256) {
+  std::shared_ptr<const StoredMesh> forgotten;  // destroyed after the lock is released
+  MutexLock lock(mutex_);
+  const auto found = meshes_.find(sha256);
+  if (found == meshes_.end()) return;
+  forgotten = std::move(found->second.mesh);
+  meshes_.erase(found);
+}
+
+std::vector<std::string> MeshCatalog::HeldNames() const {
+  std::vector<std::string> names;
+  MutexLock lock(mutex_);
+  for (const auto& [sha256, entry] : meshes_) names.push_back(sha256);
+  return names;
+}
+
 std::vector<std::string> MeshCatalog::UsedSince(Clock::TimePoint since) {
   std::vector<std::string> used;
   MutexLock lock(mutex_);

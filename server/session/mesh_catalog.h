@@ -104,6 +104,11 @@ class MeshCatalog {
   // comes after it. Blocks on the disk. Errors: NotFound, those of MeshStore::Delete.
   absl::Status Remove(const std::string& sha256);
 
+  // Another server has deleted it: out of memory, and nothing else. Who uses it keeps it.
+  void Forget(const std::string& sha256);
+  // The names of those in memory.
+  std::vector<std::string> HeldNames() const;
+
   // Takes those meshes out of memory that nobody uses and nobody has asked for within `idle`.
   // Returns how many.
   int RemoveIdle(Clock::Duration idle);

@@ -8,7 +8,7 @@
 #include "absl/status/status.h"
 
 #include "core/base/error_reason.h"
-#include "server/session/session_maker.h"
+#include "server/session/session_refusals.h"
 
 namespace tissueform {
 
@@ -24,8 +24,37 @@ void PoseCommits::Commit(std::shared_ptr<const Session> session, std::vector<Han
   } else if (session->outdated()) {
     done(WithReason(absl::AbortedError("the session has other handles now; open the stream again"),
                     ErrorReason::kSessionUpdated));
+  } else if (absl::Status may_write = session->CheckHeld(); !may_write.ok()) {
+    done(std::move(may_write));
+  } else if (session->hold() == nullptr) {
+    store_->CommitPoses(id, std::move(poses), session->epoch(), std::move(done));
   } else {
-    store_->CommitPoses(id, std::move(poses), kStoreEpoch, std::move(done));
+    Send(id, std::move(poses), session->epoch(), std::move(done));
+  }
+}
+
+void PoseCommits::Send(const std::string& id, std::vector<HandlePose> poses, int64_t epoch,
+                       SessionStore::StatusCallback done) {
+  {
+    MutexLock lock(under_way_mutex_);
+    ++under_way_[id];
+  }
+  store_->CommitPoses(id, std::move(poses), epoch,
+                      [this, id, done = std::move(done)](absl::Status status) {
+                        done(MovedIfFenced(std::move(status)));
+                        EndOne(id);
+                      });
+}
+
+void PoseCommits::EndOne(const std::string& id) {
+  MutexLock lock(under_way_mutex_);
+  if (--under_way_[id] == 0) under_way_.erase(id);
+  fewer_.NotifyAll();
+}
+
+void PoseCommits::WaitFor(const std::string& id, std::chrono::steady_clock::time_point deadline) {
+  MutexLock lock(under_way_mutex_);
+  while (under_way_.contains(id) && fewer_.WaitUntil(under_way_mutex_, deadline)) {
   }
 }
 

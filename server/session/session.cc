@@ -10,6 +10,7 @@
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
+#include "server/session/session_refusals.h"
 
 namespace tissueform {
 namespace {
@@ -96,6 +97,7 @@ absl::Status Session::Prepare(const Eigen::VectorXd& stiffness,
 }
 
 absl::Status Session::Closed() const {
+  if (moved_) return SessionMoved("");
   if (updated_) {
     return WithReason(
         absl::AbortedError(absl::StrCat("sessions/", id_, " was updated meanwhile; try again")),
@@ -229,7 +231,8 @@ void Session::Close(CloseReason reason) {
   {
     MutexLock lock(mutex_);
     // First: who finds it closed asks why.
-    evicted_ = reason != CloseReason::kDeleted;
+    moved_ = reason == CloseReason::kMoved;
+    evicted_ = reason == CloseReason::kEvicted || reason == CloseReason::kUpdated;
     std::swap(closed, models_);
     own_bytes_ = 0;
   }

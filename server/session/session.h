@@ -26,6 +26,7 @@
 #include "server/session/clock.h"
 #include "server/session/memory_budget.h"
 #include "server/session/mesh_catalog.h"
+#include "server/session/session_holds.h"
 #include "server/session/shared_preparation.h"
 #include "server/session/worker_pool.h"
 #include "server/store/session_record.h"
@@ -79,6 +80,17 @@ class Session {
       const Clock* clock, const Cancellation& cancellation);
 
   const std::string& id() const { return id_; }
+
+  // By which this server holds it; null where its store is its own. Set once, before anybody but
+  // its maker has it.
+  void SetHold(SessionHoldPtr hold) { hold_ = std::move(hold); }
+  const SessionHoldPtr& hold() const { return hold_; }
+  // Under which it is written.
+  int64_t epoch() const { return EpochUnder(hold_); }
+  // Any thread, under any lock; costs nothing where the store is not shared. What it answers may be
+  // sent, and what is written of it kept, only while this is OK. Errors: SESSION_MOVED.
+  absl::Status CheckHeld() const { return CheckHold(hold_); }
+
   const StoredMesh& mesh() const { return *mesh_; }
   const std::shared_ptr<const StoredMesh>& shared_mesh() const { return mesh_; }
   const ConstraintSet& constraints() const { return constraints_; }
@@ -115,7 +127,8 @@ class Session {
   // On the strand. `poses` has one entry per handle, in the order of the constraints.
   //
   // Errors: InvalidArgument (a pose that is not legal), NotFound (the session was closed, see
-  // evicted), FailedPrecondition (a model that was not prepared).
+  // evicted), Unavailable (it was closed, see moved), FailedPrecondition (a model that was not
+  // prepared).
   absl::StatusOr<Deformation> Deform(DeformationModel model, absl::Span<const HandlePose> poses,
                                      const DeformControl& control);
 
@@ -129,7 +142,7 @@ class Session {
   std::shared_ptr<const ProgressFeed::Follower> Follow(const ResponseRequest& request,
                                                        TellSession tell) const;
 
-  enum class CloseReason { kDeleted, kEvicted, kUpdated };
+  enum class CloseReason { kDeleted, kEvicted, kUpdated, kMoved };
 
   // Any thread; on the strand where the memory is to be free afterwards even if something is being
   // solved. Gives the memory back; later calls of Deform fail. What is being made for the session
@@ -137,6 +150,8 @@ class Session {
   void Close(CloseReason reason);
   // Any thread. Closed, but the server still has the session: SessionRegistry::Open gives another.
   bool evicted() const { return evicted_; }
+  // Any thread. Closed, since this server does not hold it any longer.
+  bool moved() const { return moved_; }
   // Any thread. That other one is made from something else; and its handles are others, so that
   // poses for this one say nothing to it. Stay so.
   bool updated() const { return updated_; }
@@ -189,6 +204,7 @@ class Session {
   const std::variant<double, std::string> stiffness_;
   DeformerOptions options_;
   PreparationSummary summary_;
+  SessionHoldPtr hold_;
 
   // Self-synchronised.
   Strand strand_;
@@ -196,6 +212,7 @@ class Session {
   std::atomic<int64_t> own_bytes_ = 0;
   std::atomic<bool> making_ = false;
   std::atomic<bool> evicted_ = false;
+  std::atomic<bool> moved_ = false;
   std::atomic<bool> updated_ = false;
   std::atomic<bool> outdated_ = false;
   std::atomic<Clock::TimePoint> last_used_;

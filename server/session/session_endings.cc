@@ -8,7 +8,6 @@
 
 #include "spdlog/spdlog.h"
 
-#include "server/session/session_maker.h"
 #include "server/session/session_refusals.h"
 
 namespace tissueform {
@@ -22,12 +21,13 @@ void WarnIfLeftBehind(const absl::Status& status) {
 }  // namespace
 
 SessionEndings::SessionEndings(const ServiceLimits& limits, SharedSessionTable* sessions,
-                               SessionStore* store, MeshCatalog* catalog, const Clock* clock,
-                               SessionObserver observer)
+                               SessionStore* store, MeshCatalog* catalog, SessionHolds* holds,
+                               const Clock* clock, SessionObserver observer)
     : limits_(limits),
       sessions_(sessions),
       store_(store),
       catalog_(catalog),
+      holds_(holds),
       clock_(clock),
       observer_(std::move(observer)) {}
 
@@ -43,6 +43,20 @@ void SessionEndings::Abandon(const std::shared_ptr<Session>& session) {
 }
 
 void SessionEndings::Delete(const std::string& id, const StatusCallback& done) {
+  holds_->Take(id, [this, id, done](const absl::StatusOr<SessionHoldPtr>& hold) {
+    if (hold.ok()) {
+      DeleteHeld(id, *hold, done);
+    } else if (absl::IsNotFound(hold.status())) {
+      Gone(id);
+      done(NoSuchSession(id));
+    } else {
+      done(hold.status());
+    }
+  });
+}
+
+void SessionEndings::DeleteHeld(const std::string& id, const SessionHoldPtr& hold,
+                                const StatusCallback& done) {
   std::optional<KnownSession> known;
   {
     MutexLock lock(sessions_->mutex);
@@ -51,21 +65,22 @@ void SessionEndings::Delete(const std::string& id, const StatusCallback& done) {
   if (!known.has_value()) {
     done(NoSuchSession(id));
   } else if (known->session == nullptr) {
-    Forget(id, done);
+    Forget(id, hold, done);
   } else {
-    End(known->session, done);
+    End(known->session, hold, done);
   }
 }
 
 void SessionEndings::EndUnwanted(const std::shared_ptr<Session>& session) {
-  End(session, WarnIfLeftBehind);
+  End(session, session->hold(), WarnIfLeftBehind);
 }
 
-void SessionEndings::End(const std::shared_ptr<Session>& session, const StatusCallback& done) {
-  session->strand().Post(Lane::kSolves, [this, session, done] {
+void SessionEndings::End(const std::shared_ptr<Session>& session, const SessionHoldPtr& hold,
+                         const StatusCallback& done) {
+  session->strand().Post(Lane::kSolves, [this, session, hold, done] {
     session->Close(Session::CloseReason::kDeleted);
     // What is being made for it holds memory until that ends.
-    const auto forget = [this, id = session->id(), done] { Forget(id, done); };
+    const auto forget = [this, id = session->id(), hold, done] { Forget(id, hold, done); };
     if (session->making()) {
       session->making_strand().Post(Lane::kBatch, forget);
     } else {
@@ -74,17 +89,56 @@ void SessionEndings::End(const std::shared_ptr<Session>& session, const StatusCa
   });
 }
 
-void SessionEndings::Forget(const std::string& id, StatusCallback done) {
-  store_->Delete(id, "", kStoreEpoch,
-                 [this, id, done = std::move(done)](const absl::Status& status) {
-                   // Only now: who comes to watch after it shall not find the record any longer.
-                   observer_(id, SessionEvent::kDeleted);
-                   {
-                     MutexLock lock(sessions_->mutex);
-                     sessions_->table.Ended(id);
-                   }
-                   done(status);
-                 });
+void SessionEndings::Forget(const std::string& id, const SessionHoldPtr& hold,
+                            const StatusCallback& done) {
+  const auto forgotten = [this, id, hold, done](const absl::Status& outcome) {
+    const absl::Status status = hold == nullptr ? outcome : MovedIfFenced(outcome);
+    // Only now: who comes to watch after it shall not find the record any longer. One of a store
+    // that is shared, whose record is still there, is found by whoever asks for it next.
+    const bool is_kept = hold != nullptr && !status.ok() && !absl::IsNotFound(status);
+    observer_(id, is_kept ? SessionEvent::kMoved : SessionEvent::kDeleted);
+    {
+      MutexLock lock(sessions_->mutex);
+      sessions_->table.Ended(id);
+    }
+    done(status);
+  };
+  if (const absl::Status held = CheckHold(hold); !held.ok()) {
+    forgotten(held);
+  } else {
+    store_->Delete(id, "", EpochUnder(hold), forgotten);
+  }
+}
+
+void SessionEndings::Lost(const std::string& id) {
+  std::shared_ptr<Session> lost;
+  {
+    MutexLock lock(sessions_->mutex);
+    KnownSession* known = sessions_->table.Find(id);
+    if (known != nullptr && known->session != nullptr) {
+      if (known->session->CheckHeld().ok()) return;  // taken anew, and made since
+      lost = std::exchange(known->session, nullptr);
+      known->last_used = lost->last_used();
+      if (!catalog_->keeps_meshes()) known->mesh = lost->shared_mesh();
+    }
+  }
+  if (lost == nullptr && holds_->Holds(id)) return;
+  if (lost != nullptr) lost->Close(Session::CloseReason::kMoved);
+  observer_(id, SessionEvent::kMoved);
+}
+
+void SessionEndings::Gone(const std::string& id) {
+  if (holds_->Holds(id)) return;
+  std::optional<KnownSession> known;
+  {
+    MutexLock lock(sessions_->mutex);
+    if (sessions_->table.FindMaking(id) != nullptr) return;
+    known = sessions_->table.Take(id);
+    if (known.has_value()) sessions_->table.Ended(id);
+  }
+  if (!known.has_value()) return;
+  if (known->session != nullptr) known->session->Close(Session::CloseReason::kDeleted);
+  observer_(id, SessionEvent::kDeleted);
 }
 
 int SessionEndings::Evict(const std::function<bool()>& enough,
@@ -113,14 +167,16 @@ int SessionEndings::Evict(const std::function<bool()>& enough,
 }
 
 int SessionEndings::RemoveIdle() {
-  std::vector<std::pair<std::string, KnownSession>> removed;
+  const Clock::TimePoint until = clock_->Now() - limits_.session_idle_ttl;
+  std::vector<std::string> ids;
   {
     MutexLock lock(sessions_->mutex);
-    for (const std::string& id :
-         sessions_->table.UnusedSince(clock_->Now() - limits_.session_idle_ttl)) {
-      removed.emplace_back(id, *sessions_->table.Take(id));
-    }
+    ids = sessions_->table.UnusedSince(until);
   }
+  const std::vector<Removed> removed =
+      TakeUnused(ids, [until](const SessionTable& table, const std::string& id) {
+        return table.IsUnusedSince(id, until);
+      });
   const int count = static_cast<int>(removed.size());
   if (count > 0) {
     spdlog::info("removed {} sessions that were idle for more than {} s", count,
@@ -131,25 +187,37 @@ int SessionEndings::RemoveIdle() {
 }
 
 int SessionEndings::RemoveUnused(const std::vector<std::string>& ids, Clock::TimePoint since) {
-  std::vector<std::pair<std::string, KnownSession>> removed;
-  {
-    MutexLock lock(sessions_->mutex);
-    SessionTable& table = sessions_->table;
-    for (const std::string& id : ids) {
-      if (table.Find(id) != nullptr && !table.IsInUse(id, since)) {
-        removed.emplace_back(id, *table.Take(id));
-      }
-    }
-  }
+  const std::vector<Removed> removed =
+      TakeUnused(ids, [since](const SessionTable& table, const std::string& id) {
+        return table.Find(id) != nullptr && !table.IsInUse(id, since);
+      });
   const int count = static_cast<int>(removed.size());
   EndUnused(removed);
   return count;
 }
 
-void SessionEndings::EndUnused(const std::vector<std::pair<std::string, KnownSession>>& removed) {
-  for (const auto& [id, known] : removed) {
+std::vector<SessionEndings::Removed> SessionEndings::TakeUnused(
+    const std::vector<std::string>& ids,
+    const std::function<bool(const SessionTable& table, const std::string& id)>& is_unused) {
+  std::vector<Removed> removed;
+  for (const std::string& id : ids) {
+    {
+      MutexLock lock(sessions_->mutex);
+      if (!is_unused(sessions_->table, id)) continue;
+    }
+    absl::StatusOr<SessionHoldPtr> hold = holds_->TakeAndWait(id);
+    if (!hold.ok()) continue;  // another server may use it
+    MutexLock lock(sessions_->mutex);
+    if (!is_unused(sessions_->table, id)) continue;
+    removed.push_back({id, *sessions_->table.Take(id), *std::move(hold)});
+  }
+  return removed;
+}
+
+void SessionEndings::EndUnused(const std::vector<Removed>& removed) {
+  for (const auto& [id, known, hold] : removed) {
     if (known.session != nullptr) known.session->Close(Session::CloseReason::kDeleted);
-    Forget(id, WarnIfLeftBehind);
+    Forget(id, hold, WarnIfLeftBehind);
   }
 }
 

@@ -16,13 +16,15 @@
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session.h"
+#include "server/session/session_holds.h"
 #include "server/session/session_table.h"
 #include "server/store/session_store.h"
 
 namespace tissueform {
 
 // What happens to a session, for those who follow it without using it.
-enum class SessionEvent { kEvicted, kRestored, kDeleted };
+// kMoved: this server holds it no longer.
+enum class SessionEvent { kEvicted, kRestored, kDeleted, kMoved };
 // From any thread, without a lock held.
 using SessionObserver = std::function<void(const std::string& id, SessionEvent event)>;
 
@@ -40,7 +42,8 @@ class SessionEndings {
 
   // All pointers must outlive it and what it ends.
   SessionEndings(const ServiceLimits& limits, SharedSessionTable* sessions, SessionStore* store,
-                 MeshCatalog* catalog, const Clock* clock, SessionObserver observer);
+                 MeshCatalog* catalog, SessionHolds* holds, const Clock* clock,
+                 SessionObserver observer);
 
   // See SessionRegistry.
   void Abandon(const std::shared_ptr<Session>& session) ABSL_LOCKS_EXCLUDED(sessions_->mutex);
@@ -52,20 +55,39 @@ class SessionEndings {
   int RemoveUnused(const std::vector<std::string>& ids, Clock::TimePoint since)
       ABSL_LOCKS_EXCLUDED(sessions_->mutex);
   absl::Status RemoveMesh(const std::string& sha256) ABSL_LOCKS_EXCLUDED(sessions_->mutex);
+  void Lost(const std::string& id) ABSL_LOCKS_EXCLUDED(sessions_->mutex);
+  // Its record is gone from the store; nothing where this server holds it or makes it.
+  void Gone(const std::string& id) ABSL_LOCKS_EXCLUDED(sessions_->mutex);
 
   // Ends a session that is out of the table, and its record; where nobody waits for that.
   void EndUnwanted(const std::shared_ptr<Session>& session);
 
  private:
-  void End(const std::shared_ptr<Session>& session, const StatusCallback& done);
+  // Of one that is out of the table.
+  struct Removed {
+    std::string id;
+    KnownSession known;
+    SessionHoldPtr hold;
+  };
+
+  void DeleteHeld(const std::string& id, const SessionHoldPtr& hold, const StatusCallback& done)
+      ABSL_LOCKS_EXCLUDED(sessions_->mutex);
+  void End(const std::shared_ptr<Session>& session, const SessionHoldPtr& hold,
+           const StatusCallback& done);
   // Takes the record of a session that has ended out of the store; then its id is free again.
-  void Forget(const std::string& id, StatusCallback done);
-  void EndUnused(const std::vector<std::pair<std::string, KnownSession>>& removed);
+  void Forget(const std::string& id, const SessionHoldPtr& hold, const StatusCallback& done);
+  // What nobody used since then, of these; of a store that is shared what can be taken.
+  std::vector<Removed> TakeUnused(
+      const std::vector<std::string>& ids,
+      const std::function<bool(const SessionTable& table, const std::string& id)>& is_unused)
+      ABSL_LOCKS_EXCLUDED(sessions_->mutex);
+  void EndUnused(const std::vector<Removed>& removed);
 
   const ServiceLimits limits_;
   SharedSessionTable* const sessions_;
   SessionStore* const store_;
   MeshCatalog* const catalog_;
+  SessionHolds* const holds_;
   const Clock* const clock_;
   const SessionObserver observer_;
 };

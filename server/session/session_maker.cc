@@ -8,11 +8,12 @@
 namespace tissueform {
 
 SessionMaker::SessionMaker(MemoryBudget* budget, WorkerPool* pool, SessionStore* store,
-                           MeshCatalog* catalog, const Clock* clock)
+                           MeshCatalog* catalog, SessionHolds* holds, const Clock* clock)
     : budget_(budget),
       pool_(pool),
       store_(store),
       catalog_(catalog),
+      holds_(holds),
       clock_(clock),
       preparations_(budget, pool) {}
 
@@ -51,11 +52,11 @@ void SessionMaker::Create(SessionRecord record, std::shared_ptr<const StoredMesh
       return;
     }
     if (tell) tell({SessionStage::kKeeping});
-    store_->Create(std::move(made->record), kStoreEpoch,
-                   [session = std::move(made->session),
+    store_->Create(std::move(made->record), kSoleEpoch,
+                   [this, session = std::move(made->session),
                     done = std::move(done)](const absl::StatusOr<SessionRecord>& stored) mutable {
                      if (stored.ok()) {
-                       done(std::move(session));
+                       TakeNew(std::move(session), done);
                      } else {
                        // Its memory is free before anybody hears of the failure and tries again.
                        session.reset();
@@ -64,6 +65,15 @@ void SessionMaker::Create(SessionRecord record, std::shared_ptr<const StoredMesh
                    });
   };
   Make(std::move(record), std::move(mesh), std::move(caller), std::move(keep));
+}
+
+void SessionMaker::TakeNew(std::shared_ptr<Session> session, const Callback& done) {
+  const std::string id = session->id();
+  holds_->Take(id,
+               [this, id, session = std::move(session), done](absl::StatusOr<SessionHoldPtr> hold) {
+                 session->SetHold(hold.ok() ? *std::move(hold) : holds_->NotHeld(id));
+                 done(session);
+               });
 }
 
 void SessionMaker::Restore(const std::string& id, SessionCaller caller, Callback done) {
@@ -80,6 +90,35 @@ void SessionMaker::Restore(const std::string& id, SessionCaller caller, Callback
 void SessionMaker::Remake(const std::string& id, Change change, SessionCaller caller,
                           MadeCallback done) {
   caller.Tell(SessionStage::kReadingMesh);
+  // Before the record is read: nobody else writes it from then on.
+  holds_->Take(id, [this, id, change = std::move(change), caller = std::move(caller),
+                    done = std::move(done)](absl::StatusOr<SessionHoldPtr> hold) {
+    if (hold.ok()) {
+      Read(id, change, caller, WithHold(*std::move(hold), done));
+    } else {
+      done(hold.status());
+    }
+  });
+}
+
+SessionMaker::MadeCallback SessionMaker::WithHold(SessionHoldPtr hold, MadeCallback done) {
+  if (hold == nullptr) return done;
+  // All copies of the callback have one.
+  auto slot = std::make_shared<SessionHoldPtr>(std::move(hold));
+  return [this, slot = std::move(slot), done = std::move(done)](absl::StatusOr<Made> made) {
+    if (made.ok()) {
+      made->session->SetHold(std::exchange(*slot, nullptr));
+      done(std::move(made));
+    } else {
+      // A client that is told of another server finds the session free.
+      holds_->GiveBack(std::exchange(*slot, nullptr),
+                       [done, status = made.status()] { done(status); });
+    }
+  };
+}
+
+void SessionMaker::Read(const std::string& id, Change change, SessionCaller caller,
+                        MadeCallback done) {
   store_->Get(id, [this, change = std::move(change), caller = std::move(caller),
                    done = std::move(done)](absl::StatusOr<SessionRecord> record) mutable {
     if (!record.ok()) {

@@ -16,15 +16,13 @@
 #include "server/session/memory_budget.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session.h"
+#include "server/session/session_holds.h"
 #include "server/session/session_progress.h"
 #include "server/session/shared_preparation.h"
 #include "server/session/worker_pool.h"
 #include "server/store/session_store.h"
 
 namespace tissueform {
-
-// This process is the only one that writes to its store: a store on disk is locked by it.
-inline constexpr int64_t kStoreEpoch = 1;
 
 // Who waits for a session: whether anybody still does, and how they are told how far it is.
 struct SessionCaller {
@@ -54,23 +52,25 @@ class SessionMaker {
 
   // All must outlive it and its sessions.
   SessionMaker(MemoryBudget* budget, WorkerPool* pool, SessionStore* store, MeshCatalog* catalog,
-               const Clock* clock);
+               SessionHolds* holds, const Clock* clock);
 
   // Makes a session of `record` and keeps nothing. `mesh` is the one that the record names. Errors:
   // those of Session::Create.
   void Make(SessionRecord record, std::shared_ptr<const StoredMesh> mesh, SessionCaller caller,
             MadeCallback done);
 
-  // Make, then the record is kept: no record tells of a session that could not be made. Errors: and
-  // those of SessionStore::Create.
+  // Make, then the record is kept, and then the session is taken: no record tells of a session that
+  // could not be made. One that cannot be taken is there all the same, but CheckHeld refuses it.
+  // Errors: and those of SessionStore::Create.
   void Create(SessionRecord record, std::shared_ptr<const StoredMesh> mesh, SessionCaller caller,
               Callback done);
 
-  // Makes the session of a record in the store. Errors: those of SessionStore::Get,
+  // Takes the session of a record in the store, and makes it. After an error it is given back, if
+  // nobody else here holds it. Errors: those of SessionHolds::Take, SessionStore::Get,
   // MeshCatalog::Load and Session::Create.
   void Restore(const std::string& id, SessionCaller caller, Callback done);
 
-  // Makes a session of a record in the store as `change` has left it, and keeps nothing; the record
+  // The same of a record in the store as `change` has left it, and keeps nothing; the record
   // has the etag of the version that was changed. Errors: those of Restore and of `change`, which
   // comes on a worker.
   using Change =
@@ -82,6 +82,11 @@ class SessionMaker {
   void Stop();
 
  private:
+  // A session whose record has just been kept.
+  void TakeNew(std::shared_ptr<Session> session, const Callback& done);
+  void Read(const std::string& id, Change change, SessionCaller caller, MadeCallback done);
+  // `done` with sessions that have this hold; where there is none it is given back before.
+  MadeCallback WithHold(SessionHoldPtr hold, MadeCallback done);
   // On a worker.
   void MakeChanged(const SessionRecord& record, const Change& change, SessionCaller caller,
                    MadeCallback done);
@@ -93,6 +98,7 @@ class SessionMaker {
   WorkerPool* const pool_;
   SessionStore* const store_;
   MeshCatalog* const catalog_;
+  SessionHolds* const holds_;
   const Clock* const clock_;
 
   // Self-synchronised.

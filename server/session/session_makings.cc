@@ -10,6 +10,7 @@
 
 #include "absl/status/status.h"
 
+#include "core/base/error_reason.h"
 #include "server/session/quotas.h"
 
 namespace tissueform {
@@ -33,6 +34,7 @@ void SessionMakings::Create(const SessionRecord& record,
     MutexLock lock(sessions_->mutex);
     admission = AdmitCreate(record, waiter);
   }
+  CloseLost(admission.lost);
   if (admission.started == nullptr) {
     Answer(admission, waiter);
   } else if (admission.started->restores) {
@@ -49,11 +51,18 @@ void SessionMakings::Open(const std::string& id, const SessionWaiter& waiter) {
     MutexLock lock(sessions_->mutex);
     admission = AdmitOpen(id, waiter);
   }
+  CloseLost(admission.lost);
   if (admission.started == nullptr) {
     Answer(admission, waiter);
   } else {
     StartRestore(admission.started);
   }
+}
+
+void SessionMakings::CloseLost(const std::shared_ptr<Session>& lost) {
+  if (lost == nullptr) return;
+  lost->Close(Session::CloseReason::kMoved);
+  observer_(lost->id(), SessionEvent::kMoved);
 }
 
 void SessionMakings::Answer(const Admission& admission, const SessionWaiter& waiter) {
@@ -118,6 +127,9 @@ SessionMakings::Admission SessionMakings::AdmitOpen(const std::string& id,
                                                     const SessionWaiter& waiter) {
   Admission admission;
   KnownSession* known = sessions_->table.Find(id);
+  if (known != nullptr && known->session != nullptr && !known->session->CheckHeld().ok()) {
+    admission.lost = std::exchange(known->session, nullptr);
+  }
   if (known == nullptr) {
     admission.refusal = NoSuchSession(id);
   } else if (known->session != nullptr) {
@@ -258,10 +270,20 @@ void SessionMakings::FinishRestore(const MakingPtr& making,
                                    absl::StatusOr<std::shared_ptr<Session>> result) {
   std::vector<SessionWaiter> waiters;
   std::shared_ptr<Session> unwanted;
+  std::shared_ptr<Session> lost;
   bool again = false;
+  if (result.ok()) {
+    if (const absl::Status held = (*result)->CheckHeld(); !held.ok()) {
+      (*result)->Close(Session::CloseReason::kMoved);
+      result = held;
+    }
+  }
   {
     MutexLock lock(sessions_->mutex);
     KnownSession* known = sessions_->table.Find(making->id);
+    if (known != nullptr && known->session != nullptr && !known->session->CheckHeld().ok()) {
+      lost = std::exchange(known->session, nullptr);
+    }
     if (known != nullptr && known->session != nullptr) {
       result = known->session;  // an update has made it meanwhile
     } else if (known != nullptr && known->version != making->version) {
@@ -284,10 +306,12 @@ void SessionMakings::FinishRestore(const MakingPtr& making,
       result = NoSuchSession(making->id);  // deleted meanwhile
     }
   }
+  CloseLost(lost);
   if (again) {
     StartRestore(making);
     return;
   }
+  if (HasReason(result.status(), ErrorReason::kSessionNotFound)) endings_->Gone(making->id);
   if (unwanted != nullptr) unwanted->Close(Session::CloseReason::kDeleted);
   if (result.ok()) observer_(making->id, SessionEvent::kRestored);
   for (const SessionWaiter& waiter : waiters) {

@@ -55,7 +55,8 @@ class SessionMakings {
     absl::Status refusal;
     std::shared_ptr<Session> existing;
     MakingPtr started;
-    std::optional<SessionProgress> joined;  // how far a making is that was under way
+    std::shared_ptr<Session> lost = nullptr;  // was in the table, though it is not held
+    std::optional<SessionProgress> joined;    // how far a making is that was under way
   };
 
   Admission AdmitCreate(const SessionRecord& record, const SessionWaiter& waiter)
@@ -78,6 +79,8 @@ class SessionMakings {
   // Tries to have room for one more session in memory.
   void MakeRoom() ABSL_LOCKS_EXCLUDED(sessions_->mutex);
 
+  // What an admission leaves to be done without the lock.
+  void CloseLost(const std::shared_ptr<Session>& lost) ABSL_LOCKS_EXCLUDED(sessions_->mutex);
   // The caller's answer, where it was not `started`.
   static void Answer(const Admission& admission, const SessionWaiter& waiter);
   void StartCreation(const MakingPtr& making, const SessionRecord& record,

@@ -3,6 +3,8 @@
 
 #include "server/session/session_refusals.h"
 
+#include <utility>
+
 #include "absl/strings/str_cat.h"
 
 #include "core/base/error_reason.h"
@@ -36,6 +38,19 @@ absl::Status EndingId(const std::string& id) {
           absl::StrCat("the session \"sessions/", id,
                        "\" is being deleted; try again in a moment, or choose another session_id")),
       ErrorReason::kSessionBeingDeleted);
+}
+
+absl::Status SessionMoved(const std::string& node) {
+  ErrorMetadata metadata;
+  if (!node.empty()) metadata["node"] = node;
+  return WithReason(
+      absl::UnavailableError("another server holds the session, or may by now; call again, and the "
+                             "session is found where it is"),
+      ErrorReason::kSessionMoved, metadata);
+}
+
+absl::Status MovedIfFenced(absl::Status status) {
+  return absl::IsFailedPrecondition(status) ? SessionMoved("") : std::move(status);
 }
 
 absl::Status MeshInUse(int sessions) {

@@ -15,9 +15,13 @@ absl::Status NoSuchSession(const std::string& id);         // NotFound
 absl::Status OtherRequest(const std::string& request_id);  // InvalidArgument: its id was used
 absl::Status TakenId(const std::string& id);               // AlreadyExists
 absl::Status EndingId(const std::string& id);              // Unavailable: it is being deleted
-absl::Status MeshInUse(int sessions);                      // FailedPrecondition
-absl::Status NoSuchMesh();                                 // NotFound
-absl::Status NoMeshAnyMore();                              // NotFound: it was deleted meanwhile
+// Unavailable: this server may not answer it, since another holds it, that node where one is named.
+absl::Status SessionMoved(const std::string& node);
+// What the store has said of a write under an epoch: SessionMoved where that is an old one.
+absl::Status MovedIfFenced(absl::Status status);
+absl::Status MeshInUse(int sessions);  // FailedPrecondition
+absl::Status NoSuchMesh();             // NotFound
+absl::Status NoMeshAnyMore();          // NotFound: it was deleted meanwhile
 // ResourceExhausted: what the server does with so many ("keeps"), and what helps.
 absl::Status TooManySessions(int limit, absl::string_view what, absl::string_view remedy);
 

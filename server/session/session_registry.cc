@@ -3,38 +3,23 @@
 
 #include "server/session/session_registry.h"
 
-#include <future>
 #include <utility>
 
 #include "core/base/error_reason.h"
-#include "core/base/status_macros.h"
 #include "server/auth/identity.h"
 #include "server/session/session_refusals.h"
 
 namespace tissueform {
-namespace {
-
-constexpr int kPageSize = 1000;
-
-absl::StatusOr<SessionStore::Page> ListAndWait(SessionStore* store,
-                                               const SessionStore::ListRequest& request) {
-  std::promise<absl::StatusOr<SessionStore::Page>> answer;
-  store->List(request, [&answer](absl::StatusOr<SessionStore::Page> page) {
-    answer.set_value(std::move(page));
-  });
-  return answer.get_future().get();
-}
-
-}  // namespace
 
 SessionRegistry::SessionRegistry(const ServiceLimits& limits, MemoryBudget* budget,
                                  WorkerPool* pool, SessionStore* store, MeshCatalog* catalog,
-                                 const Clock* clock)
+                                 const Clock* clock, SessionOwnership* ownership)
     : pool_(pool),
       store_(store),
       clock_(clock),
-      maker_(budget, pool, store, catalog, clock),
-      endings_(limits, &sessions_, store, catalog, clock,
+      holds_(std::make_shared<SessionHolds>(ownership, pool)),
+      maker_(budget, pool, store, catalog, holds_.get(), clock),
+      endings_(limits, &sessions_, store, catalog, holds_.get(), clock,
                [this](const std::string& id, Event event) { observer_(id, event); }),
       makings_(limits, &sessions_, catalog, &maker_, &endings_,
                [this](const std::string& id, Event event) { observer_(id, event); }),
@@ -42,24 +27,38 @@ SessionRegistry::SessionRegistry(const ServiceLimits& limits, MemoryBudget* budg
       updates_(&maker_, store, &commits_,
                [this](const SessionMaker::Made& remade, bool other_handles) {
                  return Replace(remade, other_handles);
-               }) {}
+               }),
+      news_(&sessions_, store, holds_.get(), clock) {}
 
-absl::Status SessionRegistry::LearnKnown() {
-  SessionStore::ListRequest request{.owner = std::nullopt, .after = "", .limit = kPageSize};
-  do {
-    TF_ASSIGN_OR_RETURN(SessionStore::Page page, ListAndWait(store_, request));
-    MutexLock lock(sessions_.mutex);
-    for (SessionRecord& record : page.records) {
-      KnownSession known;
-      known.key = RequestKeyOf(record);
-      known.owner = record.owner;
-      known.mesh_sha256 = std::move(record.mesh_sha256);
-      known.last_used = clock_->Now();
-      sessions_.table.Add(record.id, std::move(known));
-    }
-    request.after = std::move(page.next);
-  } while (!request.after.empty());
-  return absl::OkStatus();
+void SessionRegistry::HandOver(std::chrono::steady_clock::time_point deadline) {
+  holds_->StopTaking();
+  for (const std::string& id : holds_->Held()) {
+    holds_->GiveUp(id);
+    endings_.Lost(id);
+    commits_.WaitFor(id, deadline);
+    // A commit that is still under way is refused once another server has the session.
+    if (std::chrono::steady_clock::now() < deadline) holds_->Release(id);
+  }
+}
+
+void SessionRegistry::WhenKnown(const std::string& id, const std::function<void()>& then,
+                                const StatusCallback& refuse) {
+  if (!holds_->shared() || Knows(id)) {
+    then();
+  } else {
+    news_.Ask(id, [then, refuse](const absl::Status& asked) {
+      if (asked.ok() || absl::IsNotFound(asked)) {
+        then();  // which says so
+      } else {
+        refuse(asked);
+      }
+    });
+  }
+}
+
+void SessionRegistry::Delete(const std::string& id, const StatusCallback& done) {
+  WhenKnown(
+      id, [this, id, done] { endings_.Delete(id, done); }, done);
 }
 
 void SessionRegistry::Create(SessionRecord record, const std::shared_ptr<const StoredMesh>& mesh,
@@ -73,15 +72,18 @@ void SessionRegistry::Open(const std::string& id, CancelFlag cancelled, const Se
                            const TellSession& tell) {
   if (std::shared_ptr<Session> session = Loaded(id); session != nullptr) {
     done(std::move(session));
-  } else {
-    makings_.Open(id, {std::move(cancelled), done, tell});
+    return;
   }
+  const SessionWaiter waiter{std::move(cancelled), done, tell};
+  WhenKnown(
+      id, [this, id, waiter] { makings_.Open(id, waiter); }, done);
 }
 
 std::shared_ptr<Session> SessionRegistry::Loaded(const std::string& id) {
   MutexLock lock(sessions_.mutex);
   const KnownSession* known = sessions_.table.Find(id);
   if (known == nullptr || known->session == nullptr) return nullptr;
+  if (!known->session->CheckHeld().ok()) return nullptr;
   known->session->Touch();
   return known->session;
 }
@@ -127,23 +129,33 @@ void SessionRegistry::Update(const std::string& id, const std::string& etag,
                              SessionMaker::Change change, CancelFlag cancelled,
                              const std::function<void(absl::StatusOr<View>)>& done,
                              TellSession tell) {
-  if (absl::Status refusal = makings_.AdmitRemaking(id); !refusal.ok()) {
-    done(std::move(refusal));
-    return;
-  }
-  updates_.Update(id, etag, std::move(change),
-                  {.cancellation = Cancellation(
-                       [cancelled = std::move(cancelled)] { return cancelled->load(); }),
-                   .tell = std::move(tell)},
-                  [id, done](absl::StatusOr<SessionMaker::Made> remade) {
-                    if (remade.ok()) {
-                      done(View{std::move(remade->record), std::move(remade->session)});
-                    } else if (HasReason(remade.status(), ErrorReason::kSessionNotFound)) {
-                      done(NoSuchSession(id));
-                    } else {
-                      done(remade.status());
-                    }
-                  });
+  const SessionCaller caller{.cancellation = Cancellation(
+                                 [cancelled = std::move(cancelled)] { return cancelled->load(); }),
+                             .tell = std::move(tell)};
+  WhenKnown(
+      id,
+      [this, id, etag, change = std::move(change), caller, done] {
+        if (absl::Status refusal = makings_.AdmitRemaking(id); !refusal.ok()) {
+          done(std::move(refusal));
+        } else {
+          StartUpdate(id, etag, change, caller, done);
+        }
+      },
+      done);
+}
+
+void SessionRegistry::StartUpdate(const std::string& id, const std::string& etag,
+                                  const SessionMaker::Change& change, const SessionCaller& caller,
+                                  const std::function<void(absl::StatusOr<View>)>& done) {
+  updates_.Update(id, etag, change, caller, [id, done](absl::StatusOr<SessionMaker::Made> remade) {
+    if (remade.ok()) {
+      done(View{std::move(remade->record), std::move(remade->session)});
+    } else if (HasReason(remade.status(), ErrorReason::kSessionNotFound)) {
+      done(NoSuchSession(id));
+    } else {
+      done(remade.status());
+    }
+  });
 }
 
 absl::Status SessionRegistry::Replace(const SessionMaker::Made& remade, bool other_handles) {

@@ -22,12 +22,15 @@
 #include "server/session/pose_commits.h"
 #include "server/session/session.h"
 #include "server/session/session_endings.h"
+#include "server/session/session_holds.h"
 #include "server/session/session_maker.h"
 #include "server/session/session_makings.h"
+#include "server/session/session_news.h"
 #include "server/session/session_progress.h"
 #include "server/session/session_table.h"
 #include "server/session/session_updates.h"
 #include "server/session/worker_pool.h"
+#include "server/store/session_ownership.h"
 #include "server/store/session_store.h"
 
 namespace tissueform {
@@ -58,8 +61,13 @@ class SessionRegistry {
   };
 
   // All pointers must outlive the registry and all its sessions.
+  // `ownership` says which sessions of the store this server may answer and write.
   SessionRegistry(const ServiceLimits& limits, MemoryBudget* budget, WorkerPool* pool,
-                  SessionStore* store, MeshCatalog* catalog, const Clock* clock = Clock::System());
+                  SessionStore* store, MeshCatalog* catalog, const Clock* clock = Clock::System(),
+                  SessionOwnership* ownership = SoleOwnership::Get());
+  ~SessionRegistry() { Stop(); }
+  SessionRegistry(const SessionRegistry&) = delete;
+  SessionRegistry& operator=(const SessionRegistry&) = delete;
 
   // Told of every event, from any thread, without a lock held. Call it before anything else.
   void set_observer(Observer observer) { observer_ = std::move(observer); }
@@ -70,7 +78,23 @@ class SessionRegistry {
 
   // Learns which sessions the store has. Call it before anything else; blocks. Errors: those of
   // SessionStore::List.
-  absl::Status LearnKnown();
+  absl::Status LearnKnown() { return news_.LearnKnown(); }
+
+  // What others do in a store that is shared (see SessionNews). Who does not know a session asks
+  // the store before it is refused; so these may come late.
+  void Learn(const SessionRecord& record) { news_.Learn(record); }      // it was created
+  void Changed(const SessionRecord& record) { news_.Changed(record); }  // it was updated
+  void Forget(const std::string& id) { endings_.Gone(id); }             // it was deleted
+
+  // This server does not hold the session any longer: it leaves memory, and what streams and
+  // watches there are of it are told (Event::kMoved). Nothing where it has been taken anew since.
+  void Lost(const std::string& id) { endings_.Lost(id); }
+
+  // The end of a server whose store is shared: takes no session any more, and gives those that it
+  // holds to others, one after the other: its streams and watches end (Event::kMoved), commits
+  // under way are waited for, its lease is given back. Blocks, until `deadline` and a call to the
+  // store; leases that are left run out.
+  void HandOver(std::chrono::steady_clock::time_point deadline);
 
   // Makes a session of `record` on a worker, keeps the record and calls `done` once. A record
   // without id gets a random one. Calls with the same request id share one session; its making
@@ -87,8 +111,9 @@ class SessionRegistry {
 
   // Gives the session, made again from its record where it is not in memory. At once where it is.
   //
-  // Errors: NotFound; those of Session::Create, SessionStore::Get and MeshCatalog::Load;
-  // ResourceExhausted; Cancelled.
+  // Errors: NotFound; those of Session::Create, SessionHolds::Take, SessionStore::Get and
+  // MeshCatalog::Load; ResourceExhausted; Cancelled; Unavailable (SESSION_MOVED: it was lost while
+  // it was made).
   void Open(const std::string& id, CancelFlag cancelled, const SessionCallback& done,
             const TellSession& tell = {});
 
@@ -115,7 +140,8 @@ class SessionRegistry {
   // durable as far as the store is; after an error it is as it was.
   //
   // Errors: NotFound; Aborted (another version, or somebody else was faster); those of
-  // SessionMaker::Remake and SessionStore::Update; ResourceExhausted; Cancelled.
+  // SessionMaker::Remake and SessionStore::Update; ResourceExhausted; Cancelled; Unavailable
+  // (SESSION_MOVED: another server holds it).
   void Update(const std::string& id, const std::string& etag, SessionMaker::Change change,
               CancelFlag cancelled, const std::function<void(absl::StatusOr<View>)>& done,
               TellSession tell = {});
@@ -128,8 +154,8 @@ class SessionRegistry {
   }
 
   // Calls `done` when the memory of the session is free and its record is gone. Errors: NotFound,
-  // those of SessionStore::Delete.
-  void Delete(const std::string& id, const StatusCallback& done) { endings_.Delete(id, done); }
+  // those of SessionHolds::Take and SessionStore::Delete.
+  void Delete(const std::string& id, const StatusCallback& done);
 
   // Evicts sessions that are not in use, of one owner where one is given, those first that were
   // used longest ago, until `enough` or none is left. Returns how many.
@@ -148,7 +174,7 @@ class SessionRegistry {
   };
   Use UsedSince(Clock::TimePoint since) const;
   // Ends those of the sessions that were not used since, and that no stream holds, records and all.
-  // Returns how many.
+  // Returns how many. Blocks where the store is shared; what others hold there stays.
   int RemoveUnused(const std::vector<std::string>& ids, Clock::TimePoint since) {
     return endings_.RemoveUnused(ids, since);
   }
@@ -162,7 +188,10 @@ class SessionRegistry {
 
   // Nothing is posted to the pool any longer: what the store answers from now on finds nobody who
   // waits. Call it before the pool ends, and end the store's calls before the registry.
-  void Stop() { maker_.Stop(); }
+  void Stop() {
+    holds_->Stop();
+    maker_.Stop();
+  }
 
   // In memory.
   std::vector<std::shared_ptr<Session>> Loaded() const;
@@ -175,6 +204,12 @@ class SessionRegistry {
   WorkerPool& pool() { return *pool_; }
 
  private:
+  // `then` when a session that is there is known; `refuse` when that cannot be found out.
+  void WhenKnown(const std::string& id, const std::function<void()>& then,
+                 const StatusCallback& refuse);
+  void StartUpdate(const std::string& id, const std::string& etag,
+                   const SessionMaker::Change& change, const SessionCaller& caller,
+                   const std::function<void(absl::StatusOr<View>)>& done);
   // Puts an updated session into its place. Errors: NotFound.
   absl::Status Replace(const SessionMaker::Made& remade, bool other_handles)
       ABSL_LOCKS_EXCLUDED(sessions_.mutex);
@@ -187,12 +222,14 @@ class SessionRegistry {
   Observer observer_ = [](const std::string& /*id*/, Event /*event*/) {};
 
   // Self-synchronised. Sessions end before what they were made with.
+  const std::shared_ptr<SessionHolds> holds_;
   SessionMaker maker_;
   SharedSessionTable sessions_;
   SessionEndings endings_;
   SessionMakings makings_;
   PoseCommits commits_;
   SessionUpdates updates_;
+  SessionNews news_;
 };
 
 }  // namespace tissueform

@@ -116,11 +116,21 @@ int SessionTable::CountOf(const std::string& owner) const {
 std::vector<std::string> SessionTable::UnusedSince(Clock::TimePoint until) const {
   std::vector<std::string> unused;
   for (const auto& [id, known] : known_) {
-    const Clock::TimePoint used =
-        known.session == nullptr ? known.last_used : known.session->last_used();
-    if (used <= until && FindMaking(id) == nullptr) unused.push_back(id);
+    if (IsUnused(id, known, until)) unused.push_back(id);
   }
   return unused;
+}
+
+bool SessionTable::IsUnusedSince(const std::string& id, Clock::TimePoint until) const {
+  const KnownSession* known = Find(id);
+  return known != nullptr && IsUnused(id, *known, until);
+}
+
+bool SessionTable::IsUnused(const std::string& id, const KnownSession& known,
+                            Clock::TimePoint until) const {
+  const Clock::TimePoint used =
+      known.session == nullptr ? known.last_used : known.session->last_used();
+  return used <= until && FindMaking(id) == nullptr;
 }
 
 bool SessionTable::IsInUse(const std::string& id, const KnownSession& known,

@@ -126,6 +126,8 @@ class SessionTable {
   int CountOf(const std::string& owner) const;
   // Of all: those used last at `until` or before.
   std::vector<std::string> UnusedSince(Clock::TimePoint until) const;
+  // Whether it is one of those.
+  bool IsUnusedSince(const std::string& id, Clock::TimePoint until) const;
 
   // Of all: those that were used after `since`, and those that a stream holds or somebody waits
   // for.
@@ -144,6 +146,7 @@ class SessionTable {
 
  private:
   bool IsInUse(const std::string& id, const KnownSession& known, Clock::TimePoint since) const;
+  bool IsUnused(const std::string& id, const KnownSession& known, Clock::TimePoint until) const;
 
   std::map<std::string, KnownSession> known_;              // by id
   std::map<std::string, std::string> session_of_request_;  // request id: id

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/status_macros.h"
+#include "server/session/session_refusals.h"
 #include "server/store/store_errors.h"
 
 namespace tissueform {
@@ -26,7 +27,7 @@ void SessionUpdates::Update(const std::string& id, const std::string& etag,
   auto checked = [etag, change = std::move(change)](
                      SessionRecord record,
                      const StoredMesh& mesh) -> absl::StatusOr<SessionRecord> {
-    TF_RETURN_IF_ERROR(CheckSessionWrite(record.id, etag, kStoreEpoch, record.etag, record.epoch));
+    TF_RETURN_IF_ERROR(CheckSessionWrite(record.id, etag, record.epoch, record.etag, record.epoch));
     return change(std::move(record), mesh);
   };
   maker_->Remake(id, std::move(checked), caller,
@@ -41,9 +42,11 @@ void SessionUpdates::Update(const std::string& id, const std::string& etag,
 
 void SessionUpdates::Keep(SessionMaker::Made remade, const SessionCaller& caller, Done done) {
   // The last moment.
-  if (const absl::Status wanted = caller.cancellation.Check(); !wanted.ok()) {
+  absl::Status may_go_on = caller.cancellation.Check();
+  if (may_go_on.ok()) may_go_on = remade.session->CheckHeld();
+  if (!may_go_on.ok()) {
     remade.session.reset();
-    done(wanted);
+    done(may_go_on);
     return;
   }
   caller.Tell(SessionStage::kKeeping);
@@ -64,12 +67,16 @@ void SessionUpdates::Keep(SessionMaker::Made remade, const SessionCaller& caller
     const bool other_handles = !SameHandleNames(current->handles, remade.record.handles);
     remade.record.last_poses =
         other_handles ? std::vector<HandlePose>() : std::move(current->last_poses);
-    store_->Update(std::move(remade.record), kStoreEpoch,
+    const int64_t epoch = remade.session->epoch();
+    store_->Update(std::move(remade.record), epoch,
                    [this, session = std::move(remade.session), other_handles,
                     finish = std::move(finish)](absl::StatusOr<SessionRecord> kept) mutable {
                      if (!kept.ok()) {
+                       const absl::Status refusal = session->hold() == nullptr
+                                                        ? kept.status()
+                                                        : MovedIfFenced(kept.status());
                        session.reset();  // its memory is free before anybody hears of the failure
-                       finish(kept.status());
+                       finish(refusal);
                        return;
                      }
                      SessionMaker::Made result{*std::move(kept), std::move(session)};

@@ -57,6 +57,7 @@ class DurableStore final : public Stores {
   const DurationHistogram* latency() const override;
   std::string folder() const override;
   CommitThread* commit_thread() override;
+  bool keeps() const override { return true; }
 
   const std::vector<DamagedItem>& damaged() const;
 

@@ -27,6 +27,7 @@ class InMemoryStores final : public Stores {
   UploadStore& uploads() override { return *uploads_; }
   PredictionStore& predictions() override { return predictions_; }
   CaseStore& cases() override { return cases_; }
+  bool keeps() const override { return false; }
 
  private:
   InMemorySessionStore sessions_;

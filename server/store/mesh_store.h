@@ -58,7 +58,8 @@ class MeshStore {
   // Names greater than `after`. Errors: InvalidArgument (limit < 1).
   virtual absl::StatusOr<Page> List(const std::string& after, int limit) = 0;
 
-  // Errors: NotFound.
+  // Errors: NotFound; FailedPrecondition (MESH_IN_USE) where the store knows that sessions are made
+  // from it.
   virtual absl::Status Delete(const std::string& sha256) = 0;
 
   // As SessionStore::Touch and ListUnused.

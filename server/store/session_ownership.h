@@ -50,6 +50,12 @@ class SoleOwnership final : public SessionOwnership {
   absl::StatusOr<int64_t> Acquire(const std::string& /*id*/) override { return kSoleEpoch; }
   std::optional<int64_t> EpochOf(const std::string& /*id*/) override { return kSoleEpoch; }
   void Release(const std::string& /*id*/) override {}
+
+  // Has no state.
+  static SoleOwnership* Get() {
+    static SoleOwnership ownership;
+    return &ownership;
+  }
 };
 
 }  // namespace tissueform

@@ -51,7 +51,8 @@ class SessionStore {
   virtual ~SessionStore() = default;
 
   // Adds a record; `done` gets it with its etag and epoch.
-  // Errors: InvalidArgument (no id), AlreadyExists.
+  // Errors: InvalidArgument (no id), AlreadyExists; NotFound where the store is shared and the mesh
+  // was deleted by another server.
   virtual void Create(SessionRecord record, int64_t epoch, RecordCallback done) = 0;
 
   // Errors: NotFound.

@@ -57,6 +57,13 @@ absl::Status CheckPoseCount(absl::string_view id, size_t poses, size_t handles) 
                                                  "; commit one pose a handle, or none for rest"));
 }
 
+absl::Status MeshHasSessions(int64_t sessions) {
+  return WithReason(absl::FailedPreconditionError(
+                        absl::StrCat(sessions, sessions == 1 ? " session is" : " sessions are",
+                                     " made from it; delete them first")),
+                    ErrorReason::kMeshInUse, {{"sessions", absl::StrCat(sessions)}});
+}
+
 absl::Status NoMesh(absl::string_view sha256) {
   return WithReason(absl::NotFoundError(absl::StrCat("no mesh ", sha256, " is kept; upload it")),
                     ErrorReason::kMeshNotFound);

@@ -23,6 +23,7 @@ absl::Status CheckSessionWrite(absl::string_view id, absl::string_view etag, int
 absl::Status CheckPoseCount(absl::string_view id, size_t poses, size_t handles);
 
 absl::Status NoMesh(absl::string_view sha256);                        // NotFound
+absl::Status MeshHasSessions(int64_t sessions);                       // FailedPrecondition
 absl::Status NoPrediction(absl::string_view id);                      // NotFound
 absl::Status NoCase(absl::string_view sha256);                        // NotFound
 absl::Status TooManyCases(int most);                                  // ResourceExhausted

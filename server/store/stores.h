@@ -33,9 +33,10 @@ class Stores {
   virtual const DurationHistogram* latency() const { return nullptr; }
   // Where it is kept; empty: in memory.
   virtual std::string folder() const { return {}; }
-  // Of the database in which other rooms keep rows of theirs, too; null: nothing outlives the
-  // process.
+  // Of the database in which other rooms keep rows of theirs, too; null where there is none.
   virtual CommitThread* commit_thread() { return nullptr; }
+  // What is acknowledged outlives the process; so must the rows of other rooms.
+  virtual bool keeps() const = 0;
 };
 
 }  // namespace tissueform

@@ -92,7 +92,8 @@ void AddSessionMetrics(const SessionRegistry& registry, const SessionEventCounts
   });
   const std::pair<SessionEvent, const char*> kNames[] = {{SessionEvent::kEvicted, "evicted"},
                                                          {SessionEvent::kRestored, "restored"},
-                                                         {SessionEvent::kDeleted, "deleted"}};
+                                                         {SessionEvent::kDeleted, "deleted"},
+                                                         {SessionEvent::kMoved, "moved"}};
   for (const auto& [event, name] : kNames) {
     page->AddCounter("tissueform_session_events_total",
                      "Sessions that have left memory, have come back, or were deleted.",

@@ -25,7 +25,7 @@ class SessionEventCounts {
   int64_t Read(SessionEvent event) const { return counts_[static_cast<size_t>(event)]; }
 
  private:
-  std::atomic<int64_t> counts_[3] = {};
+  std::atomic<int64_t> counts_[4] = {};
 };
 
 // The page tells what these keep; all must outlive it.

@@ -9,6 +9,7 @@
 #include "google/protobuf/util/time_util.h"
 
 #include "core/base/error_reason.h"
+#include "server/session/session_refusals.h"
 
 namespace tissueform {
 namespace {
@@ -103,6 +104,11 @@ void SessionWatches::OnSessionEvent(const std::string& session_id, SessionRegist
       // The next session of this id is another one.
       channels_.erase(found);
       channel->EndWatches(SessionDeleted(session_id));
+      return;
+    case SessionRegistry::Event::kMoved:
+      // Whoever watches here again begins with the committed pose, not with a frame of before.
+      channels_.erase(found);
+      channel->EndWatches(SessionMoved(""));
       return;
     case SessionRegistry::Event::kEvicted:
       notice.mutable_evicted();

@@ -26,8 +26,10 @@ using Kind = StoreChange::Kind;
 TEST(StoreChangeTest, WhatIsNotKnownMeansThatAnythingMayHaveChanged) {
   EXPECT_EQ(ParseStoreChange("session_deleted a b"),
             (StoreChange{.kind = Kind::kSessionDeleted, .name = "a b"}));
+  EXPECT_EQ(ParseStoreChange("case_deleted 1a2b ann lee"),
+            (StoreChange{.kind = Kind::kCaseDeleted, .name = "1a2b", .owner = "ann lee"}));
   EXPECT_EQ(ParseStoreChange("access_changed "), (StoreChange{.kind = Kind::kAccessChanged}));
-  for (const char* other : {"", "session_deleted", "fresh_thing x", " "}) {
+  for (const char* other : {"", "session_deleted", "fresh_thing x", "case_created 1a", " "}) {
     EXPECT_EQ(ParseStoreChange(other), (StoreChange{.kind = Kind::kMissed})) << other;
   }
 }
@@ -70,16 +72,27 @@ TEST_F(ChangeListenerTest, WhatOthersMustKnowIsToldInOrderAndPosesAreNot) {
                 access.Change({}, {.mesh_rights = {{.principal = "ann", .sha256 = "e"}}}, done);
               }),
               IsOk());
-  const MeshPayload payload = SamplePayload(1);
-  ASSERT_THAT(stores_->meshes().Put(RecordOf(payload), payload.View()), IsOk());
-  const std::string mesh = RecordOf(payload).sha256;
-  ASSERT_THAT(stores_->meshes().Delete(mesh), IsOk());
+  const std::string mesh = record.mesh_sha256;
+  ASSERT_THAT(stores_->predictions().Create(SamplePrediction("p"), SamplePositions(1)), IsOk());
+  ASSERT_THAT(stores_->predictions().Delete("p"), IsOk());
+  const std::string file = SampleCase(1, 1'000);
+  CaseRecord of_ann = CaseRecordOf(file);
+  of_ann.owner = "ann lee";
+  ASSERT_THAT(KeepCase(stores_->cases(), of_ann, file), IsOk());
+  ASSERT_THAT(stores_->cases().Delete(of_ann.key()), IsOk());
   ASSERT_THAT(DeleteSession(stores_->sessions(), "s"), IsOk());
-  const StoreChange last = {.kind = Kind::kSessionDeleted, .name = "s"};
-  const std::vector<StoreChange> expected = {{.kind = Kind::kSessionChanged, .name = "s"},
-                                             {.kind = Kind::kAccessChanged},
-                                             {.kind = Kind::kMeshDeleted, .name = mesh},
-                                             last};
+  ASSERT_THAT(stores_->meshes().Delete(mesh), IsOk());
+  const StoreChange last = {.kind = Kind::kMeshDeleted, .name = mesh};
+  const std::vector<StoreChange> expected = {
+      {.kind = Kind::kSessionCreated, .name = "s"},
+      {.kind = Kind::kSessionChanged, .name = "s"},
+      {.kind = Kind::kAccessChanged},
+      {.kind = Kind::kPredictionCreated, .name = "p"},
+      {.kind = Kind::kPredictionDeleted, .name = "p"},
+      {.kind = Kind::kCaseCreated, .name = of_ann.sha256, .owner = "ann lee"},
+      {.kind = Kind::kCaseDeleted, .name = of_ann.sha256, .owner = "ann lee"},
+      {.kind = Kind::kSessionDeleted, .name = "s"},
+      last};
   EXPECT_EQ(SeenUntil(last), expected);
 }
 

@@ -35,7 +35,7 @@ class MigrateStoreTest : public ::testing::Test {
     TF_SKIP_WITHOUT_DATABASE();
     EmptyTestDatabase();
     from_ = *DurableStore::Open(*DataFolder::Open(folder_ / "data"), {.clock = [] { return 777; }});
-    to_ = OpenTestStores();
+    to_ = *PostgresStores::Open({.database = TestDatabaseOptions()});
   }
 
   const ScratchFolder folder_;
@@ -95,6 +95,7 @@ TEST_F(MigrateStoreTest, WhatOneServerHasKeptIsThereAsItWas) {
 
 TEST_F(MigrateStoreTest, AStoreThatHoldsSomethingIsLeftAlone) {
   ASSERT_THAT(CreateSession(from_->sessions(), SampleSession("a", 1)), IsOk());
+  to_ = OpenTestStores();
   ASSERT_THAT(CreateSession(to_->sessions(), SampleSession("b", 1)), IsOk());
   EXPECT_THAT(MigrateStore(from_.get(), to_.get()),
               StatusIs(absl::StatusCode::kFailedPrecondition,

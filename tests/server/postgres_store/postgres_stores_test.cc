@@ -15,6 +15,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/base/error_reason.h"
 #include "server/postgres_store/postgres_access_store.h"
 #include "server/postgres_store/postgres_blobs.h"
 #include "server/postgres_store/postgres_export_store.h"
@@ -79,8 +80,8 @@ TEST_F(PostgresStoresTest, ALargeBlobIsManyRowsAndIsReadAsItWas) {
   ASSERT_OK_AND_ASSIGN(const MeshPayload payload, stores_->meshes().Read(mesh));
   EXPECT_EQ(payload.View().Sha256(), mesh);
   ASSERT_THAT(stores_->meshes().Delete(mesh), IsOk());
-  EXPECT_EQ(Count("blobs"), 0);
-  EXPECT_EQ(Count("blob_pieces"), 0);
+  EXPECT_EQ(Count("blobs"), 1) << "that of sample sessions";
+  EXPECT_EQ(Count("blob_pieces"), 1);
 }
 
 TEST_F(PostgresStoresTest, PiecesThatAreMissingAreWrittenWhenItsBlobComesAgain) {
@@ -197,7 +198,7 @@ TEST_F(PostgresStoresTest, TablesOfTheVersionBeforeAreBroughtUpToDateWithWhatThe
   ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1)), IsOk());
   const std::string mesh = PutMesh(1);
   stores_.reset();
-  RunSql("DROP TABLE exports; UPDATE tissueform_version SET version = 4;");
+  RunSql("DROP TABLE exports, nodes; UPDATE tissueform_version SET version = 4;");
   stores_ = OpenTestStores();
   EXPECT_EQ(RunSql("SELECT version FROM tissueform_version").Integer(0, 0), kSchemaVersion);
   EXPECT_EQ(Count("exports"), 0);
@@ -368,7 +369,7 @@ TEST_F(PostgresStoresTest, NothingOfAWorkThatFailsIsKept) {
     return absl::CancelledError("no");
   }),
               StatusIs(Code::kCancelled));
-  EXPECT_EQ(Count("blobs"), 0);
+  EXPECT_EQ(Count("blobs WHERE sha256 = 'x'"), 0);
   EXPECT_THAT(stores_->pool()->Run([](PostgresTransaction& transaction) {
     return transaction.Run("SELECT nothing", {});
   }),
@@ -436,6 +437,35 @@ TEST_F(PostgresStoresTest, AccessRowsAreKeptAsTheyWerePutLastAndDamagedOnesGiveN
   ASSERT_OK_AND_ASSIGN(rows, store.Load());
   EXPECT_THAT(rows.shares, IsEmpty());
   EXPECT_THAT(rows.mesh_rights, ElementsAre(right));
+}
+
+TEST_F(PostgresStoresTest, AnExportThatAnotherServerHasChangedIsNotOverwritten) {
+  PostgresExportStore here(stores_->pool());
+  PostgresExportStore there(stores_->pool());
+  ExportRecord record = {.id = "a", .prediction = "p"};
+  ASSERT_THAT(here.Put(record), IsOk());
+  EXPECT_THAT(here.Put(record), IsOk()) << "as after a commit whose answer was lost";
+  record.version = 2;
+  record.detail = "there";
+  ASSERT_THAT(there.Put(record), IsOk());
+  EXPECT_THAT(there.Put(record), IsOk());
+  record.detail = "here";
+  EXPECT_THAT(here.Put(record), StatusIs(Code::kAborted));
+  ASSERT_THAT(there.Erase({"a"}), IsOk());
+  record.version = 3;
+  EXPECT_THAT(here.Put(record), StatusIs(Code::kAborted)) << "what is gone does not come back";
+}
+
+TEST_F(PostgresStoresTest, AMeshThatASessionIsMadeFromCannotBeDeleted) {
+  const std::string mesh = PutMesh(1);
+  ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1)), IsOk());
+  const absl::Status refusal = stores_->meshes().Delete(mesh);
+  EXPECT_THAT(refusal, StatusIs(Code::kFailedPrecondition, HasSubstr("1 session is made from it")));
+  EXPECT_TRUE(HasReason(refusal, ErrorReason::kMeshInUse));
+  ASSERT_THAT(DeleteSession(stores_->sessions(), "s"), IsOk());
+  ASSERT_THAT(stores_->meshes().Delete(mesh), IsOk());
+  EXPECT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1)), StatusIs(Code::kNotFound))
+      << "of a mesh that is gone no session is made";
 }
 
 TEST_F(PostgresStoresTest, ExportsAreKeptAsTheyWerePutLastAndDamagedOnesPassedOver) {

@@ -13,6 +13,7 @@
 #include "gtest/gtest.h"
 
 #include "core/base/status_macros.h"
+#include "tests/server/store/store_samples.h"
 #include "tests/server/store/stores_case.h"
 
 namespace tissueform::testing {
@@ -69,8 +70,23 @@ void RunOutsideTransaction(const std::string& sql) {
 
 void EmptyTestDatabase() { RunSql("DROP SCHEMA public CASCADE; CREATE SCHEMA public;"); }
 
+namespace {
+
+// Of the name that the contract's sessions are made from, without its bytes; no list shows it.
+void PutMeshOfContract() {
+  const std::string name(64, 'f');
+  RunSql(absl::StrCat("INSERT INTO blobs (sha256, bytes) VALUES ('", name,
+                      "', 0); INSERT INTO meshes (sha256, record, last_used_s) VALUES ('", name,
+                      "', '', 4000000000);"));
+}
+
+}  // namespace
+
 std::unique_ptr<PostgresStores> OpenTestStores(UnixClock clock, const PostgresOptions& options) {
-  return *PostgresStores::Open({.database = options, .clock = std::move(clock)});
+  auto stores = *PostgresStores::Open({.database = options, .clock = std::move(clock)});
+  const MeshPayload mesh = SamplePayload(1);
+  if (!stores->meshes().Put(RecordOf(mesh), mesh.View()).ok()) std::abort();
+  return stores;
 }
 
 }  // namespace tissueform::testing
@@ -88,7 +104,10 @@ std::vector<StoresCase> AllStores() {
   if (!testing::HasTestDatabase()) return {};
   return {{"Postgres", [](UnixClock clock) {
              testing::EmptyTestDatabase();
-             return testing::OpenTestStores(std::move(clock));
+             auto stores = *PostgresStores::Open(
+                 {.database = testing::TestDatabaseOptions(), .clock = std::move(clock)});
+             testing::PutMeshOfContract();
+             return stores;
            }}};
 }
 

@@ -38,6 +38,7 @@ PostgresRows RunSql(const std::string& sql);
 // One statement that may not be in a transaction: CREATE DATABASE.
 void RunOutsideTransaction(const std::string& sql);
 
+// With the mesh that sample sessions are made from.
 std::unique_ptr<PostgresStores> OpenTestStores(
     UnixClock clock = SystemUnixSeconds, const PostgresOptions& options = TestDatabaseOptions());
 

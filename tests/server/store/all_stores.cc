@@ -24,6 +24,7 @@ class ScratchDurableStore final : public Stores {
   UploadStore& uploads() override { return store_->uploads(); }
   PredictionStore& predictions() override { return store_->predictions(); }
   CaseStore& cases() override { return store_->cases(); }
+  bool keeps() const override { return true; }
 
  private:
   const ScratchFolder folder_;

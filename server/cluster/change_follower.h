@@ -1,0 +1,81 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/base/mutex.h"
+#include "server/access/access_changes.h"
+#include "server/exports/export_book.h"
+#include "server/postgres_store/change_listener.h"
+#include "server/postgres_store/postgres_options.h"
+#include "server/postgres_store/store_change.h"
+#include "server/session/mesh_catalog.h"
+#include "server/session/session_registry.h"
+#include "server/store/stores.h"
+
+namespace tissueform {
+
+// What this server knows of a store that it shares, and who is told when others change it.
+struct SharedRooms {
+  Stores* stores = nullptr;  // those of the database themselves
+  AccessChanges* access = nullptr;
+  SessionRegistry* sessions = nullptr;
+  MeshCatalog* meshes = nullptr;
+  ExportBook* exports = nullptr;
+};
+
+// Follows what others change in the store: reads what a notice names and tells the rooms, on a
+// thread of its own. A notice says where to look, and what is there now counts: so it may come late
+// and twice, or be of what this server has done itself. Whoever may have missed some reads all.
+class ChangeFollower {
+ public:
+  // Listens when it returns; nobody is told before Begin. Errors: those of ChangeListener::Start.
+  static absl::StatusOr<std::unique_ptr<ChangeFollower>> Start(const PostgresOptions& options);
+  // Nobody is told any longer.
+  ~ChangeFollower();
+  ChangeFollower(const ChangeFollower&) = delete;
+  ChangeFollower& operator=(const ChangeFollower&) = delete;
+
+  // `rooms`, which must outlive it, have learnt what there is: what has changed since Start is told
+  // first. Once.
+  void Begin(const SharedRooms& rooms);
+
+ private:
+  ChangeFollower() = default;
+
+  void Heard(const StoreChange& change);
+  // False at the end.
+  bool Next(StoreChange* change);
+  void Loop();
+  absl::Status Apply(const StoreChange& change);
+  absl::Status LookAtSession(const std::string& id);
+  absl::Status LookAtPrediction(const std::string& id);
+  absl::Status LookAtCase(const CaseKey& key);
+  absl::Status LookAtMesh(const std::string& sha256);
+  absl::Status LookAtAll();
+  // What there is of each kind; what was known before and is not there goes.
+  absl::Status LookAtAllSessions(const std::vector<std::string>& known);
+  absl::Status LookAtAllPredictions(const std::vector<std::string>& known);
+  absl::Status LookAtAllCases(const std::vector<CaseKey>& known);
+
+  SharedRooms rooms_;  // constant once its thread runs
+
+  Mutex mutex_;
+  ConditionVariable changed_;
+  std::deque<StoreChange> heard_ ABSL_GUARDED_BY(mutex_);
+  bool ending_ ABSL_GUARDED_BY(mutex_) = false;
+
+  std::thread thread_;
+  std::unique_ptr<ChangeListener> listener_;  // last: it uses the others
+};
+
+}  // namespace tissueform

@@ -1,0 +1,77 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/status/status.h"
+
+#include "core/base/mutex.h"
+#include "server/postgres_store/postgres_pool.h"
+
+namespace tissueform {
+
+// Which servers use the store now, and who of them has room: the table `nodes`, in which each has a
+// row that it writes anew every second. One that has not written for 10 s counts as gone. Nothing
+// but hints comes from it: who holds a session the leases decide.
+//
+// Thread-safe.
+class NodeTable {
+ public:
+  static constexpr std::chrono::seconds kEvery{1};
+  static constexpr std::chrono::seconds kGoneAfter{10};
+
+  // `pool` must outlive it; `free_bytes` is asked on its thread.
+  NodeTable(PostgresPool* pool, std::string name, std::function<int64_t()> free_bytes);
+  // Takes its row out, unless the database is away.
+  ~NodeTable();
+  NodeTable(const NodeTable&) = delete;
+  NodeTable& operator=(const NodeTable&) = delete;
+
+  // A thread writes and reads from now on. Once.
+  void Start();
+
+  // Others place nothing here any more; told to the database at once, unless it is away.
+  void SetDraining();
+
+  // Another one, not draining, that had more than so many bytes free a second ago, the one with the
+  // most; empty: none. Never blocks.
+  std::string WithRoom(int64_t bytes);
+  // Others that are there.
+  int CountOthers();
+  // Another one has this one's name: routing by name leads to either.
+  bool IsNameTaken();
+
+  // What the thread does every second. Errors: those of the pool.
+  absl::Status Exchange();
+
+ private:
+  struct Other {
+    std::string name = {};
+    int64_t free_bytes = 0;
+    bool draining = false;
+  };
+
+  void Loop();
+
+  PostgresPool* const pool_;
+  const std::string name_;
+  const std::string holder_;  // random: names may be given twice
+  const std::function<int64_t()> free_bytes_;
+
+  Mutex mutex_;
+  ConditionVariable changed_;
+  std::vector<Other> others_ ABSL_GUARDED_BY(mutex_);
+  bool draining_ ABSL_GUARDED_BY(mutex_) = false;
+  bool ending_ ABSL_GUARDED_BY(mutex_) = false;
+
+  std::thread thread_;
+};
+
+}  // namespace tissueform

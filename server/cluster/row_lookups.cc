@@ -1,0 +1,111 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/cluster/row_lookups.h"
+
+#include <future>
+#include <utility>
+
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+constexpr int kExportKind = -1;
+constexpr size_t kMostRemembered = 10'000;
+
+}  // namespace
+
+RowLookups::RowLookups(PostgresPool* pool, AccessChanges* access, ExportBook* exports)
+    : access_(*access),
+      exports_(*exports),
+      sessions_(pool, SystemUnixSeconds),
+      predictions_(pool),
+      cases_(pool),
+      rows_(pool) {}
+
+void RowLookups::LookFor(const Access::Unknown& what) {
+  Look({.kind = static_cast<int>(what.kind), .name = what.name, .owner = what.owner},
+       [&] { return Read(what); });
+}
+
+void RowLookups::LookForExport(const std::string& id) {
+  Look({.kind = kExportKind, .name = id}, [&]() -> absl::Status {
+    TF_RETURN_IF_ERROR(exports_.LearnAgain());
+    return absl::NotFoundError("");  // not again at once, whatever it has found
+  });
+}
+
+int64_t RowLookups::lookups() const {
+  MutexLock lock(mutex_);
+  return lookups_;
+}
+
+bool RowLookups::Begin(const Key& key) {
+  const auto now = std::chrono::steady_clock::now();
+  MutexLock lock(mutex_);
+  if (reading_ >= kMostAtOnce || now < silent_until_) return false;
+  if (missing_.size() >= kMostRemembered) {
+    std::erase_if(missing_, [&](const auto& missing) { return missing.second <= now; });
+    if (missing_.size() >= kMostRemembered) return false;
+  }
+  const auto missing = missing_.find(key);
+  if (missing != missing_.end() && now < missing->second) return false;
+  ++reading_;
+  ++lookups_;
+  return true;
+}
+
+void RowLookups::Look(const Key& key, const std::function<absl::Status()>& read) {
+  if (!Begin(key)) return;
+  const absl::Status status = read();
+  const auto until = std::chrono::steady_clock::now() + kRemembered;
+  MutexLock lock(mutex_);
+  --reading_;
+  if (status.ok()) {
+    missing_.erase(key);
+  } else {
+    missing_[key] = until;
+    if (absl::IsUnavailable(status)) silent_until_ = until;
+  }
+}
+
+absl::Status RowLookups::ReadSession(const std::string& id) {
+  std::promise<absl::StatusOr<SessionRecord>> answer;
+  sessions_.Get(
+      id, [&answer](absl::StatusOr<SessionRecord> record) { answer.set_value(std::move(record)); });
+  TF_ASSIGN_OR_RETURN(const SessionRecord record, answer.get_future().get());
+  access_.Added(record);
+  return absl::OkStatus();
+}
+
+absl::Status RowLookups::Read(const Access::Unknown& what) {
+  switch (what.kind) {
+    case Access::Unknown::Kind::kSession:
+      return ReadSession(what.name);
+    case Access::Unknown::Kind::kPrediction: {
+      TF_ASSIGN_OR_RETURN(const PredictionRecord record, predictions_.Get(what.name));
+      access_.Added(record);
+      return absl::OkStatus();
+    }
+    case Access::Unknown::Kind::kCase: {
+      TF_ASSIGN_OR_RETURN(const CaseRecord record,
+                          cases_.Find({.sha256 = what.name, .owner = what.owner}));
+      access_.Added(record);
+      return absl::OkStatus();
+    }
+    case Access::Unknown::Kind::kMesh: {
+      TF_ASSIGN_OR_RETURN(const MeshRight right, rows_.FindMeshRight(what.owner, what.name));
+      access_.Heard({.mesh_rights = {right}});
+      return absl::OkStatus();
+    }
+    case Access::Unknown::Kind::kLink: {
+      TF_ASSIGN_OR_RETURN(const FollowLinkRow link, rows_.FindLink(what.name));
+      access_.Heard({.links = {link}});
+      return ReadSession(link.session);
+    }
+  }
+  return absl::NotFoundError("no such kind");
+}
+
+}  // namespace tissueform

@@ -1,0 +1,79 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/session/session_news.h"
+
+#include <future>
+#include <optional>
+#include <utility>
+
+#include "absl/status/statusor.h"
+
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+constexpr int kNewsPageSize = 1000;
+
+absl::StatusOr<SessionStore::Page> ListAndWait(SessionStore* store,
+                                               const SessionStore::ListRequest& request) {
+  std::promise<absl::StatusOr<SessionStore::Page>> answer;
+  store->List(request, [&answer](absl::StatusOr<SessionStore::Page> page) {
+    answer.set_value(std::move(page));
+  });
+  return answer.get_future().get();
+}
+
+}  // namespace
+
+KnownSession SessionNews::KnownFrom(const SessionRecord& record) const {
+  KnownSession known;
+  known.key = RequestKeyOf(record);
+  known.owner = record.owner;
+  known.mesh_sha256 = record.mesh_sha256;
+  known.last_used = clock_->Now();
+  return known;
+}
+
+absl::Status SessionNews::LearnKnown() {
+  SessionStore::ListRequest request{.owner = std::nullopt, .after = "", .limit = kNewsPageSize};
+  do {
+    TF_ASSIGN_OR_RETURN(SessionStore::Page page, ListAndWait(store_, request));
+    for (const SessionRecord& record : page.records) Learn(record);
+    request.after = std::move(page.next);
+  } while (!request.after.empty());
+  return absl::OkStatus();
+}
+
+void SessionNews::Learn(const SessionRecord& record) {
+  MutexLock lock(sessions_->mutex);
+  SessionTable& table = sessions_->table;
+  if (table.Find(record.id) != nullptr || table.FindMaking(record.id) != nullptr ||
+      table.IsEnding(record.id)) {
+    return;
+  }
+  table.Add(record.id, KnownFrom(record));
+}
+
+void SessionNews::Changed(const SessionRecord& record) {
+  {
+    MutexLock lock(sessions_->mutex);
+    if (KnownSession* known = sessions_->table.Find(record.id); known != nullptr) {
+      if (known->session != nullptr && known->session->CheckHeld().ok()) return;
+      known->owner = record.owner;
+      known->mesh_sha256 = record.mesh_sha256;
+      return;
+    }
+  }
+  Learn(record);
+}
+
+void SessionNews::Ask(const std::string& id, const std::function<void(absl::Status)>& done) {
+  store_->Get(id, [this, done](const absl::StatusOr<SessionRecord>& record) {
+    if (record.ok()) Learn(*record);
+    done(record.status());
+  });
+}
+
+}  // namespace tissueform
