@@ -48,9 +48,11 @@ std::string DetailOf(const std::string& text) {
   return line;
 }
 
-// The PACS may come back, there may be room again, or the bridge is ending.
+// The PACS may come back, there may be room again, or the bridge is ending. A peer that dies in a
+// TLS handshake looks like one with a wrong certificate, and that may be renewed, too.
 bool MayCome(const absl::Status& status) {
   return IsTransient(status) || absl::IsDeadlineExceeded(status) || absl::IsCancelled(status) ||
+         absl::IsUnauthenticated(status) || absl::IsPermissionDenied(status) ||
          HasReason(status, ErrorReason::kDiskFull);
 }
 

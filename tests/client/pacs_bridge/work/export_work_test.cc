@@ -4,6 +4,7 @@
 #include "client/pacs_bridge/work/export_work.h"
 
 #include <chrono>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -348,6 +349,21 @@ TEST_F(BridgeWorkTest, APacsThatIsDownIsWaitedFor) {
   EXPECT_EQ(Stored().size(), 4);
 }
 
+TEST_F(BridgeWorkTest, APacsThatDoesNotLetUsInMayDoSoLater) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  Ask("exports/1", series);
+  Confirm("exports/1");
+  for (const absl::Status& refusal : {absl::UnauthenticatedError("the TLS handshake fails"),
+                                      absl::PermissionDeniedError("calling AE title")}) {
+    pacs_->away = refusal;
+    EXPECT_EQ(Work("exports/1"), refusal);
+    EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kConfirmed);
+  }
+  pacs_->away = absl::OkStatus();
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_EQ(Stored().size(), 4);
+}
+
 TEST_F(BridgeWorkTest, AStudyThatWasDeletedIsToldAndNothingIsStored) {
   const testing::CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
@@ -420,6 +436,57 @@ TEST_F(BridgeWorkTest, ImagesAreDeletedWhenTheirTimeIsOverAndTheCaseStays) {
   EXPECT_EQ(rows_.ListImages(kept.key)->size(), 8) << "what is written later refers to them";
   EXPECT_EQ(*DeleteOld(queue_.get(), options, 1'000'000 + 91 * 24 * 3600), 1);
   EXPECT_FALSE(fs::exists(queue_->header_path(kept.key)));
+}
+
+// Seconds of the clock that files have.
+int64_t DaysFromNow(int64_t days) { return std::time(nullptr) + days * 24 * 3600; }
+
+TEST_F(BridgeWorkTest, WhomNoCaseWasMadeOfIsForgottenWithTheHeaders) {
+  const testing::CtSeries series = Receive("a", {}, {4});
+  WaitQuietly();
+  Settle();
+  ASSERT_EQ(StateOf(series), SeriesState::kIncomplete);
+  const RetentionOptions options;
+  EXPECT_EQ(*DeleteOld(queue_.get(), options, DaysFromNow(8)), 1);
+  EXPECT_THAT(rows_.GetStudy(series.study_uid), IsOk());
+  EXPECT_EQ(*DeleteOld(queue_.get(), options, DaysFromNow(91)), 1);
+  EXPECT_THAT(rows_.GetStudy(series.study_uid), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_TRUE(rows_.List()->empty());
+}
+
+TEST_F(BridgeWorkTest, WhoseCaseWasMadeStaysKnown) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  EXPECT_THAT(DeleteOld(queue_.get(), {}, DaysFromNow(1000)), IsOk());
+  EXPECT_EQ(rows_.GetStudy(series.study_uid)->patient.id, "PLANTED-4711");
+}
+
+TEST_F(BridgeWorkTest, AFileOfNoSeriesIsDeletedInItsTime) {
+  testing::CtSeriesOptions one;
+  one.study_uid = "1.2.840.1";
+  one.series_uid = "1.2.840.2";
+  testing::CtSeriesOptions other = one;
+  other.study_uid = "1.2.840.3";
+  Receive("a", one);
+  Settle();
+  const testing::CtSeries stranger = Receive("b", other);
+  Settle();
+  EXPECT_EQ(*DeleteOld(queue_.get(), {}, DaysFromNow(6)), 0);
+  EXPECT_TRUE(fs::exists(stranger.files.front()));
+  EXPECT_EQ(*DeleteOld(queue_.get(), {}, DaysFromNow(8)), 8);
+  EXPECT_FALSE(fs::exists(stranger.files.front()));
+}
+
+TEST_F(BridgeWorkTest, WhatComesAnewOfAnOldSeriesIsNotDeletedWhileItComes) {
+  const testing::CtSeries series = Receive("a", {}, {4});
+  WaitQuietly();
+  Settle();
+  ASSERT_EQ(StateOf(series), SeriesState::kIncomplete);
+  fs::rename(root_ / "a4", series.files[4]);
+  intake_->Arrived(series.files[4], *ReadInstanceHeader(series.files[4]));
+  Settle();
+  ASSERT_EQ(StateOf(series), SeriesState::kReceiving);
+  EXPECT_EQ(*DeleteOld(queue_.get(), {}, DaysFromNow(8)), 0);
+  EXPECT_TRUE(fs::exists(series.files.front()));
 }
 
 TEST_F(BridgeWorkTest, NothingOutsideQueueImagesAndHeadersNamesThePatient) {
