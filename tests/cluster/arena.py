@@ -47,7 +47,7 @@ class Arena:
         self.cluster.make(nodes=nodes, database_ports={name: ports[name] for name in names}, server_environment={SHIFTED: fake_clock()})
         self.links, self.twin = {}, None
         self.twin_port = ports[TWIN]
-        self.events, self.lock = [], threading.Lock()
+        self.events, self.lock, self.starting = [], threading.Lock(), threading.Lock()
 
     @property
     def address(self):
@@ -116,7 +116,8 @@ class Arena:
         return event
 
     def bring_back(self, name, event):
-        self.cluster.start(name)
+        with self.starting:
+            self.cluster.start(name)
         if name == stack.HAPROXY:
             balancer.wait_until_routing(self.cluster, patience_s=20, needed=1)
         elif name != stack.DATABASE:

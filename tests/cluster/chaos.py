@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """A cluster of its own under load, of which parts are killed, stopped, cut off and drained at random: what clients were told must be so.
 
-Drags with commits, a session that all servers are asked for at once, followers, and clients that make and delete meshes, sessions and
+Drags with commits, a session that all servers are asked for at once, followers, a page's socket and calls, and clients that make and delete meshes, sessions and
 predictions: all by python3-grpcio. Exit code 0: nothing acknowledged was lost, no two servers answered for one session, and every drag
 went on in time. 1: something was not so. 77: PostgreSQL, HAProxy or python3-grpcio is missing.
 """
@@ -26,11 +26,13 @@ import stack  # noqa: E402 (after the paths)
 try:
     import grpc  # noqa: F401
     import google.protobuf  # noqa: F401
+    import websockets  # noqa: F401
 except ImportError as missing:
-    print(f"{missing}; install it: apt-get install python3-grpcio python3-protobuf")
+    print(f"{missing}; install it: apt-get install python3-grpcio python3-protobuf python3-websockets")
     sys.exit(SKIPPED)
 
 import arena as arena_module  # noqa: E402
+import browsers  # noqa: E402
 import drags  # noqa: E402
 import ledger as ledger_module  # noqa: E402
 import maker  # noqa: E402
@@ -65,6 +67,9 @@ class Load:
         sessions = [first.new_session(mesh) for _ in range(count)]
         self.contested = first.new_session(mesh)
         self.drags = [drags.Drag(arena.address, session, handle_rest, ledger) for session in sessions]
+        # One of them is a page's.
+        self.drags[-1] = browsers.SocketDrag(arena.cluster.address("browsers"), sessions[-1], handle_rest, ledger)
+        self.web_reader = browsers.WebReader(arena.cluster.address("browsers"), sessions, ledger)
         numbers = itertools.count(1)
         places = [(node, arena.cluster.address(node)) for node in arena.cluster.nodes]
         places.append((arena_module.TWIN_OF, f"{stack.processes.HOST}:{arena.twin_port}"))
@@ -84,15 +89,16 @@ class Load:
                 raise SystemExit(f"not every drag shows a frame: {dict(self.ledger.ends)} {self.ledger.violations}")
             time.sleep(0.05)
         self.preparation_s = max(each.last_frame[0] for each in self.drags) - begin
-        for each in (*self.rivals, *self.followers, *self.churns):
+        for each in (*self.rivals, *self.followers, *self.churns, self.web_reader):
             each.start()
 
     def stop(self):
-        everybody = (*self.churns, *self.followers, *self.rivals, *self.drags)
+        everybody = (self.web_reader, *self.churns, *self.followers, *self.rivals, *self.drags)
         for each in everybody:
             each.stop()
         for each in everybody:
-            each.join(30)
+            if each.is_alive():
+                each.join(30)
 
     def kept_sequence(self, session):
         poses = self.reader.session_state(session).committed_poses
@@ -145,7 +151,8 @@ def chaos(options, seed):
     chance, ledger = random.Random(seed), ledger_module.Ledger()
     print(f"seed {seed}: deploy/cluster.sh chaos --kills {options.kills} --seed {seed}", flush=True)
     arena = arena_module.Arena(options.state, options.programs, options.nodes)
-    protocol = stranger.import_protocol(ROOT / "proto")
+    stranger.import_protocol(ROOT / "proto")
+    load = None
     try:
         arena.up()
         if not arena_module.fake_clock():
@@ -159,7 +166,8 @@ def chaos(options, seed):
         judge_gaps(arena, ledger, load)
         report(ledger, load, run)
     finally:
-        shutil.rmtree(protocol, ignore_errors=True)
+        if load is not None:
+            load.stop()
         if ledger.violations or options.keep_logs:
             keep = arena.cluster.folder.with_name(arena.cluster.folder.name + "-logs")
             shutil.rmtree(keep, ignore_errors=True)
@@ -173,7 +181,7 @@ def report(ledger, load, run):
     counts = ledger.counts
     print(f"killed: {', '.join(f'{run.victims.count(name)} x {name}' for name in sorted(set(run.victims))) or 'nothing'}")
     print(f"acknowledged and read back: {counts['meshes']} meshes, {counts['sessions']} sessions, {counts['deletions']} deletions, "
-          f"{counts['predictions']} predictions, {counts['commits']} commits; {counts['frames']} frames")
+          f"{counts['predictions']} predictions, {counts['commits']} commits; {counts['frames']} frames, {counts['gRPC-Web answers']} answers by gRPC-Web")
     print(f"followers: {', '.join(str(each.frames) for each in load.followers)} frames; streams of the drags: {', '.join(str(each.streams) for each in load.drags)}")
     print(f"streams ended: {dict(ledger.ends)}; commits that were refused: {dict(ledger.refused_commits)}")
     print_gaps(ledger, load)

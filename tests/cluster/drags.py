@@ -40,7 +40,7 @@ class Drag(threading.Thread):
     def __init__(self, address, session, handle_rest, ledger, node=None, sequences=None):
         super().__init__(daemon=True)
         self.server = stranger.Stranger(address)
-        self.session, self.ledger, self.pinned = session, ledger, node
+        self.address, self.session, self.ledger, self.pinned = address, session, ledger, node
         self.handle_rest = handle_rest  # place of a vertex of the handle in a frame, and its rest position
         self.route = stranger.Route(session.removeprefix("sessions/"))
         self.sequences = sequences or itertools.count(1)
@@ -96,6 +96,11 @@ class Stream:
         self.over = threading.Event()
         self.heard_at = time.monotonic()
         drag.streams += 1
+
+    @property
+    def server(self):
+        """Which server this is, of those of one name too."""
+        return self.drag.address if self.drag.pinned else self.node
 
     def end(self):
         self.over.set()

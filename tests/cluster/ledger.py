@@ -82,9 +82,9 @@ class Ledger:
         """Whoever has shown a frame later is the owner: nothing that was sent after that, or that comes much later, may be answered by
         an older stream of another node."""
         for other in reversed(self.streams[stream.drag.session]):
-            if other is stream:
+            if other is stream or other.first_frame_at < (stream.first_frame_at or now):
                 return
-            if other.node == stream.node or stream.first_frame_at is None or other.first_frame_at < stream.first_frame_at:
+            if other.server == stream.server:
                 continue
             sent_at = stream.sent_at.get(sequence, 0)
             if sent_at > other.first_frame_at or now > other.first_frame_at + ON_ITS_WAY_S:

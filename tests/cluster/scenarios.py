@@ -34,7 +34,7 @@ class Scenarios:
 
     def kills(self, count, seconds):
         """Kills at random moments; what was killed comes back after a random time. One server at least stays."""
-        cluster, down, lock = self.arena.cluster, set(), threading.Lock()
+        down, lock = set(), threading.Lock()
 
         def bring_back(name, event, after_s):
             time.sleep(after_s)
@@ -45,21 +45,15 @@ class Scenarios:
             with lock:
                 down.discard(name)
 
-        kinds = ["server"] * 6 + ["gateway"] * 2 + ["haproxy"] * 2
         returning = []
         for number in range(count):
-            time.sleep(self.chance.expovariate(1) * 0.5 * seconds / count + 0.5 * seconds / count)
-            kind, after_s = self.chance.choice(kinds), self.chance.uniform(0.3, 4)
-            names = {"server": cluster.nodes, "gateway": cluster.gateways, "haproxy": [stack.HAPROXY]}[kind]
+            time.sleep((self.chance.expovariate(1) + 1) * seconds / count / 2)
+            after_s = self.chance.uniform(0.3, 4)
             with lock:
-                alive = [name for name in names if name not in down]
-                if len(alive) <= (kind != "haproxy"):
-                    names, alive = cluster.gateways, [name for name in cluster.gateways if name not in down]
-                if not alive:
-                    self.say(f"kill {number + 1}: all gateways are away")
-                    continue
-                name = self.chance.choice(alive)
+                name = self._victim(down)
                 down.add(name)
+            if name is None:
+                continue
             event = self.arena.kill(name)
             self.victims.append(name)
             self.say(f"kill {number + 1}: {name} ({len(event.held)} sessions), back after {after_s:.1f} s")
@@ -67,6 +61,15 @@ class Scenarios:
             returning[-1].start()
         for thread in returning:
             thread.join()
+
+    def _victim(self, down):
+        """Servers twice as often as gateways; one of each stays. None: all else is down."""
+        cluster, chances = self.arena.cluster, []
+        for names, weight, stay in ((cluster.nodes, 2, 1), (cluster.gateways, 1, 1), ([stack.HAPROXY], 2, 0)):
+            alive = [name for name in names if name not in down]
+            if len(alive) > stay:
+                chances += alive * weight
+        return self.chance.choice(chances) if chances else None
 
     def settle(self):
         """Until every drag shows frames again."""

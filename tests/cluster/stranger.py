@@ -3,8 +3,10 @@
 """A client of a cluster by python3-grpcio and docs/service-api.md, as somebody would write one: it sends a session's id and
 the node that has answered it last, follows SESSION_MOVED, and asks again where the cluster says that it may."""
 
+import importlib
 import pathlib
 import random
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -34,7 +36,9 @@ def import_protocol(folder_of_protos):
     # Beside the package of the same name that protobuf has.
     import google as package
     package.__path__.append(f"{folder}/google")
-    return folder
+    for path in (*pathlib.Path(folder).glob("tissueform/v1/*.py"), *pathlib.Path(folder).glob("google/rpc/*.py")):
+        importlib.import_module(".".join(path.relative_to(folder).with_suffix("").parts))
+    shutil.rmtree(folder)
 
 
 def why(error):
