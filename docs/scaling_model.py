@@ -40,7 +40,7 @@ COLUMN_BYTES = 1.24e6
 REST_RATE = 1         # with columns a page needs a frame now and then, to confirm
 # docs/scaling.md: commits a second of PostgreSQL with the log synced, 32 connections.
 DATABASE_COMMITS = 4670
-RENEWAL_S = 3
+RENEWAL_S = 3          # leases; the table of nodes is written every second
 PROXY_CONNECTIONS = 8000  # deploy/haproxy/cluster.cfg, maxconn
 BUDGET = 0.75         # of a machine's memory (deploy/kubernetes)
 
@@ -162,8 +162,8 @@ def demand(figures, way, planners, followers, moving):
 
 
 def writes(planners, moving, nodes):
-    """Transactions a second of the database, and rows that the renewals write."""
-    return planners * moving / COMMIT_S + 2 * nodes / RENEWAL_S + 4 * planners / SESSION_S, planners / RENEWAL_S
+    """Transactions a second of the database (of a session four: made, taken, used, ended), and rows that the renewals write."""
+    return planners * moving / COMMIT_S + nodes * (1 + 1 / RENEWAL_S) + 4 * planners / SESSION_S, planners / RENEWAL_S
 
 
 def carried_table(figures, planners, followers):
