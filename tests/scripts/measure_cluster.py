@@ -3,12 +3,13 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """Measures how many drags one, two and three servers behind one name carry: the figures of docs/scaling.md.
 
-  tests/scripts/measure_cluster.py BUILD [--seconds S] [--turns N] [--json FILE]
+  tests/scripts/measure_cluster.py BUILD [--seconds S] [--turns N] [--ahead] [--json FILE]
 
 Starts clusters by deploy/cluster, each server pinned to a core of its own (0, 1, 2) with one worker, clients to the last core; HAProxy and PostgreSQL
 share that one with them. One, three and two servers take turns. Each is asked for more than it can answer, so that the frames that come are what it
 carries; and a single one once more for whole frames, for followers, and for commits. Processor time is that of the processes, in the middle of a run.
-Prints a line a run, and what three carry for each one that one carries. By hand, on a machine with four cores and nothing else to do.
+Prints a line a run, and what three carry for each one that one carries. By hand, on a machine with four cores and nothing else to do; where others
+work on it, root may go ahead of them (--ahead).
 """
 
 import argparse
@@ -56,6 +57,11 @@ def resident_mib(pid):
     return int(pathlib.Path(f"/proc/{pid}/statm").read_text().split()[1]) * PAGE_MIB
 
 
+def go_ahead(pid):
+    """Before what else the machine does: Linux shares processors among sessions of processes first."""
+    pathlib.Path(f"/proc/{pid}/autogroup").write_text("-15")
+
+
 class Sampler(threading.Thread):
     """Processor seconds of some processes over time."""
 
@@ -82,16 +88,19 @@ class Sampler(threading.Thread):
 class Machine:
     """A cluster of so many servers, and clients on the last core."""
 
-    def __init__(self, programs, folder, nodes):
-        self.programs, self.folder = programs, folder
+    def __init__(self, options, folder, nodes):
+        self.programs, self.folder, self.ahead = options.build.resolve() / "bin", folder, options.ahead
         self.last_core = str(os.cpu_count() - 1)
-        self.cluster = stack.Cluster(folder / f"cluster{nodes}", programs)
+        self.cluster = stack.Cluster(folder / f"cluster{nodes}", self.programs)
         self.cluster.make(nodes=nodes, gateways=1, cpus=[str(core) for core in range(os.cpu_count() - 1)], server_options=SERVER_OPTIONS)
 
     def __enter__(self):
         # What is started by this process and not pinned runs where it does.
         os.sched_setaffinity(0, {int(self.last_core)})
         self.cluster.up()
+        if self.ahead:
+            for name in self.cluster.names:
+                go_ahead(self.cluster.process(name)["pid"])
         return self
 
     def __exit__(self, *_):
@@ -105,7 +114,9 @@ class Machine:
         transactions = self.transactions()
         begin = time.monotonic()
         client = subprocess.Popen([self.programs / "tissueform", "load", "--cluster", "--server", self.cluster.address("workstations"), "--seconds", str(seconds),
-                                   "--json", file, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                                   "--json", file, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+        if self.ahead:
+            go_ahead(client.pid)
         sampler = Sampler(pids | {"clients": client.pid})
         sampler.start()
         _, errors = client.communicate(timeout=seconds + 300)
@@ -142,21 +153,21 @@ def told(run):
     return run
 
 
-def measure_turns(programs, folder, turns, seconds):
+def measure_turns(options, folder):
     runs = []
-    for turn in range(turns):
+    for turn in range(options.turns):
         for nodes in (1, 3, 2):
-            with Machine(programs, folder / f"turn{turn}", nodes) as machine:
-                runs.append(told(machine.load("saturated", seconds, sessions=40 * nodes, rate=60, encoding="int16")))
+            with Machine(options, folder / f"turn{turn}", nodes) as machine:
+                runs.append(told(machine.load("saturated", options.seconds, sessions=40 * nodes, rate=60, encoding="int16")))
                 carried = runs[-1]["frames_per_second"]
                 # Seven tenths of that, for how old frames are where there is room.
-                runs.append(told(machine.load("at ease", seconds, sessions=max(1, int(0.7 * carried / 60)), rate=60, encoding="int16")))
+                runs.append(told(machine.load("at ease", options.seconds, sessions=max(1, int(0.7 * carried / 60)), rate=60, encoding="int16")))
     return runs
 
 
-def measure_rest(programs, folder, seconds):
-    runs = []
-    with Machine(programs, folder, 1) as machine:
+def measure_rest(options, folder):
+    runs, seconds = [], options.seconds
+    with Machine(options, folder, 1) as machine:
         before = machine.resident_mib()
         first = machine.load("memory", 2, sessions=1, rate=10)
         many = machine.load("memory", 2, sessions=200, rate=2)
@@ -181,22 +192,22 @@ def main():
     parser.add_argument("build", type=pathlib.Path)
     parser.add_argument("--seconds", type=float, default=12)
     parser.add_argument("--turns", type=int, default=3)
+    parser.add_argument("--ahead", action="store_true", help="go ahead of what else the machine does (root)")
     parser.add_argument("--json", type=pathlib.Path)
     options = parser.parse_args()
     missing = stack.missing_programs()
     if missing or os.cpu_count() < 4:
         raise SystemExit("\n".join(missing) or "four cores are needed: three for servers and one for all others")
-    programs = options.build.resolve() / "bin"
     load_before = os.getloadavg()[0]
     with tempfile.TemporaryDirectory() as name:
-        runs = measure_turns(programs, pathlib.Path(name), options.turns, options.seconds)
-        rest, memory = measure_rest(programs, pathlib.Path(name) / "rest", options.seconds)
+        runs = measure_turns(options, pathlib.Path(name))
+        rest, memory = measure_rest(options, pathlib.Path(name) / "rest")
     ratios = {nodes: carried(runs, nodes) / carried(runs, 1) for nodes in (2, 3)}
     print(f"two servers carry {ratios[2]:.2f} times what one carries, three {ratios[3]:.2f} times")
     said = runs[0]["load"]
     if options.json:
         options.json.write_text(json.dumps({"machine": said["machine"], "compiler": said["compiler"], "commit": said["commit"], "notice": said["notice"],
-                                            "load_average_before": load_before, "pinned": "each server to one core with one worker; clients, HAProxy and PostgreSQL together to the last of four",
+                                            "load_average_before": load_before, "ahead_of_other_work": options.ahead, "pinned": "each server to one core with one worker; clients, HAProxy and PostgreSQL together to the last of four",
                                             "turns": options.turns, "ratio_2_to_1": ratios[2], "ratio_3_to_1": ratios[3], "memory": memory, "runs": runs + rest}, indent=1) + "\n")
 
 
