@@ -13,6 +13,7 @@ through to the health service of a server with TLS, and nothing else. Exit code 
 import copy
 import json
 import pathlib
+import re
 import shutil
 import socket
 import subprocess
@@ -84,6 +85,9 @@ BROKEN = {
     "a service of a port that is none": (lambda o: of_name(o, "Service", "tissueform")["spec"]["ports"][0].update(targetPort="web"), "no container has a port web"),
     "a policy for a port that is none": (lambda o: of_name(o, "NetworkPolicy", "server")["spec"]["ingress"][0]["ports"][0].update(port="http"), "has no port http"),
     "a node more": (lambda o: server_of(o)["spec"].update(replicas=4), "--server names other nodes"),
+    "a variable that HAProxy does not read": (lambda o: of_name(o, "Deployment", "tissueform-haproxy")["spec"]["template"]["spec"]["containers"][0]["env"].append(
+        {"name": "TISSUEFORM_SERVERS", "value": "x"}), "cluster.cfg does not read TISSUEFORM_SERVERS"),
+    "a node without an address": (lambda o: o.remove(of_name(o, "Service", "tissueform-server-1")), "tissueform-server-1: it has no Service"),
     "a file that no volume brings": (lambda o: first(o)["args"].append("--audit-key=/etc/tissueform/audit/key"), "no volume brings /etc/tissueform/audit/key"),
     "a key that nobody makes": (lambda o: manifests.pod(server_of(o))["volumes"][1]["secret"]["items"][0].update(key="pasword"), "no row for pasword"),
     "too little memory": (lambda o: first(o)["resources"].update(requests={"cpu": "2", "memory": "6Gi"}, limits={"memory": "6Gi"}), "does not bear its budget"),
@@ -114,7 +118,7 @@ def check_broken(programs):
 
 def make_certificates(folder):
     """One for every use, of an authority of its own."""
-    names = "DNS:localhost,DNS:*.tissueform-server.tissueform.svc.cluster.local"
+    names = "DNS:localhost,DNS:tissueform-server.tissueform.svc.cluster.local"
     subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2", "-subj", "/CN=localhost",
                     "-addext", f"subjectAltName={names}", "-keyout", folder / "tls.key", "-out", folder / "tls.crt"], check=True, capture_output=True)
     shutil.copy(folder / "tls.key", folder / "tls.crt.key")
@@ -130,6 +134,16 @@ def copy_of(name, folder, changes):
     path = folder / name
     path.write_text(text)
     return path
+
+
+def environment_of_haproxy(folder):
+    """That of its container, with files of this machine and addresses that it knows."""
+    container = of_name(manifests.read_objects(), "Deployment", "tissueform-haproxy")["spec"]["template"]["spec"]["containers"][0]
+    values = {each["name"]: each["value"] for each in container["env"]}
+    for name, value in values.items():
+        value = re.sub(r"^[a-z0-9-]+\.tissueform\.svc\.cluster\.local(?=:)", "127.0.0.1", value)
+        values[name] = re.sub(r"^/(?:etc/tissueform/(?:tls|proxy)|run/haproxy)/", f"{folder}/", value)
+    return values
 
 
 def first_line(process, prefix):
@@ -163,9 +177,10 @@ def check_proxies(programs):
     with tempfile.TemporaryDirectory() as name, socket.create_server(("127.0.0.1", 0)) as listener:
         folder = pathlib.Path(name)
         make_certificates(folder)
-        read = subprocess.run([haproxy, "-c", "-f", copy_of("haproxy.cfg", folder, {})], capture_output=True, text=True, check=False, timeout=60)
+        read = subprocess.run([haproxy, "-c", "-f", manifests.FOLDER / "cluster.cfg"], env=environment_of_haproxy(folder), capture_output=True, text=True, check=False,
+                              timeout=60)
         if read.returncode != 0 or "WARNING" in read.stderr:
-            complaints.append(f"HAProxy does not like haproxy.cfg: {read.stderr}")
+            complaints.append(f"HAProxy does not like cluster.cfg: {read.stderr}")
         server = subprocess.Popen([programs / "tissueform-server", "--in-memory", "--host", "127.0.0.1", "--port", "0", "--tls-cert", folder / "tls.crt",
                                    "--tls-key", folder / "tls.key", "--log-level", "warn"], stdout=subprocess.PIPE, text=True)
         proxy = None

@@ -121,9 +121,10 @@ def wrong_ports(objects):
         by_labels[workload["spec"]["template"]["metadata"]["labels"]["app.kubernetes.io/name"]] = ports
         for container in pod(workload)["containers"]:
             own, given = {each["containerPort"] for each in container["ports"]}, arguments(container)
-            for listens in given.get("port", []) + [value.rpartition(":")[2] for value in given.get("listen", [])]:
-                if own != {int(listens)}:
-                    yield f"{name_of(workload, container)}: listens on {listens}, its ports are {sorted(own)}"
+            listened = given.get("port", []) + given.get("listen", [])
+            listened += [each["value"] for each in container.get("env", []) if each["name"].startswith("TISSUEFORM_LISTEN")]
+            if listened and own != {int(value.rpartition(":")[2]) for value in listened}:
+                yield f"{name_of(workload, container)}: listens on {' and '.join(listened)}, its ports are {sorted(own)}"
             for kind in ("startupProbe", "livenessProbe", "readinessProbe"):
                 probe = container.get(kind)
                 if probe is None:
@@ -151,15 +152,28 @@ def unknown_servers(objects):
     """Nodes that a gateway or HAProxy calls and that the StatefulSet does not make, and those that they leave out."""
     server = next(each for each in workloads(objects) if each["kind"] == "StatefulSet")
     name, port = server["metadata"]["name"], arguments(pod(server)["containers"][0])["port"][0]
-    nodes = [f"{name}-{i}" for i in range(server["spec"]["replicas"])]
-    wanted = {node: f"{node}.{server['spec']['serviceName']}.tissueform.svc.cluster.local:{port}" for node in nodes}
-    gateway = next(container for _, container in containers(objects) if container["command"][0] == "tissueform-gateway")
-    if dict(value.split("=", 1) for value in arguments(gateway)["server"]) != wanted:
+    wanted = {node: f"{node}.tissueform.svc.cluster.local:{port}" for node in (f"{name}-{i}" for i in range(server["spec"]["replicas"]))}
+    by_program = {container["command"][0]: container for _, container in containers(objects) if container["name"] != "health"}
+    if dict(value.split("=", 1) for value in arguments(by_program["tissueform-gateway"])["server"]) != wanted:
         yield f"tissueform-gateway: --server names other nodes than {list(wanted)}"
-    configuration = (FOLDER / "haproxy.cfg").read_text()
-    found = dict(re.findall(r"^ *server (\S+) (\S+:\d+) .*verify", configuration, flags=re.MULTILINE))
-    if found != wanted:
-        yield f"haproxy.cfg: it has the servers {found}"
+    given = {each["name"]: each["value"] for each in by_program["haproxy"]["env"]}
+    if {given[f"TISSUEFORM_NODE_{i}"]: given.get(f"TISSUEFORM_SERVER_{i}") for i in range(1, 9) if f"TISSUEFORM_NODE_{i}" in given} != wanted:
+        yield f"tissueform-haproxy: it knows other nodes than {list(wanted)}"
+    services = {each["metadata"]["name"]: each["spec"] for each in of_kind(objects, "Service")}
+    for node in wanted:
+        if services.get(node, {}).get("selector", {}).get("statefulset.kubernetes.io/pod-name") != node:
+            yield f"{node}: it has no Service"
+    for each in given.values():
+        if (found := re.fullmatch(r"([a-z0-9-]+)\.tissueform\.svc\.cluster\.local(?::(\d+))?", each)) and (
+                found.group(1) not in services or int(found.group(2) or 50051) not in {port["port"] for port in services[found.group(1)]["ports"]}):
+            yield f"tissueform-haproxy: there is no Service {each}"
+    configuration = (FOLDER / "cluster.cfg").read_text()
+    if configuration != (ROOT / "deploy/haproxy/cluster.cfg").read_text():
+        yield "cluster.cfg: it is not deploy/haproxy/cluster.cfg"
+    asked = set(re.findall(r"TISSUEFORM_[A-Z_]+(?:[0-9])?", configuration))
+    for variable in given:
+        if variable not in asked:
+            yield f"tissueform-haproxy: cluster.cfg does not read {variable}"
 
 
 def missing_files(objects):
@@ -180,8 +194,8 @@ def missing_files(objects):
                 if "configMap" in volume and item["key"] not in generated.get(source["name"], ()):
                     yield f"{name_of(workload, container)}: kustomization.yaml makes no {item['key']}"
         configurations = [FOLDER / word.removeprefix("/etc/haproxy/") for word in container["command"] if word.endswith(".cfg")]
-        text = " ".join([*container["command"], *container.get("args", []), *(file.read_text() for file in configurations)])
-        for path in set(re.findall(r"(?<=[ =])/(?:etc|usr|run)/[\w./-]+", re.sub(r"(?m)^ *#.*$", "", text))):
+        text = " ".join([*container["command"], *container.get("args", []), *(f" {each['value']}" for each in container.get("env", []) if "value" in each), *(re.sub(r"(?m)#.*$", "", file.read_text()) for file in configurations)])
+        for path in set(re.findall(r"(?<=[ =])/(?:etc|usr|run)/[\w./-]+", text)):
             if path not in present and not (path.startswith("/run/") and any(path.startswith(f"{folder}/") for folder in folders)):
                 yield f"{name_of(workload, container)}: no volume brings {path}"
         for each in container.get("env", []):
@@ -248,6 +262,9 @@ def short_grace(objects):
 def loose_ends(objects):
     """Labels that select nothing, secrets that stand in the files, a namespace that is open."""
     labels = [workload["spec"]["template"]["metadata"]["labels"] for workload in workloads(objects)]
+    # Kubernetes labels the pods of a StatefulSet with their names.
+    labels += [each["spec"]["template"]["metadata"]["labels"] | {"statefulset.kubernetes.io/pod-name": f"{each['metadata']['name']}-{i}"}
+               for each in of_kind(objects, "StatefulSet") for i in range(each["spec"]["replicas"] if isinstance(each["spec"]["replicas"], int) else 0)]
     for each in of_kind(objects, "Service", "PodDisruptionBudget", "NetworkPolicy", "StatefulSet", "Deployment"):
         spec = each["spec"]
         selector = spec.get("podSelector", spec.get("selector", {}))

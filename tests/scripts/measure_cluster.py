@@ -3,13 +3,14 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """Measures how many drags one, two and three servers behind one name carry: the figures of docs/scaling.md.
 
-  tests/scripts/measure_cluster.py BUILD [--seconds S] [--turns N] [--ahead] [--json FILE]
+  tests/scripts/measure_cluster.py BUILD [--seconds S] [--turns N] [--share PART] [--json FILE]
 
-Starts clusters by deploy/cluster, each server pinned to a core of its own (0, 1, 2) with one worker, clients to the last core; HAProxy and PostgreSQL
-share that one with them. One, three and two servers take turns. Each is asked for more than it can answer, so that the frames that come are what it
-carries; and a single one once more for whole frames, for followers, and for commits. Processor time is that of the processes, in the middle of a run.
-Prints a line a run, and what three carry for each one that one carries. By hand, on a machine with four cores and nothing else to do; where others
-work on it, root may go ahead of them (--ahead).
+Starts clusters by deploy/cluster on a machine of four cores. Clients have a core of their own, HAProxy and PostgreSQL together another one; these are
+full when three servers are, each with a whole core. So each server has one worker and a share of a core (half: --share) on the other two, by a control
+group of processors, version 1, which only root makes; whatever else the machine does comes after. One, three and two servers take turns. Each is asked
+for more than it can answer, so that the frames that come are what it carries; then for seven tenths of that. A single one is measured once more with a
+whole core, for whole frames, for followers, and for commits. Processor time is that of the processes, in the middle of a run. Prints a line a run, and
+what three carry for each one that one carries.
 """
 
 import argparse
@@ -30,6 +31,9 @@ import stack  # noqa: E402
 TICKS = os.sysconf("SC_CLK_TCK")
 PAGE_MIB = os.sysconf("SC_PAGE_SIZE") / 2**20
 SAMPLE_S = 0.25
+GROUPS = pathlib.Path("/sys/fs/cgroup/cpu")
+PERIOD_US = 4000
+CLIENT_CORE, OTHERS_CORE = 2, 3
 SERVER_OPTIONS = ["--max-streams", "4096", "--max-sessions", "4096", "--max-watches", "4096", "--quota-sessions", "4096", "--log-level", "warn"]
 
 
@@ -57,9 +61,31 @@ def resident_mib(pid):
     return int(pathlib.Path(f"/proc/{pid}/statm").read_text().split()[1]) * PAGE_MIB
 
 
-def go_ahead(pid):
-    """Before what else the machine does: Linux shares processors among sessions of processes first."""
-    pathlib.Path(f"/proc/{pid}/autogroup").write_text("-15")
+class Group:
+    """A control group: processes that have so much of a core together, before what else the machine does."""
+
+    def __init__(self, name, share=None):
+        self.folder = GROUPS / f"tissueform-{os.getpid()}-{name}"
+        self.folder.mkdir()
+        self._say("cpu.shares", 200_000)
+        if share is not None:
+            self._say("cpu.cfs_period_us", PERIOD_US)
+            self._say("cpu.cfs_quota_us", int(share * PERIOD_US))
+
+    def _say(self, name, value):
+        (self.folder / name).write_text(str(value))
+
+    def add(self, pid):
+        for each in family(pid):
+            self._say("cgroup.procs", each)
+
+    def remove(self):
+        """When its processes have ended."""
+        for _ in range(100):
+            try:
+                return self.folder.rmdir()
+            except OSError:
+                time.sleep(0.05)
 
 
 class Sampler(threading.Thread):
@@ -86,25 +112,32 @@ class Sampler(threading.Thread):
 
 
 class Machine:
-    """A cluster of so many servers, and clients on the last core."""
+    """A cluster of so many servers with a share of a core each."""
 
-    def __init__(self, options, folder, nodes):
-        self.programs, self.folder, self.ahead = options.build.resolve() / "bin", folder, options.ahead
-        self.last_core = str(os.cpu_count() - 1)
+    def __init__(self, options, folder, nodes, share):
+        self.programs, self.folder, self.share = options.build.resolve() / "bin", folder, share
         self.cluster = stack.Cluster(folder / f"cluster{nodes}", self.programs)
-        self.cluster.make(nodes=nodes, gateways=1, cpus=[str(core) for core in range(os.cpu_count() - 1)], server_options=SERVER_OPTIONS)
+        self.cluster.make(nodes=nodes, gateways=1, cpus=["0", "1"], server_options=SERVER_OPTIONS)
+        self.groups = []
+
+    def group(self, name, pid, share=None):
+        self.groups.append(Group(f"{name}-{len(self.groups)}", share))
+        self.groups[-1].add(pid)
 
     def __enter__(self):
-        # What is started by this process and not pinned runs where it does.
-        os.sched_setaffinity(0, {int(self.last_core)})
+        # What this process starts and does not pin runs where it does.
+        os.sched_setaffinity(0, {OTHERS_CORE})
         self.cluster.up()
-        if self.ahead:
-            for name in self.cluster.names:
-                go_ahead(self.cluster.process(name)["pid"])
+        for name in (stack.HAPROXY, stack.DATABASE):
+            self.group(name, self.cluster.process(name)["pid"])
+        for node in self.cluster.nodes:
+            self.group(node, self.cluster.process(node)["pid"], self.share)
         return self
 
     def __exit__(self, *_):
         self.cluster.down()
+        for group in self.groups:
+            group.remove()
 
     def load(self, kind, seconds, **options):
         """One run of `tissueform load --cluster`; what it says, with what the processes took."""
@@ -113,10 +146,9 @@ class Machine:
         words = [word for name, value in options.items() for word in (f"--{name.replace('_', '-')}", str(value))]
         transactions = self.transactions()
         begin = time.monotonic()
-        client = subprocess.Popen([self.programs / "tissueform", "load", "--cluster", "--server", self.cluster.address("workstations"), "--seconds", str(seconds),
-                                   "--json", file, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
-        if self.ahead:
-            go_ahead(client.pid)
+        client = subprocess.Popen(["taskset", "--cpu-list", str(CLIENT_CORE), self.programs / "tissueform", "load", "--cluster", "--server", self.cluster.address("workstations"), "--seconds", str(seconds),
+                                   "--json", file, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.group("clients", client.pid)
         sampler = Sampler(pids | {"clients": client.pid})
         sampler.start()
         _, errors = client.communicate(timeout=seconds + 300)
@@ -130,7 +162,7 @@ class Machine:
         quiet = 1 + 0.01 * said["sessions"]
         busy = sampler.busy(max(begin, end - quiet - 0.8 * seconds), end - quiet)
         frames = sum(node["frames"] for node in said["nodes"]) / seconds
-        return {"kind": kind, "resident_mib": sampler.resident_mib, "nodes": len(self.cluster.nodes), "frames_per_second": frames, "busy": busy,
+        return {"kind": kind, "share": self.share, "resident_mib": sampler.resident_mib, "nodes": len(self.cluster.nodes), "frames_per_second": frames, "busy": busy,
                 "node_seconds_per_frame": sum(busy[node] for node in self.cluster.nodes) / frames,
                 "watch_frames_per_second": sum(node["watch_frames"] for node in said["nodes"]) / seconds,
                 "commits_per_second": said["commits_acknowledged"] / seconds,
@@ -157,8 +189,8 @@ def measure_turns(options, folder):
     runs = []
     for turn in range(options.turns):
         for nodes in (1, 3, 2):
-            with Machine(options, folder / f"turn{turn}", nodes) as machine:
-                runs.append(told(machine.load("saturated", options.seconds, sessions=40 * nodes, rate=60, encoding="int16")))
+            with Machine(options, folder / f"turn{turn}", nodes, options.share) as machine:
+                runs.append(told(machine.load("saturated", options.seconds, sessions=round(45 * options.share) * nodes, rate=60, encoding="int16")))
                 carried = runs[-1]["frames_per_second"]
                 # Seven tenths of that, for how old frames are where there is room.
                 runs.append(told(machine.load("at ease", options.seconds, sessions=max(1, int(0.7 * carried / 60)), rate=60, encoding="int16")))
@@ -167,7 +199,7 @@ def measure_turns(options, folder):
 
 def measure_rest(options, folder):
     runs, seconds = [], options.seconds
-    with Machine(options, folder, 1) as machine:
+    with Machine(options, folder, 1, 1.0) as machine:
         before = machine.resident_mib()
         first = machine.load("memory", 2, sessions=1, rate=10)
         many = machine.load("memory", 2, sessions=200, rate=2)
@@ -175,6 +207,7 @@ def measure_rest(options, folder):
         # The first of a head is all of its preparation; the others share it.
         memory = {"idle_mib": before, "session_mib": sessions_mib[0], "shared_session_mib": (sessions_mib[1] - sessions_mib[0]) / 199,
                   "prepared_seconds": first["load"]["preparing_seconds"], "prepared_200_seconds": many["load"]["preparing_seconds"]}
+        runs.append(told(machine.load("whole core", seconds, sessions=45, rate=60, encoding="int16")))
         runs.append(told(machine.load("whole frames", seconds, sessions=40, rate=60)))
         runs.append(told(machine.load("one drag", seconds, sessions=1, rate=60, encoding="int16")))
         runs.append(told(machine.load("followers", seconds, sessions=4, followers=40, rate=30, encoding="int16")))
@@ -192,12 +225,12 @@ def main():
     parser.add_argument("build", type=pathlib.Path)
     parser.add_argument("--seconds", type=float, default=12)
     parser.add_argument("--turns", type=int, default=3)
-    parser.add_argument("--ahead", action="store_true", help="go ahead of what else the machine does (root)")
+    parser.add_argument("--share", type=float, default=0.5, help="of a core, for each server")
     parser.add_argument("--json", type=pathlib.Path)
     options = parser.parse_args()
     missing = stack.missing_programs()
-    if missing or os.cpu_count() < 4:
-        raise SystemExit("\n".join(missing) or "four cores are needed: three for servers and one for all others")
+    if missing or os.cpu_count() < 4 or not os.access(GROUPS, os.W_OK):
+        raise SystemExit("\n".join(missing) or f"four cores are needed, and root's right to make {GROUPS}/...")
     load_before = os.getloadavg()[0]
     with tempfile.TemporaryDirectory() as name:
         runs = measure_turns(options, pathlib.Path(name))
@@ -207,8 +240,8 @@ def main():
     said = runs[0]["load"]
     if options.json:
         options.json.write_text(json.dumps({"machine": said["machine"], "compiler": said["compiler"], "commit": said["commit"], "notice": said["notice"],
-                                            "load_average_before": load_before, "ahead_of_other_work": options.ahead, "pinned": "each server to one core with one worker; clients, HAProxy and PostgreSQL together to the last of four",
-                                            "turns": options.turns, "ratio_2_to_1": ratios[2], "ratio_3_to_1": ratios[3], "memory": memory, "runs": runs + rest}, indent=1) + "\n")
+                                            "load_average_before": load_before, "share": options.share,
+                                            "pinned": "servers one after the other to the cores 0 and 1 with one worker each, clients to 2, HAProxy and PostgreSQL to 3", "turns": options.turns, "ratio_2_to_1": ratios[2], "ratio_3_to_1": ratios[3], "memory": memory, "runs": runs + rest}, indent=1) + "\n")
 
 
 if __name__ == "__main__":
