@@ -43,6 +43,8 @@ DATABASE_COMMITS = 4670
 RENEWAL_S = 3          # leases; the table of nodes is written every second
 PROXY_CONNECTIONS = 8000  # deploy/haproxy/cluster.cfg, maxconn
 BUDGET = 0.75         # of a machine's memory (deploy/kubernetes)
+# Of what a frame costs a server this part does not shrink with its bytes: messages, acknowledgements, waking up. An assumption.
+FIXED = 0.5
 
 
 def wait_p99(streams, utilisation, seconds, cores=1):
@@ -70,6 +72,11 @@ def most_streams(seconds, rate, cores):
     return streams
 
 
+def cost(seconds, part):
+    """Of a frame with this part of the bytes."""
+    return seconds * (FIXED + (1 - FIXED) * part)
+
+
 class Figures:
     """What was measured, as costs."""
 
@@ -81,7 +88,8 @@ class Figures:
         # X(N) = N X(1) / (1 + s (N - 1)): least squares for s.
         slopes = [(nodes * saturated[1] / saturated[nodes] - 1, nodes - 1) for nodes in (2, 3)]
         self.contention = max(0.0, sum(lost * others for lost, others in slopes) / sum(others * others for _, others in slopes))
-        self.frame_s = {"int16": 1 / saturated[1], "float32": self._median("whole frames", "node_seconds_per_frame")}
+        self.wall_s = 1 / saturated[1]  # with a share of a core
+        self.frame_s = {"int16": 1 / self._one("whole core")["frames_per_second"], "float32": self._median("whole frames", "node_seconds_per_frame")}
         followed, alone = self._one("followers"), self._one("no followers")
         self.watch_s = max(0.0, followed["busy"]["node1"] - alone["busy"]["node1"]) / followed["watch_frames_per_second"]
         proxied = self._one("whole frames")
@@ -90,6 +98,9 @@ class Figures:
         memory = measured["memory"]
         self.session_gib = memory["session_mib"] / 1024
         self.shared_session_mib = memory["shared_session_mib"]
+
+    def sessions_per_gib(self):
+        return 1 / self.session_gib, 1024 / self.shared_session_mib
 
     def _of(self, kind, nodes=None):
         return [run for run in self.runs if run["kind"] == kind and nodes in (None, run["nodes"])]
@@ -126,21 +137,30 @@ def measured_table(figures):
         drags, p99 = figures.at_ease(nodes)
         # HAProxy's hash gives one of them more than its share: about a standard deviation of the binomial.
         share = drags / nodes + (math.sqrt(drags * (1 - 1 / nodes) / nodes) if nodes > 1 else 0)
-        utilisation = min(0.98, share * RATE / figures.carried[1])
-        wait = wait_p99(max(1, share), utilisation, figures.frame_s["int16"]) * 1e3
-        dice = erlang_wait_p99(utilisation, figures.frame_s["int16"], 1) * 1e3
+        utilisation = min(0.98, share * RATE * figures.wall_s)
+        wait = wait_p99(max(1, share), utilisation, figures.wall_s) * 1e3
+        dice = erlang_wait_p99(utilisation, figures.wall_s, 1) * 1e3
         rows.append((str(nodes), number(figures.carried[nodes]), f"{figures.carried[nodes] / figures.carried[1]:.2f}", number(modelled), str(drags), f"{p99:.1f}",
                      f"{figures.latency_alone_ms() + wait:.1f}", f"{figures.latency_alone_ms() + dice:.1f}"))
-    return table(("servers, a core each", "frames/s carried", "to one", "model", "drags at seven tenths", "latency p99, ms", "model", "M/M/1"), rows)
+    return table((f"servers, {figures.measured['share']:g} of a core each", "frames/s carried", "to one", "model", "drags at seven tenths", "latency p99, ms", "model", "M/M/1"), rows)
 
 
-# What is sent for a hand that moves: seconds of a core a frame, bytes a frame, frames a second, and bytes once.
+def costs_table(figures):
+    rows = [("frames a core and second, whole skin, int16", number(1 / figures.frame_s["int16"])), ("float32, which is not packed", number(1 / figures.frame_s["float32"])),
+            ("frames of followers a core and second, int16", number(1 / figures.watch_s)), ("Gbit/s that a core of HAProxy passes on", number(8e-9 / figures.proxy_s_per_byte)),
+            ("commits a second that one server made durable, as many as were asked for", number(figures.commits)),
+            ("MiB of a session of the bundled head that shares nothing; sessions a GiB", f"{figures.session_gib * 1024:.0f}; {figures.sessions_per_gib()[0]:.1f}"),
+            ("MiB of one that shares its preparation; sessions a GiB", f"{figures.shared_session_mib:.1f}; {number(figures.sessions_per_gib()[1])}")]
+    return table(("measured", ""), rows)
+
+
 def ways(figures):
+    """What is sent for a hand that moves: seconds of a core a frame, bytes a frame, frames a second, and bytes once."""
     page = PAGE / SKIN
     for vertices, part in (("whole skin", 1.0), ("a page's vertices", page)):
         for encoding, shrunk in (("float32", 1.0), ("int16", INT16)):
-            yield f"{vertices}, {encoding}", figures.frame_s[encoding] * part, 12 * SKIN * part * shrunk, RATE, 0.0
-    yield "columns in the page", figures.frame_s["int16"] * page, 12 * PAGE * INT16, REST_RATE, COLUMN_BYTES
+            yield f"{vertices}, {encoding}", cost(figures.frame_s[encoding], part), 12 * SKIN * part * shrunk, RATE, 0.0
+    yield "columns in the page", cost(figures.frame_s["int16"], page), 12 * PAGE * INT16, REST_RATE, COLUMN_BYTES
 
 
 def demand(figures, way, planners, followers, moving):
@@ -150,8 +170,7 @@ def demand(figures, way, planners, followers, moving):
     # Followers of a page that needs no frames are sent what the server makes for them.
     watched = followers * moving * FOLLOW_RATE
     made = drags * (max(rate, FOLLOW_RATE) if followers else rate)
-    # Of a follower's frame most is copying.
-    cores = made * seconds + watched * figures.watch_s * bytes_a_frame / (12 * SKIN * INT16)
+    cores = made * seconds + watched * cost(figures.watch_s, bytes_a_frame / (12 * SKIN * INT16))
     bits = 8 * ((drags * rate + watched) * bytes_a_frame + planners * once / SESSION_S)
     carried = most_streams(seconds, max(rate, FOLLOW_RATE), CORES) * max(rate, FOLLOW_RATE) * seconds
     nodes = math.ceil(cores / carried)
@@ -204,7 +223,8 @@ def main():
     parser.add_argument("--check", type=pathlib.Path)
     options = parser.parse_args()
     figures = Figures(json.loads(options.figures.read_text()))
-    tables = {"Measured, and modelled": measured_table(figures), "Carried further": carried_table(figures, options.planners, options.followers),
+    tables = {"Measured, and modelled": measured_table(figures), "What things cost": costs_table(figures),
+              "Carried further": carried_table(figures, options.planners, options.followers),
               "What gives in first": limits(figures)}
     if options.check:
         document = options.check.read_text()
