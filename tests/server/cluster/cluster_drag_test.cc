@@ -44,6 +44,7 @@ class ClusterDragTest : public ClusterTest {
     a_ = StartNode(options);
   }
   void TearDown() override {
+    if (proxy_ != nullptr) proxy_->Thaw();
     a_ = {};
     b_ = {};
   }
