@@ -34,4 +34,10 @@ void AddSessionHeader(const std::string& session, grpc::ClientContext* context) 
   }
 }
 
+std::string NodeOf(const grpc::ClientContext& context) {
+  const auto& metadata = context.GetServerInitialMetadata();
+  const auto node = metadata.find(kNodeHeader);
+  return node == metadata.end() ? "" : std::string(node->second.data(), node->second.size());
+}
+
 }  // namespace tissueform

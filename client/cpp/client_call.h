@@ -18,4 +18,8 @@ absl::Status FromGrpcStatus(const grpc::Status& status);
 // Lets a proxy send the call to the server of `session` ("sessions/{id}"); see kSessionHeader.
 void AddSessionHeader(const std::string& session, grpc::ClientContext* context);
 
+// The name that the server of a call has said in its initial metadata, which must have come; empty
+// where it is of no cluster.
+std::string NodeOf(const grpc::ClientContext& context);
+
 }  // namespace tissueform

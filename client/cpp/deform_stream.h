@@ -8,6 +8,8 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -15,6 +17,7 @@
 #include "grpcpp/client_context.h"
 #include "grpcpp/support/sync_stream.h"
 
+#include "client/cpp/session_routes.h"
 #include "client/cpp/token_file.h"
 #include "core/base/mutex.h"
 #include "proto/conversion/geometry_conversion.h"
@@ -49,6 +52,9 @@ class DeformStream {
   // What the server said when the stream began: number of vertices a frame, and which.
   const v1::DeformStarted& started() const { return started_; }
 
+  // The server of a cluster that answers; empty: it is of none.
+  const std::string& node() const { return node_; }
+
   // `sequence` must rise from call to call. With `commit` the server keeps the poses, and a notice
   // says when it has. An error means that the stream has ended; Finish says why.
   absl::Status SendPoses(uint64_t sequence, absl::Span<const NamedPose> poses, bool commit = false);
@@ -76,13 +82,17 @@ class DeformStream {
   friend class TissueformClient;
   using Call = grpc::ClientReaderWriter<v1::DeformRequest, v1::DeformResponse>;
 
-  DeformStream() = default;
+  DeformStream(SessionRoutes* routes, std::string session)
+      : routes_(routes), session_(std::move(session)) {}
 
   // Sends the configuration and waits for the answer. `token`: where the calls of the client have
   // theirs from; null: they have none. A new one is sent while the stream lasts.
-  absl::Status Start(v1::DeformService::Stub* stub, const std::string& session,
-                     const Options& options, const std::shared_ptr<TokenFile>& token);
+  absl::Status Start(v1::DeformService::Stub* stub, const Options& options,
+                     const std::shared_ptr<TokenFile>& token);
   absl::Status Send(const v1::DeformRequest& request) ABSL_LOCKS_EXCLUDED(send_mutex_);
+
+  SessionRoutes* const routes_;
+  const std::string session_;
 
   // Self-synchronised.
   grpc::ClientContext context_;
@@ -93,6 +103,7 @@ class DeformStream {
   // Constant after Start.
   std::function<void(const v1::DeformNotice&)> on_notice_;
   v1::DeformStarted started_;
+  std::string node_;
   std::unique_ptr<Call> call_;
 
   Mutex send_mutex_;

@@ -7,11 +7,13 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "grpcpp/client_context.h"
 #include "grpcpp/support/sync_stream.h"
 
+#include "client/cpp/session_routes.h"
 #include "tissueform/v1/deform_service.grpc.pb.h"
 
 namespace tissueform {
@@ -36,6 +38,8 @@ class WatchStream {
   // (DecodePositions of geometry_conversion.h reads them). Of the receiving thread.
   const v1::WatchForm& form() const { return form_; }
   const std::string& name() const { return name_; }
+  // The server of a cluster that answers; empty: it is of none.
+  const std::string& node() const { return node_; }
 
   // Blocks until the next frame; the first one is there at once. Empty when the watch has ended;
   // Finish says how.
@@ -54,17 +58,21 @@ class WatchStream {
  private:
   friend class TissueformClient;
 
-  WatchStream(v1::DeformService::Stub* stub, const Options& options)
-      : stub_(stub), options_(options) {}
+  WatchStream(v1::DeformService::Stub* stub, SessionRoutes* routes, std::string session,
+              const Options& options)
+      : stub_(stub), routes_(routes), session_(std::move(session)), options_(options) {}
 
   // Waits for the first message.
-  absl::Status Start(const std::string& session);
+  absl::Status Start();
 
   v1::DeformService::Stub* const stub_;
+  SessionRoutes* const routes_;
+  const std::string session_;
   const Options options_;
   grpc::ClientContext context_;  // self-synchronised
   std::unique_ptr<grpc::ClientReader<v1::WatchResponse>> call_;
-  std::string name_;  // constant after Start
+  std::string name_;  // constant after Start, as the next
+  std::string node_;
   v1::WatchForm form_;
   bool finished_ = false;
 };

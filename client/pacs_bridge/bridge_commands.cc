@@ -42,6 +42,23 @@ void PrintPatient(const QueuedStudy& study, const QueuedExport& queued) {
   if (!queued.note.empty()) absl::PrintF("  note        %s\n", queued.note);
 }
 
+// Until the server is told that it is stored. What has failed for good is told there, too.
+absl::Status StepToTheEnd(ExportWork* work, QueuedExport* queued) {
+  for (int step = 0; step < kMostSteps && queued->state != BridgeExportState::kTold; ++step) {
+    const absl::Status status = work->Step(queued);
+    if (queued->state == BridgeExportState::kFailed) {
+      if (queued->done_s == 0) work->Step(queued).IgnoreError();
+      return absl::FailedPreconditionError(absl::StrCat(queued->name, " has failed: ", queued->note,
+                                                        "; ask for it once more in the planner"));
+    }
+    TF_RETURN_IF_ERROR(status);
+    if (queued->state == BridgeExportState::kAsked) {
+      return absl::AbortedError(absl::StrCat(queued->note, "; look at the patient again"));
+    }
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 BridgeCommands::BridgeCommands(CLI::App& app, const BridgeOptions* options) : options_(options) {
@@ -140,9 +157,13 @@ absl::Status BridgeCommands::Build() const {
 absl::Status BridgeCommands::Publish() const {
   TF_ASSIGN_OR_RETURN(const auto parts, BridgeParts::Open(*options_));
   TF_ASSIGN_OR_RETURN(QueuedSeries series, ReceivedRows(&parts->queue()).Get(name_));
-  if (series.state != SeriesState::kPublished) {
+  if (series.state == SeriesState::kPacked) {
     PlanWork work = PlanWorkOf(parts.get(), *options_);
     TF_RETURN_IF_ERROR(work.Step(&series));
+  }
+  if (series.state != SeriesState::kPublished) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "series ", series.key, " is ", SeriesStateName(series.state), ": build its case first"));
   }
   absl::PrintF("%s is %s: %s\n", series.key, SeriesStateName(series.state), series.case_name);
   return absl::OkStatus();
@@ -177,12 +198,7 @@ absl::Status BridgeCommands::Store() const {
     TF_RETURN_IF_ERROR(exports.Confirm(name_, DigestOf(study.patient)));
     TF_ASSIGN_OR_RETURN(queued, exports.Get(name_));
   }
-  for (int step = 0; step < kMostSteps && queued.state != BridgeExportState::kTold; ++step) {
-    TF_RETURN_IF_ERROR(work->Step(&queued));
-    if (queued.state == BridgeExportState::kAsked) {
-      return absl::AbortedError(absl::StrCat(queued.note, "; look at the patient again"));
-    }
-  }
+  TF_RETURN_IF_ERROR(StepToTheEnd(work.get(), &queued));
   absl::PrintF("%s is %s\n", queued.name, BridgeExportStateName(queued.state));
   return absl::OkStatus();
 }

@@ -7,6 +7,7 @@
 #include <unistd.h>
 #include <utility>
 
+#include "spdlog/spdlog.h"
 #include <sys/eventfd.h>
 
 #include "client/pacs_bridge/work/prediction_writer.h"
@@ -17,8 +18,8 @@ namespace {
 
 PacsPeer PeerOf(const BridgeOptions& options) {
   PacsPeer peer = options.pacs;
-  peer.name = "the PACS";
   peer.kind = peer.url.empty() ? PacsPeer::Kind::kDimse : PacsPeer::Kind::kDicomWeb;
+  peer.name = peer.url.empty() ? peer.ae_title : "DICOMweb";
   peer.own_ae_title = options.receiver.ae_title;
   const bool web_with_files = !peer.url.empty() && !options.tls.authorities.empty();
   if (peer.tls.has_value() || web_with_files) peer.tls = options.tls;
@@ -75,9 +76,10 @@ absl::StatusOr<std::unique_ptr<BridgeParts>> BridgeParts::Open(const BridgeOptio
   }
   parts->intake_ = std::make_unique<SeriesIntake>(parts->queue_.get(), std::move(intake));
   parts->sink_ = std::make_unique<IntakeSink>(parts->intake_.get());
-  parts->writer_ = MakePredictionWriter(options.receiver.ae_title);
-  parts->export_options_.header_lifetime = options.retention.keep_headers;
   parts->cancel_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  parts->writer_ = MakePredictionWriter(options.receiver.ae_title, parts->cancel_);
+  parts->export_options_ = {.header_lifetime = options.retention.keep_headers,
+                            .warn = [](const std::string& line) { spdlog::warn("{}", line); }};
   TF_RETURN_IF_ERROR(parts->intake_->Recover());
   return parts;
 }

@@ -34,7 +34,7 @@ class BridgeParts {
   CaseServer* server() { return server_.get(); }
   PacsClient* pacs() { return pacs_.get(); }
 
-  // Becomes readable by Cancel: what PlanWork ends by.
+  // Becomes readable by Cancel: what PlanWork and the drawing of pictures end by.
   int cancel() const { return cancel_; }
   void Cancel();
 

@@ -7,8 +7,10 @@
 """
 
 import argparse
+import collections
 import json
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -25,11 +27,16 @@ def curl(programs, path):
     certificate, key = programs.identities["scanner"]
     command = ["curl", "--silent", "--show-error", "--noproxy", "*", "--cacert", programs.authority.certificate, "--cert", certificate,
                "--key", key, "--header", "Accept: application/dicom+json", programs.dicomweb + path]
+    print("  $", " ".join(map(str, command)))
     return subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=stack.PATIENCE_S, check=True).stdout
 
 
-def shown(programs, study):
-    """Stores what came back, checks it, and tells it."""
+def value_of(item, tag):
+    return str((item.get(tag, {}).get("Value") or [""])[0])
+
+
+def verified(programs, study):
+    """Stores what came back, and tells what dciodvfy says of it."""
     folder = programs.folder / "back"
     folder.mkdir(exist_ok=True)
     for number, instance in enumerate(programs.instances_of(study)):
@@ -39,15 +46,32 @@ def shown(programs, study):
         path = folder / f"{tags['Modality']}-{number}.dcm"
         path.write_bytes(programs.orthanc_file(instance))
         checked = subprocess.run(["dciodvfy", path], capture_output=True, text=True, timeout=stack.PATIENCE_S, check=False)
-        errors = [line for line in (checked.stdout + checked.stderr).splitlines() if line.startswith("Error")]
-        print(f"  {tags['Modality']:3} {tags.get('DocumentTitle') or tags.get('SeriesDescription', ''):72} dciodvfy: {len(errors)} errors")
-        for line in errors:
-            print("     ", line)
-    capture = next(folder.glob("OT-*.dcm"), None) or next(folder.glob("SC-*.dcm"), None)
-    if capture is not None:
-        picture = programs.folder / "capture.png"
-        subprocess.run(["dcmj2pnm", "--write-png", "--frame", "1", capture, picture], check=True, capture_output=True, timeout=stack.PATIENCE_S)
-        print(f"  first frame of the capture: {picture}")
+        lines = (checked.stdout + checked.stderr).splitlines()
+        errors = [line for line in lines if line.startswith("Error")]
+        print(f"  {tags['Modality']:3} {tags.get('DocumentTitle') or tags.get('SeriesDescription', '')}: {len(errors)} errors")
+        for line, count in collections.Counter(lines).items():
+            print("      ", line[:160], f"({count} times)" if count > 1 else "")
+    return folder
+
+
+def captured(programs, folder):
+    """The first frame of the capture as a picture."""
+    capture = next(folder.glob("OT-*.dcm"))
+    picture = programs.folder / "capture.png"
+    subprocess.run(["dcmj2pnm", "--write-png", "--frame", "1", capture, picture], check=True, capture_output=True, timeout=stack.PATIENCE_S)
+    print(f"  first frame of the capture: {picture}")
+
+
+def screenshot(programs, name):
+    """The work list as a browser shows it, where one is installed."""
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None:
+        return
+    picture = programs.folder / name
+    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1200,1000",
+               f"--user-data-dir={programs.folder / 'browser'}", f"--screenshot={picture}", f"http://{stack.HOST}:{programs.worklist_port}/"]
+    shot = subprocess.run(command, capture_output=True, timeout=stack.PATIENCE_S, check=False)
+    print(f"  the work list: {picture}" if shot.returncode == 0 and picture.exists() else "  the browser has made no picture of the work list")
 
 
 def run(programs, web):
@@ -73,18 +97,19 @@ def run(programs, web):
     prediction = programs.predict(case)
     tell(f"a planner stores {prediction} and sends it to the PACS")
     programs.tissueform("prediction", "send", prediction)
-    form = programs.wait_for("the work list's question", lambda: (programs.forms() or [None])[0], needs="bridge")
+    form = programs.wait_for("the work list's question, with pictures",
+                             lambda: "<img" in programs.worklist() and (programs.forms() or [None])[0], needs="bridge")
+    tell("the work list shows the patient, with pictures, and asks")
+    screenshot(programs, "worklist.png")
     programs.confirm(form)
     tell("confirmed in the work list")
     programs.wait_for("the objects", lambda: ": stored" in programs.tissueform("prediction", "send", prediction).stdout
                       or " stored " in programs.tissueform("prediction", "sent").stdout, needs="bridge")
     tell("stored; QIDO-RS lists the study's series:")
     for series in json.loads(curl(programs, f"/studies/{study}/series")):
-        def value(tag, of=series):
-            return str((of.get(tag, {}).get("Value") or [""])[0])
-        print(f"  {value('00080060'):3} {value('0008103E'):58} {value('0020000E')}")
-    tell("the objects, as Orthanc has them:")
-    shown(programs, study)
+        print(f"  {value_of(series, '00080060'):3} {value_of(series, '0008103E'):58} {value_of(series, '0020000E')}")
+    tell("the objects, as Orthanc has them, and what dciodvfy says of each:")
+    captured(programs, verified(programs, study))
 
 
 def main():
@@ -100,8 +125,9 @@ def main():
     folder = words.folder or tempfile.mkdtemp(prefix="tissueform-pacs-")
     with stack.Stack(pathlib.Path(words.programs).resolve(), pathlib.Path(folder).resolve(), HERE / "recipe.json") as programs:
         run(programs, pathlib.Path(words.web).resolve())
-        print(f"everything lies in {folder}")
+        print(f"everything lies in {folder}; delete it when you have looked")
         if not words.serve:
+            print("the programs end now; with --serve they keep running")
             return
         print(f"work list http://{stack.HOST}:{programs.worklist_port}/\nplanner   http://localhost:{programs.gateway_port}/\nCtrl-C ends it", flush=True)
         try:

@@ -8,8 +8,9 @@
 #
 #   deploy/pacs/demo.sh [--serve] [--folder DIR]
 #
-# With --serve all keep running until Ctrl-C: work list and planner are where the last lines say. Everything lies in DIR (a
-# temporary folder unless it is named) and ends with the script.
+# With --serve all keep running until Ctrl-C: work list and planner are where the last lines say; otherwise the programs end
+# with the script. What they have written, logs, pictures and the keys of this one time, stays in DIR (a temporary folder
+# unless it is named).
 #
 # TISSUEFORM_BUILD_DIR and JOBS: see deploy/build.sh.
 set -euo pipefail

@@ -24,6 +24,8 @@ PATIENCE_S = 60
 HOST = "127.0.0.1"
 SCANNER, BRIDGE, ORTHANC = "SCANNER", "TISSUEFORM", "ORTHANC"
 NEEDED = ["openssl", "storescu", "dciodvfy", "haproxy"]
+# DCMTK, which Orthanc is made with, takes 22 slices a second otherwise: it waits for acknowledgements of small pieces.
+QUICK = os.environ | {"TCP_NODELAY": "1"}
 SYSTEM_PATH = "/usr/sbin:/usr/bin:/usr/local/sbin"
 
 
@@ -112,7 +114,7 @@ class Stack:
 
     def start(self, name, command):
         with open(self.log(name), "ab") as log:
-            process = subprocess.Popen(list(map(str, command)), stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=self.folder)
+            process = subprocess.Popen(list(map(str, command)), stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=self.folder, env=QUICK)
         self.running[name] = process
         return process
 
@@ -223,7 +225,7 @@ backend orthanc
         certificate, key = self.identities["scanner"]
         return subprocess.run(["storescu", "--aetitle", SCANNER, "--call", ORTHANC, "--enable-tls", key, certificate, "--add-cert-file",
                                self.authority.certificate, "--scan-directories", *extra, HOST, str(self.orthanc_dicom), folder],
-                              capture_output=True, text=True, timeout=PATIENCE_S, env=os.environ | {"TCP_NODELAY": "1"}, check=False)
+                              capture_output=True, text=True, timeout=PATIENCE_S, env=QUICK, check=False)
 
     def send_to_bridge(self, study_uid):
         """As a rule of the PACS would."""
@@ -305,10 +307,11 @@ backend orthanc
         """Names of the cases that the server has."""
         return re.findall(r"cases/[0-9a-f]{64}", self.tissueform("case", "list").stdout)
 
-    def predict(self, case, title="Jaw forward"):
-        """A prediction of the case at the plan's own poses, as the planner makes one; its name."""
+    def predict(self, case, title="Jaw forward", model=None):
+        """A prediction of the case at the plan's own poses, by the plan's model or another, as the planner makes one; its name."""
         plan = next((self.folder / "bridge").rglob("plan.json"))
-        made = self.tissueform("prediction", "create", plan, "--case", case, "--title", title)
+        chosen = [] if model is None else ["--model", model]
+        made = self.tissueform("prediction", "create", plan, "--case", case, "--title", title, *chosen)
         found = re.search(r"^predictions/\S+", made.stdout, re.MULTILINE)
         if found is None:
             raise SystemExit(f"no prediction: {made.stdout}{made.stderr}")

@@ -91,18 +91,19 @@ absl::StatusOr<std::chrono::nanoseconds> ParseGrpcTimeout(absl::string_view text
       "grpc-timeout: at most eight digits and one of H, M, S, m, u and n are needed");
 }
 
-std::map<std::string, std::string> AllowedTrailers(const grpc::ClientContext& context) {
-  std::map<std::string, std::string> trailers;
+std::map<std::string, std::string> AllowedMetadata(
+    const std::multimap<grpc::string_ref, grpc::string_ref>& metadata) {
+  std::map<std::string, std::string> told;
   size_t bytes = 0;
-  for (const auto& [key, data] : context.GetServerTrailingMetadata()) {
+  for (const auto& [key, data] : metadata) {
     const absl::string_view name(key.data(), key.size());
     const absl::string_view value(data.data(), data.size());
     bytes += name.size() + value.size();
     const bool allowed = absl::StartsWith(name, "x-tissueform-") || name == "traceparent";
     if (!allowed || absl::EndsWith(name, "-bin") || !IsText(value)) continue;
-    if (bytes <= kMaxMetadataBytes) trailers.emplace(name, value);
+    if (bytes <= kMaxMetadataBytes) told.emplace(name, value);
   }
-  return trailers;
+  return told;
 }
 
 }  // namespace tissueform

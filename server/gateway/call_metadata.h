@@ -9,7 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
-#include "grpcpp/client_context.h"
+#include "grpcpp/support/string_ref.h"
 
 #include "server/gateway/http_message.h"
 #include "server/gateway/upstream_call.h"
@@ -36,8 +36,9 @@ std::map<std::string, std::string> MetadataOf(const HttpHead& head);
 // Error: InvalidArgument.
 absl::StatusOr<std::chrono::nanoseconds> ParseGrpcTimeout(absl::string_view text);
 
-// The server's trailers that a client is told: x-tissueform-*, traceparent; text only, at most 4
-// KiB of them.
-std::map<std::string, std::string> AllowedTrailers(const grpc::ClientContext& context);
+// Of the server's metadata what a client is told: x-tissueform-*, traceparent; text only, at most 4
+// KiB of it.
+std::map<std::string, std::string> AllowedMetadata(
+    const std::multimap<grpc::string_ref, grpc::string_ref>& metadata);
 
 }  // namespace tissueform

@@ -20,9 +20,16 @@ namespace tissueform {
 
 namespace {
 
+std::vector<NodeAddress> ServersOf(const GatewayOptions& options) {
+  std::vector<NodeAddress> servers;
+  for (const std::string& server : options.servers) servers.push_back(ParseNodeAddress(server));
+  return servers;
+}
+
 absl::Status CheckServers(const GatewayOptions& options) {
+  TF_RETURN_IF_ERROR(ServerChoice::Check(ServersOf(options)));
   if (options.insecure || !options.upstream.roots.empty()) return absl::OkStatus();
-  for (const std::string& server : options.servers) {
+  for (const auto& [node, server] : ServersOf(options)) {
     std::string host = server.substr(0, server.rfind(':'));
     if (host.size() > 2 && host.front() == '[') host = host.substr(1, host.size() - 2);
     if (absl::StartsWith(server, "unix:") || IsLoopback(host)) continue;
@@ -63,7 +70,7 @@ Gateway::Gateway(const GatewayOptions& options, WebFiles files,
                  std::unique_ptr<RotatedFiles> tls_files)
     : options_(options),
       tls_files_(std::move(tls_files)),
-      pool_(options.servers, options.limits, MakeChannelCredentials(tls_files_.get())),
+      pool_(ServersOf(options), options.limits, MakeChannelCredentials(tls_files_.get())),
       routes_(AccessRules(options.host, options.allowed_hosts, options.allowed_origins),
               ForwardedAddresses(options.trusted_proxies), std::move(files), options.login, &pool_,
               &counters_) {}

@@ -34,6 +34,7 @@ enum class GatewayEvent {
   kWrongSubprotocol,
   kTooManySockets,
   kNoCallSlot,
+  kWrongNode,
   kMethodRefused,
   kMetadataRefused,
   kMalformedFrame,

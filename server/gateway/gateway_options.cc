@@ -130,10 +130,12 @@ std::string SetListen(const std::string& text, GatewayOptions* options) {
 }  // namespace
 
 void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
-  app.add_option("--server", options->servers,
-                 "address of a tissueform-server, HOST:PORT or unix:/PATH; several may be named")
+  app.add_option(
+         "--server", options->servers,
+         "address of a tissueform-server, HOST:PORT or unix:/PATH; several may be named, in "
+         "a cluster with their --node-name before it")
       ->required()
-      ->type_name("ADDRESS");
+      ->type_name("[NODE=]ADDRESS");
   app.add_option_function<std::string>(
          "--listen",
          [options](const std::string& text) {

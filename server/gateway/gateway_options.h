@@ -16,7 +16,7 @@ namespace tissueform {
 
 // Everything that can be set about a gateway.
 struct GatewayOptions {
-  std::vector<std::string> servers;  // as gRPC has addresses
+  std::vector<std::string> servers;  // [NODE=]ADDRESS, as gRPC has addresses
   // Encryption to the servers: `roots` of their certificates, and the gateway's own. Empty: none.
   RotatedFiles::Paths upstream = {};
   bool insecure = false;  // to servers on other machines without encryption all the same

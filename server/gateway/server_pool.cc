@@ -3,20 +3,20 @@
 
 #include "server/gateway/server_pool.h"
 
-#include <cstdint>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "grpcpp/create_channel.h"
 #include "grpcpp/support/channel_arguments.h"
 
-#include "server/gateway/stable_hash.h"
+#include "core/base/status_macros.h"
 
 namespace tissueform {
 namespace {
 
-constexpr int kKeepaliveMilliseconds = 25'000;
-constexpr int kKeepaliveTimeoutMilliseconds = 10'000;
+// A machine that is gone is noticed within 20 s; servers allow a ping every 10 s.
+constexpr int kKeepaliveMilliseconds = 12'000;
+constexpr int kKeepaliveTimeoutMilliseconds = 8'000;
 // A server that was started again is found soon.
 constexpr int kFirstBackoffMilliseconds = 100;
 constexpr int kLastBackoffMilliseconds = 1000;
@@ -35,14 +35,14 @@ grpc::ChannelArguments Arguments(const GatewayLimits& limits) {
 }
 
 std::vector<std::shared_ptr<grpc::Channel>> ConnectForHealth(
-    const std::vector<std::string>& addresses, const GatewayLimits& limits,
+    const std::vector<NodeAddress>& servers, const GatewayLimits& limits,
     const std::shared_ptr<grpc::ChannelCredentials>& credentials) {
   grpc::ChannelArguments arguments = Arguments(limits);
   arguments.SetServiceConfigJSON(ServerHealth::HealthServiceConfig());
   std::vector<std::shared_ptr<grpc::Channel>> channels;
-  channels.reserve(addresses.size());
-  for (const std::string& address : addresses) {
-    channels.push_back(grpc::CreateCustomChannel(address, credentials, arguments));
+  channels.reserve(servers.size());
+  for (const NodeAddress& server : servers) {
+    channels.push_back(grpc::CreateCustomChannel(server.address, credentials, arguments));
   }
   return channels;
 }
@@ -55,33 +55,19 @@ CallSlot::~CallSlot() {
   --channel_->calls;
 }
 
-ServerPool::ServerPool(const std::vector<std::string>& addresses, const GatewayLimits& limits,
+ServerPool::ServerPool(const std::vector<NodeAddress>& servers, const GatewayLimits& limits,
                        std::shared_ptr<grpc::ChannelCredentials> credentials)
     : limits_(limits),
-      addresses_(addresses),
       credentials_(std::move(credentials)),
-      health_(ConnectForHealth(addresses, limits, credentials_)) {
-  channels_.resize(addresses.size());
+      choice_(servers),
+      health_(ConnectForHealth(servers, limits, credentials_)) {
+  channels_.resize(servers.size());
 }
 
-size_t ServerPool::Choose(absl::string_view session) const {
-  size_t chosen = 0;
-  bool any = false;
-  uint64_t highest = 0;
-  for (size_t i = 0; i < addresses_.size(); ++i) {
-    if (!health_.IsServing(i)) continue;
-    if (session.empty()) return i;
-    const uint64_t hash = StableHash(absl::StrCat(session, "\n", addresses_[i]));
-    if (any && hash <= highest) continue;
-    any = true;
-    chosen = i;
-    highest = hash;
-  }
-  return chosen;
-}
-
-absl::StatusOr<CallSlot> ServerPool::Take(absl::string_view session) {
-  const size_t server = Choose(session);
+absl::StatusOr<CallSlot> ServerPool::Take(absl::string_view session, absl::string_view node) {
+  TF_ASSIGN_OR_RETURN(const size_t server, choice_.Choose(session, node, [this](size_t place) {
+    return health_.IsServing(place);
+  }));
   MutexLock lock(mutex_);
   auto& channels = channels_[server];
   for (auto& channel : channels) {
@@ -95,8 +81,8 @@ absl::StatusOr<CallSlot> ServerPool::Take(absl::string_view session) {
                      " calls open to this server, as many as it may; try again in a moment"));
   }
   auto channel = std::make_unique<ServerChannel>();
-  channel->channel =
-      grpc::CreateCustomChannel(addresses_[server], credentials_, Arguments(limits_));
+  channel->channel = grpc::CreateCustomChannel(choice_.servers()[server].address, credentials_,
+                                               Arguments(limits_));
   channel->stub = std::make_unique<grpc::GenericStub>(channel->channel);
   channel->calls = 1;
   channels.push_back(std::move(channel));
@@ -104,7 +90,7 @@ absl::StatusOr<CallSlot> ServerPool::Take(absl::string_view session) {
 }
 
 bool ServerPool::IsReady() const {
-  for (size_t i = 0; i < addresses_.size(); ++i) {
+  for (size_t i = 0; i < choice_.servers().size(); ++i) {
     if (health_.IsServing(i)) return true;
   }
   return false;

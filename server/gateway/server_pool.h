@@ -15,6 +15,7 @@
 
 #include "core/base/mutex.h"
 #include "server/gateway/gateway_limits.h"
+#include "server/gateway/server_choice.h"
 #include "server/gateway/server_health.h"
 
 namespace tissueform {
@@ -49,17 +50,17 @@ class CallSlot {
 // The servers behind the gateway. Thread-safe.
 class ServerPool {
  public:
-  // `addresses` as gRPC has them: "host:port", "unix:/path". At least one.
+  // At least one, as ServerChoice::Check has them.
   ServerPool(
-      const std::vector<std::string>& addresses, const GatewayLimits& limits,
+      const std::vector<NodeAddress>& servers, const GatewayLimits& limits,
       std::shared_ptr<grpc::ChannelCredentials> credentials = grpc::InsecureChannelCredentials());
 
-  // A place for a call. One that names a session goes to the same server of those that are healthy,
-  // whichever gateway is asked (rendezvous hashing); one that names none (empty) to the first of
-  // them. Where none is, it is sent all the same, and the server's own answer counts.
+  // A place for a call, of the server that ServerChoice::Choose gives it; those serve that are
+  // healthy.
   //
-  // Errors: ResourceExhausted when all connections to that server carry as many calls as they may.
-  absl::StatusOr<CallSlot> Take(absl::string_view session);
+  // Errors: those of Choose; ResourceExhausted when all connections to that server carry as many
+  // calls as they may.
+  absl::StatusOr<CallSlot> Take(absl::string_view session, absl::string_view node);
 
   // Whether a server takes calls.
   bool IsReady() const;
@@ -67,15 +68,12 @@ class ServerPool {
  private:
   friend class CallSlot;
 
-  // A server's place among the addresses.
-  size_t Choose(absl::string_view session) const;
-
   // Constant.
   const GatewayLimits limits_;
-  const std::vector<std::string> addresses_;
   const std::shared_ptr<grpc::ChannelCredentials> credentials_;
 
   // Self-synchronised.
+  ServerChoice choice_;
   ServerHealth health_;
 
   mutable Mutex mutex_;

@@ -49,16 +49,22 @@ void SocketCall::Start(absl::string_view payload) {
     return Fail(event, start.status(), SocketClose::kProtocolError);
   }
   start->metadata[kClientAddressHeader] = client_address_;
-  const auto session = start->metadata.find("x-tissueform-session");
   absl::StatusOr<CallSlot> slot =
-      pool_->Take(session != start->metadata.end() ? session->second : "");
-  if (!slot.ok()) return Fail(GatewayEvent::kNoCallSlot, slot.status(), SocketClose::kNormal);
+      pool_->Take(start->Metadata("x-tissueform-session"), start->Metadata("x-tissueform-node"));
+  if (!slot.ok()) return Fail(EventOf(slot.status()), slot.status(), SocketClose::kNormal);
   started_ = true;
+  tells_begin_ = start->tells_begin;
   counters_->Add(GatewayEvent::kSocketCall);
   answer_type_ = AnswerOf(start->method);
   upstream_ = UpstreamCall::Begin(*std::move(slot), *start, socket_, shared_from_this());
-  upstream_->Read();
   socket_->Receive();
+}
+
+void SocketCall::OnBegun(std::map<std::string, std::string> headers) {
+  if (finished_ || upstream_ == nullptr) return;
+  if (!tells_begin_ || headers.empty()) return upstream_->Read();
+  sending_ = true;
+  socket_->Send(BeginFrame(headers));
 }
 
 void SocketCall::Forward(std::string payload) {

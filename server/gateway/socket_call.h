@@ -4,6 +4,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -39,6 +40,7 @@ class SocketCall final : public SocketUser,
   void OnSent() override;
   void OnGone() override;
   void OnDrain() override;
+  void OnBegun(std::map<std::string, std::string> headers) override;
   void OnAnswer(const grpc::ByteBuffer& message) override;
   void OnWritten() override;
   void OnEnd(CallEnd end) override;
@@ -62,6 +64,7 @@ class SocketCall final : public SocketUser,
   std::shared_ptr<UpstreamCall> upstream_;
   const google::protobuf::Descriptor* answer_type_ = nullptr;
   bool started_ = false;
+  bool tells_begin_ = false;
   bool half_closed_ = false;
   bool writing_ = false;  // to the server
   std::optional<std::string> waiting_;

@@ -38,6 +38,13 @@ void PutHead(SocketFrameKind kind, size_t payload_at, size_t payload_bytes, std:
   PutNumber(static_cast<uint32_t>(payload_bytes), 4, 4, frame);
 }
 
+std::string FrameOf(SocketFrameKind kind, const google::protobuf::MessageLite& message) {
+  std::string frame(kSocketFrameHeadBytes, '\0');
+  message.AppendToString(&frame);
+  PutHead(kind, kSocketFrameHeadBytes, frame.size() - kSocketFrameHeadBytes, &frame);
+  return frame;
+}
+
 absl::Status NoFrame(absl::string_view why) {
   return absl::InvalidArgumentError(absl::StrCat("frame: ", why, "; see docs/gateway.md"));
 }
@@ -85,6 +92,7 @@ absl::StatusOr<CallStart> ParseStart(absl::string_view payload) {
     start.metadata.emplace(name, value);
   }
   TF_RETURN_IF_ERROR(CheckMetadata(start.metadata));
+  start.tells_begin = message.tells_begin();
   if (message.deadline_ms() < 0) {
     return absl::InvalidArgumentError("start: deadline_ms is below 0");
   }
@@ -118,17 +126,19 @@ absl::StatusOr<std::string> MessageFrame(const grpc::ByteBuffer& message,
   return frame += payload;
 }
 
+std::string BeginFrame(const std::map<std::string, std::string>& headers) {
+  v1::GatewayCallBegin message;
+  message.mutable_headers()->insert(headers.begin(), headers.end());
+  return FrameOf(SocketFrameKind::kBegin, message);
+}
+
 std::string EndFrame(const CallEnd& end) {
   v1::GatewayCallEnd message;
   message.set_code(end.status.error_code());
   message.set_message(end.status.error_message());
   message.set_status_details(end.status.error_details());
   message.mutable_trailers()->insert(end.trailers.begin(), end.trailers.end());
-  std::string frame(kSocketFrameHeadBytes, '\0');
-  message.AppendToString(&frame);
-  PutHead(SocketFrameKind::kEnd, kSocketFrameHeadBytes, frame.size() - kSocketFrameHeadBytes,
-          &frame);
-  return frame;
+  return FrameOf(SocketFrameKind::kEnd, message);
 }
 
 }  // namespace tissueform

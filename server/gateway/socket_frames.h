@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -19,7 +20,13 @@ namespace tissueform {
 
 constexpr size_t kSocketFrameHeadBytes = 32;
 
-enum class SocketFrameKind : uint8_t { kStart = 1, kMessage = 2, kHalfClose = 3, kEnd = 4 };
+enum class SocketFrameKind : uint8_t {
+  kStart = 1,
+  kMessage = 2,
+  kHalfClose = 3,
+  kEnd = 4,
+  kBegin = 5,
+};
 
 struct SocketFrame {
   SocketFrameKind kind = SocketFrameKind::kMessage;
@@ -38,6 +45,9 @@ absl::StatusOr<CallStart> ParseStart(absl::string_view payload);
 // Error: Internal when gRPC cannot give the bytes.
 absl::StatusOr<std::string> MessageFrame(const grpc::ByteBuffer& message,
                                          const google::protobuf::Descriptor* type);
+
+// What the server has said before its first message.
+std::string BeginFrame(const std::map<std::string, std::string>& headers);
 
 std::string EndFrame(const CallEnd& end);
 

@@ -63,6 +63,15 @@ void UpstreamCall::Release() {
   RemoveHold();
 }
 
+void UpstreamCall::OnReadInitialMetadataDone(bool ok) {
+  if (!begun_) return;
+  std::map<std::string, std::string> headers;
+  if (ok) headers = AllowedMetadata(context_.GetServerInitialMetadata());
+  strand_->Post([self = shared_from_this(), headers = std::move(headers)]() mutable {
+    if (const auto user = self->user_; user != nullptr) user->OnBegun(std::move(headers));
+  });
+}
+
 void UpstreamCall::OnReadDone(bool ok) {
   if (!begun_) return;
   strand_->Post([self = shared_from_this(), ok] {
@@ -80,7 +89,8 @@ void UpstreamCall::OnWriteDone(bool /*ok*/) {
 
 void UpstreamCall::OnDone(const grpc::Status& status) {
   if (!begun_) return;
-  CallEnd end = {.status = status, .trailers = AllowedTrailers(context_)};
+  CallEnd end = {.status = status,
+                 .trailers = AllowedMetadata(context_.GetServerTrailingMetadata())};
   // `this` may be gone before Post returns.
   const std::shared_ptr<ConnectionStrand> strand = strand_;
   strand->Post([self = std::move(self_), end = std::move(end)]() mutable {

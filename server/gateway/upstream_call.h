@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 
+#include "absl/strings/string_view.h"
 #include "grpcpp/client_context.h"
 #include "grpcpp/support/byte_buffer.h"
 #include "grpcpp/support/client_callback.h"
@@ -25,6 +26,13 @@ struct CallStart {
   std::string method;                                // "/tissueform.v1.MeshService/GetMesh"
   std::map<std::string, std::string> metadata = {};  // what gRPC takes, names in lower case
   std::optional<std::chrono::nanoseconds> timeout = std::nullopt;
+  bool tells_begin = false;  // of a socket: the server's headers go to the client before all else
+
+  // Empty where there is none of that name.
+  absl::string_view Metadata(const std::string& name) const {
+    const auto found = metadata.find(name);
+    return found == metadata.end() ? absl::string_view() : absl::string_view(found->second);
+  }
 };
 
 // How a call ended.
@@ -37,6 +45,9 @@ struct CallEnd {
 class UpstreamUser {
  public:
   virtual ~UpstreamUser() = default;
+  // Once, before all others: what the server says at its first message or earlier (AllowedMetadata;
+  // none where the call ends without that). Read only from then on.
+  virtual void OnBegun(std::map<std::string, std::string> headers) = 0;
   // The message that Read asked for.
   virtual void OnAnswer(const grpc::ByteBuffer& message) = 0;
   // What was written is on its way (or lost: the end tells).
@@ -67,6 +78,7 @@ class UpstreamCall final : public std::enable_shared_from_this<UpstreamCall>,
                std::shared_ptr<UpstreamUser> user);
 
   // gRPC's threads; they hand on to the strand.
+  void OnReadInitialMetadataDone(bool ok) override;
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
   void OnDone(const grpc::Status& status) override;

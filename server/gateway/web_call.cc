@@ -6,8 +6,11 @@
 #include <utility>
 #include <vector>
 
+#include "google/rpc/error_details.pb.h"
+#include "google/rpc/status.pb.h"
 #include "grpcpp/support/slice.h"
 
+#include "core/base/error_reason.h"
 #include "server/gateway/call_metadata.h"
 #include "server/gateway/method_table.h"
 #include "server/gateway/web_frames.h"
@@ -41,8 +44,22 @@ absl::StatusOr<CallStart> StartOf(const HttpHead& head) {
 }  // namespace
 
 CallEnd EndOf(const absl::Status& status) {
+  const ErrorInfo info = ErrorInfoOf(status);
+  google::rpc::ErrorInfo proto;
+  proto.set_reason(info.reason);
+  proto.set_domain("tissueform");
+  proto.mutable_metadata()->insert(info.metadata.begin(), info.metadata.end());
+  google::rpc::Status details;
+  details.set_code(static_cast<int>(status.code()));
+  details.set_message(std::string(status.message()));
+  details.add_details()->PackFrom(proto);
   return {.status = grpc::Status(static_cast<grpc::StatusCode>(status.code()),
-                                 std::string(status.message()))};
+                                 std::string(status.message()), details.SerializeAsString())};
+}
+
+GatewayEvent EventOf(const absl::Status& no_slot) {
+  return HasReason(no_slot, ErrorReason::kWrongNode) ? GatewayEvent::kWrongNode
+                                                     : GatewayEvent::kNoCallSlot;
 }
 
 void WebCall::Begin(const HttpHead& head, absl::string_view body, ServerPool* pool,
@@ -67,13 +84,17 @@ absl::Status WebCall::TryBegin(const HttpHead& head, absl::string_view body, Ser
   start->metadata[kClientAddressHeader] = client_address_;
   const auto message = ParseWebRequest(body);
   if (!message.ok()) return counted(GatewayEvent::kMalformedFrame, message.status());
-  auto slot = pool->Take(head.Field("x-tissueform-session"));
-  if (!slot.ok()) return counted(GatewayEvent::kNoCallSlot, slot.status());
+  auto slot = pool->Take(head.Field("x-tissueform-session"), head.Field("x-tissueform-node"));
+  if (!slot.ok()) return counted(EventOf(slot.status()), slot.status());
   counters->Add(GatewayEvent::kWebCall);
   upstream_ = UpstreamCall::Begin(*std::move(slot), *start, reply_, shared_from_this());
   upstream_->Write(std::string(*message));
-  upstream_->Read();
   return absl::OkStatus();
+}
+
+void WebCall::OnBegun(std::map<std::string, std::string> headers) {
+  headers_ = std::move(headers);
+  if (upstream_ != nullptr) upstream_->Read();
 }
 
 void WebCall::OnWritten() {
@@ -82,7 +103,7 @@ void WebCall::OnWritten() {
 
 void WebCall::OnAnswer(const grpc::ByteBuffer& message) {
   if (reply_ == nullptr || end_.has_value()) return;
-  if (!begun_) BeginReply({});
+  if (!begun_) BeginReply({headers_.begin(), headers_.end()});
   sending_ = true;
   reply_->Send(WebMessageFrame(Joined(message)), false);
 }
@@ -100,19 +121,22 @@ void WebCall::OnEnd(CallEnd end) {
   end_ = std::move(end);
 }
 
-void WebCall::SendEnd(const CallEnd& end) {
+void WebCall::SendEnd(CallEnd end) {
   const bool has_messages = begun_;
-  if (!has_messages) BeginReply(WebEndFields(end));
+  if (!has_messages) {
+    end.trailers.insert(headers_.begin(), headers_.end());  // one field of each name
+    BeginReply(WebEndFields(end));
+  }
   reply_->Send(has_messages ? WebEndFrame(end) : std::string(), true);
   Done();
 }
 
-void WebCall::BeginReply(const HttpFields& end_fields) {
+void WebCall::BeginReply(const HttpFields& fields) {
   begun_ = true;
   HttpReply head = {.status = 200, .fields = fields_};
   head.fields.emplace_back("content-type", std::string(kWebContentType));
   head.fields.emplace_back("cache-control", "no-store");
-  for (const auto& field : end_fields) head.fields.push_back(field);
+  for (const auto& field : fields) head.fields.push_back(field);
   reply_->Begin(head);
 }
 

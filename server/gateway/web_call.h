@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -36,6 +37,7 @@ class WebCall final : public ReplySource,
   void OnSent() override;
   void OnGone() override;
   void OnDrain() override;
+  void OnBegun(std::map<std::string, std::string> headers) override;
   void OnAnswer(const grpc::ByteBuffer& message) override;
   void OnWritten() override;
   void OnEnd(CallEnd end) override;
@@ -43,8 +45,8 @@ class WebCall final : public ReplySource,
  private:
   absl::Status TryBegin(const HttpHead& head, absl::string_view body, ServerPool* pool,
                         GatewayCounters* counters);
-  void SendEnd(const CallEnd& end);
-  void BeginReply(const HttpFields& end_fields);
+  void SendEnd(CallEnd end);
+  void BeginReply(const HttpFields& fields);
   // Lets go of both sides.
   void Done();
 
@@ -52,12 +54,16 @@ class WebCall final : public ReplySource,
   const HttpFields fields_;
   const std::string client_address_;
   std::shared_ptr<UpstreamCall> upstream_;
+  std::map<std::string, std::string> headers_;  // of the server
   bool begun_ = false;
   bool sending_ = false;
   std::optional<CallEnd> end_;  // to be sent after what is being sent
 };
 
-// As a call's end: code and message.
+// As a call's end: code, message and reason.
 CallEnd EndOf(const absl::Status& status);
+
+// As what it is counted that ServerPool::Take gave no place.
+GatewayEvent EventOf(const absl::Status& no_slot);
 
 }  // namespace tissueform

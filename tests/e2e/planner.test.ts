@@ -98,10 +98,10 @@ describe("a planner", () => {
     expect(legend?.largestMm).toBeGreaterThan(6);
     expect(legend?.mostMm).toBeGreaterThanOrEqual(legend?.largestMm ?? Infinity);
     await page.getByLabel("Colours show").selectOption({ label: "Difference to Gradient field" });
-    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.legend.value?.title === "Difference to Gradient field");
+    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.map.legend.value?.title === "Difference to Gradient field");
     expect((await state(page)).legend?.largestMm).toBeLessThan(8);
     await page.getByLabel("Colours show").selectOption({ label: "Band of uncertainty" });
-    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.legend.value?.title.startsWith("Band of 95 in 100"));
+    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.map.legend.value?.title.startsWith("Band of 95 in 100"));
     await page.locator(".legend").getByText("stiffness only; excludes model and surgical error").waitFor();
     expect((await state(page)).legend?.largestMm).toBeGreaterThan(0.05);
     await page.getByLabel("Colours show").selectOption({ label: "Skin as it looks" });

@@ -86,6 +86,37 @@ TEST_F(BackupProgramTest, ARestoredServerKnowsAllThatWasAcknowledgedBeforeTheBac
   }
 }
 
+TEST_F(BackupProgramTest, AWishForThePacsIsThereAfterwardsAsFarAsItWas) {
+  v1::Export before;
+  {
+    const auto client = server_.Connect();
+    ASSERT_THAT(client, IsOk());
+    const auto prediction =
+        (*client)->predictions().Create(MakeSession(server_, 1), TopPose(SomePose(1)), {}, "",
+                                        {.case_name = "cases/" + std::string(64, 'a')});
+    ASSERT_THAT(prediction, IsOk());
+    const auto made = (*client)->exports().Create(prediction->name());
+    ASSERT_THAT(made, IsOk());
+    v1::UpdateExportRequest request;
+    request.set_name(made->name());
+    request.set_state(v1::EXPORT_STATE_CONFIRMATION);
+    request.set_detail("waits for a person");
+    const auto changed = (*client)->exports().Update(request);
+    ASSERT_THAT(changed, IsOk());
+    before = *changed;
+  }
+  EXPECT_EQ(RunServer({"backup", backup_, "--data-dir", server_.folder()}), 0);
+  ASSERT_THAT(server_.Kill(), IsOk());
+  ASSERT_NO_FATAL_FAILURE(Replace(server_, backup_));
+  ASSERT_THAT(server_.Start(), IsOk());
+  const auto client = server_.Connect();
+  ASSERT_THAT(client, IsOk());
+  const auto after = (*client)->exports().Get(before.name());
+  ASSERT_THAT(after, IsOk());
+  EXPECT_EQ(after->DebugString(), before.DebugString());
+  EXPECT_THAT((*client)->predictions().Get(before.prediction()), IsOk());
+}
+
 TEST_F(BackupProgramTest, WrongUseAndFailureHaveTheirExitCodes) {
   EXPECT_EQ(RunServer({"backup"}), 2);
   EXPECT_EQ(RunServer({"restore"}), 2);

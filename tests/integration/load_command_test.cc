@@ -50,10 +50,39 @@ TEST_F(LoadCommandTest, TellsWhatItsDragsGot) {
   EXPECT_GT(json["session_seconds"]["count"], 0);
 }
 
+TEST_F(LoadCommandTest, TellsWhatCameFromOneServerWithoutACluster) {
+  const ProcessResult result =
+      Load({"--cluster", "--sessions", "2", "--followers", "3", "--commit-seconds", "0.3", "--rate",
+            "20", "--seconds", "1", "--json", "cluster.json"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("(no name)"));
+  const Json json = Json::parse(Read("cluster.json"));
+  EXPECT_EQ(json["errors"], 0);
+  EXPECT_EQ(json["reattachments"], 0);
+  ASSERT_EQ(json["nodes"].size(), 1U);
+  const Json& node = json["nodes"][0];
+  EXPECT_EQ(node["node"], "");
+  EXPECT_EQ(node["drags"], 2);
+  EXPECT_GT(node["frames"], 0);
+  EXPECT_GT(node["watch_frames"], 0);
+  EXPECT_EQ(node["latency_ms"]["count"], node["frames"]);
+  // Every pose is answered, replaced by a newer one, or lost; every commit is acknowledged.
+  EXPECT_EQ(json["poses_sent"], json["poses_answered"].get<int>() +
+                                    json["poses_coalesced"].get<int>() +
+                                    json["poses_dropped"].get<int>());
+  EXPECT_EQ(json["poses_dropped"], 0);
+  EXPECT_EQ(json["commits_sent"], 6);
+  EXPECT_EQ(json["commits_acknowledged"], 6);
+  EXPECT_EQ(node["commit_ms"]["count"], 6);
+}
+
 TEST_F(LoadCommandTest, RefusesWhatCannotBeMeasured) {
   EXPECT_THAT(Load({"--sessions", "0", "--churn", "0"}), FailsWith(1, HasSubstr("--sessions")));
   EXPECT_THAT(Load({"--sessions", "0", "--churn", "1", "--bare"}),
               FailsWith(1, HasSubstr("--bare")));
+  EXPECT_THAT(Load({"--cluster", "--sessions", "0"}), FailsWith(1, HasSubstr("--sessions")));
+  EXPECT_THAT(Load({"--cluster", "--churn", "1"}), FailsWith(2, HasSubstr("--churn")));
+  EXPECT_THAT(Load({"--followers", "1"}), FailsWith(2, HasSubstr("--cluster")));
   EXPECT_THAT(Load({"--json", "missing/load.json"}), FailsWith(1, HasSubstr("missing/load.json")));
 }
 

@@ -12,6 +12,8 @@
 #include "absl/strings/str_format.h"
 
 #include "client/cli/load/bare_transport.h"
+#include "client/cli/load/cluster_load.h"
+#include "client/cli/load/cluster_report.h"
 #include "client/cli/load/load_report.h"
 #include "client/cli/load/load_run.h"
 #include "client/cli/online/server_connection.h"
@@ -30,6 +32,8 @@ constexpr std::chrono::seconds kServerStartDeadline{30};
 
 struct LoadCommandOptions {
   LoadOptions load;
+  bool cluster = false;
+  ClusterLoadOptions cluster_load;  // what is of --cluster alone
   ServerConnection server;
   std::string plan;
   std::string model = "linear_elastic";
@@ -43,8 +47,12 @@ DeformationModel ModelOf(const std::string& name) {
   return name == "neo_hookean" ? DeformationModel::kNeoHookean : DeformationModel::kLinearElastic;
 }
 
-absl::Status Run(const LoadCommandOptions& options) {
+absl::Status CheckOptions(const LoadCommandOptions& options) {
   const LoadOptions& load = options.load;
+  if (options.cluster && load.sessions == 0) {
+    return absl::InvalidArgumentError(
+        "--cluster drags and follows sessions; give --sessions a number");
+  }
   if (load.sessions + load.slow_readers + load.refining + load.churn == 0) {
     return absl::InvalidArgumentError(
         "nothing is asked for; give --sessions, --slow-readers, --refining or --churn a number");
@@ -55,6 +63,36 @@ absl::Status Run(const LoadCommandOptions& options) {
         "--sessions");
   }
   if (!options.json.empty()) TF_RETURN_IF_ERROR(CheckWritable(options.json));
+  return absl::OkStatus();
+}
+
+absl::Status KeepJson(const std::string& path, const nlohmann::ordered_json& json) {
+  return path.empty() ? absl::OkStatus() : WriteFileAtomically(path, json.dump(2) + "\n");
+}
+
+absl::Status FirstOf(const std::vector<absl::Status>& errors) {
+  if (errors.empty()) return absl::OkStatus();
+  return absl::InternalError(
+      absl::StrCat(errors.size(), " calls failed; the first: ", errors.front().message()));
+}
+
+absl::Status RunOnCluster(const LoadCommandOptions& options, const ServerConnection& connection,
+                          const PlanProblem& problem) {
+  ClusterLoadOptions load = options.cluster_load;
+  load.sessions = options.load.sessions;
+  load.poses_per_second = options.load.poses_per_second;
+  load.seconds = options.load.seconds;
+  load.int16 = options.load.int16;
+  TF_ASSIGN_OR_RETURN(const ClusterLoadResult result, RunClusterLoad(connection, problem, load));
+  absl::PrintF("prepared in %.1f s, then %g s\n%s", result.preparing_seconds, load.seconds,
+               ClusterLoadText(load, result));
+  TF_RETURN_IF_ERROR(KeepJson(options.json, ClusterLoadJson(load, result)));
+  return FirstOf(result.errors);
+}
+
+absl::Status Run(const LoadCommandOptions& options) {
+  const LoadOptions& load = options.load;
+  TF_RETURN_IF_ERROR(CheckOptions(options));
   TF_ASSIGN_OR_RETURN(const std::string path, FindDemoPlan(options.plan));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(path));
   TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan));
@@ -73,8 +111,8 @@ absl::Status Run(const LoadCommandOptions& options) {
   }
   absl::FPrintF(stderr, "plan %s: %d vertices, %d tets, %s; preparing %d drags on %s ...\n", path,
                 problem.mesh->num_vertices(), problem.mesh->num_tets(), options.model,
-                options.load.sessions + options.load.slow_readers + options.load.refining,
-                connection.address);
+                load.sessions + load.slow_readers + load.refining, connection.address);
+  if (options.cluster) return RunOnCluster(options, connection, problem);
   TF_ASSIGN_OR_RETURN(LoadResult result, RunLoad(connection, problem, options.load));
   if (load.bare && !result.drags.empty() && result.drags.front().frames > 0) {
     const DragLoad& drags = result.drags.front();
@@ -84,15 +122,33 @@ absl::Status Run(const LoadCommandOptions& options) {
   }
   absl::PrintF("prepared in %.1f s, then %g s\n%s", result.preparing_seconds, options.load.seconds,
                LoadText(options.load, result));
-  if (!options.json.empty()) {
-    TF_RETURN_IF_ERROR(
-        WriteFileAtomically(options.json, LoadJson(options.load, result).dump(2) + "\n"));
-  }
-  if (!result.errors.empty()) {
-    return absl::InternalError(absl::StrCat(
-        result.errors.size(), " calls failed; the first: ", result.errors.front().message()));
-  }
-  return absl::OkStatus();
+  TF_RETURN_IF_ERROR(KeepJson(options.json, LoadJson(load, result)));
+  return FirstOf(result.errors);
+}
+
+void AddClusterOptions(CLI::App* command, LoadCommandOptions* options) {
+  ClusterLoadOptions& load = options->cluster_load;
+  CLI::Option* cluster =
+      command
+          ->add_flag("--cluster", options->cluster,
+                     "what came from each server behind one name; drags reattach and commit")
+          ->excludes("--churn")
+          ->excludes("--slow-readers")
+          ->excludes("--refining")
+          ->excludes("--in-phase")
+          ->excludes("--bare");
+  command
+      ->add_option("--followers", load.followers,
+                   "watches, spread over the sessions; with --cluster")
+      ->check(CLI::Range(0, 4096))
+      ->capture_default_str()
+      ->needs(cluster);
+  command
+      ->add_option("--commit-seconds", load.commit_seconds,
+                   "between two commits of a drag, 0: none; with --cluster")
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str()
+      ->needs(cluster);
 }
 
 void AddOptions(CLI::App* command, LoadCommandOptions* options) {
@@ -139,6 +195,7 @@ void AddOptions(CLI::App* command, LoadCommandOptions* options) {
                     "afterwards also time frames of the same size that nobody computes, through\n"
                     "gRPC alone: what a drag's latency cannot come below");
   command->add_option("--json", options->json, "also write the figures to this JSON file");
+  AddClusterOptions(command, options);
 }
 
 }  // namespace
@@ -153,10 +210,13 @@ void AddLoadCommand(CLI::App& app, CommandWork* work) {
       "that\n"
       "poses that were dropped count; the interval of the poses is part of it. The clients run\n"
       "on this machine, too, and take their share of it. Exit code 1 when a call fails.\n"
+      "With --cluster every session has a random id, by whose hash a proxy spreads them, and the\n"
+      "figures are those of each server by the name that it says.\n"
       "Examples:\n"
       "  tissueform load --sessions 32 --rate 30 --churn 2 --seconds 60 --json load.json\n"
       "  tissueform load --server localhost:50051 --sessions 1 --churn 0 --seconds 10\n"
-      "docs/performance.md tells what was measured so.");
+      "  tissueform load --cluster --server localhost:50052 --sessions 24 --followers 24\n"
+      "docs/performance.md and docs/scaling.md tell what was measured so.");
   command->callback([options, work] {
     options->load.int16 = options->encoding == "int16";
     *work = [options] { return Run(*options); };

@@ -25,7 +25,24 @@ std::vector<double> Rising(std::vector<double> values) {
   return values;
 }
 
-// "p50 / p90 / p99 / largest", or a dash.
+double Share(int64_t part, int64_t whole) {
+  return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
+}
+
+std::string DragText(const DragLoad& load, double seconds) {
+  const double mebibytes = static_cast<double>(load.bytes) / (1 << 20);
+  return absl::StrFormat(
+      "%-12s %5d  %31s  %31s  %12s  %5.1f %%  %6.0f  %6.1f\n", load.kind, load.drags,
+      PercentilesText(load.picture_ages_ms, 1), PercentilesText(load.latencies_ms, 1),
+      load.solves_ms.empty() ? "-"
+                             : absl::StrFormat("%.2f / %.2f", Percentile(load.solves_ms, 50),
+                                               Percentile(load.solves_ms, 99)),
+      100 * Share(load.frames, load.poses_sent), static_cast<double>(load.frames) / seconds,
+      mebibytes / seconds);
+}
+
+}  // namespace
+
 std::string PercentilesText(const std::vector<double>& values, int digits) {
   if (values.empty()) return "-";
   const std::vector<double> rising = Rising(values);
@@ -46,24 +63,6 @@ Json PercentilesJson(const std::vector<double>& values) {
           {"p99", PercentileOfRising(rising, 99)},
           {"largest", rising.back()}};
 }
-
-double Share(int64_t part, int64_t whole) {
-  return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
-}
-
-std::string DragText(const DragLoad& load, double seconds) {
-  const double mebibytes = static_cast<double>(load.bytes) / (1 << 20);
-  return absl::StrFormat(
-      "%-12s %5d  %31s  %31s  %12s  %5.1f %%  %6.0f  %6.1f\n", load.kind, load.drags,
-      PercentilesText(load.picture_ages_ms, 1), PercentilesText(load.latencies_ms, 1),
-      load.solves_ms.empty() ? "-"
-                             : absl::StrFormat("%.2f / %.2f", Percentile(load.solves_ms, 50),
-                                               Percentile(load.solves_ms, 99)),
-      100 * Share(load.frames, load.poses_sent), static_cast<double>(load.frames) / seconds,
-      mebibytes / seconds);
-}
-
-}  // namespace
 
 std::string LoadText(const LoadOptions& options, const LoadResult& result) {
   std::string text =

@@ -4,12 +4,18 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "nlohmann/json.hpp"
 
 #include "client/cli/load/load_run.h"
 
 namespace tissueform {
+
+// "p50 / p90 / p99 / largest" with so many digits, or a dash.
+std::string PercentilesText(const std::vector<double>& values, int digits);
+// The same with their count, or null.
+nlohmann::ordered_json PercentilesJson(const std::vector<double>& values);
 
 // A table of the drags, a line on churn and one on errors.
 std::string LoadText(const LoadOptions& options, const LoadResult& result);

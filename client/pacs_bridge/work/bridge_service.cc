@@ -51,6 +51,7 @@ BridgeService::BridgeService(BridgeServiceParts parts) : parts_(std::move(parts)
   }
   if (parts_.exports != nullptr) {
     threads_.emplace_back([this] { Loop(kStepPause, [this] { WorkOnExports(); }); });
+    threads_.emplace_back([this] { Loop(kStepPause, [this] { WorkOnPictures(); }); });
     threads_.emplace_back([this] { Loop(kStepPause, [this] { WatchServer(); }); });
   }
 }
@@ -146,7 +147,7 @@ void BridgeService::WorkOnPlans() {
   }
 }
 
-void BridgeService::WorkOnExports() {
+void BridgeService::TakeHeard() {
   std::deque<v1::Export> heard;
   {
     MutexLock lock(mutex_);
@@ -156,14 +157,15 @@ void BridgeService::WorkOnExports() {
     const absl::Status status = parts_.exports->Take(told);
     if (!status.ok()) Tell(status, "an export cannot be taken into the queue");
   }
+  if (!heard.empty()) Wake();
+}
+
+void BridgeService::WorkOnExports() {
+  TakeHeard();
   ExportRows rows(parts_.queue);
   const absl::StatusOr<std::vector<QueuedExport>> all = rows.List();
   if (!all.ok()) return Tell(all.status(), "the queue cannot be read");
   for (QueuedExport queued : *all) {
-    if (queued.state == BridgeExportState::kAsked && drawn_.insert(queued.key).second) {
-      const absl::Status status = parts_.exports->Draw(queued);
-      if (!status.ok()) Tell(status, absl::StrCat(queued.name, " has no pictures"));
-    }
     while (HasExportStep(queued) && !stopping() && export_retries_.Due(queued.key)) {
       const std::string before = BridgeExportStateName(queued.state);
       const absl::Status status = parts_.exports->Step(&queued);
@@ -174,6 +176,21 @@ void BridgeService::WorkOnExports() {
       } else {
         export_retries_.Failed(queued.key);
       }
+    }
+  }
+}
+
+void BridgeService::WorkOnPictures() {
+  ExportRows rows(parts_.queue);
+  const absl::StatusOr<std::vector<QueuedExport>> all = rows.List();
+  if (!all.ok()) return Tell(all.status(), "the queue cannot be read");
+  for (const QueuedExport& queued : *all) {
+    if (queued.state != BridgeExportState::kAsked) {
+      drawn_.erase(queued.key);
+    } else if (!stopping() && drawn_.insert(queued.key).second) {
+      const absl::Status status = parts_.exports->Draw(queued);
+      if (absl::IsCancelled(status)) return;
+      if (!status.ok()) Tell(status, absl::StrCat(queued.name, " waits without pictures"));
     }
   }
 }

@@ -34,8 +34,9 @@ struct BridgeServiceParts {
 };
 
 // Moves everything in the queue on, each kind of work on a thread of its own: what comes in, plans
-// one after the other, exports, and the watch of the server, which is taken up again when it
-// breaks. What fails for now is tried again (RetryTimes).
+// one after the other, exports, their pictures (so that one that is drawn holds up no other), and
+// the watch of the server, which is taken up again when it breaks. What fails for now is tried
+// again (RetryTimes).
 class BridgeService {
  public:
   explicit BridgeService(BridgeServiceParts parts);
@@ -57,7 +58,9 @@ class BridgeService {
       ABSL_LOCKS_EXCLUDED(mutex_);
   void TakeIn();
   void WorkOnPlans();
+  void TakeHeard() ABSL_LOCKS_EXCLUDED(mutex_);
   void WorkOnExports();
+  void WorkOnPictures();
   void WatchServer();
   void Tell(const absl::Status& status, const std::string& line);
   bool stopping() ABSL_LOCKS_EXCLUDED(mutex_);
@@ -69,7 +72,7 @@ class BridgeService {
   RetryTimes export_retries_;
   RetryTimes watch_retries_;
   std::chrono::steady_clock::time_point next_deletion_ = {};
-  std::set<std::string> drawn_;  // keys of exports whose pictures were drawn, or could not be
+  std::set<std::string> drawn_;  // keys of exports that wait and were drawn, or could not be
 
   Mutex mutex_;
   ConditionVariable changed_;

@@ -11,6 +11,7 @@
 #include <iterator>
 #include <system_error>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 
@@ -34,6 +35,9 @@ namespace fs = std::filesystem;
 constexpr size_t kMostDetailBytes = 256;
 // Once a minute: a PACS may be down for a day.
 constexpr int64_t kMostExportAttempts = 1440;
+// A report without a band is better than none: a server that has no room for it is asked so often.
+constexpr int64_t kMostBandAttempts = 5;
+constexpr char kBandFile[] = "band.f64";
 constexpr char kSeriesKey[] = "series:";
 
 bool IsSeriesKey(const std::string& key) { return absl::StartsWith(key, kSeriesKey); }
@@ -45,9 +49,11 @@ std::string DetailOf(const std::string& text) {
   return line;
 }
 
-// The PACS may come back, or there may be room again.
+// The PACS may come back, there may be room again, or the bridge is ending. A peer that dies in a
+// TLS handshake looks like one with a wrong certificate, and that may be renewed, too.
 bool MayCome(const absl::Status& status) {
-  return IsTransient(status) || absl::IsDeadlineExceeded(status) ||
+  return IsTransient(status) || absl::IsDeadlineExceeded(status) || absl::IsCancelled(status) ||
+         absl::IsUnauthenticated(status) || absl::IsPermissionDenied(status) ||
          HasReason(status, ErrorReason::kDiskFull);
 }
 
@@ -182,6 +188,11 @@ absl::StatusOr<ExportMaterial> ExportWork::Gather(const QueuedExport& queued) {
   }
   TF_ASSIGN_OR_RETURN(material.case_file, ReadCase(material.case_path));
   TF_ASSIGN_OR_RETURN(material.prediction, server_->ReadPrediction(queued.prediction));
+  if (material.prediction.description.mesh() != material.case_file.mesh.name) {
+    return absl::FailedPreconditionError(
+        "the prediction is of another mesh than its case; predict in the case again, and send "
+        "that");
+  }
   TF_ASSIGN_OR_RETURN(material.asked, server_->GetExport(queued.name));
   TF_ASSIGN_OR_RETURN(material.sources, received_.ListImages(series.key));
   material.series_uid = series.uid;
@@ -190,18 +201,64 @@ absl::StatusOr<ExportMaterial> ExportWork::Gather(const QueuedExport& queued) {
   return material;
 }
 
-absl::Status ExportWork::Draw(const QueuedExport& queued) {
+absl::StatusOr<std::vector<double>> ExportWork::MakeShown(const QueuedExport& queued,
+                                                          const ExportMaterial& material) {
+  {
+    MutexLock lock(mutex_);
+    while (making_.contains(queued.name)) made_.Wait(mutex_);
+    making_.insert(queued.name);
+  }
+  const absl::Cleanup done = [this, &queued] {
+    MutexLock lock(mutex_);
+    making_.erase(queued.name);
+    made_.NotifyAll();
+  };
+  // The band first: who sees the pictures may confirm at once, and then nothing is left to wait
+  // for.
+  absl::StatusOr<std::vector<double>> band = BandOf(queued, material);
   std::error_code failed;
-  const std::string pictures = queue_->object_folder(queued.key) + "/pictures";
-  if (fs::exists(pictures, failed)) return absl::OkStatus();
+  if (!fs::exists(material.pictures, failed)) {
+    TF_RETURN_IF_ERROR(writer_->Draw(material, material.pictures));
+  }
+  return band;
+}
+
+absl::Status ExportWork::Draw(const QueuedExport& queued) {
+  const fs::path folder = queue_->object_folder(queued.key);
+  std::error_code failed;
+  if (fs::exists(folder / "pictures", failed) && fs::exists(folder / kBandFile, failed)) {
+    return absl::OkStatus();
+  }
   TF_ASSIGN_OR_RETURN(const ExportMaterial material, Gather(queued));
-  TF_RETURN_IF_ERROR(writer_->Draw(material, pictures));
-  return BandOf(queued, material).status();
+  const absl::Status status = MakeShown(queued, material).status();
+  // It may have failed meanwhile, and whoever told so has removed the folder.
+  const absl::StatusOr<QueuedExport> now = rows_.Get(queued.name);
+  if (now.ok() && now->done_s != 0) {
+    fs::remove_all(folder, failed);
+  }
+  return status;
+}
+
+absl::StatusOr<std::vector<double>> ExportWork::AskBand(const QueuedExport& queued,
+                                                        const ExportMaterial& material) {
+  const absl::StatusOr<std::vector<double>> band =
+      server_->ReadBand(material.case_file, material.prediction.description);
+  const bool fits =
+      band.ok() &&
+      (band->empty() || band->size() == static_cast<size_t>(material.prediction.positions.rows()));
+  if (fits) return band;
+  if (!band.ok() && MayCome(band.status()) && queued.attempts < kMostBandAttempts) return band;
+  if (options_.warn) {
+    options_.warn(
+        absl::StrCat(queued.name, " is written without its band of uncertainty: ",
+                     band.ok() ? "it is not one number for each vertex" : band.status().message()));
+  }
+  return std::vector<double>();
 }
 
 absl::StatusOr<std::vector<double>> ExportWork::BandOf(const QueuedExport& queued,
                                                        const ExportMaterial& material) {
-  const std::string path = queue_->object_folder(queued.key) + "/band.f64";
+  const std::string path = queue_->object_folder(queued.key) + "/" + kBandFile;
   const size_t vertices = static_cast<size_t>(material.prediction.positions.rows());
   std::ifstream file(path, std::ios::binary);
   if (file) {
@@ -210,30 +267,23 @@ absl::StatusOr<std::vector<double>> ExportWork::BandOf(const QueuedExport& queue
     if (!band.empty()) std::memcpy(band.data(), kept.data(), band.size() * sizeof(double));
     if (band.empty() || band.size() == vertices) return band;
   }
-  absl::StatusOr<std::vector<double>> band =
-      server_->ReadBand(material.case_file, material.prediction.description);
-  if (!band.ok() && MayCome(band.status())) return band.status();
-  // The report then has no band, as where none is known.
-  if (!band.ok() || band->size() != vertices) band = std::vector<double>();
+  TF_ASSIGN_OR_RETURN(const std::vector<double> band, AskBand(queued, material));
   TF_RETURN_IF_ERROR(
-      WriteDurably(path, {absl::string_view(reinterpret_cast<const char*>(band->data()),
-                                            band->size() * sizeof(double))}));
+      WriteDurably(path, {absl::string_view(reinterpret_cast<const char*>(band.data()),
+                                            band.size() * sizeof(double))}));
   return band;
 }
 
 absl::Status ExportWork::Write(QueuedExport* queued) {
   TF_ASSIGN_OR_RETURN(ExportMaterial material, Gather(*queued));
-  std::error_code failed;
-  if (!fs::exists(material.pictures, failed)) {
-    TF_RETURN_IF_ERROR(writer_->Draw(material, material.pictures));
-  }
-  TF_ASSIGN_OR_RETURN(material.band_mm, BandOf(*queued, material));
+  TF_ASSIGN_OR_RETURN(material.band_mm, MakeShown(*queued, material));
   TF_ASSIGN_OR_RETURN(const std::vector<std::string> keys, writer_->KeysOf(material));
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedObject> objects,
                       rows_.EnsureObjects(queued->name, keys, NewDicomUid));
   TF_FAULT_POINT("export.uids");
   for (const QueuedObject& object : objects) material.uids[object.key] = object.uid;
-  fs::remove_all(material.folder, failed);
+  std::error_code ignored;
+  fs::remove_all(material.folder, ignored);
   TF_RETURN_IF_ERROR(MakeFolder(material.folder));
   TF_ASSIGN_OR_RETURN(const std::vector<ExportFile> files, writer_->Write(material));
   TF_FAULT_POINT("export.files");

@@ -4,9 +4,12 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
 
 #include "client/pacs_bridge/network/pacs_client.h"
@@ -14,12 +17,16 @@
 #include "client/pacs_bridge/queue/received_rows.h"
 #include "client/pacs_bridge/work/case_server.h"
 #include "client/pacs_bridge/work/object_writer.h"
+#include "core/base/mutex.h"
 
 namespace tissueform {
 
 struct ExportWorkOptions {
   // How long a kept header stands for the PACS's own where that cannot be asked for one.
   std::chrono::seconds header_lifetime = std::chrono::hours(24) * 90;
+  // Told in one line what is left out although nothing stops for it; nothing of a patient. May be
+  // empty.
+  std::function<void(const std::string& line)> warn = {};
 };
 
 // From a planner's wish to objects in the patient's study, one durable step after the other:
@@ -33,7 +40,7 @@ struct ExportWorkOptions {
 //   told
 //
 // Every step may be repeated: an object keeps its UID, so the PACS gets each once. One thread at a
-// time. What it is given must outlive it.
+// time for Take and Step, and beside it one for Draw. What it is given must outlive it.
 class ExportWork {
  public:
   ExportWork(BridgeQueue* queue, CaseServer* server, PacsClient* pacs, ObjectWriter* writer,
@@ -50,9 +57,10 @@ class ExportWork {
   // another bridge's: nothing happens. Errors: those of the queue.
   absl::Status Take(const v1::Export& told);
 
-  // Draws the pictures for one that is asked for, for who is to confirm it; nothing happens where
-  // they are there. Errors: those of the server and of drawing; they keep nobody from confirming.
-  absl::Status Draw(const QueuedExport& queued);
+  // Draws the pictures for one that is asked for, for who is to confirm it, and asks for its band;
+  // nothing happens where they are there. Step waits for it where it needs them. Errors: those of
+  // the server and of drawing; they keep nobody from confirming.
+  absl::Status Draw(const QueuedExport& queued) ABSL_LOCKS_EXCLUDED(mutex_);
 
   // The next step of an export, whose new state is written to the queue and into it. An error that
   // is no transient one makes it kFailed. Also tells the server of one that waits or has failed.
@@ -64,9 +72,17 @@ class ExportWork {
   absl::Status RunStep(QueuedExport* queued);
   absl::Status Fetch(QueuedExport* queued);
   absl::StatusOr<ExportMaterial> Gather(const QueuedExport& queued);
-  // Kept beside the pictures: a restart writes the same. Empty, too, where the server has no room.
+  // Draws and asks what is not there yet, unless another thread does it for this export: then it
+  // waits. Returns the band.
+  absl::StatusOr<std::vector<double>> MakeShown(const QueuedExport& queued,
+                                                const ExportMaterial& material)
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  // Kept beside the pictures: a restart writes the same. Empty, with a warning, too, where the
+  // server cannot tell one.
   absl::StatusOr<std::vector<double>> BandOf(const QueuedExport& queued,
                                              const ExportMaterial& material);
+  absl::StatusOr<std::vector<double>> AskBand(const QueuedExport& queued,
+                                              const ExportMaterial& material);
   absl::Status Write(QueuedExport* queued);
   absl::Status Send(QueuedExport* queued);
   absl::Status SendMissing(const QueuedExport& queued, std::vector<QueuedObject>* objects);
@@ -80,6 +96,10 @@ class ExportWork {
   PacsClient* const pacs_;
   ObjectWriter* const writer_;
   const ExportWorkOptions options_;
+
+  Mutex mutex_;
+  ConditionVariable made_;
+  std::set<std::string> making_ ABSL_GUARDED_BY(mutex_);  // exports for which MakeShown works
 };
 
 }  // namespace tissueform

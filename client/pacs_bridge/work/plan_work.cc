@@ -167,7 +167,8 @@ absl::Status PlanWork::Pack(QueuedSeries* series) {
   const std::string fresh = folder + "/case.new";
   TF_RETURN_IF_ERROR(RunTissueform({"case", "pack", folder + "/plan/plan.json", "--out", fresh,
                                     "--title", TitleOfSeries(series->key), "--overwrite"},
-                                   "packing the case", folder + "/pack.log", kPackTime));
+                                   "packing the case", folder + "/pack.log", kPackTime,
+                                   options_.cancel));
   TF_FAULT_POINT("plan.packed");
   TF_ASSIGN_OR_RETURN(OpenFile file, OpenFile::Open(fresh, O_RDWR));
   TF_RETURN_IF_ERROR(file.Sync());

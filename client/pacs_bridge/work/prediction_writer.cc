@@ -55,7 +55,8 @@ PredictionObjectsInput InputOf(const ExportMaterial& material) {
 
 class PredictionWriter final : public ObjectWriter {
  public:
-  explicit PredictionWriter(std::string device_serial) : device_serial_(std::move(device_serial)) {}
+  PredictionWriter(std::string device_serial, int cancel)
+      : device_serial_(std::move(device_serial)), cancel_(cancel) {}
 
   absl::StatusOr<std::vector<std::string>> KeysOf(const ExportMaterial& material) override {
     return PredictionUidKeys(material.case_file);
@@ -71,7 +72,7 @@ class PredictionWriter final : public ObjectWriter {
         0600));
     const absl::Status drawn =
         RunTissueform({"case", "render", material.case_path, "--positions", file, "--out", folder},
-                      "drawing the pictures", folder + ".log", kRenderTime);
+                      "drawing the pictures", folder + ".log", kRenderTime, cancel_);
     std::error_code ignored;
     fs::remove(file, ignored);
     return drawn;
@@ -91,12 +92,13 @@ class PredictionWriter final : public ObjectWriter {
 
  private:
   const std::string device_serial_;
+  const int cancel_;
 };
 
 }  // namespace
 
-std::unique_ptr<ObjectWriter> MakePredictionWriter(const std::string& device_serial) {
-  return std::make_unique<PredictionWriter>(device_serial);
+std::unique_ptr<ObjectWriter> MakePredictionWriter(const std::string& device_serial, int cancel) {
+  return std::make_unique<PredictionWriter>(device_serial, cancel);
 }
 
 }  // namespace tissueform

@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <optional>
+#include <poll.h>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -16,6 +17,7 @@ namespace tissueform {
 namespace {
 
 constexpr std::chrono::seconds kCommandGrace{2};
+constexpr std::chrono::milliseconds kCancelPause{100};
 constexpr size_t kMostLineBytes = 400;
 
 // The last line that is not empty, without control characters.
@@ -31,19 +33,28 @@ std::string LastLine(const std::string& path) {
   return last;
 }
 
+bool IsReadable(int descriptor) {
+  pollfd asked = {.fd = descriptor, .events = POLLIN, .revents = 0};
+  return descriptor >= 0 && poll(&asked, 1, 0) > 0;
+}
+
 }  // namespace
 
 absl::Status RunTissueform(const std::vector<std::string>& arguments, absl::string_view what,
-                           const std::string& log, std::chrono::seconds most_time) {
+                           const std::string& log, std::chrono::seconds most_time, int cancel) {
   ChildOptions options;
   TF_ASSIGN_OR_RETURN(options.program, FindProgram("tissueform"));
   options.arguments = arguments;
   options.output = ChildStream::File(log);
   options.errors = ChildStream::File(log);
   TF_ASSIGN_OR_RETURN(const auto child, GuardedProgram::Start(std::move(options), kCommandGrace));
-  const std::optional<ChildEnd> end = child->WaitFor(most_time);
-  if (!end.has_value()) {
-    return absl::DeadlineExceededError(absl::StrCat(what, " took too long and was ended"));
+  const auto latest = std::chrono::steady_clock::now() + most_time;
+  std::optional<ChildEnd> end;
+  while (!(end = child->WaitFor(kCancelPause)).has_value()) {
+    if (IsReadable(cancel)) return absl::CancelledError(absl::StrCat(what, " was broken off"));
+    if (std::chrono::steady_clock::now() > latest) {
+      return absl::DeadlineExceededError(absl::StrCat(what, " took too long and was ended"));
+    }
   }
   if (end->exit_code == 0) return absl::OkStatus();
   return absl::FailedPreconditionError(absl::StrCat(what, " failed: ", LastLine(log)));

@@ -24,7 +24,9 @@ class FakeCall final : public grpc::ServerGenericBidiReactor {
     ++server_->open;
     const std::string& method = context->method();
     if (absl::EndsWith(method, "/Deform") || absl::EndsWith(method, "/GetMesh")) {
-      context->AddTrailingMetadata("x-tissueform-node", "fake");
+      context->AddInitialMetadata("x-tissueform-node", server->name());
+      context->AddInitialMetadata("secret", "no");
+      context->AddTrailingMetadata("x-tissueform-node", server->name());
       context->AddTrailingMetadata("secret", "no");
       StartRead(&message_);
     } else if (absl::EndsWith(method, "/ReadCase") || absl::EndsWith(method, "/Watch")) {
@@ -77,7 +79,7 @@ class FakeCall final : public grpc::ServerGenericBidiReactor {
 
 }  // namespace
 
-FakeServer::FakeServer() {
+FakeServer::FakeServer(std::string name) : name_(std::move(name)) {
   grpc::EnableDefaultHealthCheckService(true);
   grpc::ServerBuilder builder;
   builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port_);

@@ -15,8 +15,8 @@ namespace tissueform::testing {
 // A gRPC server in this process that does by a method's name what a test wants:
 //
 //   DeformService/Deform, MeshService/GetMesh   sends every message back, ends with OK at the
-//   half-close; trailers
-//                                               x-tissueform-node: fake and secret: no
+//   half-close; headers and trailers
+//                                               x-tissueform-node: its name, and secret: no
 //   MeshService/ListMeshes, DeformService/Stuck never answers; the second never reads, either
 //   CaseService/ReadCase, DeformService/Watch   sends messages of kEndlessBytes until it is
 //   cancelled SessionService/GetSession                   the names of the client's metadata that
@@ -26,10 +26,11 @@ class FakeServer : public grpc::CallbackGenericService {
  public:
   static constexpr size_t kEndlessBytes = size_t{64} << 10;
 
-  FakeServer();
+  explicit FakeServer(std::string name = "fake");
   // Cancels what is open.
   ~FakeServer() override;
 
+  const std::string& name() const { return name_; }
   std::string address() const;
   // By the health service.
   void SetServing(bool serving);
@@ -43,6 +44,7 @@ class FakeServer : public grpc::CallbackGenericService {
   grpc::ServerGenericBidiReactor* CreateReactor(
       grpc::GenericCallbackServerContext* context) override;
 
+  const std::string name_;
   int port_ = 0;
   std::unique_ptr<grpc::Server> server_;
 };

@@ -181,6 +181,7 @@ TEST_F(GatewayHttpTest, AnswersAndTrailersComeInTheBody) {
   EXPECT_THAT(reply, HasSubstr("access-control-expose-headers: grpc-status, grpc-message, "));
   EXPECT_THAT(reply, HasSubstr(WebBody("abc")));
   EXPECT_THAT(reply, HasSubstr("grpc-status: 0\r\nx-tissueform-node: fake\r\n"));
+  EXPECT_THAT(reply.substr(0, reply.find("\r\n\r\n")), HasSubstr("x-tissueform-node: fake\r\n"));
   EXPECT_THAT(reply, Not(HasSubstr("secret")));
 }
 

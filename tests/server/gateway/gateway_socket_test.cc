@@ -48,6 +48,54 @@ TEST_F(GatewaySocketTest, MessagesGoBothWaysUntilBothSidesHaveEnded) {
   EXPECT_EQ(socket.ReceiveClose(), 1000);
 }
 
+TEST_F(GatewaySocketTest, WhoAsksForItIsToldTheServersHeadersFirst) {
+  RawSocket socket(port());
+  v1::GatewayCallStart start;
+  start.set_method(kEcho);
+  start.set_tells_begin(true);
+  socket.SendOurs(SocketFrameKind::kStart, start.SerializeAsString());
+  socket.SendOurs(SocketFrameKind::kMessage, "abc");
+  const std::string first = socket.Receive().payload;
+  ASSERT_GT(first.size(), kSocketFrameHeadBytes);
+  EXPECT_EQ(first[1], static_cast<char>(SocketFrameKind::kBegin));
+  v1::GatewayCallBegin begin;
+  ASSERT_TRUE(begin.ParseFromString(first.substr(kSocketFrameHeadBytes)));
+  EXPECT_EQ(begin.headers().at("x-tissueform-node"), "fake");
+  EXPECT_EQ(begin.headers().count("secret"), 0U);
+  EXPECT_EQ(socket.Receive().payload.substr(kSocketFrameHeadBytes), "abc");
+  socket.SendOurs(SocketFrameKind::kHalfClose);
+  EXPECT_EQ(socket.ReceiveEnd().code(), 0);
+}
+
+TEST_F(GatewaySocketTest, WhoAsksForHeadersThatThereAreNoneOfIsToldTheRest) {
+  RawSocket socket(port());
+  v1::GatewayCallStart start;
+  start.set_method("/tissueform.v1.SessionService/GetSession");
+  start.set_tells_begin(true);
+  socket.SendOurs(SocketFrameKind::kStart, start.SerializeAsString());
+  EXPECT_EQ(socket.Receive().payload[1], static_cast<char>(SocketFrameKind::kMessage));
+  EXPECT_EQ(socket.ReceiveEnd().code(), 0);
+}
+
+TEST_F(GatewaySocketTest, ANodeThatIsAnotherEndsTheCallWithItsReason) {
+  GatewayOptions options;
+  options.servers = {"fake=" + server_.address()};
+  options.port = 0;
+  auto cluster = Gateway::Start(options);
+  ASSERT_TRUE(cluster.ok());
+  RawSocket socket((*cluster)->port());
+  v1::GatewayCallStart start;
+  start.set_method(kEcho);
+  (*start.mutable_metadata())["x-tissueform-node"] = "other";
+  socket.SendOurs(SocketFrameKind::kStart, start.SerializeAsString());
+  const v1::GatewayCallEnd end = socket.ReceiveEnd();
+  EXPECT_EQ(end.code(), 14);
+  EXPECT_THAT(end.status_details(), HasSubstr("WRONG_NODE"));
+  EXPECT_EQ(socket.ReceiveClose(), 1000);
+  EXPECT_EQ(server_.open, 0);
+  socket.raw().HalfClose();
+}
+
 TEST_F(GatewaySocketTest, WhatIsSentAtOnceArrivesInOrder) {
   RawSocket socket(port());
   std::string sent;

@@ -21,21 +21,21 @@ using testing::StatusIs;
 constexpr char kNobody[] = "unix:/nonexistent/tissueform.sock";
 
 TEST(ServerPool, CallsBeyondAllChannelsAreRefusedByName) {
-  ServerPool pool({kNobody}, {.calls_per_channel = 2, .channels_per_server = 2});
+  ServerPool pool({{.address = kNobody}}, {.calls_per_channel = 2, .channels_per_server = 2});
   std::vector<CallSlot> slots;
   for (int i = 0; i < 4; ++i) {
-    auto slot = pool.Take("");
+    auto slot = pool.Take("", "");
     ASSERT_TRUE(slot.ok());
     slots.push_back(*std::move(slot));
   }
-  EXPECT_THAT(pool.Take("").status(),
+  EXPECT_THAT(pool.Take("", "").status(),
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("4 calls")));
   slots.pop_back();
-  EXPECT_TRUE(pool.Take("").ok());
+  EXPECT_TRUE(pool.Take("", "").ok());
 }
 
 TEST(ServerPool, IsNotReadyWithoutServers) {
-  const ServerPool pool({kNobody}, {});
+  const ServerPool pool({{.address = kNobody}}, {});
   EXPECT_FALSE(pool.IsReady());
 }
 

@@ -98,6 +98,11 @@ export class AnswerEvaluator {
     return result;
   }
 
+  /** The band alone, of poses of any size, in an array of the caller's; null without columns of it and for poses that are none. */
+  bandAt(poses: readonly Pose[]): Float32Array | null {
+    return this.band === null || !areLegal(this.answers, poses) ? null : this.band.evaluate(poses).slice();
+  }
+
   private get isClustered(): boolean {
     return this.model === AnswerModel.NEO_HOOKEAN;
   }

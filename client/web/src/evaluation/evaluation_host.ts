@@ -22,6 +22,8 @@ export interface EvaluationHost {
   readonly kernel: string;
   /** In the page it is answered before this returns. */
   ask(poses: readonly Pose[], number: number): void;
+  /** Of every vertex, mm, an array of the caller's; null where the columns know no band. Tells nothing to who listens for answers. */
+  bandAt(poses: readonly Pose[]): Promise<Float32Array | null>;
   close(): void;
 }
 
@@ -80,6 +82,10 @@ class PageHost implements EvaluationHost {
     this.onEvaluation(this.evaluator.evaluate(poses), number);
   }
 
+  async bandAt(poses: readonly Pose[]): Promise<Float32Array | null> {
+    return this.evaluator.bandAt(poses);
+  }
+
   close(): void {}
 }
 
@@ -88,6 +94,8 @@ class WorkerHost implements EvaluationHost {
   /** Of the question that the worker has; null: none. */
   private asked: number | null = null;
   private waiting: { poses: readonly Pose[]; number: number } | null = null;
+  /** Those that wait for a band, the first first. */
+  private readonly bands: ((bandMm: Float32Array | null) => void)[] = [];
 
   constructor(
     private readonly worker: WorkerLike,
@@ -102,9 +110,17 @@ class WorkerHost implements EvaluationHost {
     this.send();
   }
 
+  bandAt(poses: readonly Pose[]): Promise<Float32Array | null> {
+    return new Promise((done) => {
+      this.bands.push(done);
+      this.worker.postMessage({ kind: "band", poses: [...poses] });
+    });
+  }
+
   close(): void {
     this.worker.onmessage = null;
     this.worker.terminate();
+    this.bands.splice(0).forEach((done) => done(null));
   }
 
   private send(): void {
@@ -115,6 +131,7 @@ class WorkerHost implements EvaluationHost {
   }
 
   private take(message: FromWorker): void {
+    if (message.kind === "band") this.bands.shift()?.(message.bandMm);
     if (message.kind !== "evaluated" || this.asked === null) return;
     const number = this.asked;
     this.asked = null;

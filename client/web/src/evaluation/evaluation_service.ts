@@ -5,13 +5,14 @@ import type { Pose } from "../geometry/pose";
 import type { AnswerEvaluator } from "./answer_evaluator";
 import { makeEvaluator } from "./evaluator";
 
-// What page and worker say to each other. A worker is loaded once, and answers one question at a time.
+// What page and worker say to each other. A worker is loaded once, and answers one question at a time, in their order.
 
-export type ToWorker = { kind: "load"; bytes: Uint8Array; sha256: string } | { kind: "evaluate"; poses: Pose[] };
+export type ToWorker = { kind: "load"; bytes: Uint8Array; sha256: string } | { kind: "evaluate"; poses: Pose[] } | { kind: "band"; poses: Pose[] };
 
 export type FromWorker =
   | { kind: "ready"; medianMs: number; kernel: string }
   | { kind: "failed"; message: string }
+  | { kind: "band"; bandMm: Float32Array | null }
   | { kind: "evaluated"; positions: Float32Array; coverage: "covered" | "beyond"; errorBoundMm: number; isEstimate: boolean; uncertainty: Float32Array | null };
 
 /** The worker's side, for whoever has a `post`. */
@@ -22,6 +23,7 @@ export class EvaluationService {
 
   async take(message: ToWorker): Promise<void> {
     if (message.kind === "load") await this.load(message.bytes, message.sha256);
+    else if (message.kind === "band") this.post({ kind: "band", bandMm: this.evaluator?.bandAt(message.poses) ?? null }, []);
     else this.evaluate(message.poses);
   }
 

@@ -58,6 +58,8 @@ export class LocalAnswers {
       if (run.signal.aborted) return;
       const error = toCallError(thrown);
       if (error.code === Code.Canceled) return;
+      // What it has stays good while the server is away: the next start of the drag asks again.
+      if (error.isPassing && this.host !== null) return this.tell("covered", 0, false);
       this.drop();
       this.listener.onState({ kind: "failed", text: sentenceOf(thrown) });
     }
@@ -97,6 +99,11 @@ export class LocalAnswers {
     this.poses = poses;
     this.asked += 1;
     this.host?.ask(poses, this.asked);
+  }
+
+  /** The band of other poses than those of the hand, of every vertex, mm; null where the columns know none. */
+  bandAt(poses: readonly Pose[]): Promise<Float32Array | null> {
+    return this.host?.bandAt(poses) ?? Promise.resolve(null);
   }
 
   /** The columns that the page answers by, as they travel; null where it has none. */

@@ -7,7 +7,8 @@ import { VIRIDIS, colorTable } from "../geometry/color_map";
 import { formatNumber } from "../planning/numbers";
 import type { LocalState } from "../live/local_answers";
 import type { MapLegend } from "../workbench/face_colors";
-import type { MapChoice, Workbench } from "../workbench/workbench";
+import type { MapChoice } from "../workbench/face_map";
+import type { Workbench } from "../workbench/workbench";
 import { type Choice, button, el, newId, onceAPicture, section, select } from "./dom";
 
 interface ModelText {
@@ -96,9 +97,9 @@ export function mapPanel(bench: Workbench): HTMLElement {
   const field = select<MapChoice>("Colours show", mapChoices(bench), choose);
   const show = () => {
     const choices = mapChoices(bench);
-    field.set(choices, Math.max(0, choices.findIndex((choice) => isSame(choice.value, bench.map.value))));
+    field.set(choices, Math.max(0, choices.findIndex((choice) => isSame(choice.value, bench.map.choice.value))));
   };
-  bench.map.watch(show);
+  bench.map.choice.watch(show);
   bench.model.watch(show);
   bench.predictions.watch(show);
   return section("Map", [field.element]);
@@ -138,7 +139,7 @@ export function legendBox(bench: Workbench): HTMLElement {
   const ticks = el("div", { class: "ticks" });
   const largest = el("small");
   const box = el("div", { class: "legend", attributes: { role: "group", "aria-label": "Legend of the map" } }, [title, bar, ticks, largest]);
-  bench.legend.watch((legend: MapLegend | null) => {
+  bench.map.legend.watch((legend: MapLegend | null) => {
     box.hidden = legend === null;
     if (legend === null) return;
     title.textContent = `${legend.title}, mm`;

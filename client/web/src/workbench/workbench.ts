@@ -26,19 +26,13 @@ import { Gizmo } from "../scene/gizmo";
 import type { HeadView } from "../scene/head_view";
 import { Answers } from "./answers";
 import { Comparer, type Comparison } from "./comparison";
-import { FaceColors, type MapLegend, followedRest, subtractInto } from "./face_colors";
+import { followedRest } from "./face_colors";
+import { FaceMap, type MapChoice } from "./face_map";
+import { NewestAnswer } from "./newest_answer";
 import { PacsExports } from "./pacs_exports";
 import { Signal } from "./signal";
 import { WishFit } from "./wish_fit";
 import { recallLandmarks, rememberLandmarks } from "./work";
-
-/** What the colours of the skin show. */
-export type MapChoice =
-  | { kind: "none" }
-  | { kind: "movement" }
-  | { kind: "band" }
-  | { kind: "model"; model: DeformationModel; label: string }
-  | { kind: "prediction"; prediction: Prediction };
 
 /** What a picture was answered with. */
 export interface PictureFacts {
@@ -71,6 +65,7 @@ export class Workbench implements ShownFace {
   readonly wishes: WishFit;
   readonly pacs: PacsExports;
   readonly local: LocalAnswers;
+  readonly map: FaceMap;
 
   readonly selected = new Signal(0);
   readonly connection = new Signal<Connection>({ kind: "preparing", text: "Opening", share: null });
@@ -79,8 +74,6 @@ export class Workbench implements ShownFace {
   readonly picture = new Signal<PictureFacts | null>(null);
   readonly localState = new Signal<LocalState>({ kind: "none" });
   readonly model = new Signal<DeformationModel>(0);
-  readonly map = new Signal<MapChoice>({ kind: "none" });
-  readonly legend = new Signal<MapLegend | null>(null);
   readonly predictions = new Signal<Prediction[]>([]);
   readonly comparison = new Signal<Comparison | null>(null);
   readonly penetrations = new Signal<Penetration[]>([]);
@@ -90,12 +83,10 @@ export class Workbench implements ShownFace {
   readonly shown = new Signal(0);
 
   private readonly comparer: Comparer;
-  private readonly colors: FaceColors;
-  private readonly rest: Float32Array;
-  private readonly displacements: Float32Array;
+  private readonly newest: NewestAnswer;
   private readonly penetrationTest: PenetrationTest;
-  private uncertainty: Float32Array | null = null;
-  private other: Float32Array | null = null;
+  /** Of the face that is shown: of each of CaseFile.followed, mm; null where none is known. */
+  private shownBand: Float32Array | null = null;
   private waitingFrom: number | null = null;
   private settling: ReturnType<typeof setTimeout> | undefined;
 
@@ -110,12 +101,15 @@ export class Workbench implements ShownFace {
     this.plan = new Plan(file);
     this.landmarks = new LandmarkBook(file);
     this.jaw = new JawOpening(file);
-    this.rest = followedRest(file);
-    this.displacements = new Float32Array(this.rest.length);
-    this.colors = new FaceColors(view.head);
-    this.answers = new Answers(gateway, file, caseName, this.rest);
+    const rest = followedRest(file);
+    this.newest = new NewestAnswer(rest);
+    this.answers = new Answers(gateway, file, caseName, rest);
     this.pacs = new PacsExports(gateway, caseName);
-    this.comparer = new Comparer(this.plan, this.answers);
+    this.comparer = new Comparer(this.plan, this.answers, (prediction, poses) => (this.knowsBand(prediction.model) ? this.local.bandAt(poses) : Promise.resolve(null)));
+    this.map = new FaceMap(view.head, {
+      ofModel: (model) => this.answers.ofModel(this.live.session, model, this.plan.poses()),
+      ofPrediction: (prediction) => this.answers.ofPrediction(prediction),
+    });
     this.wishes = new WishFit(file, this.plan, (request) => this.answers.fit({ ...request, session: this.live.session, model: this.model.value }));
     const solids = file.surfaces.filter(({ entry }) => entry.kind === "bone" || entry.kind === "segment");
     const label = (handle: string) => file.manifest.handles.find(({ name }) => name === handle)?.label;
@@ -162,19 +156,14 @@ export class Workbench implements ShownFace {
   async chooseModel(model: DeformationModel): Promise<void> {
     this.model.value = model;
     this.local.drop();
-    if (this.map.value.kind === "band" && !this.hasBand) this.map.value = { kind: "none" };
+    if (this.map.choice.value.kind === "band" && !this.hasBand) this.map.choice.value = { kind: "none" };
     await this.live.choose(this.dragChoice());
   }
 
   /** Rejects where what is compared with could not be had; the map is off then. */
   async chooseMap(choice: MapChoice): Promise<void> {
-    this.map.value = choice;
-    this.other = null;
     try {
-      await this.loadOther();
-    } catch (thrown) {
-      this.map.value = { kind: "none" };
-      throw thrown;
+      await this.map.choose(choice);
     } finally {
       this.redraw();
     }
@@ -182,8 +171,7 @@ export class Workbench implements ShownFace {
 
   /** The band needs ranges of the material and a model whose prepared answers know them. */
   get hasBand(): boolean {
-    const info = this.modelInfo(this.model.value);
-    return this.file.materialRanges !== null && info !== undefined && info.hasPreparedAnswers && info.name !== "gradient_field";
+    return this.knowsBand(this.model.value);
   }
 
   async compare(comparison: Comparison | null): Promise<void> {
@@ -214,7 +202,7 @@ export class Workbench implements ShownFace {
     await this.compare({ from: "rest", to: prediction, share: 1 });
     try {
       const { file, landmarks, shownPoses } = this;
-      return collectMeasures({ file, landmarks, shownPoses, showsPlan: true, bandOf: () => null, positionsOf: (surface) => this.positionsOf(surface) });
+      return collectMeasures({ file, landmarks, shownPoses, showsPlan: true, bandOf: (surface) => this.bandOf(surface), positionsOf: (surface) => this.positionsOf(surface) });
     } finally {
       await this.compare(before);
     }
@@ -238,10 +226,10 @@ export class Workbench implements ShownFace {
 
   /** Of a surface's vertices, in mm; null where it is not known for what is shown. */
   bandOf(surface: number): Float32Array | null {
-    if (this.uncertainty === null || this.comparison.value !== null) return null;
+    if (this.shownBand === null) return null;
     const { shape } = this.view.head.surfaces[surface];
     const band = new Float32Array(shape.positions.length / 3);
-    shape.spread(this.uncertainty, band);
+    shape.spread(this.shownBand, band);
     return band;
   }
 
@@ -260,6 +248,11 @@ export class Workbench implements ShownFace {
 
   /** Poses of the bone as it is shown. */
   shownPoses: ReadonlyMap<string, Pose> = new Map();
+
+  private knowsBand(model: DeformationModel): boolean {
+    const info = this.modelInfo(model);
+    return this.file.materialRanges !== null && info !== undefined && info.hasPreparedAnswers && info.name !== "gradient_field";
+  }
 
   private dragChoice() {
     const info = this.modelInfo(this.model.value);
@@ -296,8 +289,8 @@ export class Workbench implements ShownFace {
   private settled(): void {
     this.penetrations.value = this.penetrationTest.find(this.posesByHandle(this.plan.poses()));
     this.view.setPoints("penetration", this.penetrations.value.flatMap((penetration) => penetration.points));
-    if (this.map.value.kind === "model") {
-      this.loadOther().then(
+    if (this.map.choice.value.kind === "model") {
+      this.map.refresh().then(
         () => this.redraw(),
         (thrown) => (this.notice.value = sentenceOf(thrown)),
       );
@@ -310,32 +303,23 @@ export class Workbench implements ShownFace {
   }
 
   private show(picture: Picture, used: () => void): void {
-    if (picture.positions.length !== this.rest.length) throw new Error("a picture came that has other vertices than the case");
+    const isTaken = this.newest.takePicture(picture, this.local.posesSinceTold);
     this.waitingFrom = null;
     this.picture.value = { roundTripMs: picture.roundTripMs, summary: picture.frame.summary ?? null, isRefining: picture.frame.refining };
-    // The face never goes back to poses that the hand has left, once the page itself has shown newer ones.
-    if (picture.posesBehind > this.local.posesSinceTold) {
-      used();
-      return;
-    }
-    subtractInto(picture.positions, this.rest, this.displacements);
-    if (picture.frame.refinement === 0) this.uncertainty = picture.uncertainty;
-    if (this.comparison.value !== null) used();
-    else this.lay(this.displacements, used);
+    if (isTaken && this.comparison.value === null) this.lay(this.newest, used);
+    else used();
   }
 
   /** The page's own answer, in the picture that shows the bone there. */
-  private showLocal({ positions, uncertainty }: Evaluation): void {
-    if (positions.length !== this.rest.length) return this.local.drop();
-    if (uncertainty !== null) this.uncertainty = uncertainty;
-    subtractInto(positions, this.rest, this.displacements);
-    if (this.comparison.value === null) this.lay(this.displacements);
+  private showLocal(evaluation: Evaluation): void {
+    if (!this.newest.takeOwn(evaluation)) return this.local.drop();
+    if (this.comparison.value === null) this.lay(this.newest);
   }
 
-  private lay(displacements: Float32Array, used?: () => void): void {
+  private lay({ displacements, uncertainty }: Pick<NewestAnswer, "displacements" | "uncertainty">, used?: () => void): void {
+    this.shownBand = uncertainty;
     this.view.head.setDisplacements(displacements);
-    const legend = this.color(displacements);
-    if (legend !== null || this.legend.value !== null) this.legend.value = legend;
+    this.map.show(displacements, uncertainty);
     this.view.stage.invalidate(used);
     this.shown.value += 1;
   }
@@ -346,34 +330,14 @@ export class Workbench implements ShownFace {
     this.shown.value += 1;
   }
 
-  private color(displacements: Float32Array): MapLegend | null {
-    const map = this.map.value;
-    if (map.kind === "movement") return this.colors.showLengths("Movement of the skin", displacements);
-    if (map.kind === "band" && this.uncertainty !== null) return this.colors.showNumbers("Band of 95 in 100 (stiffness only; excludes model and surgical error)", this.uncertainty);
-    if ((map.kind === "model" || map.kind === "prediction") && this.other !== null) {
-      const title = map.kind === "model" ? `Difference to ${map.label}` : `Difference to “${map.prediction.title}”`;
-      return this.colors.showLengths(title, subtractInto(displacements, this.other, new Float32Array(displacements.length)));
-    }
-    this.colors.clear();
-    return null;
-  }
-
-  private async loadOther(): Promise<void> {
-    const map = this.map.value;
-    let other: Float32Array | null = null;
-    if (map.kind === "model") other = await this.answers.ofModel(this.live.session, map.model, this.plan.poses());
-    if (map.kind === "prediction") other = await this.answers.ofPrediction(map.prediction);
-    // Another map may have been chosen meanwhile.
-    if (map === this.map.value) this.other = other;
-  }
-
   private async redraw(): Promise<void> {
     const comparison = this.comparison.value;
-    const planned = { displacements: this.displacements, poses: this.jaw.apply(this.plan.poses()) };
+    const { displacements, uncertainty } = this.newest;
+    const planned = { displacements, uncertainty, poses: this.jaw.apply(this.plan.poses()) };
     const shape = comparison === null ? planned : await this.comparer.between(comparison, planned);
     // Another comparison may have been chosen meanwhile.
     if (comparison !== this.comparison.value) return;
-    this.lay(shape.displacements);
+    this.lay(shape);
     this.setPoses(shape.poses);
   }
 }

@@ -81,6 +81,31 @@ test("what is slow is evaluated by the worker, the newest question only", async 
   expect(told).toHaveLength(2);
 });
 
+test.each([["the page", 0.5], ["a worker", 20]])("the band of other poses comes from %s, and tells nobody who listens for answers", async (_, medianMs) => {
+  const bytes = goldenBytes("linear_elastic_band");
+  const cases = goldenCases("linear_elastic_band");
+  const { told, onEvaluation } = listener();
+  const worker = new FakeWorker(medianMs);
+  const host = await makeHost(bytes, createHash("sha256").update(bytes).digest("hex"), onEvaluation, () => worker);
+  const [one, other] = await Promise.all([host.bandAt(cases[1].poses), host.bandAt(cases[2].poses)]);
+  for (const [band, { bandMm }] of [[one, cases[1]], [other, cases[2]]] as const) {
+    expect(band?.length).toBe(bandMm?.length);
+    bandMm?.forEach((mm, vertex) => expect(Math.abs((band?.[vertex] ?? NaN) - mm)).toBeLessThan(2e-3));
+  }
+  expect(told).toEqual([]);
+});
+
+test("columns without a band know none, and who waits for one is told so when the columns go", async () => {
+  const host = await makeHost(BYTES, SHA256, () => {}, () => null);
+  expect(await host.bandAt(CASES[1].poses)).toBeNull();
+  const worker = new FakeWorker(20);
+  const beside = await makeHost(BYTES, SHA256, () => {}, () => worker);
+  worker.postMessage = () => {};
+  const waiting = beside.bandAt(CASES[1].poses);
+  beside.close();
+  expect(await waiting).toBeNull();
+});
+
 test("a browser without workers evaluates in the page", async () => {
   const { told, onEvaluation } = listener();
   const host = await makeHost(BYTES, SHA256, onEvaluation, () => null);

@@ -17,6 +17,7 @@
 #include "client/pacs_bridge/work/object_writer.h"
 #include "core/base/status_macros.h"
 #include "core/mesh_payload/sha256.h"
+#include "tests/core/case_file/sample_case.h"
 
 // What lies about a bridge, as folders, so that it outlives a process that is killed: a server that
 // keeps cases, a PACS that keeps objects, a writer of objects that are headers only.
@@ -51,10 +52,11 @@ class FolderCaseServer final : public CaseServer {
     if (predictions_gone) return absl::NotFoundError("no such prediction");
     ServedPrediction prediction;
     prediction.description.set_name(name);
+    prediction.description.set_mesh(mesh);
     return prediction;
   }
   absl::StatusOr<std::vector<double>> ReadBand(const CaseFile&, const v1::Prediction&) override {
-    return std::vector<double>();
+    return band;
   }
   absl::StatusOr<v1::Export> GetExport(const std::string& name) override {
     v1::Export found;
@@ -75,6 +77,8 @@ class FolderCaseServer final : public CaseServer {
 
   absl::Status away = {};
   bool predictions_gone = false;
+  std::string mesh = SampleCase().mesh.name;  // of its predictions
+  absl::StatusOr<std::vector<double>> band = std::vector<double>();
 
  private:
   const std::filesystem::path folder_;
@@ -124,7 +128,7 @@ class FolderPacs final : public PacsClient {
 };
 
 // Writes each object as the header of the source image under its own UID.
-class HeaderWriter final : public ObjectWriter {
+class HeaderWriter : public ObjectWriter {
  public:
   absl::StatusOr<std::vector<std::string>> KeysOf(const ExportMaterial&) override {
     return std::vector<std::string>{"stl:skin", "stl:bone", "capture", "report", "series:models"};

@@ -1,0 +1,31 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { FitBound, type FitResponse, type FittedNumber } from "../generated/tissueform/v1/plan_service_pb";
+import { formatNumber } from "../planning/numbers";
+import type { Wish } from "./wish_fit";
+
+type Named = readonly { name: string; label: string }[];
+
+/** What becomes of wishes, one thing a sentence: each reached or missed, those that contradict each other, what holds back. */
+export function wishSentences(response: FitResponse, wishes: readonly Pick<Wish, "label">[], handles: Named): string[] {
+  const label = (name: string) => wishes[Number(name.replace("wish ", "")) - 1]?.label ?? name;
+  const held = response.numbers.filter(({ bound }) => bound !== FitBound.UNSPECIFIED);
+  return [
+    ...response.targets.map(({ name, reached, missedMm }) => {
+      if (reached) return `${label(name)}: reached, within ${formatNumber(Math.max(missedMm, 0.01), 2)} mm.`;
+      return `${label(name)}: cannot be reached; ${formatNumber(missedMm)} mm are missing.`;
+    }),
+    ...response.contradictions.map(({ first, second }) => `${label(first)} and ${label(second)} ask different things of the same bone.`),
+    ...(held.length === 0 ? [] : [`Held by its limit: ${held.map((number) => numberName(number, handles)).join(", ")}.`]),
+    ...(response.converged ? [] : ["The search has not come to its end; wish for less."]),
+  ];
+}
+
+const SHIFTS = ["to the left", "to the back", "up"];
+const TURNS = ["about left", "about back", "about up"];
+
+export function numberName({ handle, isRotation, axis }: FittedNumber, handles: Named): string {
+  const label = handles.find(({ name }) => name === handle)?.label ?? handle;
+  return `${label} ${(isRotation ? TURNS : SHIFTS)[axis] ?? ""}`;
+}

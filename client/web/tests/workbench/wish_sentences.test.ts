@@ -1,0 +1,39 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { create } from "@bufbuild/protobuf";
+import { expect, test } from "vitest";
+import { FitBound, FitResponseSchema } from "../../src/generated/tissueform/v1/plan_service_pb";
+import { wishSentences } from "../../src/workbench/wish_sentences";
+
+const WISHES = [{ label: "Chin" }, { label: "Lower lip" }, { label: "Upper lip" }];
+const HANDLES = [{ name: "mandible", label: "Lower jaw" }];
+
+test("wishes that contradict each other are told by their names, as is what each of them misses", () => {
+  const response = create(FitResponseSchema, {
+    converged: true,
+    targets: [
+      { name: "wish 1", reached: false, missedMm: 2.34 },
+      { name: "wish 2", reached: false, missedMm: 1.5 },
+      { name: "wish 3", reached: true, missedMm: 0.001 },
+    ],
+    contradictions: [{ first: "wish 1", second: "wish 2" }],
+  });
+  expect(wishSentences(response, WISHES, HANDLES)).toEqual([
+    "Chin: cannot be reached; 2.3 mm are missing.",
+    "Lower lip: cannot be reached; 1.5 mm are missing.",
+    "Upper lip: reached, within 0.01 mm.",
+    "Chin and Lower lip ask different things of the same bone.",
+  ]);
+});
+
+test("what is held by its limit, and a search that did not end, are told last", () => {
+  const response = create(FitResponseSchema, {
+    converged: false,
+    numbers: [
+      { handle: "mandible", isRotation: false, axis: 1, bound: FitBound.HIGHEST },
+      { handle: "mandible", isRotation: true, axis: 0, bound: FitBound.UNSPECIFIED },
+    ],
+  });
+  expect(wishSentences(response, WISHES, HANDLES)).toEqual(["Held by its limit: Lower jaw to the back.", "The search has not come to its end; wish for less."]);
+});
