@@ -50,8 +50,8 @@ class PostgresTlsTest : public ::testing::Test {
     const TestIdentity identity = authority_.Issue(content);
     WriteAtDatabase("tissueform.pem", identity.certificate);
     WriteAtDatabase("tissueform.key", identity.key);
-    for (const char* change : {"ssl_cert_file = 'tissueform.pem'",
-                               "ssl_key_file = 'tissueform.key'", "ssl = on"}) {
+    for (const char* change :
+         {"ssl_cert_file = 'tissueform.pem'", "ssl_key_file = 'tissueform.key'", "ssl = on"}) {
       RunOutsideTransaction(absl::StrCat("ALTER SYSTEM SET ", change));
     }
     Reload();
