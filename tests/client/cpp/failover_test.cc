@@ -255,8 +255,8 @@ TEST_F(FailoverTest, ASessionThatHasMovedIsAskedForWhereItIs) {
 }
 
 TEST_F(FailoverTest, ALargeSessionGoesWhereThereIsRoom) {
-  script_.Plan({Refusal(grpc::StatusCode::RESOURCE_EXHAUSTED, ErrorReason::kMemoryBudgetFull,
-                        "two:1")});
+  script_.Plan(
+      {Refusal(grpc::StatusCode::RESOURCE_EXHAUSTED, ErrorReason::kMemoryBudgetFull, "two:1")});
   EXPECT_TRUE(client_->CreateSession(SomeRequest()).ok());
   EXPECT_THAT(script_.meant(), ElementsAre("-", "two:1"));
 }
