@@ -36,6 +36,7 @@ import browsers  # noqa: E402
 import drags  # noqa: E402
 import ledger as ledger_module  # noqa: E402
 import maker  # noqa: E402
+import our_clients  # noqa: E402
 import scenarios  # noqa: E402
 import stranger  # noqa: E402
 
@@ -130,8 +131,14 @@ def print_gaps(ledger, load):
 def run_scenarios(options, arena, load, ledger, seed):
     run = scenarios.Scenarios(arena, load, ledger, seed)
     if "kills" in options.only:
-        run.kills(options.kills, options.seconds or 2 * options.kills)
-        run.settle()
+        seconds = options.seconds or 2 * options.kills
+        ours = our_clients.OurClients(arena, seconds + 3)
+        try:
+            run.kills(options.kills, seconds)
+            run.settle()
+            run.say(f"tissueform load: {ours.judge(ledger)}")
+        finally:
+            ours.stop()
     if "stop" in options.only or "split" in options.only:
         run.stop_and_split("stop" in options.only, "split" in options.only)
         run.settle()
