@@ -4,16 +4,21 @@
 #include "client/cpp/access_calls.h"
 
 #include "client/cpp/client_call.h"
+#include "client/cpp/session_call.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
 
 AccessCalls::AccessCalls(const std::shared_ptr<grpc::Channel>& channel,
-                         std::chrono::milliseconds call_deadline)
-    : call_deadline_(call_deadline), stub_(v1::AccessService::NewStub(channel)) {}
+                         std::chrono::milliseconds call_deadline, SessionRoutes* routes)
+    : call_deadline_(call_deadline), routes_(routes), stub_(v1::AccessService::NewStub(channel)) {}
+
+std::chrono::system_clock::time_point AccessCalls::Deadline() const {
+  return std::chrono::system_clock::now() + call_deadline_;
+}
 
 void AccessCalls::SetDeadline(grpc::ClientContext* context) const {
-  context->set_deadline(std::chrono::system_clock::now() + call_deadline_);
+  context->set_deadline(Deadline());
 }
 
 absl::StatusOr<v1::Caller> AccessCalls::WhoAmI() {
@@ -57,26 +62,26 @@ absl::Status AccessCalls::DeleteShare(const std::string& resource, const std::st
 absl::StatusOr<v1::FollowLink> AccessCalls::CreateFollowLink(
     const std::string& session, const std::string& case_name,
     std::optional<std::chrono::seconds> lifetime) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
-  AddSessionHeader(session, &context);
   v1::CreateFollowLinkRequest request;
   request.set_session(session);
   request.set_case_(case_name);
   if (lifetime.has_value()) request.mutable_lifetime()->set_seconds(lifetime->count());
   v1::FollowLink link;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->CreateFollowLink(&context, request, &link)));
+  TF_RETURN_IF_ERROR(RunSessionCall(routes_, session, CallRepeat::kIfNothingWasDone, Deadline(),
+                                    [&](grpc::ClientContext* context) {
+                                      return stub_->CreateFollowLink(context, request, &link);
+                                    }));
   return link;
 }
 
 absl::Status AccessCalls::DeleteFollowLinks(const std::string& session) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
-  AddSessionHeader(session, &context);
   v1::DeleteFollowLinksRequest request;
   request.set_session(session);
   google::protobuf::Empty response;
-  return FromGrpcStatus(stub_->DeleteFollowLinks(&context, request, &response));
+  return RunSessionCall(routes_, session, CallRepeat::kAlways, Deadline(),
+                        [&](grpc::ClientContext* context) {
+                          return stub_->DeleteFollowLinks(context, request, &response);
+                        });
 }
 
 absl::StatusOr<v1::Usage> AccessCalls::GetUsage(const std::string& principal) {

@@ -13,6 +13,7 @@
 #include "absl/status/statusor.h"
 #include "grpcpp/channel.h"
 
+#include "client/cpp/session_routes.h"
 #include "tissueform/v1/access_service.grpc.pb.h"
 
 namespace tissueform {
@@ -25,7 +26,7 @@ namespace tissueform {
 class AccessCalls {
  public:
   AccessCalls(const std::shared_ptr<grpc::Channel>& channel,
-              std::chrono::milliseconds call_deadline);
+              std::chrono::milliseconds call_deadline, SessionRoutes* routes);
 
   absl::StatusOr<v1::Caller> WhoAmI();
 
@@ -44,9 +45,11 @@ class AccessCalls {
   absl::StatusOr<v1::Usage> GetUsage(const std::string& principal);
 
  private:
+  std::chrono::system_clock::time_point Deadline() const;
   void SetDeadline(grpc::ClientContext* context) const;
 
   const std::chrono::milliseconds call_deadline_;
+  SessionRoutes* const routes_;
   const std::unique_ptr<v1::AccessService::Stub> stub_;
 };
 

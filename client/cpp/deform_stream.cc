@@ -3,7 +3,6 @@
 
 #include "client/cpp/deform_stream.h"
 
-#include <string>
 #include <utility>
 
 #include "client/cpp/client_call.h"
@@ -28,16 +27,16 @@ v1::DeformConfiguration DeformStream::ConfigurationOf(const Options& options) {
   return configuration;
 }
 
-absl::Status DeformStream::Start(v1::DeformService::Stub* stub, const std::string& session,
-                                 const Options& options, const std::shared_ptr<TokenFile>& token) {
+absl::Status DeformStream::Start(v1::DeformService::Stub* stub, const Options& options,
+                                 const std::shared_ptr<TokenFile>& token) {
   on_notice_ = options.on_notice;
-  AddSessionHeader(session, &context_);
+  routes_->AddHeaders(session_, &context_);
   // Before the call is made: it may be made with a newer one, which is then sent twice.
   std::string used = token == nullptr ? "" : token->Current();
   call_ = stub->Deform(&context_);
   v1::DeformRequest request;
   *request.mutable_configuration() = ConfigurationOf(options);
-  request.mutable_configuration()->set_session(session);
+  request.mutable_configuration()->set_session(session_);
   v1::DeformResponse response;
   if (!Send(request).ok() || !call_->Read(&response)) {
     return Finish();
@@ -48,6 +47,7 @@ absl::Status DeformStream::Start(v1::DeformService::Stub* stub, const std::strin
   }
   started_ = std::move(*response.mutable_started());
   node_ = NodeOf(context_);
+  routes_->Remember(session_, node_);
   if (token != nullptr) {
     renewal_ = std::make_unique<TokenRenewal>(token, std::move(used), [this](const auto& renewed) {
       v1::DeformRequest renewal;
@@ -115,7 +115,9 @@ absl::Status DeformStream::Finish() {
   }
   renewal_.reset();
   finished_ = true;
-  return FromGrpcStatus(call_->Finish());
+  const absl::Status end = FromGrpcStatus(call_->Finish());
+  routes_->LearnFrom(end, session_);
+  return end;
 }
 
 absl::Status DeformStream::Send(const v1::DeformRequest& request) {

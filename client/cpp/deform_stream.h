@@ -8,6 +8,8 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -15,6 +17,7 @@
 #include "grpcpp/client_context.h"
 #include "grpcpp/support/sync_stream.h"
 
+#include "client/cpp/session_routes.h"
 #include "client/cpp/token_file.h"
 #include "core/base/mutex.h"
 #include "proto/conversion/geometry_conversion.h"
@@ -79,13 +82,17 @@ class DeformStream {
   friend class TissueformClient;
   using Call = grpc::ClientReaderWriter<v1::DeformRequest, v1::DeformResponse>;
 
-  DeformStream() = default;
+  DeformStream(SessionRoutes* routes, std::string session)
+      : routes_(routes), session_(std::move(session)) {}
 
   // Sends the configuration and waits for the answer. `token`: where the calls of the client have
   // theirs from; null: they have none. A new one is sent while the stream lasts.
-  absl::Status Start(v1::DeformService::Stub* stub, const std::string& session,
-                     const Options& options, const std::shared_ptr<TokenFile>& token);
+  absl::Status Start(v1::DeformService::Stub* stub, const Options& options,
+                     const std::shared_ptr<TokenFile>& token);
   absl::Status Send(const v1::DeformRequest& request) ABSL_LOCKS_EXCLUDED(send_mutex_);
+
+  SessionRoutes* const routes_;
+  const std::string session_;
 
   // Self-synchronised.
   grpc::ClientContext context_;

@@ -5,7 +5,6 @@
 
 #include <utility>
 
-#include "client/cpp/client_call.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -38,14 +37,29 @@ class ChunkReader {
   int64_t total_bytes_ = 0;
 };
 
+// How a call ended of which messages were read; OK when one was not taken, which another attempt
+// would not change.
+template <typename Message>
+grpc::Status EndOf(grpc::ClientReader<Message>* reader, const absl::Status& taken,
+                   grpc::ClientContext* context) {
+  if (!taken.ok()) context->TryCancel();
+  const grpc::Status ended = reader->Finish();
+  return taken.ok() ? ended : grpc::Status::OK;
+}
+
 }  // namespace
 
 PredictionCalls::PredictionCalls(const std::shared_ptr<grpc::Channel>& channel,
-                                 std::chrono::milliseconds call_deadline)
-    : call_deadline_(call_deadline), stub_(v1::PredictionService::NewStub(channel)) {}
+                                 std::chrono::milliseconds call_deadline, SessionRoutes* routes)
+    : call_deadline_(call_deadline),
+      routes_(routes),
+      stub_(v1::PredictionService::NewStub(channel)) {}
 
-void PredictionCalls::SetDeadline(grpc::ClientContext* context) const {
-  context->set_deadline(std::chrono::system_clock::now() + call_deadline_);
+absl::Status PredictionCalls::Call(
+    const std::string& session, CallRepeat repeat,
+    const std::function<grpc::Status(grpc::ClientContext*)>& attempt) {
+  return RunSessionCall(routes_, session, repeat, std::chrono::system_clock::now() + call_deadline_,
+                        attempt);
 }
 
 absl::StatusOr<v1::Prediction> PredictionCalls::Create(const std::string& session,
@@ -53,9 +67,6 @@ absl::StatusOr<v1::Prediction> PredictionCalls::Create(const std::string& sessio
                                                        v1::DeformationModel model,
                                                        const std::string& request_id,
                                                        const PredictionLabel& label) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
-  AddSessionHeader(session, &context);
   v1::CreatePredictionRequest request;
   request.set_session(session);
   for (const NamedPose& pose : poses) {
@@ -66,17 +77,21 @@ absl::StatusOr<v1::Prediction> PredictionCalls::Create(const std::string& sessio
   request.set_case_(label.case_name);
   request.set_title(label.title);
   v1::Prediction prediction;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->CreatePrediction(&context, request, &prediction)));
+  const CallRepeat repeat =
+      request_id.empty() ? CallRepeat::kIfNothingWasDone : CallRepeat::kAlways;
+  TF_RETURN_IF_ERROR(Call(session, repeat, [&](grpc::ClientContext* context) {
+    return stub_->CreatePrediction(context, request, &prediction);
+  }));
   return prediction;
 }
 
 absl::StatusOr<v1::Prediction> PredictionCalls::Get(const std::string& name) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
   v1::GetPredictionRequest request;
   request.set_name(name);
   v1::Prediction prediction;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->GetPrediction(&context, request, &prediction)));
+  TF_RETURN_IF_ERROR(Call("", CallRepeat::kAlways, [&](grpc::ClientContext* context) {
+    return stub_->GetPrediction(context, request, &prediction);
+  }));
   return prediction;
 }
 
@@ -87,10 +102,10 @@ absl::StatusOr<std::vector<v1::Prediction>> PredictionCalls::List(const std::str
   request.set_session(session);
   request.set_case_(case_name);
   do {
-    grpc::ClientContext context;
-    SetDeadline(&context);
     v1::ListPredictionsResponse response;
-    TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->ListPredictions(&context, request, &response)));
+    TF_RETURN_IF_ERROR(Call("", CallRepeat::kAlways, [&](grpc::ClientContext* context) {
+      return stub_->ListPredictions(context, request, &response);
+    }));
     predictions.insert(predictions.end(), response.predictions().begin(),
                        response.predictions().end());
     request.set_page_token(response.next_page_token());
@@ -99,38 +114,33 @@ absl::StatusOr<std::vector<v1::Prediction>> PredictionCalls::List(const std::str
 }
 
 absl::Status PredictionCalls::Delete(const std::string& name) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
   v1::DeletePredictionRequest request;
   request.set_name(name);
   google::protobuf::Empty response;
-  return FromGrpcStatus(stub_->DeletePrediction(&context, request, &response));
+  return Call("", CallRepeat::kIfNothingWasDone, [&](grpc::ClientContext* context) {
+    return stub_->DeletePrediction(context, request, &response);
+  });
 }
 
 absl::StatusOr<Positions> PredictionCalls::ReadPositions(const std::string& name) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
   v1::ReadPositionsRequest request;
   request.set_name(name);
-  const auto reader = stub_->ReadPositions(&context, request);
   ChunkReader chunks;
   absl::Status taken;
-  v1::ReadPositionsResponse response;
-  while (taken.ok() && reader->Read(&response)) {
-    taken = chunks.Take(response.chunk());
-  }
-  if (!taken.ok()) context.TryCancel();
-  const absl::Status ended = FromGrpcStatus(reader->Finish());
+  TF_RETURN_IF_ERROR(Call("", CallRepeat::kAlways, [&](grpc::ClientContext* context) {
+    chunks = ChunkReader();
+    const auto reader = stub_->ReadPositions(context, request);
+    v1::ReadPositionsResponse response;
+    while (taken.ok() && reader->Read(&response)) taken = chunks.Take(response.chunk());
+    return EndOf(reader.get(), taken, context);
+  }));
   TF_RETURN_IF_ERROR(taken);
-  TF_RETURN_IF_ERROR(ended);
   return chunks.Decode();
 }
 
 absl::StatusOr<ComparedPredictions> PredictionCalls::Compare(const std::string& name,
                                                              const Other& other, bool differences,
                                                              const AnswerVertices& vertices) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
   v1::ComparePredictionsRequest request;
   request.set_prediction(name);
   if (const auto* prediction = std::get_if<std::string>(&other)) {
@@ -140,22 +150,23 @@ absl::StatusOr<ComparedPredictions> PredictionCalls::Compare(const std::string& 
   }
   request.set_differences(differences);
   *request.mutable_vertices() = ToProto(vertices);
-  const auto reader = stub_->ComparePredictions(&context, request);
   ComparedPredictions compared;
   ChunkReader chunks;
   absl::Status taken;
-  v1::ComparePredictionsResponse response;
-  while (taken.ok() && reader->Read(&response)) {
-    if (response.has_comparison()) {
-      compared.comparison = std::move(*response.mutable_comparison());
-    } else {
-      taken = chunks.Take(response.differences());
+  TF_RETURN_IF_ERROR(Call("", CallRepeat::kAlways, [&](grpc::ClientContext* context) {
+    chunks = ChunkReader();
+    const auto reader = stub_->ComparePredictions(context, request);
+    v1::ComparePredictionsResponse response;
+    while (taken.ok() && reader->Read(&response)) {
+      if (response.has_comparison()) {
+        compared.comparison = std::move(*response.mutable_comparison());
+      } else {
+        taken = chunks.Take(response.differences());
+      }
     }
-  }
-  if (!taken.ok()) context.TryCancel();
-  const absl::Status ended = FromGrpcStatus(reader->Finish());
+    return EndOf(reader.get(), taken, context);
+  }));
   TF_RETURN_IF_ERROR(taken);
-  TF_RETURN_IF_ERROR(ended);
   if (differences) {
     TF_ASSIGN_OR_RETURN(compared.differences, chunks.Decode());
   }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <string>
 #include <variant>
@@ -14,6 +15,7 @@
 #include "absl/types/span.h"
 #include "grpcpp/channel.h"
 
+#include "client/cpp/session_call.h"
 #include "core/base/types.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "proto/conversion/prediction_conversion.h"
@@ -42,7 +44,7 @@ struct PredictionLabel {
 class PredictionCalls {
  public:
   PredictionCalls(const std::shared_ptr<grpc::Channel>& channel,
-                  std::chrono::milliseconds call_deadline);
+                  std::chrono::milliseconds call_deadline, SessionRoutes* routes);
 
   // Solves and keeps. `model` is the session's own when unspecified. With a `request_id` the call
   // may be repeated: it gives the same prediction again.
@@ -68,9 +70,11 @@ class PredictionCalls {
                                               const AnswerVertices& vertices = {});
 
  private:
-  void SetDeadline(grpc::ClientContext* context) const;
+  absl::Status Call(const std::string& session, CallRepeat repeat,
+                    const std::function<grpc::Status(grpc::ClientContext*)>& attempt);
 
   const std::chrono::milliseconds call_deadline_;
+  SessionRoutes* const routes_;
   const std::unique_ptr<v1::PredictionService::Stub> stub_;
 };
 

@@ -3,8 +3,10 @@
 
 #include "client/cpp/prepare_session.h"
 
+#include <algorithm>
 #include <memory>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -23,12 +25,7 @@ constexpr std::chrono::milliseconds kAsk{100};
 // One call on a queue of its own, so that waiting for a message can be interrupted.
 class Call {
  public:
-  Call(const std::string& session, std::chrono::system_clock::time_point deadline,
-       const PreparationWait& wait)
-      : wait_(wait) {
-    AddSessionHeader(session, &context_);
-    context_.set_deadline(deadline);
-  }
+  explicit Call(const PreparationWait& wait) : wait_(wait) {}
   ~Call() {
     queue_.Shutdown();
     void* tag = nullptr;
@@ -38,6 +35,9 @@ class Call {
   }
   Call(const Call&) = delete;
   Call& operator=(const Call&) = delete;
+
+  // For headers and the deadline before, for the reply's metadata after Run.
+  grpc::ClientContext* context() { return &context_; }
 
   absl::StatusOr<v1::Session> Run(v1::SessionService::Stub* stub,
                                   const v1::PrepareSessionRequest& request) {
@@ -80,6 +80,16 @@ class Call {
   std::unique_ptr<grpc::ClientAsyncReader<v1::PrepareSessionResponse>> reader_;
 };
 
+// Until another attempt is due. Errors: Cancelled.
+absl::Status WaitUntil(std::chrono::system_clock::time_point due, const PreparationWait& wait) {
+  for (auto now = std::chrono::system_clock::now(); now < due;
+       now = std::chrono::system_clock::now()) {
+    TF_RETURN_IF_ERROR(wait.cancellation.Check());
+    std::this_thread::sleep_for(std::min<std::chrono::system_clock::duration>(due - now, kAsk));
+  }
+  return absl::OkStatus();
+}
+
 std::string StageText(v1::PreparationStage stage) {
   switch (stage) {
     case v1::PREPARATION_STAGE_READING_MESH:
@@ -107,10 +117,24 @@ std::string StageText(v1::PreparationStage stage) {
 
 absl::StatusOr<v1::Session> WaitForSession(v1::SessionService::Stub* stub,
                                            const v1::PrepareSessionRequest& request,
-                                           const std::string& session,
-                                           std::chrono::system_clock::time_point deadline,
+                                           const PreparationRoute& route,
                                            const PreparationWait& wait) {
-  return Call(session, deadline, wait).Run(stub, request);
+  SessionAttempts attempts(route.routes, route.session, route.repeat);
+  while (true) {
+    Call call(wait);
+    call.context()->set_deadline(route.deadline);
+    attempts.AddHeaders(call.context());
+    absl::StatusOr<v1::Session> session = call.Run(stub, request);
+    if (session.ok()) {
+      route.routes->Remember(session->name(), NodeOf(*call.context()));
+      return session;
+    }
+    TF_RETURN_IF_ERROR(wait.cancellation.Check());
+    const auto pause = attempts.AfterError(session.status());
+    const auto again = std::chrono::system_clock::now() + pause.value_or(kAsk);
+    if (!pause.has_value() || again > route.deadline) return session;
+    TF_RETURN_IF_ERROR(WaitUntil(again, wait));
+  }
 }
 
 std::string ProgressText(const v1::PreparationProgress& progress) {

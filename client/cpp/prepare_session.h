@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 
+#include "client/cpp/session_call.h"
 #include "core/base/cancellation.h"
 #include "tissueform/v1/session_service.grpc.pb.h"
 
@@ -22,12 +23,18 @@ struct PreparationWait {
   Cancellation cancellation = {};
 };
 
-// Calls SessionService.PrepareSession and waits for the session; see TissueformClient. `session`
-// ("sessions/{id}" or empty) is for the header.
+// How the call finds its server; see RunSessionCall.
+struct PreparationRoute {
+  SessionRoutes* routes = nullptr;
+  std::string session = {};  // "sessions/{id}"; empty: one that the server names
+  CallRepeat repeat = CallRepeat::kIfNothingWasDone;
+  std::chrono::system_clock::time_point deadline = {};
+};
+
+// Calls SessionService.PrepareSession and waits for the session; see TissueformClient.
 absl::StatusOr<v1::Session> WaitForSession(v1::SessionService::Stub* stub,
                                            const v1::PrepareSessionRequest& request,
-                                           const std::string& session,
-                                           std::chrono::system_clock::time_point deadline,
+                                           const PreparationRoute& route,
                                            const PreparationWait& wait);
 
 // "factorising", or "preparing answers, 36 of 108 columns".

@@ -8,7 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "client/cpp/client_call.h"
+#include "client/cpp/session_call.h"
 #include "core/answer_evaluator/answer_bytes.h"
 #include "core/base/status_macros.h"
 #include "core/mesh_payload/sha256.h"
@@ -48,19 +48,22 @@ absl::Status TakeMessage(const v1::GetPreparedAnswersResponse& message, FetchedA
 
 absl::StatusOr<FetchedAnswers> FetchBytes(v1::DeformService::Stub* stub,
                                           const v1::GetPreparedAnswersRequest& request,
+                                          SessionRoutes* routes,
                                           std::chrono::system_clock::time_point deadline) {
-  grpc::ClientContext context;
-  context.set_deadline(deadline);
-  AddSessionHeader(request.session(), &context);
-  const auto reader = stub->GetPreparedAnswers(&context, request);
   FetchedAnswers fetched;
   absl::Status taken;
-  v1::GetPreparedAnswersResponse message;
-  while (taken.ok() && reader->Read(&message)) taken = TakeMessage(message, &fetched);
-  if (!taken.ok()) context.TryCancel();
-  const absl::Status ended = FromGrpcStatus(reader->Finish());
+  const auto fetch = [&](grpc::ClientContext* context) {
+    const auto reader = stub->GetPreparedAnswers(context, request);
+    fetched = {};
+    v1::GetPreparedAnswersResponse message;
+    while (taken.ok() && reader->Read(&message)) taken = TakeMessage(message, &fetched);
+    if (!taken.ok()) context->TryCancel();
+    const grpc::Status ended = reader->Finish();
+    return taken.ok() ? ended : grpc::Status::OK;  // what was not taken is not fetched again
+  };
+  TF_RETURN_IF_ERROR(
+      RunSessionCall(routes, request.session(), CallRepeat::kAlways, deadline, fetch));
   TF_RETURN_IF_ERROR(taken);
-  TF_RETURN_IF_ERROR(ended);
   if (Sha256Hex({fetched.bytes}) != fetched.header.sha256()) {
     return Damaged("are cut off, or have another SHA-256 than was told");
   }
@@ -71,8 +74,9 @@ absl::StatusOr<FetchedAnswers> FetchBytes(v1::DeformService::Stub* stub,
 
 absl::StatusOr<std::unique_ptr<PreparedEvaluator>> PreparedEvaluator::Fetch(
     v1::DeformService::Stub* stub, const v1::GetPreparedAnswersRequest& request,
-    std::vector<std::string> handles, std::chrono::system_clock::time_point deadline) {
-  TF_ASSIGN_OR_RETURN(FetchedAnswers fetched, FetchBytes(stub, request, deadline));
+    std::vector<std::string> handles, SessionRoutes* routes,
+    std::chrono::system_clock::time_point deadline) {
+  TF_ASSIGN_OR_RETURN(FetchedAnswers fetched, FetchBytes(stub, request, routes, deadline));
   AnswerReading reading = ReadAnswers(fetched.bytes);
   if (reading.error != AnswerError::kNone) return absl::DataLossError(reading.message);
   if (reading.answers.numbers.num_handles != static_cast<double>(handles.size())) {

@@ -12,6 +12,7 @@
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
 
+#include "client/cpp/session_routes.h"
 #include "core/answer_evaluator/answer_evaluator.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "tissueform/v1/deform_service.grpc.pb.h"
@@ -40,7 +41,8 @@ class PreparedEvaluator {
   // SHA-256 was told, or cannot be evaluated with these handles).
   static absl::StatusOr<std::unique_ptr<PreparedEvaluator>> Fetch(
       v1::DeformService::Stub* stub, const v1::GetPreparedAnswersRequest& request,
-      std::vector<std::string> handles, std::chrono::system_clock::time_point deadline);
+      std::vector<std::string> handles, SessionRoutes* routes,
+      std::chrono::system_clock::time_point deadline);
 
   const v1::PreparedAnswersHeader& header() const { return header_; }
   const AnswerEvaluator& evaluator() const { return evaluator_; }

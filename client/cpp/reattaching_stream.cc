@@ -3,7 +3,6 @@
 
 #include "client/cpp/reattaching_stream.h"
 
-#include <thread>
 #include <utility>
 
 #include "core/base/status_macros.h"
@@ -14,16 +13,17 @@ absl::StatusOr<std::unique_ptr<ReattachingStream>> ReattachingStream::Open(
     TissueformClient* client, const std::string& session, Options options) {
   std::unique_ptr<ReattachingStream> drag(
       new ReattachingStream(client, session, std::move(options)));
-  TF_ASSIGN_OR_RETURN(std::unique_ptr<DeformStream> stream, drag->OpenStream());
+  TF_ASSIGN_OR_RETURN(std::unique_ptr<DeformStream> stream, drag->OpenStream(kFailoverPatience));
   drag->started_ = stream->started();
   drag->Adopt(std::move(stream));
   return drag;
 }
 
-absl::StatusOr<std::unique_ptr<DeformStream>> ReattachingStream::OpenStream() {
+absl::StatusOr<std::unique_ptr<DeformStream>> ReattachingStream::OpenStream(
+    std::chrono::milliseconds patience) {
   DeformStream::Options options = options_.stream;
   options.on_notice = [this](const v1::DeformNotice& notice) { TakeNotice(notice); };
-  return client_->OpenStream(session_, options);
+  return client_->OpenStream(session_, options, patience);
 }
 
 void ReattachingStream::TakeNotice(const v1::DeformNotice& notice) {
@@ -55,7 +55,7 @@ void ReattachingStream::CloseSending() {
 }
 
 void ReattachingStream::Cancel() {
-  cancelled_ = true;
+  reattachment_.Cancel();
   MutexLock lock(mutex_);
   if (stream_ != nullptr) stream_->Cancel();
 }
@@ -74,35 +74,14 @@ std::optional<v1::DeformFrame> ReattachingStream::Receive() {
       stream_.reset();
     }
     end_ = stream->Finish();
-    if (!MayReattach(end_)) return std::nullopt;
-    end_ = Reattach(end_);
+    if (end_.ok()) return std::nullopt;
+    end_ = reattachment_.After(end_, [this] {
+      absl::StatusOr<std::unique_ptr<DeformStream>> next = OpenStream(kNoPatience);
+      if (next.ok()) Adopt(*std::move(next));
+      return next.status();
+    });
     if (!end_.ok()) return std::nullopt;
   }
-}
-
-bool ReattachingStream::MayReattach(const absl::Status& status) const {
-  // CANCELLED by somebody else: a server that ends while streams are open.
-  return !cancelled_ && (IsTransient(status) || absl::IsCancelled(status));
-}
-
-absl::Status ReattachingStream::Reattach(absl::Status why) {
-  if (options_.on_detached) options_.on_detached(why);
-  const auto give_up = std::chrono::steady_clock::now() + options_.give_up_after;
-  Backoff backoff(options_.backoff);
-  while (!cancelled_) {
-    absl::StatusOr<std::unique_ptr<DeformStream>> stream = OpenStream();
-    if (stream.ok()) {
-      Adopt(*std::move(stream));
-      ++reattachments_;
-      if (options_.on_reattached) options_.on_reattached();
-      return absl::OkStatus();
-    }
-    why = stream.status();
-    const std::chrono::milliseconds wait = backoff.Next();
-    if (!MayReattach(why) || std::chrono::steady_clock::now() + wait > give_up) return why;
-    std::this_thread::sleep_for(wait);
-  }
-  return absl::CancelledError("the drag was cancelled");
 }
 
 void ReattachingStream::Adopt(std::unique_ptr<DeformStream> stream) {
@@ -118,7 +97,7 @@ void ReattachingStream::Adopt(std::unique_ptr<DeformStream> stream) {
     stream_->SendPoses(newest_->sequence, newest_->poses, commit).IgnoreError();
   }
   if (closed_) stream_->CloseSending();
-  if (cancelled_) stream_->Cancel();
+  if (reattachment_.cancelled()) stream_->Cancel();
 }
 
 absl::Status ReattachingStream::Finish() {

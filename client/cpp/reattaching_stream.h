@@ -3,10 +3,8 @@
 
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,28 +14,24 @@
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
 
-#include "client/cpp/backoff.h"
+#include "client/cpp/reattachment.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/mutex.h"
 
 namespace tissueform {
 
-// A drag that outlives its connection, and a server that is started again on what it has kept:
-// where the stream breaks it opens another one of the same session and sends the newest pose once
-// more, and those that were to be committed and were not.
+// A drag that outlives its connection, a server that is started again on what it has kept, and the
+// server of a cluster that held its session: where the stream breaks it opens another one of the
+// same session and sends the newest pose once more, and before it the one that was to be committed
+// and was not (sequences must rise). What the server has said to be committed is not sent again.
 //
 // One thread may receive while another sends. It reattaches within Receive: without a thread that
 // receives nothing comes back. The client must outlive it.
 class ReattachingStream {
  public:
   struct Options {
-    DeformStream::Options stream;
-    Backoff::Options backoff;
-    // Without a stream for so long the drag ends, with the last error.
-    std::chrono::milliseconds give_up_after{60'000};
-    // Both on the receiving thread: the stream broke, and it goes on.
-    std::function<void(const absl::Status& why)> on_detached;
-    std::function<void()> on_reattached;
+    DeformStream::Options stream = {};
+    Reattachment::Options reattachment = {};  // functions are called on the receiving thread
   };
 
   // Errors: those of TissueformClient::OpenStream; the first stream is opened once.
@@ -64,7 +58,7 @@ class ReattachingStream {
 
   // Of the poses that are committed the last one; empty: none.
   std::optional<uint64_t> last_committed() const;
-  int reattachments() const { return reattachments_; }
+  int reattachments() const { return reattachment_.count(); }
   // The server of a cluster that answers now, or did last.
   std::string node() const;
 
@@ -76,15 +70,14 @@ class ReattachingStream {
   };
 
   ReattachingStream(TissueformClient* client, std::string session, Options options)
-      : client_(client), session_(std::move(session)), options_(std::move(options)) {}
+      : client_(client),
+        session_(std::move(session)),
+        options_(std::move(options)),
+        reattachment_(options_.reattachment) {}
 
-  absl::StatusOr<std::unique_ptr<DeformStream>> OpenStream();
+  absl::StatusOr<std::unique_ptr<DeformStream>> OpenStream(std::chrono::milliseconds patience);
   // Called while frames are received.
   void TakeNotice(const v1::DeformNotice& notice) ABSL_LOCKS_EXCLUDED(mutex_);
-  // Whether another stream may do better than one that ended so.
-  bool MayReattach(const absl::Status& status) const;
-  // Until there is a stream again. Errors: what cannot be mended, or the last one when time is up.
-  absl::Status Reattach(absl::Status why) ABSL_LOCKS_EXCLUDED(mutex_);
   void Adopt(std::unique_ptr<DeformStream> stream) ABSL_LOCKS_EXCLUDED(mutex_);
 
   // Constant.
@@ -94,8 +87,7 @@ class ReattachingStream {
   v1::DeformStarted started_;
 
   // Self-synchronised.
-  std::atomic<bool> cancelled_ = false;
-  std::atomic<int> reattachments_ = 0;
+  Reattachment reattachment_;
 
   // Held while sending: sequences must rise.
   mutable Mutex mutex_;

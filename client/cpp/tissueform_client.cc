@@ -38,6 +38,9 @@ grpc::ChannelArguments ArgumentsOf(bool own_connection) {
   return arguments;
 }
 
+// Empty where the server is to choose the id.
+std::string SessionNameOf(const std::string& id) { return id.empty() ? "" : SessionName(id); }
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<TissueformClient>> TissueformClient::Connect(
@@ -69,20 +72,30 @@ TissueformClient::TissueformClient(const std::shared_ptr<grpc::Channel>& channel
       sessions_(v1::SessionService::NewStub(channel)),
       deform_(v1::DeformService::NewStub(channel)),
       server_info_(v1::ServerInfoService::NewStub(channel)),
-      predictions_(channel, options.call_deadline),
+      predictions_(channel, options.call_deadline, &routes_),
       cases_(channel, options.call_deadline),
       exports_(channel, options.call_deadline),
-      access_(channel, options.call_deadline) {}
+      access_(channel, options.call_deadline, &routes_) {}
 
-void TissueformClient::SetDeadline(grpc::ClientContext* context) const {
-  context->set_deadline(std::chrono::system_clock::now() + options_.call_deadline);
+absl::Status TissueformClient::CallToDelete(
+    const std::string& session, const std::function<grpc::Status(grpc::ClientContext*)>& attempt) {
+  bool lost = false;
+  const absl::Status status = Call(session, CallRepeat::kAlways, [&](grpc::ClientContext* context) {
+    grpc::Status deleted = attempt(context);
+    // The attempt that was lost has done it.
+    if (lost && deleted.error_code() == grpc::StatusCode::NOT_FOUND) return grpc::Status::OK;
+    lost = lost || !deleted.ok();
+    return deleted;
+  });
+  if (status.ok()) routes_.Forget(session);
+  return status;
 }
 
 absl::StatusOr<v1::ServerInfo> TissueformClient::GetServerInfo() {
-  grpc::ClientContext context;
-  SetDeadline(&context);
   v1::ServerInfo info;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(server_info_->GetServerInfo(&context, {}, &info)));
+  TF_RETURN_IF_ERROR(Call("", CallRepeat::kAlways, [&](grpc::ClientContext* context) {
+    return server_info_->GetServerInfo(context, {}, &info);
+  }));
   return info;
 }
 
@@ -109,22 +122,22 @@ absl::StatusOr<v1::Mesh> TissueformClient::UploadMesh(const MeshPayloadView& pay
 }
 
 absl::StatusOr<v1::Mesh> TissueformClient::GetMesh(const std::string& name) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
   v1::GetMeshRequest request;
   request.set_name(name);
   v1::Mesh mesh;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(meshes_->GetMesh(&context, request, &mesh)));
+  TF_RETURN_IF_ERROR(Call("", CallRepeat::kAlways, [&](grpc::ClientContext* context) {
+    return meshes_->GetMesh(context, request, &mesh);
+  }));
   return mesh;
 }
 
 absl::StatusOr<v1::QueryUploadResponse> TissueformClient::QueryUpload(const std::string& name) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
   v1::QueryUploadRequest request;
   request.set_name(name);
   v1::QueryUploadResponse response;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(meshes_->QueryUpload(&context, request, &response)));
+  TF_RETURN_IF_ERROR(Call("", CallRepeat::kAlways, [&](grpc::ClientContext* context) {
+    return meshes_->QueryUpload(context, request, &response);
+  }));
   return response;
 }
 
@@ -132,10 +145,10 @@ absl::StatusOr<std::vector<v1::Mesh>> TissueformClient::ListMeshes() {
   std::vector<v1::Mesh> meshes;
   v1::ListMeshesRequest request;
   do {
-    grpc::ClientContext context;
-    SetDeadline(&context);
     v1::ListMeshesResponse response;
-    TF_RETURN_IF_ERROR(FromGrpcStatus(meshes_->ListMeshes(&context, request, &response)));
+    TF_RETURN_IF_ERROR(Call("", CallRepeat::kAlways, [&](grpc::ClientContext* context) {
+      return meshes_->ListMeshes(context, request, &response);
+    }));
     meshes.insert(meshes.end(), response.meshes().begin(), response.meshes().end());
     request.set_page_token(response.next_page_token());
   } while (!request.page_token().empty());
@@ -143,32 +156,34 @@ absl::StatusOr<std::vector<v1::Mesh>> TissueformClient::ListMeshes() {
 }
 
 absl::Status TissueformClient::DeleteMesh(const std::string& name) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
   v1::DeleteMeshRequest request;
   request.set_name(name);
   google::protobuf::Empty response;
-  return FromGrpcStatus(meshes_->DeleteMesh(&context, request, &response));
+  return CallToDelete("", [&](grpc::ClientContext* context) {
+    return meshes_->DeleteMesh(context, request, &response);
+  });
 }
 
 absl::StatusOr<v1::Session> TissueformClient::CreateSession(const SessionRequest& request) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
-  AddSessionHeader(SessionName(request.session_id), &context);
+  v1::CreateSessionRequest proto = ToProto(request);
+  const CallRepeat repeat = PrepareToRepeat(routes_, &proto);
   v1::Session session;
   TF_RETURN_IF_ERROR(
-      FromGrpcStatus(sessions_->CreateSession(&context, ToProto(request), &session)));
+      Call(SessionNameOf(request.session_id), repeat, [&](grpc::ClientContext* context) {
+        grpc::Status status = sessions_->CreateSession(context, proto, &session);
+        if (status.ok()) routes_.Remember(session.name(), NodeOf(*context));
+        return status;
+      }));
   return session;
 }
 
 absl::StatusOr<v1::Session> TissueformClient::GetSession(const std::string& name) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
-  AddSessionHeader(name, &context);
   v1::GetSessionRequest request;
   request.set_name(name);
   v1::Session session;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(sessions_->GetSession(&context, request, &session)));
+  TF_RETURN_IF_ERROR(Call(name, CallRepeat::kAlways, [&](grpc::ClientContext* context) {
+    return sessions_->GetSession(context, request, &session);
+  }));
   return session;
 }
 
@@ -176,10 +191,10 @@ absl::StatusOr<std::vector<v1::Session>> TissueformClient::ListSessions() {
   std::vector<v1::Session> sessions;
   v1::ListSessionsRequest request;
   do {
-    grpc::ClientContext context;
-    SetDeadline(&context);
     v1::ListSessionsResponse response;
-    TF_RETURN_IF_ERROR(FromGrpcStatus(sessions_->ListSessions(&context, request, &response)));
+    TF_RETURN_IF_ERROR(Call("", CallRepeat::kAlways, [&](grpc::ClientContext* context) {
+      return sessions_->ListSessions(context, request, &response);
+    }));
     sessions.insert(sessions.end(), response.sessions().begin(), response.sessions().end());
     request.set_page_token(response.next_page_token());
   } while (!request.page_token().empty());
@@ -188,39 +203,41 @@ absl::StatusOr<std::vector<v1::Session>> TissueformClient::ListSessions() {
 
 absl::StatusOr<v1::Session> TissueformClient::UpdateSession(
     const v1::UpdateSessionRequest& request) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
-  AddSessionHeader(request.name(), &context);
   v1::Session session;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(sessions_->UpdateSession(&context, request, &session)));
+  TF_RETURN_IF_ERROR(Call(request.name(), RepeatOf(request), [&](grpc::ClientContext* context) {
+    return sessions_->UpdateSession(context, request, &session);
+  }));
   return session;
 }
 
 absl::StatusOr<v1::Session> TissueformClient::PrepareSession(
     const v1::PrepareSessionRequest& request, const PreparationWait& wait) {
+  v1::PrepareSessionRequest sent = request;
   std::string name = request.open();
-  if (request.has_create()) name = SessionName(request.create().session_id());
-  if (request.has_update()) name = request.update().name();
-  return WaitForSession(sessions_.get(), request, name,
-                        std::chrono::system_clock::now() + options_.call_deadline, wait);
+  CallRepeat repeat = CallRepeat::kAlways;
+  if (request.has_create()) {
+    name = SessionNameOf(request.create().session_id());
+    repeat = PrepareToRepeat(routes_, sent.mutable_create());
+  }
+  if (request.has_update()) {
+    name = request.update().name();
+    repeat = RepeatOf(request.update());
+  }
+  return WaitForSession(sessions_.get(), sent, {&routes_, name, repeat, Deadline()}, wait);
 }
 
 absl::Status TissueformClient::DeleteSession(const std::string& name) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
-  AddSessionHeader(name, &context);
   v1::DeleteSessionRequest request;
   request.set_name(name);
   google::protobuf::Empty response;
-  return FromGrpcStatus(sessions_->DeleteSession(&context, request, &response));
+  return CallToDelete(name, [&](grpc::ClientContext* context) {
+    return sessions_->DeleteSession(context, request, &response);
+  });
 }
 
 absl::StatusOr<v1::DeformOnceResponse> TissueformClient::DeformOnce(
     const std::string& session, absl::Span<const NamedPose> poses, const AnswerVertices& vertices,
     v1::DeformationModel model, v1::PositionEncoding encoding) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
-  AddSessionHeader(session, &context);
   v1::DeformOnceRequest request;
   request.set_model(model);
   request.set_encoding(encoding);
@@ -230,15 +247,22 @@ absl::StatusOr<v1::DeformOnceResponse> TissueformClient::DeformOnce(
   }
   *request.mutable_vertices() = ToProto(vertices);
   v1::DeformOnceResponse response;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(deform_->DeformOnce(&context, request, &response)));
+  TF_RETURN_IF_ERROR(Call(session, CallRepeat::kAlways, [&](grpc::ClientContext* context) {
+    return deform_->DeformOnce(context, request, &response);
+  }));
   return response;
 }
 
 absl::StatusOr<std::unique_ptr<DeformStream>> TissueformClient::OpenStream(
-    const std::string& session, const DeformStream::Options& options) {
-  std::unique_ptr<DeformStream> stream(new DeformStream());
-  TF_RETURN_IF_ERROR(stream->Start(deform_.get(), session, options, token_));
-  return stream;
+    const std::string& session, const DeformStream::Options& options,
+    std::chrono::milliseconds patience) {
+  return OpenWithAttempts(
+      SessionAttempts(&routes_, session, CallRepeat::kAlways, patience),
+      [&]() -> absl::StatusOr<std::unique_ptr<DeformStream>> {
+        std::unique_ptr<DeformStream> stream(new DeformStream(&routes_, session));
+        TF_RETURN_IF_ERROR(stream->Start(deform_.get(), options, token_));
+        return stream;
+      });
 }
 
 absl::StatusOr<std::unique_ptr<PreparedEvaluator>> TissueformClient::FetchPreparedAnswers(
@@ -252,15 +276,20 @@ absl::StatusOr<std::unique_ptr<PreparedEvaluator>> TissueformClient::FetchPrepar
     *request.mutable_prepared() = std::move(*configuration.mutable_prepared());
   }
   return PreparedEvaluator::Fetch(deform_.get(), request,
-                                  {session.handles().begin(), session.handles().end()},
-                                  std::chrono::system_clock::now() + options_.call_deadline);
+                                  {session.handles().begin(), session.handles().end()}, &routes_,
+                                  Deadline());
 }
 
 absl::StatusOr<std::unique_ptr<WatchStream>> TissueformClient::Watch(
-    const std::string& session, const WatchStream::Options& options) {
-  std::unique_ptr<WatchStream> watch(new WatchStream(deform_.get(), options));
-  TF_RETURN_IF_ERROR(watch->Start(session));
-  return watch;
+    const std::string& session, const WatchStream::Options& options,
+    std::chrono::milliseconds patience) {
+  return OpenWithAttempts(SessionAttempts(&routes_, session, CallRepeat::kAlways, patience),
+                          [&]() -> absl::StatusOr<std::unique_ptr<WatchStream>> {
+                            std::unique_ptr<WatchStream> watch(
+                                new WatchStream(deform_.get(), &routes_, session, options));
+                            TF_RETURN_IF_ERROR(watch->Start());
+                            return watch;
+                          });
 }
 
 }  // namespace tissueform

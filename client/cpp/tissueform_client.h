@@ -4,6 +4,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,6 +23,8 @@
 #include "client/cpp/prediction_calls.h"
 #include "client/cpp/prepare_session.h"
 #include "client/cpp/prepared_evaluator.h"
+#include "client/cpp/session_call.h"
+#include "client/cpp/session_routes.h"
 #include "client/cpp/token_file.h"
 #include "client/cpp/watch_stream.h"
 #include "core/mesh/tet_mesh.h"
@@ -39,6 +42,12 @@ namespace tissueform {
 // A connection to a tissueform-server. Calls block; each has a deadline. Errors carry the server's
 // code and message (proto/tissueform/v1 says which), besides Unavailable and DeadlineExceeded.
 // Calls that concern a session carry its id in a header, by which a proxy can route them.
+//
+// Behind one name may stand a cluster. Then a call goes to the server that has the session, and is
+// tried again for kFailoverPatience where that one is away: reads, and what is done once when it
+// is done twice (CallRepeat::kAlways), after any loss; UpdateSession with an etag, sessions with an
+// id of their own and predictions without a request_id only where a server says that it has done
+// nothing. Of what a call deletes NOT_FOUND after a loss says that it was deleted.
 //
 // Thread-safe.
 class TissueformClient {
@@ -80,6 +89,7 @@ class TissueformClient {
   absl::StatusOr<std::vector<v1::Mesh>> ListMeshes();
   absl::Status DeleteMesh(const std::string& name);
 
+  // In a cluster, without a request_id of the caller's, under one that is made here.
   absl::StatusOr<v1::Session> CreateSession(const SessionRequest& request);
   absl::StatusOr<v1::Session> GetSession(const std::string& name);
   // All of them, page after page.
@@ -99,9 +109,10 @@ class TissueformClient {
       v1::DeformationModel model = v1::DEFORMATION_MODEL_UNSPECIFIED,
       v1::PositionEncoding encoding = v1::POSITION_ENCODING_FLOAT32);
 
-  // The stream has no deadline.
-  absl::StatusOr<std::unique_ptr<DeformStream>> OpenStream(const std::string& session,
-                                                           const DeformStream::Options& options);
+  // The stream has no deadline. No `patience`: for who tries again himself.
+  absl::StatusOr<std::unique_ptr<DeformStream>> OpenStream(
+      const std::string& session, const DeformStream::Options& options,
+      std::chrono::milliseconds patience = kFailoverPatience);
 
   // The prepared answers that a stream with these options answers from, to evaluate them here;
   // `session` is what the server says of it. Errors: those of PreparedEvaluator::Fetch;
@@ -110,8 +121,9 @@ class TissueformClient {
       const v1::Session& session, const DeformStream::Options& options);
 
   // Follows what others drag. The watch has no deadline.
-  absl::StatusOr<std::unique_ptr<WatchStream>> Watch(const std::string& session,
-                                                     const WatchStream::Options& options);
+  absl::StatusOr<std::unique_ptr<WatchStream>> Watch(
+      const std::string& session, const WatchStream::Options& options,
+      std::chrono::milliseconds patience = kFailoverPatience);
 
   // Answers that the server keeps.
   PredictionCalls& predictions() { return predictions_; }
@@ -129,10 +141,19 @@ class TissueformClient {
   TissueformClient(const std::shared_ptr<grpc::Channel>& channel, std::shared_ptr<TokenFile> token,
                    const Options& options);
 
-  void SetDeadline(grpc::ClientContext* context) const;
+  std::chrono::system_clock::time_point Deadline() const {
+    return std::chrono::system_clock::now() + options_.call_deadline;
+  }
+  absl::Status Call(const std::string& session, CallRepeat repeat,
+                    const std::function<grpc::Status(grpc::ClientContext*)>& attempt) {
+    return RunSessionCall(&routes_, session, repeat, Deadline(), attempt);
+  }
+  absl::Status CallToDelete(const std::string& session,
+                            const std::function<grpc::Status(grpc::ClientContext*)>& attempt);
 
   const Options options_;
   const std::shared_ptr<TokenFile> token_;  // null: none
+  SessionRoutes routes_;                    // self-synchronised
   const std::unique_ptr<v1::MeshService::Stub> meshes_;
   const std::unique_ptr<v1::SessionService::Stub> sessions_;
   const std::unique_ptr<v1::DeformService::Stub> deform_;

@@ -4,7 +4,6 @@
 #include "client/cpp/watch_stream.h"
 
 #include <chrono>
-#include <utility>
 
 #include "client/cpp/client_call.h"
 
@@ -23,10 +22,10 @@ WatchStream::~WatchStream() {
   }
 }
 
-absl::Status WatchStream::Start(const std::string& session) {
-  AddSessionHeader(session, &context_);
+absl::Status WatchStream::Start() {
+  routes_->AddHeaders(session_, &context_);
   v1::WatchRequest request;
-  request.set_session(session);
+  request.set_session(session_);
   if (options_.max_unacked.has_value()) request.set_max_unacked(*options_.max_unacked);
   call_ = stub_->Watch(&context_, request);
   v1::WatchResponse response;
@@ -37,6 +36,7 @@ absl::Status WatchStream::Start(const std::string& session) {
   }
   name_ = response.started().watch();
   node_ = NodeOf(context_);
+  routes_->Remember(session_, node_);
   form_ = std::move(*response.mutable_started()->mutable_form());
   return absl::OkStatus();
 }
@@ -53,6 +53,7 @@ std::optional<v1::WatchFrame> WatchStream::Receive() {
 
 absl::Status WatchStream::Ack(const v1::WatchFrame& frame) {
   grpc::ClientContext context;
+  routes_->AddHeaders(session_, &context);
   context.set_deadline(std::chrono::system_clock::now() + kAckDeadline);
   v1::AcknowledgeWatchRequest request;
   request.set_watch(name_);
@@ -67,7 +68,9 @@ absl::Status WatchStream::Finish() {
     if (dropped.has_notice() && options_.on_notice) options_.on_notice(dropped.notice());
   }
   finished_ = true;
-  return FromGrpcStatus(call_->Finish());
+  const absl::Status end = FromGrpcStatus(call_->Finish());
+  routes_->LearnFrom(end, session_);
+  return end;
 }
 
 }  // namespace tissueform

@@ -7,11 +7,13 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "grpcpp/client_context.h"
 #include "grpcpp/support/sync_stream.h"
 
+#include "client/cpp/session_routes.h"
 #include "tissueform/v1/deform_service.grpc.pb.h"
 
 namespace tissueform {
@@ -56,13 +58,16 @@ class WatchStream {
  private:
   friend class TissueformClient;
 
-  WatchStream(v1::DeformService::Stub* stub, const Options& options)
-      : stub_(stub), options_(options) {}
+  WatchStream(v1::DeformService::Stub* stub, SessionRoutes* routes, std::string session,
+              const Options& options)
+      : stub_(stub), routes_(routes), session_(std::move(session)), options_(options) {}
 
   // Waits for the first message.
-  absl::Status Start(const std::string& session);
+  absl::Status Start();
 
   v1::DeformService::Stub* const stub_;
+  SessionRoutes* const routes_;
+  const std::string session_;
   const Options options_;
   grpc::ClientContext context_;  // self-synchronised
   std::unique_ptr<grpc::ClientReader<v1::WatchResponse>> call_;

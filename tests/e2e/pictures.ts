@@ -1,6 +1,8 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+import { execFileSync } from "node:child_process";
+import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import type { Page } from "playwright-core";
@@ -228,3 +230,65 @@ test("the page's own answer while the server's is 150 ms away", async () => {
     line.close();
   }
 });
+
+/** Pictures of the page as they were drawn, with the time of each in seconds: those that differ from the one before. */
+async function record(page: Page, act: () => Promise<void>): Promise<{ atSeconds: number; png: Buffer }[]> {
+  const frames: { atSeconds: number; png: Buffer }[] = [];
+  const session = await page.context().newCDPSession(page);
+  session.on("Page.screencastFrame", ({ data, sessionId, metadata }) => {
+    const png = Buffer.from(data, "base64");
+    if (!frames.at(-1)?.png.equals(png)) frames.push({ atSeconds: metadata.timestamp ?? 0, png });
+    // The page may be gone by then.
+    session.send("Page.screencastFrameAck", { sessionId }).catch(() => {});
+  });
+  await session.send("Page.startScreencast", { format: "png", everyNthFrame: 1 });
+  await act();
+  await session.send("Page.stopScreencast");
+  return frames;
+}
+
+const STEPS = 30;
+/** Without a graphics card there are three pictures a second. */
+const FASTER = 3;
+
+// By ImageMagick: the frames one after the other, each with its time.
+test("a drag while every byte is 150 ms late, both ways, as it was seen", async () => {
+  const line = await SlowLine.open(planner.url, 150);
+  try {
+    const { page } = await openPage(await planner.browse(), line.url);
+    await page.setViewportSize({ width: 900, height: 520 });
+    await page.emulateMedia({ colorScheme: "dark" });
+    await page.setInputFiles("input[type=file]", planner.casePath);
+    await live(page);
+    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.localState.value.kind === "ready");
+    await takeSegment(page, "Lower jaw");
+    await page.getByRole("button", { name: "Left", exact: true }).click();
+    await page.getByRole("button", { name: "Rest shape" }).click();
+    const slider = page.getByRole("slider", { name: /^Forward/ });
+    await slider.scrollIntoViewIfNeeded();
+    await page.locator(".notice").waitFor({ state: "hidden" });
+    const box = (await slider.boundingBox()) ?? expect.fail("no slider");
+    const at = (share: number) => [box.x + (0.5 + share) * box.width, box.y + box.height / 2] as const;
+    const frames = await record(page, async () => {
+      await page.mouse.move(...at(0));
+      await page.mouse.down();
+      for (let step = 1; step <= STEPS; ++step) {
+        await page.mouse.move(...at(0.14 * (1 - Math.cos((2 * Math.PI * step) / STEPS))));
+        await page.waitForTimeout(30);
+      }
+      await page.mouse.up();
+      await page.waitForTimeout(600);
+    });
+    const seconds = frames.map(({ atSeconds }) => atSeconds - frames[0].atSeconds);
+    const words = frames.flatMap(({ png }, i) => {
+      const path = join(FOLDER, `late-${String(i).padStart(3, "0")}.png`);
+      writeFileSync(path, png);
+      const standsMs = 1000 * ((seconds[i + 1] ?? seconds[i] + 1) - seconds[i]);
+      return ["(", "-delay", `${Math.max(2, Math.round(standsMs / 10 / FASTER))}x100`, path, "-gravity", "SouthWest", "-fill", "white", "-undercolor", "#000c", "-pointsize", "18", "-annotate", "+8+8", ` ${seconds[i].toFixed(2)} s `, ")"];
+    });
+    execFileSync("convert", [...words, "-resize", "720x", "+dither", "-colors", "48", "+map", "-layers", "Optimize", "-loop", "0", join(FOLDER, "drag-at-150-ms.gif")]);
+    console.log(`${frames.length} frames in ${seconds[seconds.length - 1].toFixed(2)} s`);
+  } finally {
+    line.close();
+  }
+}, 300_000);

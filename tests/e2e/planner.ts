@@ -21,14 +21,15 @@ const START_MS = 20_000;
 export type Hook = { tissueform: { bench: any; follower: any; view: any } };
 
 /** A program that prints "listening on ADDRESS" when it is ready. */
-class Program {
+export class Program {
   private constructor(
     private readonly child: ChildProcess,
     readonly address: string,
   ) {}
 
-  static start(name: string, options: string[]): Promise<Program> {
-    const child = spawn(join(BIN, name), options, { stdio: ["ignore", "pipe", "pipe"] });
+  /** `variables`: of its environment, beside those of this process. */
+  static start(name: string, options: string[], variables: Record<string, string> = {}): Promise<Program> {
+    const child = spawn(join(BIN, name), options, { stdio: ["ignore", "pipe", "pipe"], env: { ...process.env, ...variables } });
     return new Promise((accept, reject) => {
       let out = "";
       let errors = "";
@@ -87,16 +88,17 @@ export class Planner {
 
   /**
    * `casePath`: of a case; left out: one of the bundled head with three segments, without the surfaces that surround it.
-   * `options`: more of the programs.
+   * `options`: more of the programs; `servers`: those of the gateway, in place of one of its own.
    */
-  static async start(casePath?: string, options: { gateway?: string[]; server?: string[] } = {}): Promise<Planner> {
+  static async start(casePath?: string, options: { gateway?: string[]; server?: string[]; servers?: string[] } = {}): Promise<Planner> {
     const planner = new Planner(options.server ?? []);
     chmodSync(planner.folder, 0o700);
     if (casePath !== undefined) planner.casePath = casePath;
     else execFileSync(join(BIN, "tissueform"), ["case", "pack", planner.writePlan(false), "--out", planner.casePath]);
-    await planner.startServer();
+    if (options.servers === undefined) await planner.startServer();
+    const servers = options.servers ?? [planner.serverAddress];
     planner.gateway = await Program.start("tissueform-gateway", [
-      "--server", planner.serverAddress, "--listen", "127.0.0.1:0", "--web", WEB, "--drain-seconds", "1",
+      ...servers.flatMap((server) => ["--server", server]), "--listen", "127.0.0.1:0", "--web", WEB, "--drain-seconds", "1",
       ...(options.gateway ?? []),
     ]);
     return planner;

@@ -66,8 +66,10 @@ TEST_F(RestartTest, ADragGoesOnThroughKillAndRestart) {
   const v1::Session session = MakeSession(client.get(), "a-session-of-this-test");
   ReattachingStream::Options options;
   std::vector<std::string> told;
-  options.on_detached = [&told](const absl::Status& /*why*/) { told.emplace_back("detached"); };
-  options.on_reattached = [&told] { told.emplace_back("reattached"); };
+  options.reattachment.on_detached = [&told](const absl::Status& /*why*/) {
+    told.emplace_back("detached");
+  };
+  options.reattachment.on_reattached = [&told] { told.emplace_back("reattached"); };
   ASSERT_OK_AND_ASSIGN(const std::unique_ptr<ReattachingStream> drag,
                        ReattachingStream::Open(client.get(), session.name(), options));
   drag->SendPoses(1, TopPose(SomePose(1)), /*commit=*/true);

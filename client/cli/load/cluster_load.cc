@@ -37,9 +37,9 @@ absl::StatusOr<Load> OpenLoad(const ServerConnection& server, const PlanProblem&
   const std::string run = absl::StrFormat("load-%08x%08x", random(), random());
   Load load;
   for (int i = 0; i < options.sessions; ++i) {
-    TF_ASSIGN_OR_RETURN(std::unique_ptr<ClusterDrag> drag,
-                        ClusterDrag::Open(server, problem, mesh.name(),
-                                          absl::StrFormat("%s-%d", run, i), options));
+    TF_ASSIGN_OR_RETURN(
+        std::unique_ptr<ClusterDrag> drag,
+        ClusterDrag::Open(server, problem, mesh.name(), absl::StrFormat("%s-%d", run, i), options));
     load.drags.push_back(std::move(drag));
   }
   for (int i = 0; i < options.followers; ++i) {

@@ -29,7 +29,7 @@ struct ClusterLoadOptions {
 
 // What came from one node, by the name that its streams say. Without a name: no cluster.
 struct NodeLoad {
-  int drags = 0;          // that were there when they ended
+  int drags = 0;  // that were there when they ended
   int64_t frames = 0;
   int64_t bytes = 0;      // of positions
   int64_t coalesced = 0;  // poses that newer ones had replaced, as its frames say
@@ -51,7 +51,7 @@ struct ClusterLoadResult {
   int64_t commits_failed = 0;  // as the server says; those without a word are the rest
   int64_t reattachments = 0;
   int64_t watch_reattachments = 0;
-  double longest_gap_ms = 0;  // without a frame, of one drag
+  double longest_gap_ms = 0;            // without a frame, of one drag
   std::vector<double> picture_ages_ms;  // of all drags; see PictureAges
   std::map<std::string, NodeLoad> nodes;
   std::vector<absl::Status> errors;  // how drags and watches ended that ended early

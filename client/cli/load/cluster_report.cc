@@ -18,12 +18,11 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 std::string NodeText(const std::string& name, const NodeLoad& node, double seconds) {
-  return absl::StrFormat("%-20s %5d  %8.0f  %6.1f  %31s  %9d  %7d  %8d\n",
-                         name.empty() ? "(no name)" : name, node.drags,
-                         static_cast<double>(node.frames) / seconds,
-                         static_cast<double>(node.bytes) / (1 << 20) / seconds,
-                         PercentilesText(node.latencies_ms, 1), node.coalesced,
-                         node.commits_ms.size(), node.watch_frames);
+  return absl::StrFormat(
+      "%-20s %5d  %8.0f  %6.1f  %31s  %9d  %7d  %8d\n", name.empty() ? "(no name)" : name,
+      node.drags, static_cast<double>(node.frames) / seconds,
+      static_cast<double>(node.bytes) / (1 << 20) / seconds, PercentilesText(node.latencies_ms, 1),
+      node.coalesced, node.commits_ms.size(), node.watch_frames);
 }
 
 Json NodeJson(const std::string& name, const NodeLoad& node) {

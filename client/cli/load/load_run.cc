@@ -6,14 +6,18 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <thread>
 #include <utility>
+
+#include "absl/strings/str_format.h"
 
 #include "client/cli/load/picture_age.h"
 #include "client/cli/online/drag.h"
 #include "client/cli/online/session_wait.h"
 #include "client/cpp/plan_session.h"
+#include "client/cpp/reattaching_stream.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
@@ -53,7 +57,8 @@ class LoadDrag {
     auto drag = std::unique_ptr<LoadDrag>(new LoadDrag(kind, NamedPoses(problem)));
     TF_ASSIGN_OR_RETURN(drag->client_, ConnectTo(server, /*own_connection=*/true));
     TF_ASSIGN_OR_RETURN(drag->session_, MakePlanSession(drag->client_.get(), problem, nullptr));
-    DeformStream::Options stream;
+    ReattachingStream::Options options;
+    DeformStream::Options& stream = options.stream;
     stream.vertices.kind = AnswerVertices::Kind::kSkin;
     if (kind.int16) stream.encoding = v1::POSITION_ENCODING_INT16_ZSTD;
     if (kind.neo_hookean) {
@@ -61,7 +66,13 @@ class LoadDrag {
     } else if (HasPreparedAnswers(problem.deformer)) {
       stream.prepared.emplace();
     }
-    TF_ASSIGN_OR_RETURN(drag->stream_, drag->client_->OpenStream(drag->session_->name(), stream));
+    options.reattachment.give_up_after = kFailoverPatience;
+    options.reattachment.on_detached = [](const absl::Status& why) {
+      absl::FPrintF(stderr, "%s\n", DetachedText(why));
+    };
+    TF_ASSIGN_OR_RETURN(
+        drag->stream_,
+        ReattachingStream::Open(drag->client_.get(), drag->session_->name(), std::move(options)));
     const auto& skin = drag->stream_->started().vertices();
     drag->rest_ =
         problem.mesh->positions()(std::vector<int32_t>(skin.begin(), skin.end()), Eigen::all);
@@ -71,15 +82,19 @@ class LoadDrag {
   // Sends poses from `start` on, every `interval` until `end`, and takes the frames.
   void Run(SteadyClock::time_point origin, SteadyClock::time_point start,
            SteadyClock::time_point end, SteadyClock::duration interval) {
-    std::thread receiver([&] { Receive(origin); });
-    for (int64_t i = 0;; ++i) {
+    std::atomic<bool> ended = false;  // Finish says why
+    std::thread receiver([&] {
+      Receive(origin);
+      ended = true;
+    });
+    for (int64_t i = 0; !ended; ++i) {
       const SteadyClock::time_point due = start + interval * i;
       if (due >= end) break;
       std::this_thread::sleep_until(due);
       const double seconds = std::chrono::duration<double>(due - start).count();
       const double amount = (1 - std::cos(2 * M_PI * seconds / kPeriodSeconds)) / 2;
       send_times_.Append(Milliseconds(SteadyClock::now() - origin));
-      if (!stream_->SendPoses(i, PartOfPoses(poses_, amount)).ok()) break;  // Finish says why
+      stream_->SendPoses(i, PartOfPoses(poses_, amount));
     }
     end_ms_ = Milliseconds(SteadyClock::now() - origin);
     stream_->CloseSending();
@@ -121,7 +136,7 @@ class LoadDrag {
       solves_ms_.push_back(frame->summary().solve_seconds() * 1e3);
       bytes_ += static_cast<int64_t>(frame->positions().size());
       if (kind_.slow_ms > 0) std::this_thread::sleep_for(Seconds(kind_.slow_ms / 1e3));
-      stream_->Ack(*frame).IgnoreError();  // not needed once the sender has closed
+      stream_->Ack(*frame);
     }
   }
 
@@ -129,7 +144,7 @@ class LoadDrag {
   const std::vector<NamedPose> poses_;
   std::unique_ptr<TissueformClient> client_;
   std::unique_ptr<PlanSession> session_;
-  std::unique_ptr<DeformStream> stream_;
+  std::unique_ptr<ReattachingStream> stream_;
   Positions rest_;  // of what the stream answers
 
   // Self-synchronised.

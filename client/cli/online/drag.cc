@@ -6,10 +6,15 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <thread>
 #include <utility>
 
+#include "absl/strings/str_format.h"
+
+#include "client/cli/online/server_connection.h"
+#include "client/cpp/reattaching_stream.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/constraints/handle_pose.h"
@@ -23,11 +28,11 @@ double Milliseconds(SteadyClock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
 }
 
-void Receive(DeformStream* stream, SteadyClock::time_point start, const SendTimes& send_times,
+void Receive(ReattachingStream* stream, SteadyClock::time_point start, const SendTimes& send_times,
              DragResult* result) {
   while (std::optional<v1::DeformFrame> frame = stream->Receive()) {
     const SteadyClock::time_point now = SteadyClock::now();
-    stream->Ack(*frame).IgnoreError();  // not needed once the sender has closed
+    stream->Ack(*frame);
     result->frames.push_back({.sequence = frame->sequence(),
                               .sent_ms = send_times.Get(frame->sequence()),
                               .received_ms = Milliseconds(now - start),
@@ -54,8 +59,13 @@ absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& 
                                    absl::Span<const NamedPose> poses, const DragOptions& options,
                                    const std::atomic<bool>& interrupted) {
   const Stopwatch opening;
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<DeformStream> stream,
-                      client->OpenStream(session, options.stream));
+  ReattachingStream::Options streaming = {.stream = options.stream};
+  streaming.reattachment.give_up_after = kFailoverPatience;
+  streaming.reattachment.on_detached = [](const absl::Status& why) {
+    absl::FPrintF(stderr, "%s\n", DetachedText(why));
+  };
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<ReattachingStream> stream,
+                      ReattachingStream::Open(client, session, std::move(streaming)));
   DragResult result;
   result.open_seconds = opening.Seconds();
   result.vertex_count = stream->started().vertex_count();
@@ -67,9 +77,12 @@ absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& 
   const std::chrono::duration<double> interval(1 / options.poses_per_second);
   SendTimes send_times;
   const SteadyClock::time_point start = SteadyClock::now();
-  std::thread receiver([&] { Receive(stream.get(), start, send_times, &result); });
-  absl::Status sent;
-  for (int64_t i = 0; i < count && sent.ok() && !interrupted; ++i) {
+  std::atomic<bool> ended = false;  // Finish says why
+  std::thread receiver([&] {
+    Receive(stream.get(), start, send_times, &result);
+    ended = true;
+  });
+  for (int64_t i = 0; i < count && !ended && !interrupted; ++i) {
     // Deadlines of their own: a late pose does not delay the ones after it.
     std::this_thread::sleep_until(start +
                                   std::chrono::duration_cast<SteadyClock::duration>(interval * i));
@@ -77,7 +90,7 @@ absl::StatusOr<DragResult> RunDrag(TissueformClient* client, const std::string& 
     const double amount =
         (1 - std::cos(M_PI * static_cast<double>(i + 1) / static_cast<double>(count))) / 2;
     send_times.Append(Milliseconds(SteadyClock::now() - start));
-    sent = stream->SendPoses(i, PartOfPoses(poses, amount));
+    stream->SendPoses(i, PartOfPoses(poses, amount));
     ++result.poses_sent;
   }
   if (interrupted) {

@@ -79,7 +79,7 @@ ReattachingStream::Options StreamOptions(const PlanProblem& problem,
   ReattachingStream::Options stream;
   stream.stream.vertices.kind = AnswerVertices::Kind::kSkin;
   if (HasPreparedAnswers(problem.deformer)) stream.stream.prepared = PreparedAnswersOf(problem);
-  stream.give_up_after =
+  stream.reattachment.give_up_after =
       std::chrono::milliseconds(static_cast<int64_t>(1e3 * options.give_up_seconds));
   stream.stream.on_notice = [](const v1::DeformNotice& notice) {
     if (notice.has_draining()) absl::PrintF("the server is about to end\n");
@@ -91,11 +91,11 @@ ReattachingStream::Options StreamOptions(const PlanProblem& problem,
                    notice.committed().failure());
     }
   };
-  stream.on_detached = [totals](const absl::Status& why) {
+  stream.reattachment.on_detached = [totals](const absl::Status& why) {
     totals->detached_at = SteadyClock::now();
-    absl::PrintF("the connection is lost (%s); trying again\n", why.message());
+    absl::PrintF("%s\n", DetachedText(why));
   };
-  stream.on_reattached = [totals] {
+  stream.reattachment.on_reattached = [totals] {
     const double away =
         std::chrono::duration<double>(SteadyClock::now() - totals->detached_at).count();
     totals->longest_away_seconds = std::max(totals->longest_away_seconds, away);

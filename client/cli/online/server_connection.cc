@@ -7,7 +7,10 @@
 #include <filesystem>
 #include <system_error>
 
+#include "absl/strings/str_cat.h"
+
 #include "client/cpp/server_channel.h"
+#include "core/base/error_reason.h"
 
 namespace tissueform {
 namespace {
@@ -61,6 +64,11 @@ void AddServerOption(CLI::App* command, ServerConnection* server) {
       ->required()
       ->type_name("HOST:PORT");
   AddConnectionOptions(command, &server->options);
+}
+
+std::string DetachedText(const absl::Status& why) {
+  if (HasReason(why, ErrorReason::kSessionMoved)) return "moved to another server, going on";
+  return absl::StrCat("the connection is lost (", why.message(), "); trying again");
 }
 
 std::string DefaultTokenPath() {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "CLI/CLI.hpp"
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
 #include "client/cpp/tissueform_client.h"
@@ -34,6 +35,9 @@ ConnectionOptions ResolveConnection(const ServerConnection& server);
 // Errors: those of TissueformClient::Connect.
 absl::StatusOr<std::unique_ptr<TissueformClient>> ConnectTo(const ServerConnection& server,
                                                             bool own_connection = false);
+
+// One line on why a stream broke that is about to come back.
+std::string DetachedText(const absl::Status& why);
 
 // Where a token lies that was not named; empty without a home.
 std::string DefaultTokenPath();

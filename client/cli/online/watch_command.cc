@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "absl/strings/str_format.h"
 #include "google/protobuf/util/time_util.h"
@@ -17,7 +18,7 @@
 #include "client/cli/online/server_connection.h"
 #include "client/cli/online/session_command.h"
 #include "client/cli/shared/companion.h"
-#include "client/cpp/tissueform_client.h"
+#include "client/cpp/reattaching_watch.h"
 #include "core/base/mutex.h"
 #include "core/base/status_macros.h"
 
@@ -89,10 +90,10 @@ void TellNotice(const v1::DeformNotice& notice) {
   if (notice.has_restored()) absl::PrintF("the session is back in memory\n");
 }
 
-void Receive(WatchStream* watch, Seen* seen) {
+void Receive(ReattachingWatch* watch, Seen* seen) {
   while (const std::optional<v1::WatchFrame> frame = watch->Receive()) {
     seen->Take(*frame);
-    if (!watch->Ack(*frame).ok()) break;  // Finish says why
+    watch->Ack(*frame);
   }
   seen->End();
 }
@@ -101,8 +102,13 @@ absl::Status Run(const WatchCommandOptions& options) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);  // seen at once, also through a pipe
   TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   const std::string session = FullSessionName(options.session);
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<WatchStream> watch,
-                      client->Watch(session, {.max_unacked = {}, .on_notice = TellNotice}));
+  ReattachingWatch::Options watching;
+  watching.watch.on_notice = TellNotice;
+  watching.reattachment.on_detached = [](const absl::Status& why) {
+    absl::PrintF("%s\n", DetachedText(why));
+  };
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<ReattachingWatch> watch,
+                      ReattachingWatch::Open(client.get(), session, std::move(watching)));
   absl::PrintF("watching %s, %d vertices a frame\n", session, watch->form().vertex_count());
   Seen seen;
   std::thread receiver([&] { Receive(watch.get(), &seen); });

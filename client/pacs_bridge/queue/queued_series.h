@@ -47,7 +47,7 @@ struct QueuedSeries {
   int64_t attempts = 0;        // of the step that is next
   std::string last_error = {};
   int64_t first_s = 0;  // wall clock, to be told and for retention
-  int64_t done_s = 0;   // published, passed over or failed
+  int64_t done_s = 0;   // since when nothing is done with it; 0: it is being worked on
   bool has_files = true;
   bool has_header = false;
   int64_t images = 0;  // filled by reading; writing passes over it

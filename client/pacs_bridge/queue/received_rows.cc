@@ -101,8 +101,10 @@ absl::StatusOr<QueuedSeries> ReceivedRows::Add(const QueuedStudy& study, const Q
     if (any_new) {
       TF_RETURN_IF_ERROR(
           database
-              .Prepare("UPDATE series SET has_files = 1, state = CASE WHEN state IN "
-                       "('incomplete', 'complete') THEN 'receiving' ELSE state END WHERE key = ?")
+              .Prepare(
+                  "UPDATE series SET has_files = 1, done_s = CASE WHEN state IN "
+                  "('incomplete', 'complete') THEN 0 ELSE done_s END, state = CASE WHEN state "
+                  "IN ('incomplete', 'complete') THEN 'receiving' ELSE state END WHERE key = ?")
               .Bind(found->key)
               .Run());
     }
@@ -236,6 +238,14 @@ absl::StatusOr<std::vector<QueuedImage>> ReceivedRows::ListImages(const std::str
   });
   TF_RETURN_IF_ERROR(done);
   return images;
+}
+
+absl::Status ReceivedRows::Forget(const std::string& series) {
+  return queue_->Change([&](Database& database) -> absl::Status {
+    TF_RETURN_IF_ERROR(database.Prepare("DELETE FROM images WHERE series = ?").Bind(series).Run());
+    TF_RETURN_IF_ERROR(database.Prepare("DELETE FROM series WHERE key = ?").Bind(series).Run());
+    return database.Execute("DELETE FROM studies WHERE uid NOT IN (SELECT study_uid FROM series)");
+  });
 }
 
 absl::Status ReceivedRows::ForgetFiles(const std::string& series) {

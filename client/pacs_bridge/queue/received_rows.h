@@ -42,6 +42,8 @@ class ReceivedRows {
   absl::StatusOr<std::vector<QueuedImage>> ListImages(const std::string& series);
   // Takes the images' files out of the queue before they are deleted; the images stay known.
   absl::Status ForgetFiles(const std::string& series);
+  // All that is known of a series, and of its study where that has no other.
+  absl::Status Forget(const std::string& series);
 
  private:
   absl::StatusOr<std::vector<QueuedSeries>> Select(const char* sql, const std::string& value);

@@ -11,6 +11,7 @@
 #include <iterator>
 #include <system_error>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 
@@ -48,9 +49,11 @@ std::string DetailOf(const std::string& text) {
   return line;
 }
 
-// The PACS may come back, there may be room again, or the bridge is ending.
+// The PACS may come back, there may be room again, or the bridge is ending. A peer that dies in a
+// TLS handshake looks like one with a wrong certificate, and that may be renewed, too.
 bool MayCome(const absl::Status& status) {
   return IsTransient(status) || absl::IsDeadlineExceeded(status) || absl::IsCancelled(status) ||
+         absl::IsUnauthenticated(status) || absl::IsPermissionDenied(status) ||
          HasReason(status, ErrorReason::kDiskFull);
 }
 
@@ -198,10 +201,26 @@ absl::StatusOr<ExportMaterial> ExportWork::Gather(const QueuedExport& queued) {
   return material;
 }
 
-absl::Status ExportWork::EnsurePictures(const ExportMaterial& material) {
+absl::StatusOr<std::vector<double>> ExportWork::MakeShown(const QueuedExport& queued,
+                                                          const ExportMaterial& material) {
+  {
+    MutexLock lock(mutex_);
+    while (making_.contains(queued.name)) made_.Wait(mutex_);
+    making_.insert(queued.name);
+  }
+  const absl::Cleanup done = [this, &queued] {
+    MutexLock lock(mutex_);
+    making_.erase(queued.name);
+    made_.NotifyAll();
+  };
+  // The band first: who sees the pictures may confirm at once, and then nothing is left to wait
+  // for.
+  absl::StatusOr<std::vector<double>> band = BandOf(queued, material);
   std::error_code failed;
-  if (fs::exists(material.pictures, failed)) return absl::OkStatus();
-  return writer_->Draw(material, material.pictures);
+  if (!fs::exists(material.pictures, failed)) {
+    TF_RETURN_IF_ERROR(writer_->Draw(material, material.pictures));
+  }
+  return band;
 }
 
 absl::Status ExportWork::Draw(const QueuedExport& queued) {
@@ -211,14 +230,7 @@ absl::Status ExportWork::Draw(const QueuedExport& queued) {
     return absl::OkStatus();
   }
   TF_ASSIGN_OR_RETURN(const ExportMaterial material, Gather(queued));
-  absl::Status status;
-  {
-    MutexLock lock(drawing_);
-    // The band first: who sees the pictures may confirm at once, and then nothing is left to wait
-    // for.
-    status = BandOf(queued, material).status();
-    status.Update(EnsurePictures(material));
-  }
+  const absl::Status status = MakeShown(queued, material).status();
   // It may have failed meanwhile, and whoever told so has removed the folder.
   const absl::StatusOr<QueuedExport> now = rows_.Get(queued.name);
   if (now.ok() && now->done_s != 0) {
@@ -264,11 +276,7 @@ absl::StatusOr<std::vector<double>> ExportWork::BandOf(const QueuedExport& queue
 
 absl::Status ExportWork::Write(QueuedExport* queued) {
   TF_ASSIGN_OR_RETURN(ExportMaterial material, Gather(*queued));
-  {
-    MutexLock lock(drawing_);
-    TF_RETURN_IF_ERROR(EnsurePictures(material));
-    TF_ASSIGN_OR_RETURN(material.band_mm, BandOf(*queued, material));
-  }
+  TF_ASSIGN_OR_RETURN(material.band_mm, MakeShown(*queued, material));
   TF_ASSIGN_OR_RETURN(const std::vector<std::string> keys, writer_->KeysOf(material));
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedObject> objects,
                       rows_.EnsureObjects(queued->name, keys, NewDicomUid));

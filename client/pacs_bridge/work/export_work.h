@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -59,7 +60,7 @@ class ExportWork {
   // Draws the pictures for one that is asked for, for who is to confirm it, and asks for its band;
   // nothing happens where they are there. Step waits for it where it needs them. Errors: those of
   // the server and of drawing; they keep nobody from confirming.
-  absl::Status Draw(const QueuedExport& queued) ABSL_LOCKS_EXCLUDED(drawing_);
+  absl::Status Draw(const QueuedExport& queued) ABSL_LOCKS_EXCLUDED(mutex_);
 
   // The next step of an export, whose new state is written to the queue and into it. An error that
   // is no transient one makes it kFailed. Also tells the server of one that waits or has failed.
@@ -71,13 +72,15 @@ class ExportWork {
   absl::Status RunStep(QueuedExport* queued);
   absl::Status Fetch(QueuedExport* queued);
   absl::StatusOr<ExportMaterial> Gather(const QueuedExport& queued);
-  absl::Status EnsurePictures(const ExportMaterial& material)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(drawing_);
+  // Draws and asks what is not there yet, unless another thread does it for this export: then it
+  // waits. Returns the band.
+  absl::StatusOr<std::vector<double>> MakeShown(const QueuedExport& queued,
+                                                const ExportMaterial& material)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   // Kept beside the pictures: a restart writes the same. Empty, with a warning, too, where the
   // server cannot tell one.
   absl::StatusOr<std::vector<double>> BandOf(const QueuedExport& queued,
-                                             const ExportMaterial& material)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(drawing_);
+                                             const ExportMaterial& material);
   absl::StatusOr<std::vector<double>> AskBand(const QueuedExport& queued,
                                               const ExportMaterial& material);
   absl::Status Write(QueuedExport* queued);
@@ -94,7 +97,9 @@ class ExportWork {
   ObjectWriter* const writer_;
   const ExportWorkOptions options_;
 
-  Mutex drawing_;  // held while pictures or a band are made
+  Mutex mutex_;
+  ConditionVariable made_;
+  std::set<std::string> making_ ABSL_GUARDED_BY(mutex_);  // exports for which MakeShown works
 };
 
 }  // namespace tissueform

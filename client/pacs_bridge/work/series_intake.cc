@@ -172,7 +172,12 @@ absl::StatusOr<std::vector<std::string>> SeriesIntake::Settle() {
         changed.push_back(series.key);
       }
     }
-    if (state == SeriesState::kReceiving) busy.insert(series.study_uid);
+    if (state == SeriesState::kReceiving) {
+      busy.insert(series.study_uid);
+    } else {
+      MutexLock lock(mutex_);
+      progress_.erase(series.uid);  // of an image that came again
+    }
     if (state == SeriesState::kComplete) studies.insert(series.study_uid);
   }
   if (options_.rules.empty()) return changed;
@@ -269,7 +274,7 @@ absl::Status SeriesIntake::Write(QueuedSeries series, SeriesState state,
   series.state = state;
   series.reason = reason;
   const bool done = state == SeriesState::kPassedOver || state == SeriesState::kFailed ||
-                    state == SeriesState::kIncomplete;
+                    state == SeriesState::kIncomplete || state == SeriesState::kComplete;
   series.done_s = done ? std::time(nullptr) : 0;
   if (state != SeriesState::kReceiving) {
     MutexLock lock(mutex_);

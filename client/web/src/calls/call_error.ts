@@ -4,7 +4,7 @@
 import { fromBinary, type Message } from "@bufbuild/protobuf";
 import type { GenMessage } from "@bufbuild/protobuf/codegenv2";
 import { Code, ConnectError } from "@connectrpc/connect";
-import { ErrorInfoSchema } from "../generated/google/rpc/error_details_pb";
+import { type ErrorInfo, ErrorInfoSchema } from "../generated/google/rpc/error_details_pb";
 import { StatusSchema } from "../generated/google/rpc/status_pb";
 
 /** Codes of gRPC by which this page decides. */
@@ -12,13 +12,14 @@ export { Code };
 
 /**
  * A call that failed: the code of gRPC, and the server's reason (docs/service-api.md), "" where it gave none. `message` is a
- * sentence for people.
+ * sentence for people. `node`: the server of a cluster that is to be asked instead; "" where it names none.
  */
 export class CallError extends Error {
   constructor(
     readonly code: Code,
     message: string,
     readonly reason = "",
+    readonly node = "",
   ) {
     super(message);
     this.name = "CallError";
@@ -27,7 +28,22 @@ export class CallError extends Error {
   /** Whether the same call may succeed in a moment: nobody answered, or not for now. */
   get isPassing(): boolean {
     // A server that is killed shows as UNAVAILABLE directly, as UNKNOWN or INTERNAL behind proxies.
-    return this.code === Code.Unavailable || this.code === Code.DeadlineExceeded || this.reason === "UPLOAD_UNDER_WAY" || this.isOfTransport;
+    return this.isOfServer || this.node !== "" || this.code === Code.DeadlineExceeded || this.reason === "UPLOAD_UNDER_WAY";
+  }
+
+  /** Whether it says nothing of the call itself, only that this server does not answer it now. */
+  get isOfServer(): boolean {
+    return this.code === Code.Unavailable || this.isOfTransport;
+  }
+
+  /** Whether another server of the cluster is to be asked; this one has done nothing. */
+  get isElsewhere(): boolean {
+    return this.isMoved || this.reason === "WRONG_NODE";
+  }
+
+  /** Whether that may be done at once. */
+  get isMoved(): boolean {
+    return this.node !== "" || this.reason === "SESSION_MOVED";
   }
 
   private get isOfTransport(): boolean {
@@ -37,7 +53,8 @@ export class CallError extends Error {
 
 /** Of an end frame: `details` are the bytes of a google.rpc.Status, or none. */
 export function callErrorOf(code: number, message: string, details: Uint8Array): CallError {
-  return new CallError(code as Code, message === "" ? describe(code) : message, reasonOf(details));
+  const info = infoOf(details);
+  return new CallError(code as Code, message === "" ? describe(code) : message, info?.reason ?? "", info?.metadata.node ?? "");
 }
 
 /** Whatever was thrown, as a CallError. */
@@ -45,7 +62,7 @@ export function toCallError(thrown: unknown): CallError {
   if (thrown instanceof CallError) return thrown;
   const error = ConnectError.from(thrown);
   const info = error.findDetails(ErrorInfoSchema)[0];
-  return new CallError(error.code, error.rawMessage === "" ? describe(error.code) : error.rawMessage, info?.reason ?? "");
+  return new CallError(error.code, error.rawMessage === "" ? describe(error.code) : error.rawMessage, info?.reason ?? "", info?.metadata.node ?? "");
 }
 
 /** As a sentence that begins upper case and ends with a full stop: what a person reads. */
@@ -55,10 +72,10 @@ export function sentenceOf(thrown: unknown): string {
   return /[.!?]$/.test(sentence) ? sentence : `${sentence}.`;
 }
 
-function reasonOf(details: Uint8Array): string {
+function infoOf(details: Uint8Array): ErrorInfo | undefined {
   const status = parse(StatusSchema, details);
   const info = status?.details.find((detail) => detail.typeUrl.endsWith("/google.rpc.ErrorInfo"));
-  return info === undefined ? "" : (parse(ErrorInfoSchema, info.value)?.reason ?? "");
+  return info === undefined ? undefined : parse(ErrorInfoSchema, info.value);
 }
 
 // Details are an addition: an answer is not refused for details that cannot be read.

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { create, fromBinary, toBinary, type DescMethod, type MessageShape } from "@bufbuild/protobuf";
-import { GatewayCallEndSchema, GatewayCallStartSchema } from "../generated/tissueform/v1/gateway_pb";
+import { GatewayCallBeginSchema, GatewayCallEndSchema, GatewayCallStartSchema } from "../generated/tissueform/v1/gateway_pb";
 import { CallError, Code, callErrorOf } from "./call_error";
 import { type Frame, FrameKind, decodeFrame, encodeFrame } from "./frame";
 
@@ -22,6 +22,8 @@ export type SocketFactory = () => Socket;
 
 /** What a call tells its owner. Nothing is told after `onEnd`, and nothing after `cancel`. */
 export interface CallHandlers<Response> {
+  /** What the server says of itself before its first message, by names in lower case; not told where it says nothing. */
+  onBegin?(headers: Record<string, string>): void;
   /** A message of the server, with the frame that it lies in. */
   onMessage(message: Response, frame: Frame): void;
   /** Once: null when the call ended well. */
@@ -59,6 +61,7 @@ export class CallSocket<M extends DescMethod> {
       method: `/${method.parent.typeName}/${method.name}`,
       metadata: options.metadata ?? {},
       deadlineMs: BigInt(Math.ceil(options.deadlineMs ?? 0)),
+      tellsBegin: handlers.onBegin !== undefined,
     });
     this.write(FrameKind.Start, toBinary(GatewayCallStartSchema, start));
   }
@@ -104,6 +107,7 @@ export class CallSocket<M extends DescMethod> {
       if (!(data instanceof ArrayBuffer)) throw new Error("the gateway sent text");
       const frame = decodeFrame(data);
       if (frame.kind === FrameKind.End) this.endWith(frame.payload);
+      else if (frame.kind === FrameKind.Begin) this.handlers.onBegin?.(fromBinary(GatewayCallBeginSchema, frame.payload).headers);
       else if (frame.kind === FrameKind.Message) {
         this.handlers.onMessage(fromBinary(this.method.output, frame.payload) as MessageShape<M["output"]>, frame);
       } else throw new Error(`a frame of kind ${frame.kind} came, which only clients send`);

@@ -16,15 +16,21 @@ import { SessionService } from "../generated/tissueform/v1/session_service_pb";
 import { Bearer } from "./bearer";
 import { CallError, Code, toCallError } from "./call_error";
 import { type CallHandlers, type CallOptions, CallSocket, type Socket, type SocketFactory } from "./call_socket";
+import { withRoutes } from "./repetition";
+import { NODE_HEADER, SESSION_HEADER, SessionRoutes } from "./session_routes";
+
+export { sessionMetadata } from "./session_routes";
 
 const UNARY_DEADLINE_MS = 60_000;
 
 /**
  * The page's own gateway: services for unary calls and bounded downloads over gRPC-Web, `open` for what lives long, over a
- * socket of its own. The token of `bearer` goes with every call. Where the server does not take it and there is another one, a
+ * socket of its own. The token of `bearer` goes with every call, and the name of the server that holds its session. Where the server does not take it and there is another one, a
  * unary call is made again with that, and a call over a socket ends with an error that passes.
  */
 export class Gateway {
+  /** Where the sessions of this page's calls are. */
+  readonly routes = new SessionRoutes();
   readonly access: Client<typeof AccessService>;
   readonly cases: Client<typeof CaseService>;
   readonly meshes: Client<typeof MeshService>;
@@ -45,7 +51,7 @@ export class Gateway {
       baseUrl: base,
       useBinaryFormat: true,
       defaultTimeoutMs: UNARY_DEADLINE_MS,
-      interceptors: [withToken(bearer)],
+      interceptors: [withRoutes(this.routes), withToken(bearer)],
     });
     this.access = createClient(AccessService, transport);
     this.cases = createClient(CaseService, transport);
@@ -60,12 +66,16 @@ export class Gateway {
 
   open<M extends DescMethod>(method: M, handlers: CallHandlers<MessageShape<M["output"]>>, options?: CallOptions): CallSocket<M> {
     const { token } = this.bearer;
+    const session = options?.metadata?.[SESSION_HEADER] ?? "";
+    const route = this.routes.metadata(session);
+    const onBegin = (headers: Record<string, string>) => this.routes.learn(session, headers[NODE_HEADER] ?? "");
     const onEnd = (error: CallError | null) => {
+      if (error !== null) this.routes.failed(session, route[NODE_HEADER] ?? "", error);
       if (error?.code === Code.Unauthenticated) void this.refused(error, token, (told) => handlers.onEnd(told));
       else handlers.onEnd(error);
     };
-    const metadata = { ...this.bearer.headers, ...options?.metadata };
-    return new CallSocket(this.sockets, method, { onMessage: (message, frame) => handlers.onMessage(message, frame), onEnd }, { ...options, metadata });
+    const metadata = { ...this.bearer.headers, ...options?.metadata, ...route };
+    return new CallSocket(this.sockets, method, { onBegin, onMessage: (message, frame) => handlers.onMessage(message, frame), onEnd }, { ...options, metadata });
   }
 
   private async refused(error: CallError, token: string, onEnd: (error: CallError) => void): Promise<void> {
@@ -113,11 +123,6 @@ function withToken(bearer: Bearer): Interceptor {
       return ask();
     }
   };
-}
-
-/** Metadata by which a proxy may send all calls of a session to one server. */
-export function sessionMetadata(session: string): Record<string, string> {
-  return { "x-tissueform-session": session.replace(/^sessions\//, "") };
 }
 
 function webSocket(base: string): Socket {

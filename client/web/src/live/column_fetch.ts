@@ -5,7 +5,7 @@ import { create } from "@bufbuild/protobuf";
 import { CallError, Code, toCallError } from "../calls/call_error";
 import { type Gateway, sessionMetadata } from "../calls/gateway";
 import { type DeformConfiguration, type GetPreparedAnswersRequest, GetPreparedAnswersRequestSchema } from "../generated/tissueform/v1/deform_service_pb";
-import { Backoff } from "./backoff";
+import { Backoff } from "../calls/backoff";
 
 /** More than any head needs; what is larger stays on the server. */
 const MOST_BYTES = 2 ** 26;
@@ -43,9 +43,10 @@ export async function fetchColumns(gateway: Pick<Gateway, "deform">, configurati
       return await download.run(gateway, request, signal);
     } catch (thrown) {
       const error = toCallError(thrown);
-      tries = download.done > before ? 0 : tries + 1;
+      // A session that moves is somewhere else within seconds: that is not the line's fault.
+      tries = download.done > before || error.isElsewhere ? 0 : tries + 1;
       if (signal.aborted || !error.isPassing || tries >= MOST_TRIES) throw error;
-      await wait(backoff.next());
+      await wait(backoff.next(error));
     }
   }
 }

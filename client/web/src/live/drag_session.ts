@@ -16,7 +16,7 @@ import {
   type DeformStarted,
 } from "../generated/tissueform/v1/deform_service_pb";
 import type { HandlePose } from "../generated/tissueform/v1/geometry_pb";
-import { Backoff, type Timer, browserTimer } from "./backoff";
+import { Backoff, type Timer, browserTimer } from "../calls/backoff";
 
 /** A frame as the page shows it. */
 export interface Picture {
@@ -173,7 +173,7 @@ export class DragSession {
       this.listener.onEnd(cause);
       return;
     }
-    const delay = this.backoff.next();
+    const delay = this.backoff.next(cause);
     this.stopTimer = this.timer(() => this.connect(), delay);
     this.listener.onBroken(cause, delay);
   }

@@ -16,7 +16,7 @@ import {
   type WatchResponse,
 } from "../generated/tissueform/v1/deform_service_pb";
 import { PositionEncoding } from "../generated/tissueform/v1/geometry_pb";
-import { Backoff, type Timer, browserTimer } from "./backoff";
+import { Backoff, type Timer, browserTimer } from "../calls/backoff";
 
 /** What a follower is shown. */
 export interface FollowedPicture {
@@ -121,7 +121,7 @@ export class FollowSession {
       this.listener.onEnd(cause);
       return;
     }
-    const delay = this.backoff.next();
+    const delay = this.backoff.next(cause);
     this.stopTimer = this.timer(() => this.connect(), delay);
     this.listener.onBroken(cause, delay);
   }

@@ -7,18 +7,14 @@ import type { CaseFile } from "../case/case_file";
 import type { DeformConfiguration, DeformNotice } from "../generated/tissueform/v1/deform_service_pb";
 import type { DeformationModel, Session } from "../generated/tissueform/v1/session_pb";
 import type { Pose } from "../geometry/pose";
-import { Backoff } from "./backoff";
+import { Backoff } from "../calls/backoff";
 import { DragSession, type Picture } from "./drag_session";
+import { type Connection, Interruption } from "./interruption";
 import { fromMessages, toMessages } from "./pose_messages";
 import { claimSession, forgetAbandoned, forgetSession, newSession } from "./session_memory";
 import { type DragChoice, createSession, deleteSession, dragConfiguration, openSession } from "./session_opening";
 
-/** How the page and the server stand to each other, for who draws it in words. */
-export type Connection =
-  | { kind: "preparing"; text: string; share: number | null }
-  | { kind: "live" }
-  | { kind: "broken"; text: string }
-  | { kind: "failed"; text: string };
+export type { Connection } from "./interruption";
 
 export interface LiveListener {
   onConnection(connection: Connection): void;
@@ -49,6 +45,7 @@ export class LiveSession {
   /** Which attempt is the newest: older ones give up when they see another. */
   private attempt = 0;
   private readonly names: string[];
+  private readonly interruption: Interruption;
 
   constructor(
     private readonly gateway: Gateway,
@@ -57,6 +54,7 @@ export class LiveSession {
     private readonly listener: LiveListener,
     private choice: DragChoice,
   ) {
+    this.interruption = new Interruption(gateway.routes);
     this.names = file.manifest.handles.map((handle) => handle.name);
   }
 
@@ -122,7 +120,7 @@ export class LiveSession {
       } catch (thrown) {
         if (isOver()) return null;
         const error = toCallError(thrown);
-        if (error.isPassing) await this.wait(error, backoff.next());
+        if (error.isPassing) await this.wait(error, backoff.next(error));
         else if (++mended > MOST_MENDED) return this.fail(error);
         else if (isThere && error.code === Code.NotFound) [isThere, wasMissing] = [false, true];
         else if (error.reason === "NO_PREPARED_ANSWERS" && this.choice.isPrepared) this.choice = { ...this.choice, isPrepared: false, ranges: null };
@@ -149,7 +147,8 @@ export class LiveSession {
   }
 
   private async wait(error: CallError, delayMs: number): Promise<void> {
-    this.listener.onConnection({ kind: "broken", text: sentenceOf(error) });
+    // A hop to the server that was named is not worth a word.
+    if (delayMs > 0) this.listener.onConnection(this.interruption.connection(error));
     await new Promise((resolve) => setTimeout(resolve, delayMs));
   }
 
@@ -160,12 +159,13 @@ export class LiveSession {
     const configuration = dragConfiguration(this.session, this.file, this.choice);
     this.drag = new DragSession(this.gateway, configuration, {
       onStarted: () => {
+        this.interruption.end();
         this.listener.onConnection({ kind: "live" });
         this.listener.onStarted(configuration);
       },
       onPicture: (picture, used) => this.listener.onPicture(picture, used),
       onNotice: (notice) => this.tell(notice),
-      onBroken: (error) => this.listener.onConnection({ kind: "broken", text: sentenceOf(error) }),
+      onBroken: (error) => this.listener.onConnection(this.interruption.connection(error)),
       onEnd: (error) => this.dragEnded(error),
     });
     this.drag.sendPoses(toMessages(this.names, this.poses), isUnkept);
@@ -188,7 +188,8 @@ export class LiveSession {
 
   private tell({ notice }: DeformNotice): void {
     if (notice.case === "followers") this.listener.onFollowers(notice.value.count);
-    if (notice.case === "draining") this.listener.onNotice("The server is about to end. Your poses are kept; the page connects again by itself.");
+    // In a cluster another server goes on with it, of which the connection's state tells.
+    if (notice.case === "draining" && !this.gateway.routes.isCluster) this.listener.onNotice("The server is about to end. Your poses are kept; the page connects again by itself.");
     if (notice.case === "evicted") this.listener.onNotice("The session had left the server's memory and is being prepared again.");
     if (notice.case === "restored") this.listener.onNotice("The session is back in the server's memory.");
     if (notice.case === "updated") {

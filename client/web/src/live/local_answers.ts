@@ -58,6 +58,8 @@ export class LocalAnswers {
       if (run.signal.aborted) return;
       const error = toCallError(thrown);
       if (error.code === Code.Canceled) return;
+      // What it has stays good while the server is away: the next start of the drag asks again.
+      if (error.isPassing && this.host !== null) return this.tell("covered", 0, false);
       this.drop();
       this.listener.onState({ kind: "failed", text: sentenceOf(thrown) });
     }

@@ -3,7 +3,7 @@
 
 import { create } from "@bufbuild/protobuf";
 import { CallError } from "../calls/call_error";
-import type { Gateway } from "../calls/gateway";
+import { type Gateway, sessionMetadata } from "../calls/gateway";
 import { type CaseSource } from "../case/case_file";
 import type { Range } from "../case/container";
 import type { Manifest } from "../case/manifest";
@@ -41,7 +41,10 @@ export async function uploadCase(gateway: Gateway, source: CaseSource, sha256: s
   return (answer as UploadCaseResponse | null)?.case ?? create(CaseSchema, { name: `cases/${sha256}`, title });
 }
 
-/** Sends the mesh of a case, from where an earlier upload broke off. Rejects with a CallError. */
+/**
+ * Sends the mesh of a case, from where an earlier upload broke off. What has not arrived in full is on one server: all calls of
+ * a mesh go to the same one, by its name. Rejects with a CallError.
+ */
 export async function uploadMesh(gateway: Gateway, source: CaseSource, payload: Range, mesh: Manifest["mesh"], onProgress: Progress): Promise<void> {
   const committed = await committedBytes(gateway, mesh.name);
   let answer: UploadMeshResponse | null = null;
@@ -49,7 +52,7 @@ export async function uploadMesh(gateway: Gateway, source: CaseSource, payload: 
     const call = gateway.open(MeshService.method.uploadMesh, {
       onMessage: (message) => (answer = message),
       onEnd: (error) => (error === null ? resolve() : reject(error)),
-    });
+    }, { metadata: sessionMetadata(mesh.name) });
     const header = {
       $typeName: "tissueform.v1.MeshHeader" as const,
       vertexCount: BigInt(mesh.vertexCount),
@@ -73,7 +76,7 @@ export async function uploadMesh(gateway: Gateway, source: CaseSource, payload: 
 
 async function committedBytes(gateway: Gateway, name: string): Promise<number> {
   try {
-    return Number((await gateway.meshes.queryUpload({ name })).committedBytes);
+    return Number((await gateway.meshes.queryUpload({ name }, { headers: sessionMetadata(name) })).committedBytes);
   } catch {
     return 0;
   }

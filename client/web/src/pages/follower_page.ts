@@ -8,6 +8,7 @@ import { WatchOrigin } from "../generated/tissueform/v1/deform_service_pb";
 import type { Pose } from "../geometry/pose";
 import { pointAt, rigidPose } from "../geometry/rigid_fit";
 import { FollowSession, type FollowedPicture } from "../live/follow_session";
+import { type Connection, Interruption } from "../live/interruption";
 import { fromMessages } from "../live/pose_messages";
 import { el } from "../panels/dom";
 import { lookByKey } from "../panels/keyboard";
@@ -25,7 +26,7 @@ export function followerPage(gateway: Gateway, file: CaseFile, session: string, 
   if (link.endsAt !== null) status.element.append(el("span", { class: "quiet", text: `Link works until ${timeText(link.endsAt)}` }));
   status.connection({ kind: "preparing", text: "Joining", share: null });
   const follower = new Follower(gateway, file, session, view, {
-    onLive: (isLive, text) => status.connection(isLive ? { kind: "live" } : { kind: "broken", text }),
+    onConnection: (connection) => status.connection(connection),
     onEnd: (text) => status.connection({ kind: "failed", text }),
     onNotice: notice.show,
   });
@@ -45,7 +46,7 @@ export function endOfWatch(error: CallError): string {
 export const LINK_HAS_ENDED = "The link has expired, or was ended. Ask whoever sent it for another one.";
 
 interface FollowerListener {
-  onLive(isLive: boolean, text: string): void;
+  onConnection(connection: Connection): void;
   onEnd(text: string): void;
   onNotice(text: string): void;
 }
@@ -69,14 +70,18 @@ export class Follower {
     this.rest = followedRest(file);
     this.displacements = new Float32Array(this.rest.length);
     this.places = new Map(Array.from(file.followed, (vertex, place) => [vertex, place]));
+    const interruption = new Interruption(gateway.routes);
     new FollowSession(gateway, session, {
-      onStarted: () => listener.onLive(true, ""),
+      onStarted: () => {
+        interruption.end();
+        listener.onConnection({ kind: "live" });
+      },
       onPicture: (picture, used) => this.show(picture, used),
       onNotice: ({ notice }) => {
-        if (notice.case === "draining") listener.onNotice("The server is about to end; the page connects again by itself.");
+        if (notice.case === "draining" && !gateway.routes.isCluster) listener.onNotice("The server is about to end; the page connects again by itself.");
         if (notice.case === "evicted") listener.onNotice("The session is being prepared again.");
       },
-      onBroken: (error) => listener.onLive(false, sentenceOf(error)),
+      onBroken: (error) => listener.onConnection(interruption.connection(error)),
       onEnd: (error) => listener.onEnd(endOfWatch(error)),
     });
   }

@@ -82,6 +82,8 @@ function describe(connection: Connection): string {
       return "Live";
     case "preparing":
       return connection.share === null ? `${connection.text} …` : `${connection.text}, ${Math.round(100 * connection.share)} %`;
+    case "moving":
+      return "Moving to another server…";
     case "broken":
       return `Connecting again. ${connection.text}`;
     case "failed":

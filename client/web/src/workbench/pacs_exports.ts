@@ -7,7 +7,7 @@ import type { CallSocket } from "../calls/call_socket";
 import type { Gateway } from "../calls/gateway";
 import { type Export, ExportService, ExportState, type Measure, WatchExportsRequestSchema } from "../generated/tissueform/v1/export_service_pb";
 import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
-import { Backoff, type Timer, browserTimer } from "../live/backoff";
+import { Backoff, type Timer, browserTimer } from "../calls/backoff";
 import { randomId } from "../live/session_opening";
 import { Signal } from "./signal";
 

@@ -1,12 +1,15 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { create } from "@bufbuild/protobuf";
+import { create, toBinary } from "@bufbuild/protobuf";
+import { anyPack } from "@bufbuild/protobuf/wkt";
 import { describe, expect, test } from "vitest";
 import { Bearer } from "../../src/calls/bearer";
 import { CallError, Code } from "../../src/calls/call_error";
 import { CallSocket } from "../../src/calls/call_socket";
 import type { Gateway } from "../../src/calls/gateway";
+import { ErrorInfoSchema } from "../../src/generated/google/rpc/error_details_pb";
+import { StatusSchema } from "../../src/generated/google/rpc/status_pb";
 import { DeformConfigurationSchema } from "../../src/generated/tissueform/v1/deform_service_pb";
 import { DragSession, type Picture } from "../../src/live/drag_session";
 import { toMessages } from "../../src/live/pose_messages";
@@ -51,6 +54,11 @@ function drag() {
   );
   const last = () => sockets[sockets.length - 1];
   return { session, sockets, timers, told, pictures, errors, last, bearer, sleep: (ms: number) => (now += ms) };
+}
+
+function sessionMoved(): Uint8Array {
+  const info = anyPack(ErrorInfoSchema, create(ErrorInfoSchema, { reason: "SESSION_MOVED" }));
+  return toBinary(StatusSchema, create(StatusSchema, { code: Code.Unavailable, details: [info] }));
 }
 
 const STARTED = { message: { case: "started" as const, value: {} } };
@@ -133,6 +141,20 @@ describe("a drag", () => {
     last().answer(STARTED);
     last().onclose?.({ code: 1006, reason: "" });
     expect(timers[8].delayMs).toBeLessThanOrEqual(250);
+  });
+
+  test("whose session moves goes on at once, with the newest poses and what was not kept", () => {
+    const { session, sockets, timers, last, told } = drag();
+    last().answer(STARTED);
+    session.sendPoses(POSES, true);
+    last().end(Code.Unavailable, "elsewhere", sessionMoved());
+    expect(timers[0].delayMs).toBe(0);
+    session.sendPoses(POSES, false);
+    timers[0].action();
+    expect(sockets).toHaveLength(2);
+    last().answer(STARTED);
+    expect(last().deformRequests()[1].message).toMatchObject({ case: "pose", value: { sequence: 2n, commit: true } });
+    expect(told).toEqual(["started", "broken", "started"]);
   });
 
   test("repeats a commit until the server says that it keeps the poses", () => {

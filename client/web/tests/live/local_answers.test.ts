@@ -3,7 +3,7 @@
 
 import { create } from "@bufbuild/protobuf";
 import { createHash } from "node:crypto";
-import { expect, test } from "vitest";
+import { expect, test, vi } from "vitest";
 import { CallError, Code } from "../../src/calls/call_error";
 import type { Gateway } from "../../src/calls/gateway";
 import { makeHost } from "../../src/evaluation/evaluation_host";
@@ -20,8 +20,8 @@ const sha256Of = (bytes: Uint8Array) => createHash("sha256").update(bytes).diges
 function server(bytes: () => Uint8Array, faults: (offset: number) => void = () => {}) {
   const offsets: number[] = [];
   async function* getPreparedAnswers(request: GetPreparedAnswersRequest, options: { signal: AbortSignal }) {
-    const all = bytes();
     offsets.push(Number(request.readOffset));
+    const all = bytes();
     yield { message: { case: "header" as const, value: { totalBytes: BigInt(all.length), sha256: sha256Of(all) } } };
     for (let at = Number(request.readOffset); at < all.length; at += CHUNK) {
       faults(at);
@@ -128,6 +128,29 @@ test("the same columns stay through a break of the line, others of an updated se
   answers.drop();
   answers.ask(CASES[1].poses);
   expect(firsts).toHaveLength(1);
+});
+
+test("while the server is away the page goes on by what it has", async () => {
+  vi.useFakeTimers({ toFake: ["setTimeout"] });
+  try {
+    let isAway = false;
+    const { answers, firsts, offsets, last } = local(() => {
+      if (isAway) throw new CallError(Code.Unavailable, "the server is gone");
+      return goldenBytes("linear_elastic");
+    });
+    await answers.follow(configuration());
+    isAway = true;
+    let isOver = false;
+    const following = answers.follow(configuration()).then(() => (isOver = true));
+    while (!isOver) await vi.advanceTimersByTimeAsync(1000);
+    await following;
+    expect(offsets.length).toBeGreaterThan(2);
+    answers.ask(CASES[1].poses);
+    expect(firsts).toHaveLength(1);
+    expect(last()).toMatchObject({ kind: "ready", coverage: "covered" });
+  } finally {
+    vi.useRealTimers();
+  }
 });
 
 test("a model without prepared answers, and another session, leave the server to answer", async () => {

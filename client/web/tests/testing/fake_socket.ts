@@ -4,7 +4,7 @@
 import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
 import type { Socket } from "../../src/calls/call_socket";
 import { FrameKind, decodeFrame, encodeFrame } from "../../src/calls/frame";
-import { GatewayCallEndSchema, GatewayCallStartSchema } from "../../src/generated/tissueform/v1/gateway_pb";
+import { GatewayCallBeginSchema, GatewayCallEndSchema, GatewayCallStartSchema } from "../../src/generated/tissueform/v1/gateway_pb";
 import { type DeformRequest, DeformRequestSchema, DeformResponseSchema } from "../../src/generated/tissueform/v1/deform_service_pb";
 import type { MessageInitShape } from "@bufbuild/protobuf";
 
@@ -43,6 +43,11 @@ export class FakeSocket implements Socket {
   answer(response: MessageInitShape<typeof DeformResponseSchema>): void {
     const payload = toBinary(DeformResponseSchema, create(DeformResponseSchema, response));
     this.onmessage?.({ data: encodeFrame(FrameKind.Message, payload).buffer });
+  }
+
+  begin(headers: Record<string, string>): void {
+    const payload = toBinary(GatewayCallBeginSchema, create(GatewayCallBeginSchema, { headers }));
+    this.onmessage?.({ data: encodeFrame(FrameKind.Begin, payload).buffer });
   }
 
   end(code: number, message = "", statusDetails: Uint8Array = new Uint8Array()): void {

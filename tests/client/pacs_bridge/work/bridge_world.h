@@ -128,7 +128,7 @@ class FolderPacs final : public PacsClient {
 };
 
 // Writes each object as the header of the source image under its own UID.
-class HeaderWriter final : public ObjectWriter {
+class HeaderWriter : public ObjectWriter {
  public:
   absl::StatusOr<std::vector<std::string>> KeysOf(const ExportMaterial&) override {
     return std::vector<std::string>{"stl:skin", "stl:bone", "capture", "report", "series:models"};

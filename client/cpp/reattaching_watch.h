@@ -1,0 +1,85 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "client/cpp/reattachment.h"
+#include "client/cpp/tissueform_client.h"
+#include "core/base/mutex.h"
+
+namespace tissueform {
+
+// A watch that outlives its connection and the server that held its session: where it breaks
+// another one of the same session begins. Frames are then numbered anew; what was received last
+// stays good until the next comes.
+//
+// One thread receives and acknowledges; Cancel may be called from others. It comes back within
+// Receive. The client must outlive it.
+class ReattachingWatch {
+ public:
+  struct Options {
+    WatchStream::Options watch = {};
+    Reattachment::Options reattachment = {};  // functions are called on the receiving thread
+  };
+
+  // Errors: those of TissueformClient::Watch.
+  static absl::StatusOr<std::unique_ptr<ReattachingWatch>> Open(TissueformClient* client,
+                                                                const std::string& session,
+                                                                Options options);
+
+  // As of WatchStream.
+  const v1::WatchForm& form() const { return form_; }
+
+  // Blocks until the next frame. Empty when the watch has ended; Finish says how.
+  std::optional<v1::WatchFrame> Receive();
+
+  // The frame that was received last, and all before it, were used. Where that cannot be said the
+  // watch begins anew: the server would soon send nothing more.
+  void Ack(const v1::WatchFrame& frame);
+
+  // Ends the watch at once. Any thread, any time.
+  void Cancel();
+
+  // How the watch ended. Call it once, when Receive has returned nothing.
+  absl::Status Finish() const { return end_; }
+
+  int reattachments() const { return reattachment_.count(); }
+  // The server of a cluster that answers now, or did last.
+  std::string node() const { return Current()->node(); }
+
+ private:
+  ReattachingWatch(TissueformClient* client, std::string session, Options options)
+      : client_(client),
+        session_(std::move(session)),
+        options_(std::move(options)),
+        reattachment_(options_.reattachment) {}
+
+  void Adopt(std::unique_ptr<WatchStream> watch) ABSL_LOCKS_EXCLUDED(mutex_);
+  std::shared_ptr<WatchStream> Current() const ABSL_LOCKS_EXCLUDED(mutex_);
+
+  // Constant.
+  TissueformClient* const client_;
+  const std::string session_;
+  const Options options_;
+
+  // Self-synchronised.
+  Reattachment reattachment_;
+
+  // The receiving thread's.
+  v1::WatchForm form_;
+  absl::Status end_;
+
+  mutable Mutex mutex_;
+  // Replaced by the receiving thread alone.
+  std::shared_ptr<WatchStream> watch_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace tissueform

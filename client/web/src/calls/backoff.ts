@@ -1,0 +1,46 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import type { CallError } from "./call_error";
+
+/** Runs `action` after a while; the result stops it. Tests have their own. */
+export type Timer = (action: () => void, delayMs: number) => () => void;
+
+export const browserTimer: Timer = (action, delayMs) => {
+  const id = setTimeout(action, delayMs);
+  return () => clearTimeout(id);
+};
+
+const FIRST_MS = 250;
+const LONGEST_MS = 5000;
+/** While servers of a cluster say that the session is moving: it is free within seconds, and the hand waits. */
+const LONGEST_MOVING_MS = 800;
+const MOST_HOPS = 4;
+
+/**
+ * How long to wait before each further try: twice as long each time, up to 5 s, a fifth at random so that pages spread. Not at
+ * all where an error says which server to ask instead, up to four times on end, and once where it says that there is another.
+ */
+export class Backoff {
+  private tries = 0;
+  private hops = 0;
+
+  constructor(private readonly random: () => number = Math.random) {}
+
+  next(error?: CallError): number {
+    if (error?.isMoved && this.hops < (error.node === "" ? 1 : MOST_HOPS)) {
+      this.hops += 1;
+      return 0;
+    }
+    this.hops = 0;
+    const delay = Math.min(error?.isElsewhere ? LONGEST_MOVING_MS : LONGEST_MS, FIRST_MS * 2 ** this.tries);
+    // What follows on a move does not wait long because the move took long.
+    if (!error?.isElsewhere || delay < LONGEST_MOVING_MS) this.tries += 1;
+    return delay * (1 - 0.2 * this.random());
+  }
+
+  reset(): void {
+    this.tries = 0;
+    this.hops = 0;
+  }
+}

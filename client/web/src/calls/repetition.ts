@@ -1,0 +1,74 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import type { Interceptor, StreamResponse } from "@connectrpc/connect";
+import { Backoff } from "./backoff";
+import { type CallError, toCallError } from "./call_error";
+import { NODE_HEADER, SESSION_HEADER, type SessionRoutes } from "./session_routes";
+
+/** How long a unary call is tried again: longer than another server needs to take a session over. */
+const PATIENCE_MS = 15_000;
+/** Methods that do no more the second time than the first: they read, or carry an id of their request. */
+const REPEATABLE = /^(Get|List|Query)[A-Z]|^(WhoAmI|DeformOnce|Fit|CreatePrediction)$/;
+
+export interface RepetitionClock {
+  now(): number;
+  wait(ms: number): Promise<void>;
+}
+
+const BROWSER_CLOCK: RepetitionClock = {
+  now: () => performance.now(),
+  wait: (ms) => new Promise((resolve) => setTimeout(resolve, ms)),
+};
+
+/**
+ * Sends calls over gRPC-Web to the server that holds their session, learns from what comes back where that is, and makes unary
+ * calls again: at once where the answer says who holds it, after a while where a server is gone. What was refused before
+ * anything was done is repeated whatever it is, all else only where nothing is done twice.
+ */
+export function withRoutes(routes: SessionRoutes, clock: RepetitionClock = BROWSER_CLOCK): Interceptor {
+  return (next) => async (request) => {
+    const session = request.header.get(SESSION_HEADER) ?? "";
+    const ask = async () => {
+      const node = routes.nodeOf(session);
+      if (node === "") request.header.delete(NODE_HEADER);
+      else request.header.set(NODE_HEADER, node);
+      const onError = (thrown: unknown) => routes.failed(session, node, toCallError(thrown));
+      try {
+        const response = await next(request);
+        routes.learn(session, response.header.get(NODE_HEADER) ?? response.trailer.get(NODE_HEADER) ?? "");
+        return response.stream ? { ...response, message: watched(response.message, onError) } : response;
+      } catch (thrown) {
+        onError(thrown);
+        throw thrown;
+      }
+    };
+    if (request.stream) return ask();
+    const backoff = new Backoff();
+    const end = clock.now() + PATIENCE_MS;
+    for (;;) {
+      try {
+        return await ask();
+      } catch (thrown) {
+        const error = toCallError(thrown);
+        const delay = backoff.next(error);
+        if (request.signal.aborted || !mayRepeat(request.method.name, error) || clock.now() + delay > end) throw thrown;
+        await clock.wait(delay);
+      }
+    }
+  };
+}
+
+function mayRepeat(method: string, error: CallError): boolean {
+  return error.isElsewhere || (error.isOfServer && REPEATABLE.test(method));
+}
+
+// A stream of answers ends within what the caller reads.
+async function* watched(messages: StreamResponse["message"], onError: (thrown: unknown) => void) {
+  try {
+    yield* messages;
+  } catch (thrown) {
+    onError(thrown);
+    throw thrown;
+  }
+}

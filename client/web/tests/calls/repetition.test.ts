@@ -1,0 +1,182 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { create, toBinary } from "@bufbuild/protobuf";
+import { anyPack } from "@bufbuild/protobuf/wkt";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { Bearer } from "../../src/calls/bearer";
+import { CallError, Code } from "../../src/calls/call_error";
+import { Gateway, sessionMetadata } from "../../src/calls/gateway";
+import { ErrorInfoSchema } from "../../src/generated/google/rpc/error_details_pb";
+import { StatusSchema } from "../../src/generated/google/rpc/status_pb";
+import { DeformService, GetPreparedAnswersResponseSchema } from "../../src/generated/tissueform/v1/deform_service_pb";
+import { SessionSchema } from "../../src/generated/tissueform/v1/session_pb";
+import { FakeSocket } from "../testing/fake_socket";
+
+beforeEach(() => vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout", "performance"] }));
+afterEach(() => {
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
+});
+
+const TYPE = { "content-type": "application/grpc-web+proto" };
+
+function details(code: Code, reason: string, node: string): string {
+  const info = create(ErrorInfoSchema, { reason, domain: "tissueform", metadata: node === "" ? {} : { node } });
+  const status = toBinary(StatusSchema, create(StatusSchema, { code, details: [anyPack(ErrorInfoSchema, info)] }));
+  return Buffer.from(status).toString("base64");
+}
+
+/** What a server answers with: an error. */
+function failure(code: Code, reason = "", node = ""): () => Response {
+  const fields = { ...TYPE, "grpc-status": String(code), "grpc-message": "no", ...(reason === "" ? {} : { "grpc-status-details-bin": details(code, reason, node) }) };
+  return () => new Response(null, { status: 200, headers: fields });
+}
+
+function framed(flag: number, payload: Uint8Array): Uint8Array {
+  const bytes = new Uint8Array(5 + payload.length);
+  bytes[0] = flag;
+  new DataView(bytes.buffer).setUint32(1, payload.length);
+  bytes.set(payload, 5);
+  return bytes;
+}
+
+/** A message, then the end. `node`: who says so. */
+function success(node: string, message: Uint8Array = toBinary(SessionSchema, create(SessionSchema)), trailers = "grpc-status: 0\r\n"): () => Response {
+  const body = new Blob([framed(0, message), framed(0x80, new TextEncoder().encode(trailers))] as BlobPart[]);
+  return () => new Response(body, { status: 200, headers: { ...TYPE, ...(node === "" ? {} : { "x-tissueform-node": node }) } });
+}
+
+/** A gateway whose servers answer in this order; the last answer stays. */
+function gateway(...answers: (() => Response)[]) {
+  const asked: { node: string | null; atMs: number }[] = [];
+  const begin = performance.now();
+  vi.stubGlobal("fetch", (_: string, { headers }: { headers: Headers }) => {
+    asked.push({ node: headers.get("x-tissueform-node"), atMs: performance.now() - begin });
+    return Promise.resolve((answers.length > 1 ? answers.shift() : answers[0])?.());
+  });
+  const sockets: FakeSocket[] = [];
+  const calls = new Gateway("http://127.0.0.1", new Bearer(), () => {
+    const socket = new FakeSocket();
+    sockets.push(socket);
+    return socket;
+  });
+  const options = { headers: sessionMetadata("sessions/s"), timeoutMs: 300_000 };
+  const run = async <T>(call: Promise<T>): Promise<T> => {
+    let isDone = false;
+    const settled = call.finally(() => (isDone = true));
+    settled.catch(() => {});
+    for (let i = 0; i < 400 && !isDone; ++i) {
+      await new Promise((done) => setImmediate(done));
+      await vi.advanceTimersByTimeAsync(100);
+    }
+    return settled;
+  };
+  const read = () => run(calls.sessions.getSession({ name: "sessions/s" }, options));
+  const remove = () => run(calls.sessions.deleteSession({ name: "sessions/s" }, options));
+  const keep = () => run(calls.predictions.createPrediction({ session: "sessions/s", requestId: "r" }, options));
+  const codeOf = (call: Promise<unknown>) => call.then(() => 0, (error: { code: Code }) => error.code);
+  return { asked, calls, sockets, run, read, remove, keep, codeOf, nodes: () => asked.map(({ node }) => node) };
+}
+
+test("a session's calls name the server that has answered first", async () => {
+  const { read, nodes } = gateway(success("a"));
+  await read();
+  await read();
+  expect(nodes()).toEqual([null, "a"]);
+});
+
+test("who says where the session is, is believed at once, whatever the call", async () => {
+  const { read, remove, asked, nodes } = gateway(failure(14, "SESSION_MOVED", "b"), success("b"), failure(14, "SESSION_MOVED", "c"), success("c"));
+  await read();
+  await remove();
+  expect(nodes()).toEqual([null, "b", "b", "c"]);
+  expect(asked[1].atMs - asked[0].atMs).toBeLessThan(100);
+});
+
+test("servers that send a call round in a circle are left alone for a while", async () => {
+  const { read, asked, codeOf } = gateway(failure(14, "SESSION_MOVED", "a"));
+  expect(await codeOf(read())).toBe(Code.Unavailable);
+  // Five at a time, and 15 s.
+  expect(asked.length).toBeLessThan(150);
+  expect(asked[asked.length - 1].atMs).toBeLessThan(15_000);
+});
+
+test("a wrong node is dropped, and the call goes wherever it goes", async () => {
+  const { calls, read, nodes } = gateway(failure(14, "WRONG_NODE"), success("b"));
+  calls.routes.learn("s", "a");
+  await read();
+  await read();
+  expect(nodes()).toEqual(["a", null, "b"]);
+});
+
+test("what only reads, or has an id, is tried again where the server dies", async () => {
+  const { read, keep, nodes } = gateway(failure(14), failure(2), success("b"), failure(14), success("b"));
+  await read();
+  await keep();
+  expect(nodes()).toEqual([null, null, null, "b", null]);
+});
+
+test("what might be done twice says the error", async () => {
+  const { remove, asked, codeOf } = gateway(failure(14), success(""));
+  expect(await codeOf(remove())).toBe(Code.Unavailable);
+  expect(asked).toHaveLength(1);
+});
+
+test("errors of the call itself are said at once", async () => {
+  const { read, asked, codeOf } = gateway(failure(5, "SESSION_NOT_FOUND"));
+  expect(await codeOf(read())).toBe(Code.NotFound);
+  expect(asked).toHaveLength(1);
+});
+
+test("after 15 s the error is said", async () => {
+  const { read, asked, codeOf } = gateway(failure(14));
+  expect(await codeOf(read())).toBe(Code.Unavailable);
+  expect(asked[asked.length - 1].atMs).toBeGreaterThan(9000);
+  expect(asked[asked.length - 1].atMs).toBeLessThan(15_000);
+});
+
+test("a download learns its server, and forgets it when that dies on the way", async () => {
+  const header = toBinary(GetPreparedAnswersResponseSchema, create(GetPreparedAnswersResponseSchema));
+  const { calls, run, codeOf } = gateway(success("a", header), success("a", header, "grpc-status: 14\r\ngrpc-message: gone\r\n"));
+  const download = async () => {
+    for await (const _ of calls.deform.getPreparedAnswers({ session: "sessions/s" }, { headers: sessionMetadata("sessions/s") }));
+  };
+  await run(download());
+  expect(calls.routes.nodeOf("s")).toBe("a");
+  expect(await codeOf(run(download()))).toBe(Code.Unavailable);
+  expect(calls.routes.nodeOf("s")).toBe("");
+});
+
+test("a socket names the server, learns it when it begins, and forgets it when that is gone", () => {
+  const { calls, sockets } = gateway(success(""));
+  const ends: (CallError | null)[] = [];
+  const open = () => {
+    calls.open(DeformService.method.deform, { onMessage: () => {}, onEnd: (error) => ends.push(error) }, { metadata: sessionMetadata("sessions/s") });
+    const socket = sockets[sockets.length - 1];
+    socket.onopen?.();
+    return socket;
+  };
+  const first = open();
+  expect(first.start()).toMatchObject({ metadata: { "x-tissueform-session": "s" }, tellsBegin: true });
+  first.begin({ "x-tissueform-node": "a" });
+  expect(calls.routes.nodeOf("s")).toBe("a");
+  const second = open();
+  expect(second.start().metadata["x-tissueform-node"]).toBe("a");
+  second.onclose?.({ code: 1006, reason: "" });
+  expect(ends[0]?.isPassing).toBe(true);
+  expect(open().start().metadata["x-tissueform-node"]).toBeUndefined();
+});
+
+test("a socket that ends with where the session is leads the next one there", () => {
+  const { calls, sockets } = gateway(success(""));
+  const ends: (CallError | null)[] = [];
+  const open = () => calls.open(DeformService.method.deform, { onMessage: () => {}, onEnd: (error) => ends.push(error) }, { metadata: sessionMetadata("sessions/s") });
+  open();
+  sockets[0].onopen?.();
+  sockets[0].end(Code.ResourceExhausted, "full", Buffer.from(details(Code.ResourceExhausted, "MEMORY_BUDGET_FULL", "b"), "base64"));
+  expect(ends[0]).toMatchObject({ node: "b", isPassing: true });
+  open();
+  sockets[1].onopen?.();
+  expect(sockets[1].start().metadata["x-tissueform-node"]).toBe("b");
+});

@@ -1,0 +1,30 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { expect, test } from "vitest";
+import { CallError, Code } from "../../src/calls/call_error";
+import { Interruption } from "../../src/live/interruption";
+
+const GONE = new CallError(Code.Unavailable, "the server is gone");
+const MOVED = new CallError(Code.Unavailable, "the session is elsewhere", "SESSION_MOVED");
+
+test("one server that is away is told by its error", () => {
+  expect(new Interruption({ isCluster: false }).connection(GONE)).toEqual({ kind: "broken", text: "The server is gone." });
+});
+
+test("in a cluster the session moves, as a short word", () => {
+  expect(new Interruption({ isCluster: true }).connection(GONE)).toEqual({ kind: "moving" });
+  expect(new Interruption({ isCluster: false }).connection(MOVED)).toEqual({ kind: "moving" });
+});
+
+test("what lasts longer than any move is told by its error, until it goes on", () => {
+  let now = 0;
+  const interruption = new Interruption({ isCluster: true }, () => now);
+  interruption.connection(GONE);
+  now = 29_000;
+  expect(interruption.connection(GONE).kind).toBe("moving");
+  now = 31_000;
+  expect(interruption.connection(MOVED).kind).toBe("broken");
+  interruption.end();
+  expect(interruption.connection(GONE).kind).toBe("moving");
+});

@@ -1,0 +1,91 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/work/retention.h"
+
+#include <ctime>
+#include <filesystem>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "tests/client/pacs_bridge/work/bridge_work.h"
+
+namespace tissueform {
+namespace {
+
+namespace fs = std::filesystem;
+
+using testing::IsOk;
+using testing::StatusIs;
+
+class RetentionTest : public testing::BridgeWork {};
+
+// Seconds of the clock that files have.
+int64_t DaysFromNow(int64_t days) { return std::time(nullptr) + days * 24 * 3600; }
+
+TEST_F(RetentionTest, ImagesAreDeletedWhenTheirTimeIsOverAndTheCaseStays) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  const RetentionOptions options;
+  EXPECT_EQ(*DeleteOld(queue_.get(), options, 1'000'000 + 6 * 24 * 3600), 0);
+  EXPECT_TRUE(fs::exists(series.files.front()));
+  EXPECT_EQ(*DeleteOld(queue_.get(), options, 1'000'000 + 8 * 24 * 3600), 1);
+  EXPECT_FALSE(fs::exists(series.files.front()));
+  const QueuedSeries kept = *rows_.GetByUid(series.series_uid);
+  EXPECT_FALSE(kept.has_files);
+  EXPECT_TRUE(kept.has_header);
+  EXPECT_EQ(rows_.ListImages(kept.key)->size(), 8) << "what is written later refers to them";
+  EXPECT_EQ(*DeleteOld(queue_.get(), options, 1'000'000 + 91 * 24 * 3600), 1);
+  EXPECT_FALSE(fs::exists(queue_->header_path(kept.key)));
+}
+
+TEST_F(RetentionTest, WhomNoCaseWasMadeOfIsForgottenWithTheHeaders) {
+  const testing::CtSeries series = Receive("a", {}, {4});
+  WaitQuietly();
+  Settle();
+  ASSERT_EQ(StateOf(series), SeriesState::kIncomplete);
+  const RetentionOptions options;
+  EXPECT_EQ(*DeleteOld(queue_.get(), options, DaysFromNow(8)), 1);
+  EXPECT_THAT(rows_.GetStudy(series.study_uid), IsOk());
+  EXPECT_EQ(*DeleteOld(queue_.get(), options, DaysFromNow(91)), 1);
+  EXPECT_THAT(rows_.GetStudy(series.study_uid), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_TRUE(rows_.List()->empty());
+}
+
+TEST_F(RetentionTest, WhoseCaseWasMadeStaysKnown) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  EXPECT_THAT(DeleteOld(queue_.get(), {}, DaysFromNow(1000)), IsOk());
+  EXPECT_EQ(rows_.GetStudy(series.study_uid)->patient.id, "PLANTED-4711");
+}
+
+TEST_F(RetentionTest, AFileOfNoSeriesIsDeletedInItsTime) {
+  testing::CtSeriesOptions one;
+  one.study_uid = "1.2.840.1";
+  one.series_uid = "1.2.840.2";
+  testing::CtSeriesOptions other = one;
+  other.study_uid = "1.2.840.3";
+  Receive("a", one);
+  Settle();
+  const testing::CtSeries stranger = Receive("b", other);
+  Settle();
+  EXPECT_EQ(*DeleteOld(queue_.get(), {}, DaysFromNow(6)), 0);
+  EXPECT_TRUE(fs::exists(stranger.files.front()));
+  EXPECT_EQ(*DeleteOld(queue_.get(), {}, DaysFromNow(8)), 8);
+  EXPECT_FALSE(fs::exists(stranger.files.front()));
+}
+
+TEST_F(RetentionTest, WhatComesAnewOfAnOldSeriesIsNotDeletedWhileItComes) {
+  const testing::CtSeries series = Receive("a", {}, {4});
+  WaitQuietly();
+  Settle();
+  ASSERT_EQ(StateOf(series), SeriesState::kIncomplete);
+  fs::rename(root_ / "a4", series.files[4]);
+  intake_->Arrived(series.files[4], *ReadInstanceHeader(series.files[4]));
+  Settle();
+  ASSERT_EQ(StateOf(series), SeriesState::kReceiving);
+  EXPECT_EQ(*DeleteOld(queue_.get(), {}, DaysFromNow(8)), 0);
+  EXPECT_TRUE(fs::exists(series.files.front()));
+}
+
+}  // namespace
+}  // namespace tissueform

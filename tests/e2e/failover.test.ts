@@ -1,0 +1,164 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { join } from "node:path";
+import type { Page } from "playwright-core";
+import { Planner, Program, type Hook, live, openCase, openPage, state, takeSegment, typeMove } from "./planner";
+
+// Two servers of a cluster, the one that holds the drag killed or drained. With TISSUEFORM_PICTURES=FOLDER also a picture of what
+// the page says meanwhile, moved.jpg. PostgreSQL is that of pg_virtualenv:
+//
+//   pg_virtualenv -t npm --prefix client/web run test:e2e -- failover.test.ts
+
+const { PGHOST, PGPORT, PGUSER, PGPASSWORD, TISSUEFORM_PICTURES } = process.env;
+if (PGPORT === undefined) console.log("no PostgreSQL: run this with pg_virtualenv (package postgresql-common)");
+
+const NODES = ["left", "right"];
+
+class Cluster {
+  private readonly servers = new Map<string, Program>();
+  planner!: Planner;
+
+  static async start(): Promise<Cluster> {
+    const cluster = new Cluster();
+    // One after the other: the first makes the tables.
+    for (const node of NODES) await cluster.startNode(node);
+    const servers = NODES.map((node) => `${node}=${cluster.servers.get(node)?.address}`);
+    cluster.planner = await Planner.start(undefined, { servers });
+    return cluster;
+  }
+
+  /** At the same address as before. */
+  async startNode(node: string): Promise<void> {
+    const port = this.servers.get(node)?.address.split(":")[1] ?? "0";
+    const store = `postgresql://${PGUSER}@${PGHOST ?? "localhost"}:${PGPORT}/postgres`;
+    const options = ["--port", port, "--store", store, "--node-name", node, "--workers", "2", "--drain-seconds", "5"];
+    this.servers.set(node, await Program.start("tissueform-server", options, { TISSUEFORM_STORE_PASSWORD: PGPASSWORD ?? "" }));
+  }
+
+  async end(node: string, signal: NodeJS.Signals): Promise<void> {
+    await this.servers.get(node)?.stop(signal);
+  }
+
+  async stop(): Promise<void> {
+    await this.planner?.stop();
+    for (const server of this.servers.values()) await server.stop("SIGKILL");
+  }
+}
+
+/** Who holds the page's session, as the page knows it. */
+function holder(page: Page): Promise<string> {
+  return page.evaluate(() => {
+    const { bench } = (globalThis as unknown as Hook).tissueform;
+    return bench.live.gateway.routes.nodeOf(bench.live.session.replace("sessions/", ""));
+  });
+}
+
+/** From now on: how the connection stood, and what notices there were. */
+function listen(page: Page): Promise<void> {
+  return page.evaluate(() => {
+    const { bench } = (globalThis as unknown as Hook).tissueform;
+    const heard: string[] = ((globalThis as any).heard = []);
+    bench.connection.watch(({ kind }: { kind: string }) => heard.push(kind));
+    bench.notice.watch((text: string) => text !== "" && heard.push(text));
+  });
+}
+
+function heard(page: Page): Promise<string[]> {
+  return page.evaluate(() => (globalThis as any).heard);
+}
+
+/** Until the server has answered the newest poses and keeps them. */
+async function answered(page: Page): Promise<void> {
+  await live(page);
+  await page.evaluate(() => ((globalThis as unknown as Hook).tissueform.bench.picture.value = null));
+  await page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.plan.change(1, { upMm: 0.5 * Math.random() }, true));
+  await page.waitForFunction(() => {
+    const { bench } = (globalThis as unknown as Hook).tissueform;
+    return bench.picture.value !== null && bench.live.isKept;
+  });
+}
+
+/** Moves the lower jaw; the face's largest movement right after it. */
+function drag(page: Page, forwardMm: number): Promise<number> {
+  return page.evaluate(async (mm) => {
+    const { bench, view } = (globalThis as unknown as Hook).tissueform;
+    bench.plan.change(1, { forwardMm: mm }, false);
+    // On a machine that is too busy a worker answers, a picture later.
+    for (let i = 0; i < 200 && bench.local.posesSinceTold > 0; ++i) await new Promise((done) => setTimeout(done, 5));
+    const { shape } = view.head.skins[0];
+    let most = 0;
+    for (let i = 0; i < shape.positions.length; i += 3) {
+      most = Math.max(most, Math.hypot(...[0, 1, 2].map((k) => shape.positions[i + k] - shape.rest[i + k])));
+    }
+    return most;
+  }, forwardMm);
+}
+
+describe.skipIf(PGPORT === undefined)("a drag in a cluster", () => {
+  let cluster: Cluster;
+  let opened: Awaited<ReturnType<typeof openCase>>;
+  let follower: Awaited<ReturnType<typeof openPage>>;
+
+  beforeAll(async () => {
+    cluster = await Cluster.start();
+    opened = await openCase(await cluster.planner.browse(), cluster.planner);
+    const { page } = opened;
+    await takeSegment(page, "Lower jaw");
+    await typeMove(page, "Forward", "5");
+    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.localState.value.kind === "ready");
+    const { session } = await state(page);
+    const link = page.url().replace("#case=", `#follow=${session.replace("sessions/", "")}&case=`);
+    follower = await openPage(await cluster.planner.browse(), link);
+    await follower.page.getByText("Live", { exact: true }).waitFor();
+  });
+  afterAll(() => cluster?.stop());
+  afterEach(() => expect([...opened.faults, ...follower.faults]).toEqual([]));
+
+  test("whose server is killed goes on on the other one, after a short word", async () => {
+    const { page } = opened;
+    const before = await holder(page);
+    expect(NODES).toContain(before);
+    await listen(page);
+    await cluster.end(before, "SIGKILL");
+    await page.getByText("Moving to another server…").waitFor();
+    if (TISSUEFORM_PICTURES !== undefined) {
+      await page.screenshot({ path: join(TISSUEFORM_PICTURES, "moved.jpg"), type: "jpeg", quality: 90 });
+    }
+    // The page answers the hand by itself, and a follower has its last picture.
+    const seen = await drag(page, 8);
+    expect((await state(page)).connection).toBe("moving");
+    expect(seen).toBeGreaterThan(6);
+    expect((await follower.page.evaluate(() => (globalThis as unknown as Hook).tissueform.follower.positions.length))).toBeGreaterThan(0);
+    await answered(page);
+    expect(await holder(page)).toBe(NODES.find((node) => node !== before));
+    expect((await heard(page)).filter((text) => text !== "live" && text !== "moving")).toEqual([]);
+  });
+
+  test("has its followers with it", async () => {
+    const { page } = follower;
+    await page.getByText("Live", { exact: true }).waitFor();
+    const number = await page.evaluate(() => Number((globalThis as unknown as Hook).tissueform.follower.number));
+    await answered(opened.page);
+    await page.waitForFunction((old) => Number((globalThis as unknown as Hook).tissueform.follower.number) > old, number);
+  });
+
+  test("is handed on by a server that drains, and no click ends in an error", async () => {
+    const { page } = opened;
+    const before = await holder(page);
+    await cluster.startNode(NODES.find((node) => node !== before) ?? "");
+    await listen(page);
+    const ended = cluster.end(before, "SIGTERM");
+    await page.waitForFunction(() => (globalThis as any).heard.includes("moving"));
+    const names = await page.evaluate(async () => {
+      const { bench } = (globalThis as unknown as Hook).tissueform;
+      await bench.storePrediction("In the middle of it");
+      return bench.predictions.value.map(({ title }: { title: string }) => title);
+    });
+    expect(names).toContain("In the middle of it");
+    await answered(page);
+    await ended;
+    expect(await holder(page)).not.toBe(before);
+    expect((await heard(page)).filter((text) => text !== "live" && text !== "moving")).toEqual([]);
+  });
+});

@@ -1,0 +1,241 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// Two servers with one store (server/session/session_registry.h).
+
+#include <future>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "core/base/error_reason.h"
+#include "tests/server/session/node.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using testing::FakeOwnership;
+using testing::IsOk;
+using testing::Node;
+using testing::SharedSessions;
+using testing::StatusIs;
+
+constexpr int kPastTheLease = SharedSessions::kLeaseSeconds + 1;
+
+bool IsMoved(const absl::Status& status) {
+  return absl::IsUnavailable(status) && HasReason(status, ErrorReason::kSessionMoved);
+}
+std::string NodeIn(const absl::Status& status) {
+  const ErrorMetadata metadata = ErrorInfoOf(status).metadata;
+  return metadata.contains("node") ? metadata.at("node") : "";
+}
+
+class HeldSessionsTest : public ::testing::Test {
+ protected:
+  SharedSessions shared_;
+  Node a_{&shared_, "a"};
+  Node b_{&shared_, "b"};
+};
+
+TEST_F(HeldSessionsTest, WhoMakesASessionHoldsItAndOthersAreToldWhoDoes) {
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, a_.Create("s"));
+  EXPECT_THAT(session->CheckHeld(), IsOk());
+  EXPECT_EQ(session->epoch(), shared_.Find("s")->epoch);
+  for (const absl::Status& refused : {b_.Open("s").status(), b_.Update("s"), b_.Delete("s")}) {
+    EXPECT_TRUE(IsMoved(refused)) << refused;
+    EXPECT_EQ(NodeIn(refused), "a");
+  }
+  EXPECT_THAT(b_.Look("s"), IsOk()) << "it is only read";
+  EXPECT_EQ(b_.registry.size(), 0);
+  EXPECT_THAT(a_.Update("s"), IsOk());
+  EXPECT_THAT(a_.Delete("s"), IsOk());
+  EXPECT_THAT(b_.Open("s"), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_EQ(b_.registry.CountKnown(), 0) << "nothing of it stays known";
+}
+
+TEST_F(HeldSessionsTest, ASessionThatAnotherServerHasMadeIsFoundWithoutBeingToldOfIt) {
+  ASSERT_THAT(a_.Create("s"), IsOk());
+  EXPECT_EQ(b_.registry.CountKnown(), 0);
+  shared_.Wait(kPastTheLease);
+  EXPECT_THAT(b_.Open("s"), IsOk());
+  shared_.Wait(kPastTheLease);
+  EXPECT_THAT(a_.Update("s"), IsOk());
+  shared_.Wait(kPastTheLease);
+  EXPECT_THAT(b_.Delete("s"), IsOk());
+  EXPECT_THAT(b_.Open("never"), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_THAT(b_.Update("never"), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_THAT(b_.Delete("never"), StatusIs(absl::StatusCode::kNotFound));
+}
+
+TEST_F(HeldSessionsTest, WhatWasTakenOverIsNeitherAnsweredNorWrittenByWhoHadIt) {
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> before, a_.Create("s"));
+  EXPECT_THAT(a_.Commit(before, 1), IsOk());
+  shared_.Wait(kPastTheLease);
+  EXPECT_TRUE(IsMoved(before->CheckHeld())) << "nobody has it yet, but somebody may";
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> after, b_.Open("s"));
+  EXPECT_EQ(after->epoch(), before->epoch() + 1);
+  EXPECT_TRUE(IsMoved(a_.Commit(before, 2)));
+  EXPECT_THAT(b_.Commit(after, 3), IsOk());
+  // It was stopped, and goes on where it had looked whether it may.
+  a_.ownership.set_stopped(true);
+  EXPECT_THAT(before->CheckHeld(), IsOk());
+  EXPECT_EQ(shared_.refused_writes(), 0);
+  EXPECT_TRUE(IsMoved(a_.Commit(before, 4)));
+  EXPECT_EQ(shared_.refused_writes(), 1);
+  ASSERT_OK_AND_ASSIGN(const SessionRegistry::View view, b_.Look("s"));
+  EXPECT_EQ(view.record.last_poses[0].translation_mm.z(), 3);
+  EXPECT_EQ(shared_.stale_writes(), 0);
+}
+
+TEST_F(HeldSessionsTest, WhatIsLostLeavesMemoryAndStaysKnown) {
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, a_.Create("s"));
+  const int64_t bytes = a_.reserved_bytes();
+  a_.registry.Lost("s");
+  EXPECT_EQ(a_.CountMoved("s"), 0) << "it is held";
+  shared_.Wait(kPastTheLease);
+  EXPECT_THAT(a_.ownership.Renew(), ::testing::ElementsAre("s"));
+  a_.registry.Lost("s");
+  EXPECT_EQ(a_.CountMoved("s"), 1);
+  EXPECT_EQ(a_.registry.size(), 0);
+  EXPECT_EQ(a_.registry.CountKnown(), 1);
+  EXPECT_LT(a_.reserved_bytes(), bytes) << "though somebody has the session";
+  EXPECT_TRUE(session->moved());
+  EXPECT_FALSE(session->evicted()) << "no stream may open it again and go on";
+  EXPECT_TRUE(IsMoved(session->Deform(session->model(), {HandlePose()}, {}).status()));
+  EXPECT_THAT(a_.Open("s"), IsOk()) << "nobody else has taken it";
+}
+
+TEST_F(HeldSessionsTest, WhatWasTakenAnewIsMadeAnew) {
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> before, a_.Create("s"));
+  shared_.Wait(kPastTheLease);
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> after, a_.Open("s"));
+  EXPECT_NE(before, after) << "another server may have had it in between";
+  EXPECT_EQ(a_.CountMoved("s"), 1);
+  EXPECT_TRUE(before->moved());
+  EXPECT_TRUE(IsMoved(before->CheckHeld()));
+  a_.registry.Lost("s");  // comes late, of the lease before
+  EXPECT_EQ(a_.CountMoved("s"), 1);
+  EXPECT_THAT(after->CheckHeld(), IsOk());
+  EXPECT_EQ(a_.Open("s").value(), after);
+}
+
+TEST_F(HeldSessionsTest, ASessionThatIsLostWhileItIsMadeIsNotGivenOut) {
+  ASSERT_THAT(a_.Create("s"), IsOk());
+  shared_.Wait(kPastTheLease);
+  b_.ownership.set_acquired([&] { shared_.Wait(kPastTheLease); });
+  EXPECT_TRUE(IsMoved(b_.Open("s").status()));
+  EXPECT_EQ(b_.registry.size(), 0);
+  b_.ownership.set_acquired(nullptr);
+  EXPECT_THAT(b_.Open("s"), IsOk());
+}
+
+TEST_F(HeldSessionsTest, AnEvictedSessionIsOthersUnlessSomebodyHasIt) {
+  for (const bool is_dragged : {false, true}) {
+    SCOPED_TRACE(is_dragged);
+    const std::string id = is_dragged ? "dragged" : "idle";
+    ASSERT_OK_AND_ASSIGN(std::shared_ptr<Session> session, a_.Create(id));
+    if (!is_dragged) session.reset();
+    a_.EvictAll();
+    a_.Settle();
+    EXPECT_EQ(IsMoved(b_.Open(id).status()), is_dragged);
+    if (!is_dragged) continue;
+    session.reset();
+    a_.Settle();
+    EXPECT_THAT(b_.Open(id), IsOk()) << "nobody drags it any more";
+  }
+}
+
+TEST_F(HeldSessionsTest, AWatchersHoldOutlivesTheSessionInMemory) {
+  ASSERT_OK_AND_ASSIGN(std::shared_ptr<Session> session, a_.Create("s"));
+  SessionHoldPtr hold = session->hold();
+  session.reset();
+  a_.EvictAll();
+  a_.Settle();
+  EXPECT_THAT(hold->Check(), IsOk());
+  EXPECT_TRUE(IsMoved(b_.Open("s").status()));
+  hold.reset();
+  a_.Settle();
+  EXPECT_EQ(a_.ownership.releases(), 1);
+  EXPECT_THAT(b_.Open("s"), IsOk());
+}
+
+TEST_F(HeldSessionsTest, WhatCannotBeMadeIsOthersBeforeAnybodyHearsOfIt) {
+  ASSERT_THAT(a_.Create("s"), IsOk());
+  shared_.Wait(kPastTheLease);
+  // Unknown to b, whose catalog has lost the mesh.
+  const absl::Status removed = b_.registry.RemoveMesh(a_.Look("s")->record.mesh_sha256);
+  ASSERT_THAT(removed, IsOk());
+  EXPECT_THAT(b_.Open("s"), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_TRUE(shared_.Find("s")->node.empty());
+  EXPECT_EQ(b_.registry.CountKnown(), 1) << "the mesh is gone, not the session";
+  EXPECT_THAT(a_.Open("s"), IsOk());
+}
+
+TEST_F(HeldSessionsTest, NewsOfOthersAreLearntAndThoseOfOwnDoingPassedOver) {
+  ASSERT_THAT(a_.Create("s", "request"), IsOk());
+  SessionRecord record = a_.Look("s")->record;
+  a_.registry.Learn(record);
+  a_.registry.Changed(record);
+  a_.registry.Forget("s");
+  EXPECT_EQ(a_.registry.size(), 1) << "it is held: whoever deletes it takes it first";
+  b_.registry.Changed(record);
+  b_.registry.Learn(record);
+  EXPECT_EQ(b_.registry.CountMadeFrom(record.mesh_sha256), 1);
+  EXPECT_TRUE(IsMoved(b_.Create("", "request").status())) << "the same request, to be called at a";
+  record.mesh_sha256 = std::string(64, 'f');
+  b_.registry.Changed(record);
+  EXPECT_EQ(b_.registry.CountMadeFrom(record.mesh_sha256), 1);
+  b_.registry.Forget("s");
+  b_.registry.Forget("s");
+  EXPECT_EQ(b_.registry.CountKnown(), 0);
+}
+
+TEST_F(HeldSessionsTest, OnlyWhatCanBeTakenIsRemovedForItsAge) {
+  ASSERT_THAT(a_.Create("held"), IsOk());
+  ASSERT_THAT(a_.Create("free"), IsOk());
+  a_.EvictAll();
+  a_.Settle();
+  ASSERT_THAT(a_.Open("held"), IsOk());
+  ASSERT_THAT(b_.registry.LearnKnown(), IsOk());
+  EXPECT_EQ(b_.registry.RemoveUnused({"held", "free", "never"}, b_.clock.Now()), 1);
+  EXPECT_THAT(a_.Look("held"), IsOk());
+  EXPECT_THAT(a_.Look("free"), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_TRUE(b_.registry.Knows("held"));
+}
+
+TEST_F(HeldSessionsTest, AServerThatHandsOverHasNothingLeftAndTakesNothingMore) {
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> dragged, a_.Create("dragged"));
+  ASSERT_THAT(a_.Create("loaded"), IsOk());
+  ASSERT_THAT(a_.Commit(dragged, 1), IsOk());
+  a_.registry.HandOver(std::chrono::steady_clock::now() + std::chrono::seconds(30));
+  EXPECT_TRUE(IsMoved(dragged->CheckHeld()));
+  EXPECT_TRUE(IsMoved(a_.Commit(dragged, 2)));
+  EXPECT_TRUE(IsMoved(a_.Open("loaded").status()));
+  EXPECT_EQ(a_.registry.size(), 0);
+  for (const char* id : {"dragged", "loaded"}) {
+    EXPECT_EQ(a_.CountMoved(id), 1);
+    EXPECT_THAT(b_.Open(id), IsOk()) << "at once, no lease has to run out";
+  }
+  EXPECT_EQ(b_.Look("dragged")->record.last_poses[0].translation_mm.z(), 1);
+  // Its client asks again with the same name, elsewhere.
+  EXPECT_THAT(a_.Create("late"), IsOk()) << "the record is kept";
+  EXPECT_THAT(b_.Open("late"), IsOk());
+}
+
+TEST_F(HeldSessionsTest, WhatIsGivenBackIsNotTakenFromWhoOpensItMeanwhile) {
+  ASSERT_THAT(a_.Create("s"), IsOk());
+  for (int i = 0; i < 200; ++i) {
+    // Given back on one thread while it is asked for on another.
+    ASSERT_EQ(a_.EvictAll(), 1);
+    ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, a_.Open("s"));
+    a_.Settle();
+    ASSERT_THAT(session->CheckHeld(), IsOk());
+  }
+}
+
+}  // namespace
+}  // namespace tissueform

@@ -1,0 +1,269 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/error_reason.h"
+#include "core/base/mutex.h"
+#include "server/store/in_memory_session_store.h"
+#include "server/store/session_ownership.h"
+#include "server/store/store_errors.h"
+
+// Servers that share a store, in one process: who holds a session by leases on a clock that a test
+// turns, and a store that refuses writes under old epochs.
+namespace tissueform::testing {
+
+// What all servers share. Thread-safe.
+class SharedSessions {
+ public:
+  static constexpr int kLeaseSeconds = 10;
+
+  struct Lease {
+    std::string node = "";  // empty: nobody's
+    int64_t epoch = kSoleEpoch;
+    int until = 0;
+  };
+
+  void Wait(int seconds) {
+    MutexLock lock(mutex_);
+    now_ += seconds;
+  }
+  int now() const {
+    MutexLock lock(mutex_);
+    return now_;
+  }
+  // What is kept of a session; nothing when there is none.
+  std::optional<Lease> Find(const std::string& id) const {
+    MutexLock lock(mutex_);
+    const auto found = leases_.find(id);
+    return found == leases_.end() ? std::nullopt : std::optional<Lease>(found->second);
+  }
+  // Writes that were kept though another server had taken the session over.
+  int stale_writes() const {
+    MutexLock lock(mutex_);
+    return stale_writes_;
+  }
+  // That were refused for it.
+  int refused_writes() const {
+    MutexLock lock(mutex_);
+    return refused_writes_;
+  }
+
+ private:
+  friend class FakeOwnership;
+  friend class SharedSessionStore;
+
+  mutable Mutex mutex_;
+  int now_ ABSL_GUARDED_BY(mutex_) = 0;
+  int stale_writes_ ABSL_GUARDED_BY(mutex_) = 0;
+  int refused_writes_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::map<std::string, Lease> leases_ ABSL_GUARDED_BY(mutex_);
+  InMemorySessionStore store_;
+};
+
+// One server's side of the leases. A server that is stopped goes on as if no time had passed.
+class FakeOwnership final : public SessionOwnership {
+ public:
+  FakeOwnership(SharedSessions* shared, std::string node)
+      : shared_(*shared), node_(std::move(node)) {}
+
+  bool is_shared() const override { return true; }
+
+  absl::StatusOr<int64_t> Acquire(const std::string& id) override {
+    const absl::StatusOr<int64_t> epoch = TakeLease(id);
+    std::function<void()> acquired;
+    {
+      MutexLock lock(shared_.mutex_);
+      acquired = acquired_;
+    }
+    if (acquired) acquired();
+    return epoch;
+  }
+
+  std::optional<int64_t> EpochOf(const std::string& id) override {
+    MutexLock lock(shared_.mutex_);
+    const auto found = known_.find(id);
+    if (found == known_.end()) return std::nullopt;
+    if (!stopped_ && found->second.until <= shared_.now_) return std::nullopt;
+    return found->second.epoch;
+  }
+
+  void Release(const std::string& id) override {
+    MutexLock lock(shared_.mutex_);
+    if (!known_.contains(id)) return;
+    ++releases_;
+    known_.erase(id);
+    const auto found = shared_.leases_.find(id);
+    if (found == shared_.leases_.end() || found->second.node != node_) return;
+    found->second.node = "";
+    found->second.until = 0;
+  }
+
+  // Renews what has not run out, and returns what is lost.
+  std::vector<std::string> Renew() {
+    std::vector<std::string> lost;
+    MutexLock lock(shared_.mutex_);
+    for (auto& [id, known] : known_) {
+      const auto found = shared_.leases_.find(id);
+      const bool mine = found != shared_.leases_.end() && found->second.node == node_ &&
+                        found->second.epoch == known.epoch && found->second.until > shared_.now_;
+      if (mine) {
+        known.until = found->second.until = shared_.now_ + SharedSessions::kLeaseSeconds;
+      } else {
+        lost.push_back(id);
+      }
+    }
+    for (const std::string& id : lost) known_.erase(id);
+    return lost;
+  }
+
+  // What may not be answered any longer, without asking the store.
+  std::vector<std::string> TakeEnded() {
+    std::vector<std::string> ended;
+    MutexLock lock(shared_.mutex_);
+    for (const auto& [id, known] : known_) {
+      if (known.until <= shared_.now_) ended.push_back(id);
+    }
+    for (const std::string& id : ended) known_.erase(id);
+    return ended;
+  }
+
+  void set_stopped(bool stopped) {
+    MutexLock lock(shared_.mutex_);
+    stopped_ = stopped;
+  }
+  // Called at the end of each Acquire, without a lock.
+  void set_acquired(std::function<void()> acquired) {
+    MutexLock lock(shared_.mutex_);
+    acquired_ = std::move(acquired);
+  }
+  int releases() const {
+    MutexLock lock(shared_.mutex_);
+    return releases_;
+  }
+
+ private:
+  absl::StatusOr<int64_t> TakeLease(const std::string& id) {
+    MutexLock lock(shared_.mutex_);
+    const auto found = shared_.leases_.find(id);
+    if (found == shared_.leases_.end()) return NoSession(id);
+    SharedSessions::Lease& lease = found->second;
+    const bool runs = lease.until > shared_.now_;
+    if (runs && lease.node != node_) {
+      return WithReason(absl::UnavailableError("another server holds the session"),
+                        ErrorReason::kSessionMoved, {{"node", lease.node}});
+    }
+    if (!runs) ++lease.epoch;
+    lease.node = node_;
+    lease.until = shared_.now_ + SharedSessions::kLeaseSeconds;
+    known_[id] = lease;
+    return lease.epoch;
+  }
+
+  SharedSessions& shared_;
+  const std::string node_;
+  // Guarded by the mutex of what is shared.
+  std::map<std::string, SharedSessions::Lease> known_;
+  std::function<void()> acquired_;
+  bool stopped_ = false;
+  int releases_ = 0;
+};
+
+// One server's side of the store.
+class SharedSessionStore final : public SessionStore {
+ public:
+  SharedSessionStore(SharedSessions* shared, std::string node)
+      : shared_(*shared), node_(std::move(node)) {}
+
+  void Create(SessionRecord record, int64_t epoch, RecordCallback done) override {
+    const std::string id = record.id;
+    absl::StatusOr<SessionRecord> created;
+    shared_.store_.Create(std::move(record), epoch, Into(&created));
+    if (created.ok()) {
+      MutexLock lock(shared_.mutex_);
+      shared_.leases_[id] = {};
+    }
+    done(std::move(created));
+  }
+  void Get(const std::string& id, RecordCallback done) override {
+    shared_.store_.Get(id, std::move(done));
+  }
+  void Update(SessionRecord record, int64_t epoch, RecordCallback done) override {
+    absl::StatusOr<SessionRecord> updated = Fence(record.id, epoch);
+    if (absl::IsUnknown(updated.status())) {
+      const std::string id = record.id;
+      shared_.store_.Update(std::move(record), epoch, Into(&updated));
+      Count(id, epoch, updated.status());
+    }
+    done(std::move(updated));
+  }
+  void CommitPoses(const std::string& id, std::vector<HandlePose> poses, int64_t epoch,
+                   StatusCallback done) override {
+    absl::Status committed = Fence(id, epoch);
+    if (absl::IsUnknown(committed)) {
+      shared_.store_.CommitPoses(id, std::move(poses), epoch, Into(&committed));
+      Count(id, epoch, committed);
+    }
+    done(std::move(committed));
+  }
+  void Delete(const std::string& id, const std::string& etag, int64_t epoch,
+              StatusCallback done) override {
+    absl::Status deleted = Fence(id, epoch);
+    if (absl::IsUnknown(deleted)) {
+      Count(id, epoch, absl::OkStatus());
+      shared_.store_.Delete(id, etag, epoch, Into(&deleted));
+    }
+    if (deleted.ok()) {
+      MutexLock lock(shared_.mutex_);
+      shared_.leases_.erase(id);
+    }
+    done(std::move(deleted));
+  }
+  void List(const ListRequest& request, PageCallback done) override {
+    shared_.store_.List(request, std::move(done));
+  }
+  void Touch(std::vector<std::string> ids, int64_t now_s, StatusCallback done) override {
+    shared_.store_.Touch(std::move(ids), now_s, std::move(done));
+  }
+  void ListUnused(int64_t before_s, int limit, PageCallback done) override {
+    shared_.store_.ListUnused(before_s, limit, std::move(done));
+  }
+
+ private:
+  template <typename Result>
+  static std::function<void(Result)> Into(Result* result) {
+    return [result](Result answer) { *result = std::move(answer); };
+  }
+
+  // Unknown where the write may go on.
+  absl::Status Fence(const std::string& id, int64_t epoch) {
+    MutexLock lock(shared_.mutex_);
+    const auto found = shared_.leases_.find(id);
+    if (found == shared_.leases_.end()) return NoSession(id);
+    if (epoch >= found->second.epoch) return absl::UnknownError("go on");
+    ++shared_.refused_writes_;
+    return CheckSessionWrite(id, "", epoch, "", found->second.epoch);
+  }
+  void Count(const std::string& id, int64_t epoch, const absl::Status& outcome) {
+    MutexLock lock(shared_.mutex_);
+    const auto found = shared_.leases_.find(id);
+    if (!outcome.ok() || found == shared_.leases_.end()) return;
+    const SharedSessions::Lease& lease = found->second;
+    const bool taken = !lease.node.empty() && lease.node != node_;
+    if (taken || lease.epoch != epoch) ++shared_.stale_writes_;
+  }
+
+  SharedSessions& shared_;
+  const std::string node_;
+};
+
+}  // namespace tissueform::testing
