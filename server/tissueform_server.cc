@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <mutex>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "grpc/health/v1/health.pb.h"
@@ -40,6 +41,9 @@ constexpr int kMinClientPingMilliseconds = 10'000;
 constexpr int kHandshakeMilliseconds = 10'000;
 // For what was finished just now to leave the buffers.
 constexpr std::chrono::milliseconds kLastMessagesGrace{500};
+
+// Proxies ask for the health every second; who is sent here meanwhile is served as ever.
+constexpr std::chrono::seconds kUntilProxiesSee{3};
 
 // Of the memory budget: how far sessions that are not in use are evicted once something does not
 // fit. The high watermark is the budget itself.
@@ -120,6 +124,11 @@ NamedLimits LimitsOf(const ServerOptions& options) {
   return limits;
 }
 
+SessionOwnership* OwnershipOf(Cluster* cluster) {
+  if (cluster == nullptr) return SoleOwnership::Get();
+  return &cluster->node();
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
@@ -134,20 +143,32 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
   }
   parts.authenticator = authenticator != nullptr ? authenticator : parts.tokens.get();
   TF_ASSIGN_OR_RETURN(parts.opened, OpenStores(options));
+  if (parts.opened.shared != nullptr) {
+    TF_ASSIGN_OR_RETURN(parts.cluster,
+                        Cluster::Open(options.cluster, options.port, parts.opened.shared));
+  }
   std::unique_ptr<TissueformServer> server(new TissueformServer(options, std::move(parts)));
   if (server->is_exposed()) {
     spdlog::warn("INSECURE: {}, and strangers may reach it (--insecure)",
                  options.tls.enabled() ? "nobody is asked to log in" : "calls are not encrypted");
   }
-  TF_RETURN_IF_ERROR(server->access_changes_.Learn());
-  TF_RETURN_IF_ERROR(TellWhatIsKept(server->stores_.get(), &server->access_changes_));
-  TF_RETURN_IF_ERROR(server->exports_.Learn(
-      [&](const std::string& id) { return server->access_.KnowsPrediction(id); }));
-  TF_RETURN_IF_ERROR(server->registry_.LearnKnown());
+  TF_RETURN_IF_ERROR(server->LearnWhatIsKept());
   server->housekeeping_.Start();
   TF_RETURN_IF_ERROR(server->ServeMetrics());
   TF_RETURN_IF_ERROR(server->Listen());
   return server;
+}
+
+absl::Status TissueformServer::LearnWhatIsKept() {
+  TF_RETURN_IF_ERROR(access_changes_.Learn());
+  TF_RETURN_IF_ERROR(TellWhatIsKept(stores_.get(), &access_changes_));
+  TF_RETURN_IF_ERROR(
+      exports_.Learn([&](const std::string& id) { return access_.KnowsPrediction(id); }));
+  TF_RETURN_IF_ERROR(registry_.LearnKnown());
+  if (cluster_ != nullptr) {
+    cluster_->Start([this] { return budget_.limit_bytes() - budget_.reserved_bytes(); });
+  }
+  return absl::OkStatus();
 }
 
 TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
@@ -164,17 +185,20 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       authenticator_(parts.authenticator == nullptr
                          ? nullptr
                          : std::make_unique<LinkAuthenticator>(&access_, parts.authenticator)),
+      cluster_(std::move(parts.cluster)),
       gate_({.authenticator = authenticator_.get(),
              .may_call = &Access::MayCall,
              .observer = telemetry_.get(),
              .quotas = &quotas_,
-             .gateway_name = options.tls.gateway_name}),
+             .gateway_name = options.tls.gateway_name,
+             .node_name = cluster_ == nullptr ? "" : cluster_->name()}),
       budget_(options.memory_budget_bytes),
       stores_(WatchStores(std::move(parts.opened.stores), &access_changes_)),
-      catalog_(options.limits, &budget_, options.in_memory ? nullptr : &stores_->meshes()),
+      catalog_(options.limits, &budget_, stores_->keeps() ? &stores_->meshes() : nullptr),
       uploads_(options.limits, &catalog_, &stores_->uploads()),
       pool_(std::make_unique<WorkerPool>(options.workers)),
-      registry_(options.limits, &budget_, pool_.get(), &stores_->sessions(), &catalog_),
+      registry_(options.limits, &budget_, pool_.get(), &stores_->sessions(), &catalog_,
+                Clock::System(), OwnershipOf(cluster_.get())),
       housekeeping_(
           {.retention_days = options.limits.retention_days,
            .export_retention_days = options.exports.retention_days,
@@ -222,6 +246,13 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
     ReclaimOf(owner, bytes);
   });
   budget_.set_reclaimer([this](int64_t bytes) { Reclaim(bytes); });
+  if (cluster_ != nullptr) {
+    cluster_->Join({.access = &access_changes_,
+                    .sessions = &registry_,
+                    .meshes = &catalog_,
+                    .exports = &exports_},
+                   &access_);
+  }
 }
 
 TissueformServer::~TissueformServer() {
@@ -233,6 +264,7 @@ TissueformServer::~TissueformServer() {
     server_.reset();
   }
   housekeeping_.Stop();
+  if (cluster_ != nullptr) cluster_->Stop();
   registry_.Stop();
   pool_.reset();    // its last jobs may still use the registry and the store
   stores_.reset();  // its last answers may still use the registry
@@ -249,6 +281,7 @@ absl::Status TissueformServer::ServeMetrics() {
   AddMemoryMetrics(budget_, catalog_, &*metrics_);
   AddStoreMetrics(*stores_, &*metrics_);
   AddSecurityMetrics(ReadSecurity(), &*metrics_);
+  if (cluster_ != nullptr) cluster_->AddTo(&*metrics_);
   metrics_->AddGauge("tissueform_streams", "Drags open.", {},
                      [this] { return static_cast<double>(streams_.size()); });
   metrics_->AddGauge("tissueform_watches", "Watches open.", {},
@@ -359,11 +392,20 @@ void TissueformServer::Drain() {
   const auto deadline = std::chrono::steady_clock::now() + options_.drain_deadline;
   spdlog::info("draining: {} open streams, at most {} s", streams_.size(),
                options_.drain_deadline.count());
+  if (cluster_ != nullptr) cluster_->BeginDraining();
   server_->GetHealthCheckService()->SetServingStatus(false);
+  if (cluster_ != nullptr) {
+    std::this_thread::sleep_for(
+        std::min<std::chrono::milliseconds>(kUntilProxiesSee, options_.drain_deadline / 4));
+  }
   gate_.StartDraining();
-  const auto end = std::chrono::system_clock::now() + options_.drain_deadline;
-  streams_.NotifyDraining(end);
-  watches_.NotifyDraining(end);
+  if (cluster_ != nullptr) {
+    registry_.HandOver(deadline);
+  } else {
+    const auto end = std::chrono::system_clock::now() + options_.drain_deadline;
+    streams_.NotifyDraining(end);
+    watches_.NotifyDraining(end);
+  }
   export_watches_.NotifyDraining();
   if (!gate_.WaitUntilIdle(deadline)) {
     spdlog::warn("draining: cancelling the calls that are still open");

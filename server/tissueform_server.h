@@ -19,6 +19,7 @@
 #include "server/auth/authenticator.h"
 #include "server/auth/token_authenticator.h"
 #include "server/calls/call_scope.h"
+#include "server/cluster/cluster.h"
 #include "server/exports/export_book.h"
 #include "server/exports/export_store.h"
 #include "server/open_stores.h"
@@ -74,6 +75,9 @@ class TissueformServer {
   // deadline), new work is refused with
   // UNAVAILABLE; open calls may go on until the drain deadline and are then cancelled; the listener
   // closes. Blocks until all calls have ended. One thread, once.
+  //
+  // A node of a cluster serves on for some seconds, in which proxies see its health; then it gives
+  // its sessions to the others, and their streams end with SESSION_MOVED.
   void Drain();
 
   // Calls `answered` later, when the lanes that planners wait for have each done a job.
@@ -93,6 +97,8 @@ class TissueformServer {
   bool is_exposed() const;
   // Null: nobody logs in.
   const TokenAuthenticator* tokens() const { return tokens_.get(); }
+  // Null without --store.
+  Cluster* cluster() { return cluster_.get(); }
 
  private:
   // What is made before the server itself.
@@ -102,10 +108,13 @@ class TissueformServer {
     std::unique_ptr<TokenAuthenticator> tokens;  // null: none are configured
     Authenticator* authenticator = nullptr;      // null: nobody logs in
     OpenedStores opened;
+    std::unique_ptr<Cluster> cluster;  // null without --store
   };
 
   TissueformServer(const ServerOptions& options, Parts parts);
 
+  // What the store has is known then, and followed.
+  absl::Status LearnWhatIsKept();
   absl::Status Listen();
   void Reclaim(int64_t bytes);
   void ReclaimOf(const std::string& owner, int64_t bytes);
@@ -129,6 +138,7 @@ class TissueformServer {
   ExportBook exports_;
   ExportWatches export_watches_;
   std::unique_ptr<LinkAuthenticator> authenticator_;  // null: nobody logs in
+  std::unique_ptr<Cluster> cluster_;                  // null without --store
   ServiceGate gate_;
   MemoryBudget budget_;
   std::unique_ptr<Stores> stores_;

@@ -14,20 +14,24 @@
 
 namespace tissueform {
 
-ClusterNode::ClusterNode(PostgresPool* pool, const ClusterOptions& options, std::string name,
-                         std::function<int64_t()> free_bytes)
+ClusterNode::ClusterNode(PostgresPool* pool, const ClusterOptions& options, std::string name)
     : name_(std::move(name)),
       leases_(pool, name_, options.lease),
       counted_(&leases_),
-      nodes_(pool, name_, std::move(free_bytes)),
+      nodes_(pool, name_),
       keeper_(&counted_, {.renew_every = options.renew_every}, [this](const SessionLease& lease) {
         ++lost_;
         on_lost_(lease.session);
       }) {}
 
-void ClusterNode::Start() {
-  nodes_.Start();
+void ClusterNode::Start(std::function<int64_t()> free_bytes) {
+  nodes_.Start(std::move(free_bytes));
   keeper_.Start();
+}
+
+void ClusterNode::Stop() {
+  keeper_.Stop();
+  nodes_.Stop();
 }
 
 absl::StatusOr<int64_t> ClusterNode::Acquire(const std::string& id) {

@@ -28,17 +28,19 @@ namespace tissueform {
 // Thread-safe.
 class ClusterNode final : public SessionOwnership {
  public:
-  // `pool` must outlive it; `free_bytes` says how much memory sessions may still take here.
-  ClusterNode(PostgresPool* pool, const ClusterOptions& options, std::string name,
-              std::function<int64_t()> free_bytes);
+  // `pool` must outlive it.
+  ClusterNode(PostgresPool* pool, const ClusterOptions& options, std::string name);
 
   // Told of each session that this server held and holds no longer, without a lock held. Before
   // Start.
   void set_on_lost(std::function<void(const std::string& id)> on_lost) {
     on_lost_ = std::move(on_lost);
   }
-  // Leases are renewed, and others told of this server, from now on. Once.
-  void Start();
+  // Leases are renewed, and others told of this server, from now on. `free_bytes` says how much
+  // memory sessions may still take here. Once.
+  void Start(std::function<int64_t()> free_bytes);
+  // Neither is done any longer, and nobody is told of anything.
+  void Stop();
 
   const std::string& name() const { return name_; }
   NodeTable& nodes() { return nodes_; }

@@ -20,13 +20,10 @@ constexpr int64_t kForgottenAfterS = 3600;
 
 }  // namespace
 
-NodeTable::NodeTable(PostgresPool* pool, std::string name, std::function<int64_t()> free_bytes)
-    : pool_(pool),
-      name_(std::move(name)),
-      holder_(RandomId()),
-      free_bytes_(std::move(free_bytes)) {}
+NodeTable::NodeTable(PostgresPool* pool, std::string name)
+    : pool_(pool), name_(std::move(name)), holder_(RandomId()) {}
 
-NodeTable::~NodeTable() {
+void NodeTable::Stop() {
   {
     MutexLock lock(mutex_);
     ending_ = true;
@@ -43,7 +40,8 @@ NodeTable::~NodeTable() {
       .IgnoreError();
 }
 
-void NodeTable::Start() {
+void NodeTable::Start(std::function<int64_t()> free_bytes) {
+  free_bytes_ = std::move(free_bytes);
   thread_ = std::thread([this] { Loop(); });
 }
 

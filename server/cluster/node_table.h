@@ -27,15 +27,16 @@ class NodeTable {
   static constexpr std::chrono::seconds kEvery{1};
   static constexpr std::chrono::seconds kGoneAfter{10};
 
-  // `pool` must outlive it; `free_bytes` is asked on its thread.
-  NodeTable(PostgresPool* pool, std::string name, std::function<int64_t()> free_bytes);
-  // Takes its row out, unless the database is away.
-  ~NodeTable();
+  // `pool` must outlive it.
+  NodeTable(PostgresPool* pool, std::string name);
+  ~NodeTable() { Stop(); }
   NodeTable(const NodeTable&) = delete;
   NodeTable& operator=(const NodeTable&) = delete;
 
-  // A thread writes and reads from now on. Once.
-  void Start();
+  // A thread writes and reads from now on, and asks for the free bytes. Once.
+  void Start(std::function<int64_t()> free_bytes);
+  // Takes its row out, unless the database is away.
+  void Stop();
 
   // Others place nothing here any more; told to the database at once, unless it is away.
   void SetDraining();
@@ -63,7 +64,7 @@ class NodeTable {
   PostgresPool* const pool_;
   const std::string name_;
   const std::string holder_;  // random: names may be given twice
-  const std::function<int64_t()> free_bytes_;
+  std::function<int64_t()> free_bytes_ = [] { return int64_t{0}; };  // constant once it runs
 
   Mutex mutex_;
   ConditionVariable changed_;

@@ -11,7 +11,7 @@ namespace tissueform {
 LeaseKeeper::LeaseKeeper(SessionLeases* leases, Options options, LostCallback lost)
     : leases_(leases), options_(std::move(options)), lost_(std::move(lost)) {}
 
-LeaseKeeper::~LeaseKeeper() {
+void LeaseKeeper::Stop() {
   {
     MutexLock lock(mutex_);
     ending_ = true;

@@ -36,12 +36,14 @@ class LeaseKeeper {
   // `leases` must outlive it, and be used by nobody else.
   LeaseKeeper(SessionLeases* leases, Options options, LostCallback lost);
   // Ends renewing. Leases are not released: see ReleaseAll.
-  ~LeaseKeeper();
+  ~LeaseKeeper() { Stop(); }
   LeaseKeeper(const LeaseKeeper&) = delete;
   LeaseKeeper& operator=(const LeaseKeeper&) = delete;
 
   // A thread renews from now on. Once.
   void Start();
+  // And no longer: nobody is told of what is lost by it.
+  void Stop();
 
   // As SessionLeases::Acquire; where it is mine it is kept.
   absl::StatusOr<LeaseAnswer> Acquire(const std::string& session);

@@ -61,11 +61,18 @@ void SessionRegistry::Delete(const std::string& id, const StatusCallback& done) 
       id, [this, id, done] { endings_.Delete(id, done); }, done);
 }
 
+SessionRegistry::SessionCallback SessionRegistry::NamingRoom(const SessionCallback& done) const {
+  if (!naming_room_) return done;
+  return [this, done](absl::StatusOr<std::shared_ptr<Session>> made) {
+    done(made.ok() ? std::move(made) : naming_room_(made.status()));
+  };
+}
+
 void SessionRegistry::Create(SessionRecord record, const std::shared_ptr<const StoredMesh>& mesh,
                              CancelFlag cancelled, const SessionCallback& done,
                              const TellSession& tell) {
   if (record.id.empty()) record.id = RandomId();
-  makings_.Create(record, mesh, {std::move(cancelled), done, tell});
+  makings_.Create(record, mesh, {std::move(cancelled), NamingRoom(done), tell});
 }
 
 void SessionRegistry::Open(const std::string& id, CancelFlag cancelled, const SessionCallback& done,
@@ -74,7 +81,7 @@ void SessionRegistry::Open(const std::string& id, CancelFlag cancelled, const Se
     done(std::move(session));
     return;
   }
-  const SessionWaiter waiter{std::move(cancelled), done, tell};
+  const SessionWaiter waiter{std::move(cancelled), NamingRoom(done), tell};
   WhenKnown(
       id, [this, id, waiter] { makings_.Open(id, waiter); }, done);
 }

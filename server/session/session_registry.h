@@ -76,6 +76,12 @@ class SessionRegistry {
   // anything else.
   void set_most_of_owner(int most) { makings_.set_most_of_owner(most); }
 
+  // `named` gives what Create and Open refuse with, with the server that has room where one is
+  // known; where several share a store. Call it before anything else.
+  void set_naming_room(std::function<absl::Status(const absl::Status&)> named) {
+    naming_room_ = std::move(named);
+  }
+
   // Learns which sessions the store has. Call it before anything else; blocks. Errors: those of
   // SessionStore::List.
   absl::Status LearnKnown() { return news_.LearnKnown(); }
@@ -204,6 +210,7 @@ class SessionRegistry {
   WorkerPool& pool() { return *pool_; }
 
  private:
+  SessionCallback NamingRoom(const SessionCallback& done) const;
   // `then` when a session that is there is known; `refuse` when that cannot be found out.
   void WhenKnown(const std::string& id, const std::function<void()>& then,
                  const StatusCallback& refuse);
@@ -220,6 +227,7 @@ class SessionRegistry {
   SessionStore* const store_;
   const Clock* const clock_;
   Observer observer_ = [](const std::string& /*id*/, Event /*event*/) {};
+  std::function<absl::Status(const absl::Status&)> naming_room_;  // empty: nobody else has any
 
   // Self-synchronised. Sessions end before what they were made with.
   const std::shared_ptr<SessionHolds> holds_;

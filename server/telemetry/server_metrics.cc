@@ -145,11 +145,12 @@ void AddSecurityMetrics(const SecurityReadings& readings, MetricsPage* page) {
 }
 
 void AddStoreMetrics(const Stores& stores, MetricsPage* page) {
-  const std::string folder = stores.folder();
-  if (folder.empty() || stores.latency() == nullptr) return;
+  if (stores.latency() == nullptr) return;
   page->AddHistogram("tissueform_store_latency_seconds",
                      "How long rows took to be read, or to be written and synced.", {},
                      stores.latency());
+  const std::string folder = stores.folder();
+  if (folder.empty()) return;
   const std::pair<const char*, const char*> kKinds[] = {{"database", "tissueform.db"},
                                                         {"database_log", "tissueform.db-wal"},
                                                         {"blobs", "blobs"},

@@ -34,7 +34,7 @@ void AddLaneMetrics(const WorkerPool& pool, MetricsPage* page);
 void AddSessionMetrics(const SessionRegistry& registry, const SessionEventCounts& events,
                        MetricsPage* page);
 void AddMemoryMetrics(const MemoryBudget& budget, const MeshCatalog& catalog, MetricsPage* page);
-// Of a store on a disk; of one in memory there is nothing to tell.
+// Of a store on a disk or in a database; of one in memory there is nothing to tell.
 void AddStoreMetrics(const Stores& stores, MetricsPage* page);
 
 // What TLS and logins tell of themselves; a reading that is null is left out.

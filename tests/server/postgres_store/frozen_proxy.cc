@@ -68,6 +68,11 @@ FrozenProxy::~FrozenProxy() {
 
 void FrozenProxy::Freeze() { ++generation_; }
 
+void FrozenProxy::FreezeAll() {
+  shut_ = true;
+  Freeze();
+}
+
 void FrozenProxy::Accept() {
   while (!ending_) {
     pollfd waiting = {.fd = listener_, .events = POLLIN, .revents = 0};
@@ -76,7 +81,7 @@ void FrozenProxy::Accept() {
     if (client < 0) continue;
     ++accepted_;
     MutexLock lock(mutex_);
-    threads_.emplace_back([this, client, generation = generation_.load()] {
+    threads_.emplace_back([this, client, generation = shut_ ? -1 : generation_.load()] {
       Forward(client, generation);
       close(client);
     });

@@ -24,6 +24,9 @@ class FrozenProxy {
 
   int port() const { return port_; }
   void Freeze();
+  // New ones too, until Thaw; those that were frozen stay so.
+  void FreezeAll();
+  void Thaw() { shut_ = false; }
   int accepted() const { return accepted_; }
 
  private:
@@ -35,6 +38,7 @@ class FrozenProxy {
   int port_ = 0;
   std::atomic<int> generation_ = 0;
   std::atomic<int> accepted_ = 0;
+  std::atomic<bool> shut_ = false;
   std::atomic<bool> ending_ = false;
   Mutex mutex_;
   std::vector<std::thread> threads_ ABSL_GUARDED_BY(mutex_);

@@ -1,0 +1,67 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "server/access/access.h"
+#include "server/cluster/change_follower.h"
+#include "server/cluster/cluster_node.h"
+#include "server/cluster/cluster_options.h"
+#include "server/cluster/row_lookups.h"
+#include "server/monitoring/metrics_page.h"
+#include "server/postgres_store/postgres_pool.h"
+#include "server/postgres_store/postgres_stores.h"
+
+namespace tissueform {
+
+// All that makes a server one of several, joined: what it holds, what it hears, what it looks for.
+//
+// Opened, then joined with the rooms, then started when these have learnt what the store has;
+// stopped before any of them ends. One thread, but for node().
+class Cluster {
+ public:
+  // What changes in the store from here on is not missed. `stores` must outlive Stop. Errors:
+  // InvalidArgument (the name), those of PostgresPool::Open and ChangeFollower::Start.
+  static absl::StatusOr<std::unique_ptr<Cluster>> Open(const ClusterOptions& options, int port,
+                                                       PostgresStores* stores);
+  ~Cluster() { Stop(); }
+  Cluster(const Cluster&) = delete;
+  Cluster& operator=(const Cluster&) = delete;
+
+  ClusterNode& node() { return node_; }
+  const std::string& name() const { return node_.name(); }
+
+  // Whatever the rooms do not know they look for from now on. All must outlive Stop.
+  void Join(SharedRooms rooms, Access* access);
+  // `free_bytes` says how much memory sessions may still take here; any thread.
+  void Start(std::function<int64_t()> free_bytes);
+  // No room is told of anything any more; leases are renewed no longer.
+  void Stop();
+
+  // Others place nothing here any more. Blocks on the store.
+  void BeginDraining() { node_.nodes().SetDraining(); }
+
+  // Must outlive the page.
+  void AddTo(MetricsPage* page);
+
+ private:
+  Cluster(const ClusterOptions& options, std::string name, PostgresStores* stores,
+          std::unique_ptr<PostgresPool> pool);
+
+  const std::unique_ptr<PostgresPool> pool_;
+  PostgresStores* const stores_;
+  ClusterNode node_;
+  SharedRooms rooms_;
+  std::unique_ptr<RowLookups> lookups_;
+  std::unique_ptr<ChangeFollower> follower_;
+};
+
+}  // namespace tissueform

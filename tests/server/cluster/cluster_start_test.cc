@@ -1,0 +1,134 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <chrono>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "client/cpp/client_call.h"
+#include "server/cluster/cluster_options.h"
+#include "tests/server/cluster/cluster_test.h"
+#include "tests/server/postgres_store/test_database.h"
+#include "tests/testing/status_matchers.h"
+
+// How a server becomes a node of a cluster, and what it does when the database goes away.
+namespace tissueform::testing {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::SizeIs;
+using ::testing::StartsWith;
+using Code = absl::StatusCode;
+
+TEST(NodeNameTest, ANameIsShortAndPlain) {
+  for (const char* good : {"a", "node-1.example_x:50051", "A"}) {
+    EXPECT_THAT(CheckNodeName(good), IsOk()) << good;
+  }
+  for (const std::string& bad : {std::string(), std::string("a b"), std::string("a/b"),
+                                 std::string("a\n"), std::string("ä"), std::string(65, 'a')}) {
+    EXPECT_THAT(CheckNodeName(bad), StatusIs(Code::kInvalidArgument)) << bad;
+  }
+  EXPECT_THAT(CheckNodeName(DefaultNodeName(50051)), IsOk());
+  EXPECT_THAT(DefaultNodeName(50051), ::testing::EndsWith(":50051"));
+  EXPECT_NE(DefaultNodeName(0), DefaultNodeName(0)) << "the port is not known yet";
+}
+
+class ClusterStartTest : public ClusterTest {
+ protected:
+  absl::Status StartOf(const ServerOptions& options) {
+    return TissueformServer::Start(options, &callers_).status();
+  }
+};
+
+TEST_F(ClusterStartTest, ADatabaseBesideAFolderOrMemoryIsRefused) {
+  ServerOptions options = NodeOptions("c");
+  options.in_memory = true;
+  EXPECT_THAT(StartOf(options), StatusIs(Code::kInvalidArgument, HasSubstr("--store")));
+  options.in_memory = false;
+  options.data_dir = "/tmp/somewhere";
+  EXPECT_THAT(StartOf(options), StatusIs(Code::kInvalidArgument, HasSubstr("--store")));
+}
+
+TEST_F(ClusterStartTest, ADatabaseThatIsAwayIsWaitedForAndNotForever) {
+  ServerOptions options = NodeOptions("c");
+  options.cluster.store = "postgresql://postgres@127.0.0.1:1/postgres";
+  options.cluster.start_patience = std::chrono::milliseconds(700);
+  EXPECT_THAT(StartOf(options),
+              StatusIs(Code::kUnavailable, AllOf(HasSubstr("127.0.0.1:1"), HasSubstr("--store"))));
+}
+
+TEST_F(ClusterStartTest, TablesOfANewerServerAndAReplicaAreRefusedAtOnce) {
+  RunOutsideTransaction("DROP DATABASE IF EXISTS odd WITH (FORCE)");
+  RunOutsideTransaction("CREATE DATABASE odd");
+  ServerOptions options = NodeOptions("c");
+  options.cluster.store = TestDatabaseOptions("odd").url;
+  ASSERT_THAT(StartOf(options), IsOk());
+  RunOutsideTransaction("ALTER DATABASE odd SET default_transaction_read_only = on");
+  EXPECT_THAT(StartOf(options), StatusIs(Code::kFailedPrecondition, HasSubstr("read-only")));
+  RunOutsideTransaction("ALTER DATABASE odd RESET default_transaction_read_only");
+  PostgresOutcome outcome = PostgresOutcome::kFailed;
+  ASSERT_THAT((*PostgresConnection::Open(*TargetOf(TestDatabaseOptions("odd"))))
+                  ->Transact(
+                      [](PostgresTransaction& transaction) {
+                        return transaction.Execute("UPDATE tissueform_version SET version = 99");
+                      },
+                      &outcome),
+              IsOk());
+  EXPECT_THAT(StartOf(options), StatusIs(Code::kFailedPrecondition, HasSubstr("newer server")));
+}
+
+TEST_F(ClusterStartTest, NodesOfOneNameAreToldAndHoldSessionsApartAllTheSame) {
+  const TestNode other = StartNode(NodeOptions("a"));
+  EXPECT_TRUE(Eventually([&] { return other.server->cluster()->node().nodes().IsNameTaken(); }));
+  EXPECT_TRUE(Eventually([&] { return a_.server->cluster()->node().nodes().IsNameTaken(); }));
+  const std::string session = MakeSession(a_, 1);
+  RawDrag drag(a_, session);
+  ASSERT_TRUE(drag.Send(1));
+  ASSERT_TRUE(drag.ReceiveFrame(1).has_value());
+  EXPECT_THAT(AskOnce(other, session, 1), StatusIs(Code::kUnavailable));
+  ASSERT_TRUE(drag.Send(2));
+  EXPECT_TRUE(drag.ReceiveFrame(2).has_value());
+}
+
+TEST_F(ClusterStartTest, ANodeSaysItsNameAndRefusesWhatIsMeantForAnother) {
+  const std::string session = MakeSession(a_, 1);
+  v1::GetSessionRequest get;
+  get.set_name(session);
+  v1::Session found;
+  auto context = As();
+  ASSERT_TRUE(a_.stubs->sessions->GetSession(context.get(), get, &found).ok());
+  const auto said = context->GetServerInitialMetadata().find("x-tissueform-node");
+  ASSERT_NE(said, context->GetServerInitialMetadata().end());
+  EXPECT_EQ(said->second, "a");
+  context = As();
+  context->AddMetadata("x-tissueform-node", "b");
+  EXPECT_THAT(FromGrpcStatus(a_.stubs->sessions->GetSession(context.get(), get, &found)),
+              StatusIs(Code::kUnavailable));
+}
+
+TEST_F(ClusterStartTest, ANodeThatWasCutOffFromTheDatabaseServesOnWhenItIsBack) {
+  a_ = {};
+  FrozenProxy proxy(TestDatabasePort());
+  ServerOptions options = NodeOptions("a");
+  options.cluster.store =
+      absl::StrCat("postgresql://postgres@127.0.0.1:", proxy.port(), "/postgres");
+  a_ = StartNode(options);
+  const std::string session = MakeSession(a_, 1);
+  ASSERT_THAT(AskOnce(a_, session, 1), IsOk());
+  proxy.FreezeAll();
+  const CountedLeases::Counts& counts = a_.server->cluster()->node().leases().counts();
+  const int64_t failed = counts.renewals_failed;
+  EXPECT_TRUE(Eventually([&] { return counts.renewals_failed > failed; }));
+  EXPECT_TRUE(Eventually([&] { return a_.server->cluster()->node().held() == 0; }));
+  proxy.Thaw();
+  EXPECT_TRUE(Eventually([&] { return AskOnce(a_, session, 2).ok(); }));
+  a_ = {};  // before the proxy
+}
+
+}  // namespace
+}  // namespace tissueform::testing
