@@ -81,7 +81,7 @@ class Scenarios:
             time.sleep(0.1)
         for drag in self.load.drags:
             if not drag.last_frame or time.monotonic() - drag.last_frame[0] > 0.5:
-                self.ledger.violation(f"the drag of {drag.session} does not go on; {dict(self.ledger.ends)}")
+                self.ledger.violation(f"the drag of {drag.session} does not go on: {drag.state()}")
 
     # An owner that is stopped, another one that is cut off from the database
 
