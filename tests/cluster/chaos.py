@@ -10,6 +10,7 @@ went on in time. 1: something was not so. 77: PostgreSQL, HAProxy or python3-grp
 
 import argparse
 import itertools
+import os
 import pathlib
 import random
 import shutil
@@ -20,6 +21,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 for folder in ("deploy/cluster", "tests/integration"):
     sys.path.append(str(ROOT / folder))
 SKIPPED = 77
+os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # a proxy's own errors are no gRPC, of which its log would tell each
 
 import stack  # noqa: E402 (after the paths)
 
@@ -106,7 +108,7 @@ class Load:
         return int(poses[0].pivot_mm.x) if poses else 0
 
 
-def judge_gaps(arena, ledger, load):
+def judge_gaps(arena, ledger, load, began):
     """Every time for which a drag showed nothing, against what was done to the cluster meanwhile."""
     for session, begin, end, before, after in ledger.gaps:
         if session == load.contested:  # its drags stay with servers that are killed
@@ -114,7 +116,8 @@ def judge_gaps(arena, ledger, load):
         until = arena.may_rest_until(session, begin, end, load.preparation_s)
         if end > until:
             done = [event.what for event in arena.events if begin - 1 <= event.at <= end]
-            ledger.violation(f"the drag of {session} showed nothing for {end - begin:.2f} s, {end - until:.2f} s too long; from {before} to {after}; {done}")
+            ledger.violation(f"the drag of {session} showed nothing from {begin - began:.2f} to {end - began:.2f} s, {end - until:.2f} s too long; "
+                             f"from {before} to {after}; {done}")
 
 
 def print_gaps(ledger, load):
@@ -170,7 +173,7 @@ def chaos(options, seed):
         load.stop()
         run.say("all that was acknowledged is read back, through one server after the other")
         maker.read_back([maker.Maker(arena.cluster.address(node), ledger, chance) for node in arena.cluster.nodes], ledger)
-        judge_gaps(arena, ledger, load)
+        judge_gaps(arena, ledger, load, run.begin)
         report(ledger, load, run)
     finally:
         if load is not None:

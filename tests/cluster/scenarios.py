@@ -148,7 +148,7 @@ class Scenarios:
     def database_gone(self, seconds):
         self.say(f"PostgreSQL is away for {seconds} s")
         dragged = {drag: drag.last_frame for drag in self.load.drags}
-        event = self.arena.note("database gone")
+        event = self.arena.note("database gone", stops_all=True)
         self.arena.cluster.stop(stack.DATABASE)
         last = arena_module.LEASE_S - MARGIN_S
         time.sleep(last + 0.5)
