@@ -112,6 +112,10 @@ class AccessChanges {
   absl::Status CheckLink(const Principal& caller, const FollowLinkRow& link) const
       ABSL_LOCKS_EXCLUDED(access_.mutex_);
 
+  // Has it looked for where nobody here knows it.
+  void LookFor(const Principal& caller, absl::string_view resource) const
+      ABSL_LOCKS_EXCLUDED(access_.mutex_);
+
   // From memory at once, then from the store.
   void Erase(AccessRows rows, const Done& done) ABSL_LOCKS_EXCLUDED(access_.mutex_);
   // Into the store, then into memory.

@@ -68,7 +68,8 @@ std::string DefaultNodeName(int port) {
 }
 
 absl::StatusOr<PostgresOptions> StoreOptionsOf(const ClusterOptions& options) {
-  PostgresOptions store{.url = options.store};
+  PostgresOptions store = options.limits;
+  store.url = options.store;
   TF_ASSIGN_OR_RETURN(store.password, ReadPostgresPassword(options.password_file));
   return store;
 }

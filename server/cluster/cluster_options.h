@@ -24,6 +24,7 @@ struct ClusterOptions {
 
   // No options of the program.
   std::chrono::milliseconds start_patience{30'000};  // a start waits so long for the database
+  PostgresOptions limits = {};                       // of the database; without an address
   LeaseOptions lease = {};
   std::chrono::milliseconds renew_every{3'000};
 

@@ -3,10 +3,12 @@
 
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -17,7 +19,9 @@
 
 namespace tissueform {
 
-// Tells changes in their order, on a thread and a connection of its own.
+// Tells changes in their order, on a thread and a connection of its own. Where nothing is told for
+// some seconds it asks whether the other end is there, and connects again when that is not answered
+// (PostgresOptions::unanswered_timeout).
 class ChangeListener {
  public:
   using Callback = std::function<void(const StoreChange&)>;
@@ -31,20 +35,30 @@ class ChangeListener {
   ChangeListener& operator=(const ChangeListener&) = delete;
 
  private:
-  ChangeListener(PostgresTarget target, Callback told,
+  ChangeListener(PostgresTarget target, std::chrono::milliseconds unanswered, Callback told,
                  std::unique_ptr<PostgresConnection> connection);
 
-  void Loop(std::unique_ptr<PostgresConnection> connection);
-  // A connection that listens, as soon as there is one; null at the end.
-  std::unique_ptr<PostgresConnection> ConnectAgain();
+  void Loop();
+  // What was told; empty after a while without. Errors: the connection is of no use any longer.
+  absl::StatusOr<std::vector<std::string>> Wait();
+  // False at the end.
+  bool ConnectAgain();
   bool ending();
+  // Gives the connection up when it is not answered.
+  void Watch();
 
   const PostgresTarget target_;
+  const std::chrono::milliseconds unanswered_;
   const Callback told_;
   Mutex mutex_;
   ConditionVariable changed_;
   bool ending_ ABSL_GUARDED_BY(mutex_) = false;
-  std::thread thread_;  // last: it uses the others
+  // Used by its thread without the lock, and changed with it.
+  std::unique_ptr<PostgresConnection> connection_;
+  std::chrono::steady_clock::time_point heard_ = std::chrono::steady_clock::now();
+  // Last: they use the others.
+  std::thread watch_;
+  std::thread thread_;
 };
 
 }  // namespace tissueform

@@ -107,6 +107,8 @@ struct PostgresConnection::Library {
     socket = fcntl(connection.sock(), F_DUPFD_CLOEXEC, 0);
   }
   ~Library() {
+    // A receiver says good-bye and waits for the answer, which may never come.
+    if (receiver != nullptr) shutdown(socket, SHUT_RDWR);
     if (socket >= 0) close(socket);
   }
   Library(const Library&) = delete;

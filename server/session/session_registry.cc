@@ -71,8 +71,15 @@ SessionRegistry::SessionCallback SessionRegistry::NamingRoom(const SessionCallba
 void SessionRegistry::Create(SessionRecord record, const std::shared_ptr<const StoredMesh>& mesh,
                              CancelFlag cancelled, const SessionCallback& done,
                              const TellSession& tell) {
-  if (record.id.empty()) record.id = RandomId();
-  makings_.Create(record, mesh, {std::move(cancelled), NamingRoom(done), tell});
+  const SessionWaiter waiter{std::move(cancelled), NamingRoom(done), tell};
+  if (record.id.empty() || !holds_->shared()) {
+    if (record.id.empty()) record.id = RandomId();
+    makings_.Create(record, mesh, waiter);
+    return;
+  }
+  // The same request may have been made of another server, before anything is prepared for it.
+  WhenKnown(
+      record.id, [this, record, mesh, waiter] { makings_.Create(record, mesh, waiter); }, done);
 }
 
 void SessionRegistry::Open(const std::string& id, CancelFlag cancelled, const SessionCallback& done,

@@ -263,12 +263,17 @@ class FakeBidiCall : public grpc::ServerCallbackReaderWriter<Request, Response> 
     reads_.Close();
     MutexLock lock(mutex_);
     stalled_ = false;
-    CompleteStalledWrite();
+    if (stalled_write_ != nullptr) Complete(std::exchange(stalled_write_, nullptr));
   }
-  // From now on writes do not complete: the client does not read.
+  // From now on writes do not complete, until ReadOn: the client does not read.
   void StopReading() {
     MutexLock lock(mutex_);
     stalled_ = true;
+  }
+  void ReadOn() {
+    MutexLock lock(mutex_);
+    stalled_ = false;
+    if (stalled_write_ != nullptr) Complete(std::exchange(stalled_write_, nullptr));
   }
   // The next message of the server; empty when the call has ended, or after 30 s.
   std::optional<Response> Receive() {
@@ -303,18 +308,10 @@ class FakeBidiCall : public grpc::ServerCallbackReaderWriter<Request, Response> 
     MutexLock lock(mutex_);
     ++writes_started_;
     if (stalled_) {
-      write_waits_ = true;
-      return;
+      stalled_write_ = message;
+    } else {
+      Complete(message);
     }
-    state_.React([this, message] {
-      const bool ok = !state_.cancelled();
-      if (ok) {
-        MutexLock react_lock(mutex_);
-        responses_.push_back(*message);
-        changed_.NotifyAll();
-      }
-      reactor_->OnWriteDone(ok);
-    });
   }
   void WriteAndFinish(const Response*, grpc::WriteOptions, grpc::Status) override {}
 
@@ -322,10 +319,16 @@ class FakeBidiCall : public grpc::ServerCallbackReaderWriter<Request, Response> 
   grpc::internal::ServerReactor* reactor() override { return nullptr; }
   void CallOnDone() override {}
 
-  void CompleteStalledWrite() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    if (std::exchange(write_waits_, false)) {
-      state_.React([this] { reactor_->OnWriteDone(false); });
-    }
+  void Complete(const Response* message) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    state_.React([this, message] {
+      const bool ok = !state_.cancelled();
+      if (ok) {
+        MutexLock lock(mutex_);
+        responses_.push_back(*message);
+        changed_.NotifyAll();
+      }
+      reactor_->OnWriteDone(ok);
+    });
   }
 
   grpc::ServerBidiReactor<Request, Response>* reactor_ = nullptr;  // constant after Bind
@@ -335,7 +338,7 @@ class FakeBidiCall : public grpc::ServerCallbackReaderWriter<Request, Response> 
   ConditionVariable changed_;
   std::deque<Response> responses_ ABSL_GUARDED_BY(mutex_);
   bool stalled_ ABSL_GUARDED_BY(mutex_) = false;
-  bool write_waits_ ABSL_GUARDED_BY(mutex_) = false;
+  const Response* stalled_write_ ABSL_GUARDED_BY(mutex_) = nullptr;
   bool ended_ ABSL_GUARDED_BY(mutex_) = false;
   int writes_started_ ABSL_GUARDED_BY(mutex_) = 0;
 };

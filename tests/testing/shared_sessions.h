@@ -90,7 +90,15 @@ class FakeOwnership final : public SessionOwnership {
   }
 
   std::optional<int64_t> EpochOf(const std::string& id) override {
+    std::function<void()> ended;
+    {
+      MutexLock lock(shared_.mutex_);
+      if (answers_left_ == 0) ended = std::exchange(ended_, nullptr);
+    }
+    if (ended) ended();
     MutexLock lock(shared_.mutex_);
+    if (answers_left_ == 0) return std::nullopt;
+    if (answers_left_ > 0) --answers_left_;
     const auto found = known_.find(id);
     if (found == known_.end()) return std::nullopt;
     if (!stopped_ && found->second.until <= shared_.now_) return std::nullopt;
@@ -146,6 +154,13 @@ class FakeOwnership final : public SessionOwnership {
     MutexLock lock(shared_.mutex_);
     acquired_ = std::move(acquired);
   }
+  // After so many more answers of EpochOf the sessions are lost; `ended` when the next is asked
+  // for.
+  void set_answers_left(int answers, std::function<void()> ended) {
+    MutexLock lock(shared_.mutex_);
+    answers_left_ = answers;
+    ended_ = std::move(ended);
+  }
   int releases() const {
     MutexLock lock(shared_.mutex_);
     return releases_;
@@ -174,6 +189,8 @@ class FakeOwnership final : public SessionOwnership {
   // Guarded by the mutex of what is shared.
   std::map<std::string, SharedSessions::Lease> known_;
   std::function<void()> acquired_;
+  std::function<void()> ended_;
+  int answers_left_ = -1;  // without end
   bool stopped_ = false;
   int releases_ = 0;
 };
@@ -208,6 +225,14 @@ class SharedSessionStore final : public SessionStore {
   }
   void CommitPoses(const std::string& id, std::vector<HandlePose> poses, int64_t epoch,
                    StatusCallback done) override {
+    {
+      MutexLock lock(shared_.mutex_);
+      if (is_silent_) {
+        unanswered_.push_back(std::move(done));
+        asked_.NotifyAll();
+        return;
+      }
+    }
     absl::Status committed = Fence(id, epoch);
     if (absl::IsUnknown(committed)) {
       shared_.store_.CommitPoses(id, std::move(poses), epoch, Into(&committed));
@@ -238,6 +263,18 @@ class SharedSessionStore final : public SessionStore {
     shared_.store_.ListUnused(before_s, limit, std::move(done));
   }
 
+  // From now on commits are not answered.
+  void FallSilent() {
+    MutexLock lock(shared_.mutex_);
+    is_silent_ = true;
+  }
+  // The first of those that were not, when it has come.
+  StatusCallback WaitForUnanswered() {
+    MutexLock lock(shared_.mutex_);
+    while (unanswered_.empty()) asked_.Wait(shared_.mutex_);
+    return unanswered_.front();
+  }
+
  private:
   template <typename Result>
   static std::function<void(Result)> Into(Result* result) {
@@ -264,6 +301,10 @@ class SharedSessionStore final : public SessionStore {
 
   SharedSessions& shared_;
   const std::string node_;
+  // Guarded by the mutex of what is shared.
+  bool is_silent_ = false;
+  std::vector<StatusCallback> unanswered_;
+  ConditionVariable asked_;
 };
 
 }  // namespace tissueform::testing

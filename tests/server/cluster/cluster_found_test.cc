@@ -19,9 +19,7 @@
 namespace tissueform::testing {
 namespace {
 
-using ::testing::Contains;
-using ::testing::HasSubstr;
-using ::testing::Not;
+using ::testing::AnyOf;
 using Code = absl::StatusCode;
 
 class ClusterFoundTest : public ClusterTest {
@@ -30,6 +28,7 @@ class ClusterFoundTest : public ClusterTest {
     v1::CreatePredictionRequest request;
     request.set_session(session);
     request.add_poses()->set_handle("top");
+    request.set_case_("cases/" + std::string(64, 'c'));
     v1::Prediction made;
     EXPECT_THAT(
         FromGrpcStatus(node.stubs->predictions->CreatePrediction(As().get(), request, &made)),
@@ -189,6 +188,7 @@ TEST_F(ClusterFoundTest, AMeshThatAnotherNodeHasMadeASessionOfIsNotDeleted) {
 TEST_F(ClusterFoundTest, WhereThereIsNoRoomTheNodeThatHasSomeIsNamed) {
   ServerOptions small = NodeOptions("small");
   small.memory_budget_bytes = 1 << 20;
+  small.quotas.memory_bytes = 1 << 30;
   const TestNode node = StartNode(small);
   // As large as others are not; the table is read every second.
   absl::Status refusal;
@@ -207,7 +207,7 @@ TEST_F(ClusterFoundTest, WhereThereIsNoRoomTheNodeThatHasSomeIsNamed) {
     return ErrorInfoOf(refusal).metadata.contains("node");
   })) << refusal;
   EXPECT_TRUE(HasReason(refusal, ErrorReason::kMemoryBudgetFull)) << refusal;
-  EXPECT_THAT(ErrorInfoOf(refusal).metadata["node"], ::testing::AnyOf("a", "b"));
+  EXPECT_THAT(ErrorInfoOf(refusal).metadata["node"], AnyOf("a", "b"));
 }
 
 }  // namespace

@@ -20,9 +20,6 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using ::testing::Not;
-using ::testing::SizeIs;
-using ::testing::StartsWith;
 using Code = absl::StatusCode;
 
 TEST(NodeNameTest, ANameIsShortAndPlain) {

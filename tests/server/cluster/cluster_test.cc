@@ -98,6 +98,9 @@ ServerOptions ClusterTest::NodeOptions(const std::string& name) {
                            .margin = std::chrono::milliseconds(400),
                            .patience = std::chrono::milliseconds(500)};
   options.cluster.renew_every = std::chrono::milliseconds(400);
+  options.cluster.limits = {.unanswered_timeout = std::chrono::milliseconds(1'000),
+                            .patience = std::chrono::milliseconds(5'000)};
+  options.quotas.calls_per_second = 1'000'000;  // tests ask until it is so
   return options;
 }
 

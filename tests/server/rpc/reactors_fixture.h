@@ -56,6 +56,10 @@ inline constexpr int kWorkers = 2;
 // through.
 class ReactorsTest : public ::testing::Test {
  protected:
+  // `sessions`: what the records are kept in; null: a store of its own.
+  explicit ReactorsTest(SessionStore* sessions = nullptr,
+                        SessionOwnership* ownership = SoleOwnership::Get())
+      : sessions_(sessions != nullptr ? sessions : &store_), ownership_(ownership) {}
   ~ReactorsTest() override {
     reactions_.reset();
     workers_.reset();
@@ -115,8 +119,11 @@ class ReactorsTest : public ::testing::Test {
   MeshUploads uploads_{limits_, &catalog_, upload_store_.get()};
   std::unique_ptr<WorkerPool> workers_ = std::make_unique<WorkerPool>(kWorkers);
   InMemorySessionStore store_;
+  SessionStore* const sessions_;
+  SessionOwnership* const ownership_;
   FakeClock clock_;
-  SessionRegistry registry_{limits_, &budget_, workers_.get(), &store_, &catalog_, &clock_};
+  SessionRegistry registry_{limits_,   &budget_, workers_.get(), sessions_,
+                            &catalog_, &clock_,  ownership_};
   DeformStreams streams_{limits_.max_streams};
   SessionWatches watches_{limits_, workers_.get()};
   DeadlineTimer timer_;

@@ -71,6 +71,18 @@ TEST_F(HeldSessionsTest, ASessionThatAnotherServerHasMadeIsFoundWithoutBeingTold
   EXPECT_THAT(b_.Delete("never"), StatusIs(absl::StatusCode::kNotFound));
 }
 
+TEST_F(HeldSessionsTest, ARequestThatIsRepeatedElsewhereIsTheSameRequest) {
+  ASSERT_THAT(a_.Create("s", "request"), IsOk());
+  const absl::Status held = b_.Create("s", "request").status();
+  EXPECT_TRUE(IsMoved(held)) << held;
+  EXPECT_EQ(NodeIn(held), "a");
+  EXPECT_THAT(b_.Create("s", "another"), StatusIs(absl::StatusCode::kAlreadyExists));
+  shared_.Wait(kPastTheLease);
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, b_.Create("s", "request"));
+  EXPECT_EQ(session->id(), "s");
+  EXPECT_EQ(b_.registry.CountKnown(), 1);
+}
+
 TEST_F(HeldSessionsTest, WhatWasTakenOverIsNeitherAnsweredNorWrittenByWhoHadIt) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> before, a_.Create("s"));
   EXPECT_THAT(a_.Commit(before, 1), IsOk());
