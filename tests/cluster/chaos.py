@@ -10,6 +10,7 @@ went on in time. 1: something was not so. 77: PostgreSQL, HAProxy or python3-grp
 
 import argparse
 import itertools
+import os
 import pathlib
 import random
 import shutil
@@ -20,6 +21,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 for folder in ("deploy/cluster", "tests/integration"):
     sys.path.append(str(ROOT / folder))
 SKIPPED = 77
+os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # a proxy's own errors are no gRPC, of which its log would tell each
 
 import stack  # noqa: E402 (after the paths)
 
@@ -36,6 +38,7 @@ import browsers  # noqa: E402
 import drags  # noqa: E402
 import ledger as ledger_module  # noqa: E402
 import maker  # noqa: E402
+import our_clients  # noqa: E402
 import scenarios  # noqa: E402
 import stranger  # noqa: E402
 
@@ -105,7 +108,7 @@ class Load:
         return int(poses[0].pivot_mm.x) if poses else 0
 
 
-def judge_gaps(arena, ledger, load):
+def judge_gaps(arena, ledger, load, began):
     """Every time for which a drag showed nothing, against what was done to the cluster meanwhile."""
     for session, begin, end, before, after in ledger.gaps:
         if session == load.contested:  # its drags stay with servers that are killed
@@ -113,7 +116,8 @@ def judge_gaps(arena, ledger, load):
         until = arena.may_rest_until(session, begin, end, load.preparation_s)
         if end > until:
             done = [event.what for event in arena.events if begin - 1 <= event.at <= end]
-            ledger.violation(f"the drag of {session} showed nothing for {end - begin:.2f} s, {end - until:.2f} s too long; from {before} to {after}; {done}")
+            ledger.violation(f"the drag of {session} showed nothing from {begin - began:.2f} to {end - began:.2f} s, {end - until:.2f} s too long; "
+                             f"from {before} to {after}; {done}")
 
 
 def print_gaps(ledger, load):
@@ -130,8 +134,14 @@ def print_gaps(ledger, load):
 def run_scenarios(options, arena, load, ledger, seed):
     run = scenarios.Scenarios(arena, load, ledger, seed)
     if "kills" in options.only:
-        run.kills(options.kills, options.seconds or 2 * options.kills)
-        run.settle()
+        seconds = options.seconds or 2 * options.kills
+        ours = our_clients.OurClients(arena, seconds + 3)
+        try:
+            run.kills(options.kills, seconds)
+            run.settle()
+            run.say(f"tissueform load: {ours.judge(ledger)}")
+        finally:
+            ours.stop()
     if "stop" in options.only or "split" in options.only:
         run.stop_and_split("stop" in options.only, "split" in options.only)
         run.settle()
@@ -163,7 +173,7 @@ def chaos(options, seed):
         load.stop()
         run.say("all that was acknowledged is read back, through one server after the other")
         maker.read_back([maker.Maker(arena.cluster.address(node), ledger, chance) for node in arena.cluster.nodes], ledger)
-        judge_gaps(arena, ledger, load)
+        judge_gaps(arena, ledger, load, run.begin)
         report(ledger, load, run)
     finally:
         if load is not None:

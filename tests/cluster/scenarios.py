@@ -81,7 +81,7 @@ class Scenarios:
             time.sleep(0.1)
         for drag in self.load.drags:
             if not drag.last_frame or time.monotonic() - drag.last_frame[0] > 0.5:
-                self.ledger.violation(f"the drag of {drag.session} does not go on; {dict(self.ledger.ends)}")
+                self.ledger.violation(f"the drag of {drag.session} does not go on: {drag.state()}")
 
     # An owner that is stopped, another one that is cut off from the database
 
@@ -148,7 +148,7 @@ class Scenarios:
     def database_gone(self, seconds):
         self.say(f"PostgreSQL is away for {seconds} s")
         dragged = {drag: drag.last_frame for drag in self.load.drags}
-        event = self.arena.note("database gone")
+        event = self.arena.note("database gone", stops_all=True)
         self.arena.cluster.stop(stack.DATABASE)
         last = arena_module.LEASE_S - MARGIN_S
         time.sleep(last + 0.5)
