@@ -42,6 +42,8 @@ REST_RATE = 1         # with columns a page needs a frame now and then, to confi
 DATABASE_COMMITS = 4670
 RENEWAL_S = 3          # leases; the table of nodes is written every second
 PROXY_CONNECTIONS = 8000  # deploy/haproxy/cluster.cfg, maxconn
+STREAMS, WATCHES = 512, 2048  # of a server: deploy/kubernetes/server.yaml
+SOCKETS = 2048        # of a gateway: docs/gateway.md, --max-sockets
 BUDGET = 0.75         # of a machine's memory (deploy/kubernetes)
 # Of what a frame costs a server this part does not shrink with its bytes: messages, acknowledgements, waking up. An assumption.
 FIXED = 0.5
@@ -148,7 +150,7 @@ def measured_table(figures):
 def costs_table(figures):
     rows = [("frames a core and second, whole skin, int16", number(1 / figures.frame_s["int16"])), ("float32, which is not packed", number(1 / figures.frame_s["float32"])),
             ("frames of followers a core and second, int16", number(1 / figures.watch_s)), ("Gbit/s that a core of HAProxy passes on", number(8e-9 / figures.proxy_s_per_byte)),
-            ("commits a second that one server made durable, as many as were asked for", number(figures.commits)),
+            ("commits a second that one server with a whole core made durable, each with a frame", number(figures.commits)),
             ("MiB of a session of the bundled head that shares nothing; sessions a GiB", f"{figures.session_gib * 1024:.0f}; {figures.sessions_per_gib()[0]:.1f}"),
             ("MiB of one that shares its preparation; sessions a GiB", f"{figures.shared_session_mib:.1f}; {number(figures.sessions_per_gib()[1])}")]
     return table(("measured", ""), rows)
@@ -198,7 +200,7 @@ def carried_table(figures, planners, followers):
                   "database, writes/s"), rows)
 
 
-def limits(figures, nodes=3, proxies=2):
+def limits(figures, nodes=3, proxies=2, gateways=2):
     """How many planners, each with ten followers and 30 % of the hands moving, until something of a small cluster is full."""
     followers = 10
     way = list(ways(figures))[3]
@@ -209,6 +211,9 @@ def limits(figures, nodes=3, proxies=2):
              f"network of {proxies} HAProxys": proxies * 0.7 * GBIT / (need["gbit"] / 1000),
              f"processors of {proxies} HAProxys": proxies * 0.7 * CORES / (need["gbit"] * 1e9 / 8 * figures.proxy_s_per_byte / 1000),
              f"connections of {proxies} HAProxys": proxies * PROXY_CONNECTIONS / (1 + followers),
+             f"drags open on {nodes} servers, `--max-streams {STREAMS}`": nodes * STREAMS,
+             f"watches open on {nodes} servers, `--max-watches {WATCHES}`": nodes * WATCHES / followers,
+             f"sockets of {gateways} gateways, `--max-sockets {SOCKETS}`": gateways * SOCKETS / (1 + followers),
              "commits of the database": DATABASE_COMMITS / (writes(1000, MOVING, nodes)[0] / 1000),
              "leases, rows the database renews": DATABASE_COMMITS / (writes(1000, MOVING, nodes)[1] / 1000)}
     rows = [(part, number(planners)) for part, planners in sorted(parts.items(), key=lambda each: each[1])]

@@ -69,6 +69,13 @@ class ScalingModelTest(unittest.TestCase):
             self.assertLess(streams * 60 * 0.0005, cores)
             self.assertLessEqual(model.wait_p99(streams, streams * 60 * 0.0005 / cores, 0.0005, cores) + 0.0005, model.LATE_S)
 
+    def test_limits_are_those_of_the_files_that_they_are_from(self):
+        server = (ROOT / "deploy/kubernetes/server.yaml").read_text()
+        self.assertIn(f"--max-streams={model.STREAMS}\n", server)
+        self.assertIn(f"--max-watches={model.WATCHES}\n", server)
+        self.assertIn(f"| `--max-sockets` | {model.SOCKETS} |", (ROOT / "docs/gateway.md").read_text())
+        self.assertIn(f"    maxconn {model.PROXY_CONNECTIONS}\n", (ROOT / "deploy/haproxy/cluster.cfg").read_text())
+
     def test_the_document_holds_what_is_printed(self):
         code, told = run(["--check", ROOT / "docs/scaling.md"])
         self.assertEqual(code, 0, told)
