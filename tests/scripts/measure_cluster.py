@@ -34,6 +34,7 @@ SAMPLE_S = 0.25
 GROUPS = pathlib.Path("/sys/fs/cgroup/cpu")
 PERIOD_US = 4000
 CLIENT_CORE, OTHERS_CORE = 2, 3
+SLOW_START_S = 11
 MANY = 150  # sessions at once; HAProxy lets an address have 200 connections
 SERVER_OPTIONS = ["--max-streams", "4096", "--max-sessions", "4096", "--max-watches", "4096", "--quota-sessions", "4096", "--log-level", "warn"]
 
@@ -129,6 +130,8 @@ class Machine:
         # What this process starts and does not pin runs where it does.
         os.sched_setaffinity(0, {OTHERS_CORE})
         self.cluster.up()
+        # HAProxy lets a server begin slowly.
+        time.sleep(SLOW_START_S)
         for name in (stack.HAPROXY, stack.DATABASE):
             self.group(name, self.cluster.process(name)["pid"])
         for node in self.cluster.nodes:
