@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 #include <chrono>
+#include <filesystem>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -9,10 +10,12 @@
 #include "gtest/gtest.h"
 
 #include "client/cpp/client_call.h"
+#include "core/process/child_process.h"
 #include "server/cluster/cluster_options.h"
 #include "tests/server/cluster/cluster_test.h"
 #include "tests/server/postgres_store/test_database.h"
 #include "tests/testing/status_matchers.h"
+#include "tests/testing/test_paths.h"
 
 // How a server becomes a node of a cluster, and what it does when the database goes away.
 namespace tissueform::testing {
@@ -77,6 +80,44 @@ TEST_F(ClusterStartTest, TablesOfANewerServerAndAReplicaAreRefusedAtOnce) {
                       &outcome),
               IsOk());
   EXPECT_THAT(StartOf(options), StatusIs(Code::kFailedPrecondition, HasSubstr("newer server")));
+}
+
+TEST_F(ClusterStartTest, ADataFolderIsCarriedOverAndServedByNodes) {
+  a_ = {};
+  b_ = {};
+  EmptyTestDatabase();
+  const std::string folder = ::testing::TempDir() + "carried_over";
+  std::filesystem::remove_all(folder);
+  ServerOptions alone = NodeOptions("");
+  alone.cluster = {};
+  alone.data_dir = folder;
+  std::string session;
+  {
+    const TestNode node = StartNode(alone);
+    session = MakeSession(node, 1);
+    RawDrag drag(node, session);
+    ASSERT_TRUE(drag.Send(3, /*commit=*/true));
+    ASSERT_TRUE(drag.WaitForCommit(3));
+  }
+  ChildOptions command;
+  command.program = ProgramPath("tissueform-server");
+  command.arguments = {"migrate", "--data-dir", folder, "--store", TestDatabaseOptions().url};
+  ASSERT_OK_AND_ASSIGN(const auto child, ChildProcess::Start(command));
+  ASSERT_EQ(child->Wait().exit_code, 0);
+  a_ = StartNode(NodeOptions("a"));
+  v1::GetSessionRequest get;
+  get.set_name(session);
+  v1::Session found;
+  ASSERT_THAT(FromGrpcStatus(a_.stubs->sessions->GetSession(As().get(), get, &found)), IsOk());
+  ASSERT_EQ(found.committed_poses_size(), 1);
+  EXPECT_EQ(found.committed_poses(0).scale(), SomePose(3).scale);
+  EXPECT_THAT(AskOnce(a_, session, 4), IsOk());
+  ASSERT_OK_AND_ASSIGN(const auto again, ChildProcess::Start(command));
+  EXPECT_EQ(again->Wait().exit_code, 1) << "into an empty database only";
+  command.arguments = {"backup", "--store", TestDatabaseOptions().url, folder + "-backup"};
+  ASSERT_OK_AND_ASSIGN(const auto backup, ChildProcess::Start(command));
+  EXPECT_EQ(backup->Wait().exit_code, 1);
+  std::filesystem::remove_all(folder);
 }
 
 TEST_F(ClusterStartTest, NodesOfOneNameAreToldAndHoldSessionsApartAllTheSame) {
