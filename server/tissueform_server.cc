@@ -162,8 +162,11 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
 absl::Status TissueformServer::LearnWhatIsKept() {
   TF_RETURN_IF_ERROR(access_changes_.Learn());
   TF_RETURN_IF_ERROR(TellWhatIsKept(stores_.get(), &access_changes_));
-  TF_RETURN_IF_ERROR(
-      exports_.Learn([&](const std::string& id) { return access_.KnowsPrediction(id); }));
+  TF_RETURN_IF_ERROR(exports_.Learn([&](const std::string& id) {
+    if (access_.KnowsPrediction(id)) return true;
+    // Another server may have made it since; what is not known to be gone stays.
+    return cluster_ != nullptr && !absl::IsNotFound(stores_->predictions().Get(id).status());
+  }));
   TF_RETURN_IF_ERROR(registry_.LearnKnown());
   if (cluster_ != nullptr) {
     cluster_->Start([this] { return budget_.limit_bytes() - budget_.reserved_bytes(); });

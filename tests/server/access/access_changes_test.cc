@@ -263,11 +263,13 @@ TEST_F(FollowingAccessChangesTest, WhatACallNamesAndNobodyKnowsIsLookedForBefore
   std::vector<Access::Unknown> asked;
   access_.set_on_unknown([&](const Access::Unknown& what) {
     asked.push_back(what);
-    if (what.name != "t") return;
+    if (what.name == "away") return absl::UnavailableError("the store is away");
+    if (what.name != "t") return absl::OkStatus();
     SessionRecord session;
     session.id = "t";
     session.owner = "ann";
     changes_.Added(session);
+    return absl::OkStatus();
   });
   EXPECT_THAT(access_.MaySession(ann_, "t", Need::kOwn), IsOk());
   EXPECT_THAT(access_.MaySession(ann_, "t", Need::kOwn), IsOk());
@@ -279,6 +281,8 @@ TEST_F(FollowingAccessChangesTest, WhatACallNamesAndNobodyKnowsIsLookedForBefore
   EXPECT_THAT(access_.FindLink(kMesh).status(), StatusIs(Code::kUnauthenticated));
   ASSERT_THAT(asked, SizeIs(5));
   EXPECT_EQ(asked[2].owner, "ann") << "a case is somebody's";
+  EXPECT_THAT(access_.MaySession(ann_, "away", Need::kLook), StatusIs(Code::kUnavailable))
+      << "nobody knows that it is not there";
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -14,6 +15,7 @@
 #include "server/cluster/cluster_options.h"
 #include "tests/server/cluster/cluster_test.h"
 #include "tests/server/postgres_store/test_database.h"
+#include "tests/testing/http_get.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
 
@@ -147,6 +149,26 @@ TEST_F(ClusterStartTest, ANodeSaysItsNameAndRefusesWhatIsMeantForAnother) {
   context->AddMetadata("x-tissueform-node", "b");
   EXPECT_THAT(FromGrpcStatus(a_.stubs->sessions->GetSession(context.get(), get, &found)),
               StatusIs(Code::kUnavailable));
+}
+
+TEST_F(ClusterStartTest, APageOfMetricsTellsOfLeases) {
+  ServerOptions options = NodeOptions("c");
+  options.telemetry.metrics_port = 0;
+  const TestNode node = StartNode(options);
+  MakeSession(node, 1);
+  EXPECT_TRUE(Eventually([&] {
+    return absl::StrContains(HttpGet(node.server->metrics_port(), "/metrics"),
+                             "tissueform_other_nodes 2\n");
+  }));
+  const std::string page = HttpGet(node.server->metrics_port(), "/metrics");
+  for (const char* line :
+       {"\ntissueform_sessions_held 1\n", "\ntissueform_sessions_lost_total 0\n",
+        "\ntissueform_lease_calls_total{call=\"take\",outcome=\"mine\"} 1\n",
+        "\ntissueform_lease_calls_total{call=\"renew\",outcome=\"failed\"} 0\n",
+        "\ntissueform_lease_renewal_age_seconds ", "\ntissueform_node_name_taken 0\n",
+        "\ntissueform_row_lookups_total ", "\ntissueform_store_latency_seconds_count "}) {
+    EXPECT_THAT(page, HasSubstr(line));
+  }
 }
 
 TEST_F(ClusterStartTest, ANodeThatWasCutOffFromTheDatabaseServesOnWhenItIsBack) {
