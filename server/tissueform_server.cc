@@ -156,6 +156,7 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
   server->housekeeping_.Start();
   TF_RETURN_IF_ERROR(server->ServeMetrics());
   TF_RETURN_IF_ERROR(server->Listen());
+  if (server->cluster_ != nullptr) server->StartCluster();
   return server;
 }
 
@@ -168,10 +169,17 @@ absl::Status TissueformServer::LearnWhatIsKept() {
     return cluster_ != nullptr && !absl::IsNotFound(stores_->predictions().Get(id).status());
   }));
   TF_RETURN_IF_ERROR(registry_.LearnKnown());
-  if (cluster_ != nullptr) {
-    cluster_->Start([this] { return budget_.limit_bytes() - budget_.reserved_bytes(); });
-  }
   return absl::OkStatus();
+}
+
+void TissueformServer::StartCluster() {
+  // Proxies send calls elsewhere, where the way to the database may be open.
+  cluster_->node().set_on_renewable([this](bool renewable) {
+    spdlog::log(renewable ? spdlog::level::info : spdlog::level::err,
+                renewable ? "leases are renewed again" : "leases cannot be renewed: not serving");
+    if (!leaving_) server_->GetHealthCheckService()->SetServingStatus(renewable);
+  });
+  cluster_->Start([this] { return budget_.limit_bytes() - budget_.reserved_bytes(); });
 }
 
 TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
@@ -260,6 +268,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
 
 TissueformServer::~TissueformServer() {
   metrics_.reset();
+  if (cluster_ != nullptr) cluster_->Stop();
   if (server_ != nullptr) {
     listener_->Stop();
     server_->Shutdown(std::chrono::system_clock::now());
@@ -267,7 +276,6 @@ TissueformServer::~TissueformServer() {
     server_.reset();
   }
   housekeeping_.Stop();
-  if (cluster_ != nullptr) cluster_->Stop();
   registry_.Stop();
   pool_.reset();    // its last jobs may still use the registry and the store
   stores_.reset();  // its last answers may still use the registry
@@ -395,6 +403,7 @@ void TissueformServer::Drain() {
   const auto deadline = std::chrono::steady_clock::now() + options_.drain_deadline;
   spdlog::info("draining: {} open streams, at most {} s", streams_.size(),
                options_.drain_deadline.count());
+  leaving_ = true;
   if (cluster_ != nullptr) cluster_->BeginDraining();
   server_->GetHealthCheckService()->SetServingStatus(false);
   if (cluster_ != nullptr) {

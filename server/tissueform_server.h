@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -113,8 +114,9 @@ class TissueformServer {
 
   TissueformServer(const ServerOptions& options, Parts parts);
 
-  // What the store has is known then, and followed.
   absl::Status LearnWhatIsKept();
+  // From now on leases are renewed, and what others change is followed.
+  void StartCluster();
   absl::Status Listen();
   void Reclaim(int64_t bytes);
   void ReclaimOf(const std::string& owner, int64_t bytes);
@@ -165,6 +167,7 @@ class TissueformServer {
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
   std::unique_ptr<grpc::Server> server_;
   std::optional<MetricsPage> metrics_;  // reads what the others count
+  std::atomic<bool> leaving_ = false;   // health says NOT_SERVING for good
 };
 
 }  // namespace tissueform

@@ -3,11 +3,16 @@
 
 #include <chrono>
 #include <filesystem>
+#include <future>
 #include <string>
+#include <utility>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
+#include "grpcpp/create_channel.h"
+#include "grpcpp/generic/generic_stub.h"
+#include "grpcpp/support/byte_buffer.h"
 #include "gtest/gtest.h"
 
 #include "client/cpp/client_call.h"
@@ -42,6 +47,21 @@ TEST(NodeNameTest, ANameIsShortAndPlain) {
 
 class ClusterStartTest : public ClusterTest {
  protected:
+  // What the standard health service says: HealthCheckResponse{status: SERVING}.
+  static bool IsServing(const TestNode& node) {
+    grpc::GenericStub stub(grpc::CreateChannel(absl::StrCat("127.0.0.1:", node.server->port()),
+                                               grpc::InsecureChannelCredentials()));
+    grpc::ClientContext context;
+    const grpc::Slice empty;
+    const grpc::ByteBuffer request(&empty, 1);
+    grpc::ByteBuffer response;
+    std::promise<grpc::Status> done;
+    stub.UnaryCall(&context, "/grpc.health.v1.Health/Check", grpc::StubOptions(), &request,
+                   &response, [&done](grpc::Status status) { done.set_value(std::move(status)); });
+    grpc::Slice bytes;
+    return done.get_future().get().ok() && response.DumpToSingleSlice(&bytes).ok() &&
+           std::string(bytes.begin(), bytes.end()) == "\x08\x01";
+  }
   absl::Status StartOf(const ServerOptions& options) {
     return TissueformServer::Start(options, &callers_).status();
   }
@@ -185,7 +205,11 @@ TEST_F(ClusterStartTest, ANodeThatWasCutOffFromTheDatabaseServesOnWhenItIsBack) 
   const int64_t failed = counts.renewals_failed;
   EXPECT_TRUE(Eventually([&] { return counts.renewals_failed > failed; }));
   EXPECT_TRUE(Eventually([&] { return a_.server->cluster()->node().held() == 0; }));
+  // Proxies see it, and send calls to others.
+  EXPECT_TRUE(Eventually([&] { return !IsServing(a_); }));
+  EXPECT_TRUE(IsServing(b_));
   proxy.Thaw();
+  EXPECT_TRUE(Eventually([&] { return IsServing(a_); }));
   EXPECT_TRUE(Eventually([&] { return AskOnce(a_, session, 2).ok(); }));
   a_ = {};  // before the proxy
 }
