@@ -270,6 +270,7 @@ TissueformServer::~TissueformServer() {
   metrics_.reset();
   if (cluster_ != nullptr) cluster_->Stop();
   if (server_ != nullptr) {
+    if (cluster_ != nullptr) cluster_->node().nodes().TellReach([](bool /*reached*/) {});
     listener_->Stop();
     server_->Shutdown(std::chrono::system_clock::now());
     server_->Wait();
@@ -353,6 +354,12 @@ absl::Status TissueformServer::Listen() {
   builder.RegisterService(&server_info_service_);
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) return absl::InternalError("gRPC does not start");
+  if (cluster_ != nullptr) {
+    // Proxies send calls to servers that can take a session; streams stay while leases last.
+    cluster_->node().nodes().TellReach([health = server_->GetHealthCheckService()](bool reached) {
+      health->SetServingStatus(reached);
+    });
+  }
   listener_->Start([this](int fd, int listener_fd) {
     grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
     connection.fd = fd;

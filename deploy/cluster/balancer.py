@@ -12,53 +12,30 @@ import processes
 import stack
 
 PATIENCE_S = 60
-
-
-def configuration(cluster):
-    """Placeholder until deploy/haproxy/cluster.cfg is there."""
-    named = "\n".join(f"    use-server {node} if {{ req.hdr(x-tissueform-node) {node} }}" for node in cluster.nodes)
-    servers = "\n".join(f"    server {node} {cluster.address(node)} check inter 500ms fall 2 rise 1 proto h2" for node in cluster.nodes)
-    gateways = "\n".join(f"    server {each} {cluster.address(each)} check inter 500ms fall 2 rise 1" for each in cluster.gateways)
-    return f"""
-global
-    maxconn 8192
-    stats socket {socket_path(cluster)} mode 600 level admin
-defaults
-    mode http
-    timeout connect 5s
-    timeout client 1h
-    timeout server 1h
-    timeout tunnel 90s
-    option abortonclose
-    retries 0
-frontend workstations
-    bind {cluster.address("workstations")} proto h2
-    default_backend servers
-backend servers
-{named}
-    balance hdr(x-tissueform-session)
-    hash-type consistent
-    http-request return status 200 content-type application/grpc hdr grpc-status 14 if {{ req.hdr(x-tissueform-node) -m found }} {{ nbsrv(servers) lt 0 }}
-{servers}
-frontend planner
-    bind {cluster.address("browsers")}
-    default_backend gateways
-backend gateways
-    balance leastconn
-    option httpchk
-    http-check send meth GET uri /readyz hdr host localhost
-{gateways}
-"""
+CONFIGURATION = stack.ROOT / "deploy/haproxy/cluster.cfg"
+LONGEST_SOCKET = 107
 
 
 def socket_path(cluster):
-    return cluster.folder / "haproxy.sock"
+    path = cluster.folder / "haproxy.sock"
+    if len(str(path)) > LONGEST_SOCKET:
+        raise SystemExit(f"{path} is too long for a socket; name a folder with a shorter path by --state")
+    return path
+
+
+def environment(cluster):
+    """What deploy/haproxy/cluster.cfg reads."""
+    words = {"LISTEN": cluster.address("workstations"), "LISTEN_WEB": cluster.address("browsers"), "SOCKET": str(socket_path(cluster))}
+    for number, node in enumerate(cluster.nodes, 1):
+        words |= {f"NODE_{number}": node, f"SERVER_{number}": cluster.address(node)}
+    for number, gateway in enumerate(cluster.gateways, 1):
+        words[f"GATEWAY_{number}"] = cluster.address(gateway)
+    return {f"TISSUEFORM_{name}": value for name, value in words.items()}
 
 
 def start(cluster):
-    file = cluster.folder / "haproxy.cfg"
-    file.write_text(configuration(cluster))
-    return processes.start([shutil.which("haproxy", path=stack.SYSTEM_PATH), "-db", "-f", file], cluster.log(stack.HAPROXY))
+    return processes.start([shutil.which("haproxy", path=stack.SYSTEM_PATH), "-db", "-f", CONFIGURATION], cluster.log(stack.HAPROXY),
+                           environment=environment(cluster))
 
 
 def tell(cluster, words):

@@ -25,6 +25,8 @@ class Event:
     at: float
     what: str
     held: set = dataclasses.field(default_factory=set)  # sessions of the server that it was done to
+    stops_all: bool = False  # nobody is answered until it is over
+    seen_after_s: float = 0  # so much later proxies know
     back_at: float = None
 
 
@@ -101,14 +103,14 @@ class Arena:
 
     # What is done
 
-    def note(self, what, held=()):
-        event = Event(time.monotonic(), what, set(held))
+    def note(self, what, held=(), **facts):
+        event = Event(time.monotonic(), what, set(held), **facts)
         with self.lock:
             self.events.append(event)
         return event
 
     def kill(self, name):
-        event = self.note(f"kill -9 {name}")
+        event = self.note(f"kill -9 {name}", stops_all=name == stack.HAPROXY)
         self.cluster.kill(name)
         processes.wait_until_gone(self.cluster.process(name))
         if name in self.cluster.nodes:
@@ -130,14 +132,11 @@ class Arena:
         """Until when a drag that showed its last frame at `begin` may go without the next one."""
         base = begin
         with self.lock:
-            for event in self.events:
-                if not begin - AFTER_S <= event.at <= end:
-                    continue
-                if session in event.held:
-                    base = max(base, event.at + LEASE_S)
-                if event.back_at is not None and not event.held and event.what.endswith((stack.HAPROXY, "database gone")):
-                    base = max(base, event.back_at)
-                elif event.back_at is None and event.what.endswith((stack.HAPROXY, "database gone")):
-                    base = max(base, end)
+            events = [event for event in self.events if event.at <= end and (event.back_at or end) >= begin - AFTER_S]
+        for event in events:
+            if session in event.held:
+                base = max(base, event.at + LEASE_S + event.seen_after_s)
+            if event.stops_all:
+                base = max(base, (event.back_at or end) + event.seen_after_s)
         return base + preparation_s + AFTER_S
 

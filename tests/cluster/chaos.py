@@ -10,6 +10,7 @@ went on in time. 1: something was not so. 77: PostgreSQL, HAProxy or python3-grp
 
 import argparse
 import itertools
+import os
 import pathlib
 import random
 import shutil
@@ -20,6 +21,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 for folder in ("deploy/cluster", "tests/integration"):
     sys.path.append(str(ROOT / folder))
 SKIPPED = 77
+os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # a proxy's own errors are no gRPC, of which its log would tell each
 
 import stack  # noqa: E402 (after the paths)
 
@@ -36,6 +38,7 @@ import browsers  # noqa: E402
 import drags  # noqa: E402
 import ledger as ledger_module  # noqa: E402
 import maker  # noqa: E402
+import our_clients  # noqa: E402
 import scenarios  # noqa: E402
 import stranger  # noqa: E402
 
@@ -80,7 +83,7 @@ class Load:
         self.reader = first
 
     def start(self):
-        """Every drag shows a frame; how long that took is what a preparation takes here."""
+        """Every drag shows a frame; the longest time from a stream's begin to that is what a preparation takes here."""
         begin = time.monotonic()
         for each in self.drags:
             each.start()
@@ -88,7 +91,8 @@ class Load:
             if time.monotonic() > begin + 60:
                 raise SystemExit(f"not every drag shows a frame: {dict(self.ledger.ends)} {self.ledger.violations}")
             time.sleep(0.05)
-        self.preparation_s = max(each.last_frame[0] for each in self.drags) - begin
+        self.preparation_s = max(each.stream.first_frame_at - each.stream.begun_at for each in self.drags)
+        print(f"all drags show frames after {time.monotonic() - begin:.2f} s: {dict(self.ledger.ends)}", flush=True)
         for each in (*self.rivals, *self.followers, *self.churns, self.web_reader):
             each.start()
 
@@ -105,7 +109,7 @@ class Load:
         return int(poses[0].pivot_mm.x) if poses else 0
 
 
-def judge_gaps(arena, ledger, load):
+def judge_gaps(arena, ledger, load, began):
     """Every time for which a drag showed nothing, against what was done to the cluster meanwhile."""
     for session, begin, end, before, after in ledger.gaps:
         if session == load.contested:  # its drags stay with servers that are killed
@@ -113,7 +117,8 @@ def judge_gaps(arena, ledger, load):
         until = arena.may_rest_until(session, begin, end, load.preparation_s)
         if end > until:
             done = [event.what for event in arena.events if begin - 1 <= event.at <= end]
-            ledger.violation(f"the drag of {session} showed nothing for {end - begin:.2f} s, {end - until:.2f} s too long; from {before} to {after}; {done}")
+            ledger.violation(f"the drag of {session} showed nothing from {begin - began:.2f} to {end - began:.2f} s, {end - until:.2f} s too long; "
+                             f"from {before} to {after}; {done}")
 
 
 def print_gaps(ledger, load):
@@ -130,8 +135,14 @@ def print_gaps(ledger, load):
 def run_scenarios(options, arena, load, ledger, seed):
     run = scenarios.Scenarios(arena, load, ledger, seed)
     if "kills" in options.only:
-        run.kills(options.kills, options.seconds or 2 * options.kills)
-        run.settle()
+        seconds = options.seconds or 2 * options.kills
+        ours = our_clients.OurClients(arena, seconds + 3)
+        try:
+            run.kills(options.kills, seconds)
+            run.settle()
+            run.say(f"tissueform load: {ours.judge(ledger)}")
+        finally:
+            ours.stop()
     if "stop" in options.only or "split" in options.only:
         run.stop_and_split("stop" in options.only, "split" in options.only)
         run.settle()
@@ -163,7 +174,7 @@ def chaos(options, seed):
         load.stop()
         run.say("all that was acknowledged is read back, through one server after the other")
         maker.read_back([maker.Maker(arena.cluster.address(node), ledger, chance) for node in arena.cluster.nodes], ledger)
-        judge_gaps(arena, ledger, load)
+        judge_gaps(arena, ledger, load, run.begin)
         report(ledger, load, run)
     finally:
         if load is not None:

@@ -46,7 +46,7 @@ class Drag(threading.Thread):
         self.sequences = sequences or itertools.count(1)
         self.ending = threading.Event()
         self.last_frame = None  # when, and from which node
-        self.streams = 0
+        self.stream, self.streams = None, 0
 
     def stop(self):
         self.ending.set()
@@ -66,6 +66,11 @@ class Drag(threading.Thread):
                     return
                 self.ending.wait(0.1 if self.pinned else wait_s)
         self.server.close()
+
+    def state(self):
+        stream = self.stream
+        told = "none" if stream is None else f"{time.monotonic() - stream.begun_at:.1f} s old, from {stream.node or 'nobody'}, {'' if stream.started else 'not '}started"
+        return f"stream {self.streams}: {told}; sent to {self.route.node or 'any server'}"
 
     def _one_stream(self):
         from tissueform.v1 import deform_service_pb2 as protocol
@@ -95,7 +100,8 @@ class Stream:
         self.outgoing = queue.SimpleQueue()
         self.over = threading.Event()
         self.heard_at = time.monotonic()
-        drag.streams += 1
+        self.begun_at = self.heard_at
+        drag.stream, drag.streams = self, drag.streams + 1
 
     @property
     def server(self):

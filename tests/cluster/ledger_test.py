@@ -109,11 +109,11 @@ class Rest(unittest.TestCase):
         self.assertEqual(self.until(100, 120), 101.5)
 
     def test_until_haproxy_is_back(self):
-        self.arena.events = [arena.Event(100.1, "kill -9 haproxy", back_at=103)]
+        self.arena.events = [arena.Event(100.1, "kill -9 haproxy", stops_all=True, back_at=103)]
         self.assertEqual(self.until(100, 120), 104.5)
 
     def test_what_was_long_ago_does_not_count(self):
-        self.arena.events = [arena.Event(90, "kill -9 node1", {SESSION})]
+        self.arena.events = [arena.Event(90, "kill -9 node1", {SESSION}, back_at=92)]
         self.assertEqual(self.until(100, 120), 101.5)
 
 

@@ -19,6 +19,9 @@ SESSION_HEADER, NODE_HEADER = "x-tissueform-session", "x-tissueform-node"
 MOST_HOPS = 4
 FIRST_WAIT_S, MOST_WAIT_S = 0.05, 0.4
 ATTEMPT_S = 15
+ELSEWHERE = {"SESSION_MOVED", "MEMORY_BUDGET_FULL"}
+# Whatever the code: through HAProxy an error that ends a stream early may arrive as CANCELLED, with the server's details.
+LATER = ELSEWHERE | {"WRONG_NODE", "SERVER_DRAINING", "UNAVAILABLE", "SESSION_BEING_DELETED"}
 # What a proxy or a cut connection says where a server has said nothing.
 FROM_THE_WAY = {grpc.StatusCode.UNKNOWN, grpc.StatusCode.INTERNAL, grpc.StatusCode.CANCELLED, grpc.StatusCode.DEADLINE_EXCEEDED}
 CHANNEL = [("grpc.initial_reconnect_backoff_ms", 50), ("grpc.min_reconnect_backoff_ms", 50), ("grpc.max_reconnect_backoff_ms", 200),
@@ -81,15 +84,14 @@ class Route:
         """Seconds until it may be tried again; Refused where that is no use."""
         code, reason, metadata = why(error)
         node = metadata.get("node")
-        if reason in ("SESSION_MOVED", "MEMORY_BUDGET_FULL") and node and self.hops < MOST_HOPS:
+        if reason in ELSEWHERE and node and self.hops < MOST_HOPS:
             self.node, self.hops = node, self.hops + 1
             return 0.0
-        moved = reason in ("SESSION_MOVED", "MEMORY_BUDGET_FULL")
-        if code != grpc.StatusCode.UNAVAILABLE and not moved and (reason or code not in FROM_THE_WAY):
+        if reason not in LATER and not (code == grpc.StatusCode.UNAVAILABLE or (not reason and code in FROM_THE_WAY)):
             raise Refused(code, reason, error.details())
-        first = self.node is not None
+        knew = self.node is not None
         self.node, self.hops = None, 0
-        if first and reason == "SESSION_MOVED":
+        if knew and reason == "SESSION_MOVED":
             return 0.0
         wait_s, self.wait_s = self.wait_s, min(MOST_WAIT_S, self.wait_s * 1.6)
         return wait_s * random.uniform(0.8, 1.2)
