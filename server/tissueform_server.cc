@@ -156,7 +156,10 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
   server->housekeeping_.Start();
   TF_RETURN_IF_ERROR(server->ServeMetrics());
   TF_RETURN_IF_ERROR(server->Listen());
-  if (server->cluster_ != nullptr) server->StartCluster();
+  if (server->cluster_ != nullptr) {
+    const MemoryBudget& budget = server->budget_;
+    server->cluster_->Start([&budget] { return budget.limit_bytes() - budget.reserved_bytes(); });
+  }
   return server;
 }
 
@@ -170,16 +173,6 @@ absl::Status TissueformServer::LearnWhatIsKept() {
   }));
   TF_RETURN_IF_ERROR(registry_.LearnKnown());
   return absl::OkStatus();
-}
-
-void TissueformServer::StartCluster() {
-  // Proxies send calls elsewhere, where the way to the database may be open.
-  cluster_->node().set_on_renewable([this](bool renewable) {
-    spdlog::log(renewable ? spdlog::level::info : spdlog::level::err,
-                renewable ? "leases are renewed again" : "leases cannot be renewed: not serving");
-    if (!leaving_) server_->GetHealthCheckService()->SetServingStatus(renewable);
-  });
-  cluster_->Start([this] { return budget_.limit_bytes() - budget_.reserved_bytes(); });
 }
 
 TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
@@ -270,7 +263,6 @@ TissueformServer::~TissueformServer() {
   metrics_.reset();
   if (cluster_ != nullptr) cluster_->Stop();
   if (server_ != nullptr) {
-    if (cluster_ != nullptr) cluster_->node().nodes().TellReach([](bool /*reached*/) {});
     listener_->Stop();
     server_->Shutdown(std::chrono::system_clock::now());
     server_->Wait();
@@ -410,7 +402,6 @@ void TissueformServer::Drain() {
   const auto deadline = std::chrono::steady_clock::now() + options_.drain_deadline;
   spdlog::info("draining: {} open streams, at most {} s", streams_.size(),
                options_.drain_deadline.count());
-  leaving_ = true;
   if (cluster_ != nullptr) cluster_->BeginDraining();
   server_->GetHealthCheckService()->SetServingStatus(false);
   if (cluster_ != nullptr) {

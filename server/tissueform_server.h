@@ -3,7 +3,6 @@
 
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -115,8 +114,6 @@ class TissueformServer {
   TissueformServer(const ServerOptions& options, Parts parts);
 
   absl::Status LearnWhatIsKept();
-  // From now on leases are renewed, and what others change is followed.
-  void StartCluster();
   absl::Status Listen();
   void Reclaim(int64_t bytes);
   void ReclaimOf(const std::string& owner, int64_t bytes);
@@ -167,7 +164,6 @@ class TissueformServer {
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
   std::unique_ptr<grpc::Server> server_;
   std::optional<MetricsPage> metrics_;  // reads what the others count
-  std::atomic<bool> leaving_ = false;   // health says NOT_SERVING for good
 };
 
 }  // namespace tissueform

@@ -17,7 +17,7 @@ namespace tissueform {
 ClusterNode::ClusterNode(PostgresPool* pool, const ClusterOptions& options, std::string name)
     : name_(std::move(name)),
       leases_(pool, name_, options.lease),
-      counted_(&leases_, options.lease.duration - options.lease.margin),
+      counted_(&leases_),
       nodes_(pool, name_),
       keeper_(&counted_, {.renew_every = options.renew_every}, [this](const SessionLease& lease) {
         ++lost_;

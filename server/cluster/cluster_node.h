@@ -36,10 +36,6 @@ class ClusterNode final : public SessionOwnership {
   void set_on_lost(std::function<void(const std::string& id)> on_lost) {
     on_lost_ = std::move(on_lost);
   }
-  // Told when this server cannot hold sessions any longer, and when it can again. Before Start.
-  void set_on_renewable(std::function<void(bool)> told) {
-    counted_.set_on_renewable(std::move(told));
-  }
   // Leases are renewed, and others told of this server, from now on. `free_bytes` says how much
   // memory sessions may still take here. Once.
   void Start(std::function<int64_t()> free_bytes);

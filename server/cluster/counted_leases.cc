@@ -19,8 +19,6 @@ absl::StatusOr<std::vector<SessionLease>> CountedLeases::Renew() {
   absl::StatusOr<std::vector<SessionLease>> leases = leases_.Renew();
   ++(leases.ok() ? counts_.renewed : counts_.renewals_failed);
   if (leases.ok()) renewed_ = std::chrono::steady_clock::now();
-  const bool renewable = leases.ok() || SinceRenewal() < lasting_;
-  if (renewable != std::exchange(renewable_, renewable)) on_renewable_(renewable);
   return leases;
 }
 

@@ -6,27 +6,20 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <functional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "server/postgres_store/session_leases.h"
 
 namespace tissueform {
 
-// Leases whose calls are counted, by what became of them, and that tell when they cannot be renewed
-// any longer: no session can be held here then, and can elsewhere, perhaps.
+// Leases whose calls are counted, by what became of them.
 //
 // Thread-safe.
 class CountedLeases final : public SessionLeases {
  public:
-  // `leases` must outlive it; `lasting` is how long they may be answered after a renewal.
-  CountedLeases(SessionLeases* leases, std::chrono::milliseconds lasting)
-      : leases_(*leases), lasting_(lasting) {}
-
-  // Told true or false when that changes, on the thread that renews. Before the first renewal.
-  void set_on_renewable(std::function<void(bool)> told) { on_renewable_ = std::move(told); }
+  // `leases` must outlive it.
+  explicit CountedLeases(SessionLeases* leases) : leases_(*leases) {}
 
   absl::StatusOr<LeaseAnswer> Acquire(const std::string& session) override;
   absl::StatusOr<std::vector<SessionLease>> Renew() override;
@@ -48,10 +41,7 @@ class CountedLeases final : public SessionLeases {
 
  private:
   SessionLeases& leases_;
-  const std::chrono::milliseconds lasting_;
-  std::function<void(bool)> on_renewable_ = [](bool /*renewable*/) {};
   Counts counts_;
-  bool renewable_ = true;  // of the thread that renews
   std::atomic<std::chrono::steady_clock::time_point> renewed_ = std::chrono::steady_clock::now();
 };
 
