@@ -156,18 +156,22 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
   server->housekeeping_.Start();
   TF_RETURN_IF_ERROR(server->ServeMetrics());
   TF_RETURN_IF_ERROR(server->Listen());
+  if (server->cluster_ != nullptr) {
+    const MemoryBudget& budget = server->budget_;
+    server->cluster_->Start([&budget] { return budget.limit_bytes() - budget.reserved_bytes(); });
+  }
   return server;
 }
 
 absl::Status TissueformServer::LearnWhatIsKept() {
   TF_RETURN_IF_ERROR(access_changes_.Learn());
   TF_RETURN_IF_ERROR(TellWhatIsKept(stores_.get(), &access_changes_));
-  TF_RETURN_IF_ERROR(
-      exports_.Learn([&](const std::string& id) { return access_.KnowsPrediction(id); }));
+  TF_RETURN_IF_ERROR(exports_.Learn([&](const std::string& id) {
+    if (access_.KnowsPrediction(id)) return true;
+    // Another server may have made it since; what is not known to be gone stays.
+    return cluster_ != nullptr && !absl::IsNotFound(stores_->predictions().Get(id).status());
+  }));
   TF_RETURN_IF_ERROR(registry_.LearnKnown());
-  if (cluster_ != nullptr) {
-    cluster_->Start([this] { return budget_.limit_bytes() - budget_.reserved_bytes(); });
-  }
   return absl::OkStatus();
 }
 
@@ -257,6 +261,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
 
 TissueformServer::~TissueformServer() {
   metrics_.reset();
+  if (cluster_ != nullptr) cluster_->Stop();
   if (server_ != nullptr) {
     listener_->Stop();
     server_->Shutdown(std::chrono::system_clock::now());
@@ -264,7 +269,6 @@ TissueformServer::~TissueformServer() {
     server_.reset();
   }
   housekeeping_.Stop();
-  if (cluster_ != nullptr) cluster_->Stop();
   registry_.Stop();
   pool_.reset();    // its last jobs may still use the registry and the store
   stores_.reset();  // its last answers may still use the registry
@@ -342,6 +346,12 @@ absl::Status TissueformServer::Listen() {
   builder.RegisterService(&server_info_service_);
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) return absl::InternalError("gRPC does not start");
+  if (cluster_ != nullptr) {
+    // Proxies send calls to servers that can take a session; streams stay while leases last.
+    cluster_->node().nodes().TellReach([health = server_->GetHealthCheckService()](bool reached) {
+      health->SetServingStatus(reached);
+    });
+  }
   listener_->Start([this](int fd, int listener_fd) {
     grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
     connection.fd = fd;

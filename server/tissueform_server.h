@@ -113,7 +113,6 @@ class TissueformServer {
 
   TissueformServer(const ServerOptions& options, Parts parts);
 
-  // What the store has is known then, and followed.
   absl::Status LearnWhatIsKept();
   absl::Status Listen();
   void Reclaim(int64_t bytes);

@@ -77,8 +77,9 @@ std::optional<v1::DeformFrame> ReattachingStream::Receive() {
     if (end_.ok()) return std::nullopt;
     end_ = reattachment_.After(end_, [this] {
       absl::StatusOr<std::unique_ptr<DeformStream>> next = OpenStream(kNoPatience);
-      if (next.ok()) Adopt(*std::move(next));
-      return next.status();
+      if (!next.ok()) return next.status();
+      Adopt(*std::move(next));
+      return absl::OkStatus();
     });
     if (!end_.ok()) return std::nullopt;
   }

@@ -31,8 +31,9 @@ std::optional<v1::WatchFrame> ReattachingWatch::Receive() {
     end_ = reattachment_.After(end_, [this] {
       absl::StatusOr<std::unique_ptr<WatchStream>> next =
           client_->Watch(session_, options_.watch, kNoPatience);
-      if (next.ok()) Adopt(*std::move(next));
-      return next.status();
+      if (!next.ok()) return next.status();
+      Adopt(*std::move(next));
+      return absl::OkStatus();
     });
   }
   return std::nullopt;

@@ -160,18 +160,19 @@ bool Access::Knows(const Unknown& what) const {
   return true;
 }
 
-void Access::LookFor(Unknown::Kind kind, const std::string& name, const std::string& owner) const {
-  if (!on_unknown_) return;
+absl::Status Access::LookFor(Unknown::Kind kind, const std::string& name,
+                             const std::string& owner) const {
+  if (!on_unknown_) return absl::OkStatus();
   const Unknown what = {.kind = kind, .name = name, .owner = owner};
   {
     MutexLock lock(mutex_);
-    if (Knows(what)) return;
+    if (Knows(what)) return absl::OkStatus();
   }
-  on_unknown_(what);
+  return on_unknown_(what);
 }
 
 absl::Status Access::MaySession(const Principal& caller, const std::string& id, Need need) const {
-  LookFor(Unknown::Kind::kSession, id);
+  TF_RETURN_IF_ERROR(LookFor(Unknown::Kind::kSession, id));
   MutexLock lock(mutex_);
   if (caller.only_session == SessionResource(id) && !HasGoodLink(id)) return LinkHasEnded();
   return Judge(SessionLevel(caller, id), need, NoSuchSession(id));
@@ -179,7 +180,7 @@ absl::Status Access::MaySession(const Principal& caller, const std::string& id, 
 
 absl::Status Access::MayPrediction(const Principal& caller, const std::string& id,
                                    Need need) const {
-  LookFor(Unknown::Kind::kPrediction, id);
+  TF_RETURN_IF_ERROR(LookFor(Unknown::Kind::kPrediction, id));
   MutexLock lock(mutex_);
   return Judge(PredictionLevel(caller, id), need, NoPrediction(id));
 }
@@ -192,7 +193,7 @@ absl::StatusOr<CaseKey> Access::MayCase(const Principal& caller, const std::stri
   };
   absl::StatusOr<CaseKey> first = found();
   if (first.ok() || IsLink(caller)) return first;
-  LookFor(Unknown::Kind::kCase, sha256, caller.name);
+  TF_RETURN_IF_ERROR(LookFor(Unknown::Kind::kCase, sha256, caller.name));
   return found();
 }
 
@@ -242,7 +243,7 @@ absl::Status Access::MayMesh(const Principal& caller, const std::string& sha256,
   };
   const absl::Status first = judged();
   if (first.ok() || IsLink(caller)) return first;
-  LookFor(Unknown::Kind::kMesh, sha256, caller.name);
+  TF_RETURN_IF_ERROR(LookFor(Unknown::Kind::kMesh, sha256, caller.name));
   return judged();
 }
 
@@ -310,7 +311,7 @@ bool Access::HasGoodLink(const std::string& session) const {
 }
 
 absl::StatusOr<FollowLinkRow> Access::FindLink(const std::string& digest) const {
-  LookFor(Unknown::Kind::kLink, digest);
+  TF_RETURN_IF_ERROR(LookFor(Unknown::Kind::kLink, digest));
   MutexLock lock(mutex_);
   const FollowLinkRow* link = table_.FindLink(digest);
   if (link == nullptr || !IsGood(*link)) return LinkHasEnded();
@@ -342,13 +343,13 @@ absl::Status Access::MayKeep(const Principal& caller, int64_t bytes) const {
 }
 
 bool Access::KnowsSession(const std::string& id) const {
-  LookFor(Unknown::Kind::kSession, id);
+  LookFor(Unknown::Kind::kSession, id).IgnoreError();
   MutexLock lock(mutex_);
   return index_.FindSession(id) != nullptr;
 }
 
 bool Access::KnowsPrediction(const std::string& id) const {
-  LookFor(Unknown::Kind::kPrediction, id);
+  LookFor(Unknown::Kind::kPrediction, id).IgnoreError();
   MutexLock lock(mutex_);
   return index_.FindPrediction(id) != nullptr;
 }

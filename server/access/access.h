@@ -57,8 +57,9 @@ class Access {
     friend auto operator<=>(const Unknown&, const Unknown&) = default;
   };
   // Asked once for what a call names and nobody here knows, without a lock held, on the call's
-  // thread: tells AccessChanges of it where it is there. Call it before calls are served.
-  void set_on_unknown(std::function<void(const Unknown&)> on_unknown) {
+  // thread: tells AccessChanges of it where it is there. Errors: what the call is refused with
+  // where that cannot be found out. Call it before calls are served.
+  void set_on_unknown(std::function<absl::Status(const Unknown&)> on_unknown) {
     on_unknown_ = std::move(on_unknown);
   }
 
@@ -141,13 +142,13 @@ class Access {
   bool HasGoodLink(const std::string& session) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   // Have it looked for where it is not known.
-  void LookFor(Unknown::Kind kind, const std::string& name, const std::string& owner = {}) const
-      ABSL_LOCKS_EXCLUDED(mutex_);
+  absl::Status LookFor(Unknown::Kind kind, const std::string& name,
+                       const std::string& owner = {}) const ABSL_LOCKS_EXCLUDED(mutex_);
   bool Knows(const Unknown& what) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const UnixClock clock_;
-  int64_t most_bytes_ = 0;                          // of one principal
-  std::function<void(const Unknown&)> on_unknown_;  // empty: all that there is is known
+  int64_t most_bytes_ = 0;                                  // of one principal
+  std::function<absl::Status(const Unknown&)> on_unknown_;  // empty: all that there is is known
 
   mutable Mutex mutex_;
   ResourceIndex index_ ABSL_GUARDED_BY(mutex_);

@@ -102,15 +102,18 @@ void AccessChanges::End(Unseen* unseen, bool kept) {
   if (kept) access_.table_.Add(unseen->put);
 }
 
-void AccessChanges::LookFor(const Principal& caller, absl::string_view resource) const {
+absl::Status AccessChanges::LookFor(const Principal& caller, absl::string_view resource) const {
   using Kind = Access::Unknown::Kind;
   if (absl::ConsumePrefix(&resource, kSessionsPrefix)) {
-    access_.LookFor(Kind::kSession, std::string(resource));
-  } else if (absl::ConsumePrefix(&resource, kPredictionsPrefix)) {
-    access_.LookFor(Kind::kPrediction, std::string(resource));
-  } else if (absl::ConsumePrefix(&resource, kCasesPrefix)) {
-    access_.LookFor(Kind::kCase, std::string(resource), caller.name);
+    return access_.LookFor(Kind::kSession, std::string(resource));
   }
+  if (absl::ConsumePrefix(&resource, kPredictionsPrefix)) {
+    return access_.LookFor(Kind::kPrediction, std::string(resource));
+  }
+  if (absl::ConsumePrefix(&resource, kCasesPrefix)) {
+    return access_.LookFor(Kind::kCase, std::string(resource), caller.name);
+  }
+  return absl::OkStatus();
 }
 
 absl::Status AccessChanges::MayOwn(const Principal& caller, const std::string& resource) const {
@@ -139,7 +142,7 @@ absl::Status AccessChanges::MayOwn(const Principal& caller, const std::string& r
 
 absl::Status AccessChanges::CheckShare(const Principal& caller, const ShareRow& share) const {
   TF_RETURN_IF_ERROR(CheckAccessName(share.principal, "principal"));
-  LookFor(caller, share.resource);
+  TF_RETURN_IF_ERROR(LookFor(caller, share.resource));
   MutexLock lock(access_.mutex_);
   TF_RETURN_IF_ERROR(MayOwn(caller, share.resource));
   const bool is_new =
@@ -166,9 +169,8 @@ void AccessChanges::Share(const Principal& caller, ShareRow share, const Done& d
 
 void AccessChanges::Unshare(const Principal& caller, const std::string& resource,
                             const std::string& with, const Done& done) {
-  absl::Status status;
-  LookFor(caller, resource);
-  {
+  absl::Status status = LookFor(caller, resource);
+  if (status.ok()) {
     MutexLock lock(access_.mutex_);
     status = MayOwn(caller, resource);
     if (status.ok() && !access_.table_.RoleOf(caller.name, resource, with).has_value()) {
@@ -185,15 +187,17 @@ void AccessChanges::Unshare(const Principal& caller, const std::string& resource
 
 absl::StatusOr<std::vector<ShareRow>> AccessChanges::SharesOf(const Principal& caller,
                                                               const std::string& resource) const {
-  LookFor(caller, resource);
+  TF_RETURN_IF_ERROR(LookFor(caller, resource));
   MutexLock lock(access_.mutex_);
   TF_RETURN_IF_ERROR(MayOwn(caller, resource));
   return access_.table_.SharesOf(caller.name, resource);
 }
 
 absl::Status AccessChanges::CheckLink(const Principal& caller, const FollowLinkRow& link) const {
-  LookFor(caller, SessionResource(link.session));
-  if (!link.case_sha256.empty()) LookFor(caller, CaseResource(link.case_sha256));
+  TF_RETURN_IF_ERROR(LookFor(caller, SessionResource(link.session)));
+  if (!link.case_sha256.empty()) {
+    TF_RETURN_IF_ERROR(LookFor(caller, CaseResource(link.case_sha256)));
+  }
   MutexLock lock(access_.mutex_);
   if (access_.index_.FindSession(link.session) == nullptr) return NoSuchSession(link.session);
   TF_RETURN_IF_ERROR(Access::Judge(access_.SessionLevel(caller, link.session), Need::kDrag,

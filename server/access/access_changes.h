@@ -113,7 +113,7 @@ class AccessChanges {
       ABSL_LOCKS_EXCLUDED(access_.mutex_);
 
   // Has it looked for where nobody here knows it.
-  void LookFor(const Principal& caller, absl::string_view resource) const
+  absl::Status LookFor(const Principal& caller, absl::string_view resource) const
       ABSL_LOCKS_EXCLUDED(access_.mutex_);
 
   // From memory at once, then from the store.

@@ -47,8 +47,9 @@ void Cluster::Join(SharedRooms rooms, Access* access) {
   rooms_ = rooms;
   lookups_ = std::make_unique<RowLookups>(pool_.get(), rooms.access, rooms.exports);
   rooms.access->FollowOthers();
-  access->set_on_unknown([this](const Access::Unknown& what) { lookups_->LookFor(what); });
-  rooms.exports->set_on_unknown([this](const std::string& id) { lookups_->LookForExport(id); });
+  access->set_on_unknown([this](const Access::Unknown& what) { return lookups_->LookFor(what); });
+  rooms.exports->set_on_unknown(
+      [this](const std::string& id) { return lookups_->LookForExport(id); });
   rooms.sessions->set_naming_room(
       [this](const absl::Status& refusal) { return node_.NamingRoom(refusal); });
   node_.set_on_lost([sessions = rooms.sessions](const std::string& id) { sessions->Lost(id); });

@@ -38,6 +38,8 @@ class Cluster {
 
   ClusterNode& node() { return node_; }
   const std::string& name() const { return node_.name(); }
+  // Once joined.
+  const RowLookups& lookups() const { return *lookups_; }
 
   // Whatever the rooms do not know they look for from now on. All must outlive Stop.
   void Join(SharedRooms rooms, Access* access);

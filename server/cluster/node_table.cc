@@ -113,11 +113,32 @@ absl::Status NodeTable::Exchange() {
   return status;
 }
 
+void NodeTable::TellReach(std::function<void(bool)> tell) {
+  MutexLock lock(mutex_);
+  tell_ = std::move(tell);
+  if (!reached_ && !draining_) tell_(false);
+}
+
+void NodeTable::NoteAnswer(bool answered) {
+  const auto now = std::chrono::steady_clock::now();
+  MutexLock lock(mutex_);
+  if (answered) answered_ = now;
+  const bool reached = now - answered_ < kCutOffAfter;
+  if (reached == reached_) return;
+  reached_ = reached;
+  if (reached) {
+    spdlog::info("the database answers again");
+  } else {
+    spdlog::warn("the database does not answer; calls should go to other servers");
+  }
+  if (!draining_) tell_(reached);
+}
+
 void NodeTable::Loop() {
   bool was_taken = false;
   for (;;) {
     // What fails is tried again in a second; meanwhile nobody is thought to have room.
-    Exchange().IgnoreError();
+    NoteAnswer(Exchange().ok());
     const bool taken = IsNameTaken();
     if (taken && !was_taken) {
       spdlog::warn("another server of the cluster has this one's name; give each its --node-name");

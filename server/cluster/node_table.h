@@ -8,6 +8,7 @@
 #include <functional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -26,6 +27,9 @@ class NodeTable {
  public:
   static constexpr std::chrono::seconds kEvery{1};
   static constexpr std::chrono::seconds kGoneAfter{10};
+  // Without the database for so long no lease is good, and calls are better sent to others. Not
+  // before: proxies may end the streams of a server that does not serve.
+  static constexpr std::chrono::seconds kCutOffAfter{8};
 
   // `pool` must outlive it.
   NodeTable(PostgresPool* pool, std::string name);
@@ -33,6 +37,9 @@ class NodeTable {
   NodeTable(const NodeTable&) = delete;
   NodeTable& operator=(const NodeTable&) = delete;
 
+  // Whom to tell from now on, under a lock, whether calls should come here: false when the database
+  // has not answered for kCutOffAfter, true when it does again; nothing once this server drains.
+  void TellReach(std::function<void(bool)> tell) ABSL_LOCKS_EXCLUDED(mutex_);
   // A thread writes and reads from now on, and asks for the free bytes. Once.
   void Start(std::function<int64_t()> free_bytes);
   // Takes its row out, unless the database is away.
@@ -60,6 +67,7 @@ class NodeTable {
   };
 
   void Loop();
+  void NoteAnswer(bool answered) ABSL_LOCKS_EXCLUDED(mutex_);
 
   PostgresPool* const pool_;
   const std::string name_;
@@ -68,6 +76,10 @@ class NodeTable {
 
   Mutex mutex_;
   ConditionVariable changed_;
+  std::chrono::steady_clock::time_point answered_ ABSL_GUARDED_BY(mutex_) =
+      std::chrono::steady_clock::now();
+  bool reached_ ABSL_GUARDED_BY(mutex_) = true;
+  std::function<void(bool)> tell_ ABSL_GUARDED_BY(mutex_) = [](bool /*reached*/) {};
   std::vector<Other> others_ ABSL_GUARDED_BY(mutex_);
   bool draining_ ABSL_GUARDED_BY(mutex_) = false;
   bool ending_ ABSL_GUARDED_BY(mutex_) = false;

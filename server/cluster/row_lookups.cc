@@ -24,13 +24,13 @@ RowLookups::RowLookups(PostgresPool* pool, AccessChanges* access, ExportBook* ex
       cases_(pool),
       rows_(pool) {}
 
-void RowLookups::LookFor(const Access::Unknown& what) {
-  Look({.kind = static_cast<int>(what.kind), .name = what.name, .owner = what.owner},
-       [&] { return Read(what); });
+absl::Status RowLookups::LookFor(const Access::Unknown& what) {
+  return Look({.kind = static_cast<int>(what.kind), .name = what.name, .owner = what.owner},
+              [&] { return Read(what); });
 }
 
-void RowLookups::LookForExport(const std::string& id) {
-  Look({.kind = kExportKind, .name = id}, [&]() -> absl::Status {
+absl::Status RowLookups::LookForExport(const std::string& id) {
+  return Look({.kind = kExportKind, .name = id}, [&]() -> absl::Status {
     TF_RETURN_IF_ERROR(exports_.LearnAgain());
     return absl::NotFoundError("");  // not again at once, whatever it has found
   });
@@ -41,33 +41,42 @@ int64_t RowLookups::lookups() const {
   return lookups_;
 }
 
-bool RowLookups::Begin(const Key& key) {
+absl::StatusOr<bool> RowLookups::Begin(const Key& key) {
   const auto now = std::chrono::steady_clock::now();
   MutexLock lock(mutex_);
-  if (reading_ >= kMostAtOnce || now < silent_until_) return false;
-  if (missing_.size() >= kMostRemembered) {
-    std::erase_if(missing_, [&](const auto& missing) { return missing.second <= now; });
-    if (missing_.size() >= kMostRemembered) return false;
-  }
   const auto missing = missing_.find(key);
   if (missing != missing_.end() && now < missing->second) return false;
+  while (reading_ >= kMostAtOnce && now >= silent_until_) {
+    if (!place_.WaitUntil(mutex_, now + kPatience) && reading_ >= kMostAtOnce) break;
+  }
+  if (reading_ >= kMostAtOnce || now < silent_until_) {
+    return absl::UnavailableError(
+        "what is named is not known here, and the store cannot be asked now; try again");
+  }
+  if (missing_.size() >= kMostRemembered) missing_.clear();
   ++reading_;
   ++lookups_;
   return true;
 }
 
-void RowLookups::Look(const Key& key, const std::function<absl::Status()>& read) {
-  if (!Begin(key)) return;
+absl::Status RowLookups::Look(const Key& key, const std::function<absl::Status()>& read) {
+  TF_ASSIGN_OR_RETURN(const bool begun, Begin(key));
+  if (!begun) return absl::OkStatus();
   const absl::Status status = read();
   const auto until = std::chrono::steady_clock::now() + kRemembered;
   MutexLock lock(mutex_);
   --reading_;
+  place_.NotifyAll();
+  if (absl::IsUnavailable(status)) {
+    silent_until_ = until;
+    return status;
+  }
   if (status.ok()) {
     missing_.erase(key);
   } else {
     missing_[key] = until;
-    if (absl::IsUnavailable(status)) silent_until_ = until;
   }
+  return absl::OkStatus();
 }
 
 absl::Status RowLookups::ReadSession(const std::string& id) {

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 
 #include "core/base/mutex.h"
 #include "server/access/access.h"
@@ -25,21 +26,23 @@ namespace tissueform {
 // Reads the one row that a call names and nobody here knows: another server may have made it a
 // moment ago, before its notice has come. Bounded, since anybody may name anything: at most
 // kMostAtOnce read at a time, what was not there is not looked for again for kRemembered, and
-// nothing is while the database does not answer. Whoever finds no place goes without.
+// nothing is while the database does not answer.
 //
-// Thread-safe. Calls block, for as long as the pool is patient.
+// Thread-safe. Calls block, for kPatience and as long as the pool is patient. Errors: Unavailable,
+// where nobody knows whether it is there.
 class RowLookups {
  public:
   static constexpr int kMostAtOnce = 4;
   static constexpr std::chrono::seconds kRemembered{1};
+  static constexpr std::chrono::seconds kPatience{1};  // for one of the places
 
   // `pool` has connections for kMostAtOnce of them; all must outlive it.
   RowLookups(PostgresPool* pool, AccessChanges* access, ExportBook* exports);
 
   // Tells `access` of it where it is there.
-  void LookFor(const Access::Unknown& what);
+  absl::Status LookFor(const Access::Unknown& what);
   // Tells `exports` to learn again where it is there.
-  void LookForExport(const std::string& id);
+  absl::Status LookForExport(const std::string& id);
 
   // Rows that were read, or were not there.
   int64_t lookups() const;
@@ -53,8 +56,9 @@ class RowLookups {
     friend auto operator<=>(const Key&, const Key&) = default;
   };
 
-  void Look(const Key& key, const std::function<absl::Status()>& read);
-  bool Begin(const Key& key);
+  absl::Status Look(const Key& key, const std::function<absl::Status()>& read);
+  // A place; false where it is known not to be there. Errors: Unavailable.
+  absl::StatusOr<bool> Begin(const Key& key);
   absl::Status Read(const Access::Unknown& what);
   absl::Status ReadSession(const std::string& id);
 
@@ -66,6 +70,7 @@ class RowLookups {
   PostgresAccessStore rows_;
 
   mutable Mutex mutex_;
+  ConditionVariable place_;
   int reading_ ABSL_GUARDED_BY(mutex_) = 0;
   int64_t lookups_ ABSL_GUARDED_BY(mutex_) = 0;
   std::map<Key, std::chrono::steady_clock::time_point> missing_ ABSL_GUARDED_BY(mutex_);

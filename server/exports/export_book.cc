@@ -166,7 +166,7 @@ void ExportBook::Take(const ExportRecord& record) {
 absl::StatusOr<ExportRecord> ExportBook::Find(const std::string& id) const {
   absl::StatusOr<ExportRecord> found = FindKnown(id);
   if (found.ok() || !on_unknown_) return found;
-  on_unknown_(id);
+  TF_RETURN_IF_ERROR(on_unknown_(id));
   return FindKnown(id);
 }
 

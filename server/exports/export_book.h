@@ -49,8 +49,8 @@ class ExportBook {
   }
 
   // Where others write to the store as well: asked once for an id that is not known, without a lock
-  // held; calls LearnAgain where it is there.
-  void set_on_unknown(std::function<void(const std::string& id)> on_unknown) {
+  // held; calls LearnAgain. Errors: what Find answers where that is not possible.
+  void set_on_unknown(std::function<absl::Status(const std::string& id)> on_unknown) {
     on_unknown_ = std::move(on_unknown);
   }
 
@@ -71,7 +71,7 @@ class ExportBook {
   // ExportStore.
   absl::StatusOr<ExportRecord> Create(ExportRecord wanted);
 
-  // Errors: NotFound.
+  // Errors: NotFound, those of set_on_unknown.
   absl::StatusOr<ExportRecord> Find(const std::string& id) const;
 
   struct ListRequest {
@@ -131,7 +131,7 @@ class ExportBook {
   std::function<void(const ExportRecord&)> on_changed_ = [](const ExportRecord&) {};
   std::function<void(const std::string&, bool)> on_exported_ = [](const std::string&, bool) {};
 
-  std::function<void(const std::string&)> on_unknown_;  // empty: nobody else writes
+  std::function<absl::Status(const std::string&)> on_unknown_;  // empty: nobody else writes
 
   // Held over the store and over those who are told: changes come one after the other.
   Mutex writing_;

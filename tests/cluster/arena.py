@@ -26,6 +26,7 @@ class Event:
     what: str
     held: set = dataclasses.field(default_factory=set)  # sessions of the server that it was done to
     stops_all: bool = False  # nobody is answered until it is over
+    seen_after_s: float = 0  # so much later proxies know
     back_at: float = None
 
 
@@ -102,8 +103,8 @@ class Arena:
 
     # What is done
 
-    def note(self, what, held=(), stops_all=False):
-        event = Event(time.monotonic(), what, set(held), stops_all)
+    def note(self, what, held=(), **facts):
+        event = Event(time.monotonic(), what, set(held), **facts)
         with self.lock:
             self.events.append(event)
         return event
@@ -134,8 +135,8 @@ class Arena:
             events = [event for event in self.events if event.at <= end and (event.back_at or end) >= begin - AFTER_S]
         for event in events:
             if session in event.held:
-                base = max(base, event.at + LEASE_S)
+                base = max(base, event.at + LEASE_S + event.seen_after_s)
             if event.stops_all:
-                base = max(base, event.back_at or end)
+                base = max(base, (event.back_at or end) + event.seen_after_s)
         return base + preparation_s + AFTER_S
 

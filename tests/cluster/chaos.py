@@ -83,7 +83,7 @@ class Load:
         self.reader = first
 
     def start(self):
-        """Every drag shows a frame; how long that took is what a preparation takes here."""
+        """Every drag shows a frame; the longest time from a stream's begin to that is what a preparation takes here."""
         begin = time.monotonic()
         for each in self.drags:
             each.start()
@@ -91,7 +91,8 @@ class Load:
             if time.monotonic() > begin + 60:
                 raise SystemExit(f"not every drag shows a frame: {dict(self.ledger.ends)} {self.ledger.violations}")
             time.sleep(0.05)
-        self.preparation_s = max(each.last_frame[0] for each in self.drags) - begin
+        self.preparation_s = max(each.stream.first_frame_at - each.stream.begun_at for each in self.drags)
+        print(f"all drags show frames after {time.monotonic() - begin:.2f} s: {dict(self.ledger.ends)}", flush=True)
         for each in (*self.rivals, *self.followers, *self.churns, self.web_reader):
             each.start()
 

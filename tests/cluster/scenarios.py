@@ -13,6 +13,8 @@ import stack
 MARGIN_S = 1  # a server answers until so long before its lease ends
 RENEWAL_S = 3
 BEYOND_LEASE_S = arena_module.LEASE_S + 3
+CUT_OFF_S = 4  # a server without the database says so when its leases have ended, and proxies see it, so long after that
+FOUND_AGAIN_S = 8  # and that it is there again, gateways and proxies
 LATE_S = 2  # for what was stopped to show what it does when it goes on
 
 
@@ -73,7 +75,7 @@ class Scenarios:
 
     def settle(self):
         """Until every drag shows frames again."""
-        end = time.monotonic() + arena_module.LEASE_S + self.load.preparation_s + 5
+        end = time.monotonic() + arena_module.LEASE_S + CUT_OFF_S + self.load.preparation_s + 2
         while time.monotonic() < end:
             now = time.monotonic()
             if all(drag.last_frame and now - drag.last_frame[0] < 0.5 for drag in self.load.drags):
@@ -95,12 +97,13 @@ class Scenarios:
             events.append(self.arena.note(f"SIGSTOP {owner}", self.arena.held_by(owner)))
             self.arena.cluster.kill(owner, signal.SIGSTOP)
         for node in cut:
-            events.append(self.arena.note(f"database cut off from {node}", self.arena.held_by(node)))
+            events.append(self.arena.note(f"database cut off from {node}", self.arena.held_by(node), seen_after_s=CUT_OFF_S))
             stack.processes.send(self.arena.links[node], signal.SIGSTOP)
         self.say(", ".join(event.what for event in events) + f"; {owner} holds the contested session under epoch {epoch}")
         time.sleep(BEYOND_LEASE_S)
         if stop:
             self.arena.cluster.kill(owner, signal.SIGCONT)
+        time.sleep(CUT_OFF_S if cut else 0)
         for node in cut:
             stack.processes.send(self.arena.links[node], signal.SIGCONT)
         self.say("they go on")
@@ -148,7 +151,7 @@ class Scenarios:
     def database_gone(self, seconds):
         self.say(f"PostgreSQL is away for {seconds} s")
         dragged = {drag: drag.last_frame for drag in self.load.drags}
-        event = self.arena.note("database gone", stops_all=True)
+        event = self.arena.note("database gone", stops_all=True, seen_after_s=FOUND_AGAIN_S)
         self.arena.cluster.stop(stack.DATABASE)
         last = arena_module.LEASE_S - MARGIN_S
         time.sleep(last + 0.5)

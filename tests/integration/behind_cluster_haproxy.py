@@ -227,6 +227,17 @@ def check_half_open(haproxy):
         each.close()
 
 
+def check_nobody(haproxy):
+    for name in haproxy.states():
+        if name != "BACKEND":
+            haproxy.tell(f"disable server servers/{name}")
+    try:
+        haproxy.unary(b"", timeout=PATIENCE_S)
+        expect(False, "nobody answers")
+    except grpc.RpcError as error:
+        expect(error.code() == grpc.StatusCode.UNAVAILABLE and "no server is up" in error.details(), "without servers a client hears so")
+
+
 def check_hung(haproxy, server, name):
     server.send_signal(signal.SIGSTOP)
     try:
@@ -264,6 +275,7 @@ def main():
             check_added(haproxy, Node("added:1"))
             check_half_open(haproxy)
             check_many_keys(haproxy)
+            check_nobody(haproxy)
         finally:
             haproxy.stop()
             server.terminate()

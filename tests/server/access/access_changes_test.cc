@@ -3,7 +3,10 @@
 
 #include "server/access/access_changes.h"
 
+#include <functional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
@@ -160,6 +163,126 @@ TEST_F(AccessChangesTest, AMeshIsOfWhoHasSentItUntilItGoes) {
   changes_.MeshRemoved(mesh);
   EXPECT_THAT(access_.MayMesh(bob_, mesh, Need::kLook), StatusIs(Code::kNotFound));
   EXPECT_THAT(store_.Load()->mesh_rights, IsEmpty());
+}
+
+// Answers a change when the test says so; something may happen between its reading and its answer.
+class HeldAccessStore final : public AccessStore {
+ public:
+  absl::StatusOr<AccessRows> Load() override {
+    absl::StatusOr<AccessRows> rows = store_.Load();
+    if (after_reading_) std::exchange(after_reading_, nullptr)();
+    return rows;
+  }
+  void Change(AccessRows erase, AccessRows put, std::function<void(absl::Status)> done) override {
+    auto change = [this, erase = std::move(erase), put = std::move(put), done = std::move(done)] {
+      store_.Change(erase, put, done);
+    };
+    if (holds_) {
+      held_.push_back(std::move(change));
+    } else {
+      change();
+    }
+  }
+
+  void Hold() { holds_ = true; }
+  void Release() {
+    holds_ = false;
+    for (const auto& change : std::exchange(held_, {})) change();
+  }
+  void AfterReading(std::function<void()> then) { after_reading_ = std::move(then); }
+  InMemoryAccessStore& rows() { return store_; }
+
+ private:
+  InMemoryAccessStore store_;
+  bool holds_ = false;
+  std::vector<std::function<void()>> held_;
+  std::function<void()> after_reading_;
+};
+
+class FollowingAccessChangesTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    changes_.FollowOthers();
+    changes_.set_on_revoked([this] { ++revoked_; });
+    SessionRecord session;
+    session.id = "s";
+    session.owner = "ann";
+    changes_.Added(session);
+  }
+
+  void Share() {
+    changes_.Share(ann_, share_, [](const absl::Status& status) { EXPECT_THAT(status, IsOk()); });
+  }
+  bool BobMayLook() { return access_.MaySession(bob_, "s", Need::kLook).ok(); }
+
+  const Principal ann_{.name = "ann"};
+  const Principal bob_{.name = "bob"};
+  const ShareRow share_{.resource = "sessions/s", .owner = "ann", .principal = "bob"};
+  int revoked_ = 0;
+  HeldAccessStore store_;
+  Access access_;
+  AccessChanges changes_{{}, &store_, &access_};
+};
+
+TEST_F(FollowingAccessChangesTest, WhatOthersGiveAndTakeIsLearnt) {
+  store_.rows().Change({}, {.shares = {share_}}, [](const absl::Status&) {});
+  EXPECT_FALSE(BobMayLook());
+  ASSERT_THAT(changes_.LearnAgain(), IsOk());
+  EXPECT_TRUE(BobMayLook());
+  store_.rows().Change({.shares = {share_}}, {}, [](const absl::Status&) {});
+  revoked_ = 0;
+  ASSERT_THAT(changes_.LearnAgain(), IsOk());
+  EXPECT_FALSE(BobMayLook());
+  EXPECT_EQ(revoked_, 1) << "streams ask again";
+  changes_.SessionGone("s");
+  EXPECT_THAT(access_.MaySession(ann_, "s", Need::kLook), StatusIs(Code::kNotFound));
+}
+
+TEST_F(FollowingAccessChangesTest, WhatIsBeingTakenAwayDoesNotComeBackMeanwhile) {
+  Share();
+  store_.Hold();
+  changes_.Unshare(ann_, "sessions/s", "bob", [](const absl::Status&) {});
+  EXPECT_FALSE(BobMayLook());
+  ASSERT_THAT(changes_.LearnAgain(), IsOk());
+  EXPECT_FALSE(BobMayLook()) << "though the store has it still";
+  store_.Release();
+  ASSERT_THAT(changes_.LearnAgain(), IsOk());
+  EXPECT_FALSE(BobMayLook());
+  ASSERT_THAT(changes_.LearnAgain(), IsOk());
+  Share();
+  EXPECT_TRUE(BobMayLook()) << "and it may be given again";
+}
+
+TEST_F(FollowingAccessChangesTest, WhatIsGivenWhileAllIsReadStays) {
+  store_.AfterReading([this] { Share(); });
+  ASSERT_THAT(changes_.LearnAgain(), IsOk());
+  EXPECT_TRUE(BobMayLook());
+}
+
+TEST_F(FollowingAccessChangesTest, WhatACallNamesAndNobodyKnowsIsLookedForBeforeItIsRefused) {
+  std::vector<Access::Unknown> asked;
+  access_.set_on_unknown([&](const Access::Unknown& what) {
+    asked.push_back(what);
+    if (what.name == "away") return absl::UnavailableError("the store is away");
+    if (what.name != "t") return absl::OkStatus();
+    SessionRecord session;
+    session.id = "t";
+    session.owner = "ann";
+    changes_.Added(session);
+    return absl::OkStatus();
+  });
+  EXPECT_THAT(access_.MaySession(ann_, "t", Need::kOwn), IsOk());
+  EXPECT_THAT(access_.MaySession(ann_, "t", Need::kOwn), IsOk());
+  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(asked, SizeIs(1)) << "what is known is not looked for";
+  EXPECT_THAT(access_.MayPrediction(ann_, "p", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.MayCase(ann_, kMesh, Need::kLook).status(), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.MayMesh(ann_, kMesh, Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.FindLink(kMesh).status(), StatusIs(Code::kUnauthenticated));
+  ASSERT_THAT(asked, SizeIs(5));
+  EXPECT_EQ(asked[2].owner, "ann") << "a case is somebody's";
+  EXPECT_THAT(access_.MaySession(ann_, "away", Need::kLook), StatusIs(Code::kUnavailable))
+      << "nobody knows that it is not there";
 }
 
 }  // namespace

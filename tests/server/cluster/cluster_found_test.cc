@@ -100,6 +100,14 @@ TEST_F(ClusterFoundTest, WhateverOneNodeHasMadeAnotherFindsInTheNextCall) {
   }
 }
 
+TEST_F(ClusterFoundTest, WhatIsNowhereIsNotLookedForAgainAtOnce) {
+  const int64_t before = b_.server->cluster()->lookups().lookups();
+  for (int i = 0; i < 50; ++i) {
+    EXPECT_THAT(FindSession(b_, "sessions/nowhere"), StatusIs(Code::kNotFound));
+  }
+  EXPECT_LT(b_.server->cluster()->lookups().lookups() - before, 50);
+}
+
 TEST_F(ClusterFoundTest, AFollowLinkOpensItsSessionOnEveryNodeAtOnce) {
   const std::string session = MakeSession(a_, 1);
   v1::CreateFollowLinkRequest request;

@@ -2,17 +2,27 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 #include <chrono>
+#include <filesystem>
+#include <future>
 #include <string>
+#include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
+#include "grpcpp/create_channel.h"
+#include "grpcpp/generic/generic_stub.h"
+#include "grpcpp/support/byte_buffer.h"
 #include "gtest/gtest.h"
 
 #include "client/cpp/client_call.h"
+#include "core/process/child_process.h"
 #include "server/cluster/cluster_options.h"
 #include "tests/server/cluster/cluster_test.h"
 #include "tests/server/postgres_store/test_database.h"
+#include "tests/testing/http_get.h"
 #include "tests/testing/status_matchers.h"
+#include "tests/testing/test_paths.h"
 
 // How a server becomes a node of a cluster, and what it does when the database goes away.
 namespace tissueform::testing {
@@ -37,6 +47,21 @@ TEST(NodeNameTest, ANameIsShortAndPlain) {
 
 class ClusterStartTest : public ClusterTest {
  protected:
+  // What the standard health service says: HealthCheckResponse{status: SERVING}.
+  static bool IsServing(const TestNode& node) {
+    grpc::GenericStub stub(grpc::CreateChannel(absl::StrCat("127.0.0.1:", node.server->port()),
+                                               grpc::InsecureChannelCredentials()));
+    grpc::ClientContext context;
+    const grpc::Slice empty;
+    const grpc::ByteBuffer request(&empty, 1);
+    grpc::ByteBuffer response;
+    std::promise<grpc::Status> done;
+    stub.UnaryCall(&context, "/grpc.health.v1.Health/Check", grpc::StubOptions(), &request,
+                   &response, [&done](grpc::Status status) { done.set_value(std::move(status)); });
+    grpc::Slice bytes;
+    return done.get_future().get().ok() && response.DumpToSingleSlice(&bytes).ok() &&
+           std::string(bytes.begin(), bytes.end()) == "\x08\x01";
+  }
   absl::Status StartOf(const ServerOptions& options) {
     return TissueformServer::Start(options, &callers_).status();
   }
@@ -79,6 +104,44 @@ TEST_F(ClusterStartTest, TablesOfANewerServerAndAReplicaAreRefusedAtOnce) {
   EXPECT_THAT(StartOf(options), StatusIs(Code::kFailedPrecondition, HasSubstr("newer server")));
 }
 
+TEST_F(ClusterStartTest, ADataFolderIsCarriedOverAndServedByNodes) {
+  a_ = {};
+  b_ = {};
+  EmptyTestDatabase();
+  const std::string folder = ::testing::TempDir() + "carried_over";
+  std::filesystem::remove_all(folder);
+  ServerOptions alone = NodeOptions("");
+  alone.cluster = {};
+  alone.data_dir = folder;
+  std::string session;
+  {
+    const TestNode node = StartNode(alone);
+    session = MakeSession(node, 1);
+    RawDrag drag(node, session);
+    ASSERT_TRUE(drag.Send(3, /*commit=*/true));
+    ASSERT_TRUE(drag.WaitForCommit(3));
+  }
+  ChildOptions command;
+  command.program = ProgramPath("tissueform-server");
+  command.arguments = {"migrate", "--data-dir", folder, "--store", TestDatabaseOptions().url};
+  ASSERT_OK_AND_ASSIGN(const auto child, ChildProcess::Start(command));
+  ASSERT_EQ(child->Wait().exit_code, 0);
+  a_ = StartNode(NodeOptions("a"));
+  v1::GetSessionRequest get;
+  get.set_name(session);
+  v1::Session found;
+  ASSERT_THAT(FromGrpcStatus(a_.stubs->sessions->GetSession(As().get(), get, &found)), IsOk());
+  ASSERT_EQ(found.committed_poses_size(), 1);
+  EXPECT_EQ(found.committed_poses(0).scale(), SomePose(3).scale);
+  EXPECT_THAT(AskOnce(a_, session, 4), IsOk());
+  ASSERT_OK_AND_ASSIGN(const auto again, ChildProcess::Start(command));
+  EXPECT_EQ(again->Wait().exit_code, 1) << "into an empty database only";
+  command.arguments = {"backup", "--store", TestDatabaseOptions().url, folder + "-backup"};
+  ASSERT_OK_AND_ASSIGN(const auto backup, ChildProcess::Start(command));
+  EXPECT_EQ(backup->Wait().exit_code, 1);
+  std::filesystem::remove_all(folder);
+}
+
 TEST_F(ClusterStartTest, NodesOfOneNameAreToldAndHoldSessionsApartAllTheSame) {
   const TestNode other = StartNode(NodeOptions("a"));
   EXPECT_TRUE(Eventually([&] { return other.server->cluster()->node().nodes().IsNameTaken(); }));
@@ -108,6 +171,26 @@ TEST_F(ClusterStartTest, ANodeSaysItsNameAndRefusesWhatIsMeantForAnother) {
               StatusIs(Code::kUnavailable));
 }
 
+TEST_F(ClusterStartTest, APageOfMetricsTellsOfLeases) {
+  ServerOptions options = NodeOptions("c");
+  options.telemetry.metrics_port = 0;
+  const TestNode node = StartNode(options);
+  MakeSession(node, 1);
+  EXPECT_TRUE(Eventually([&] {
+    return absl::StrContains(HttpGet(node.server->metrics_port(), "/metrics"),
+                             "tissueform_other_nodes 2\n");
+  }));
+  const std::string page = HttpGet(node.server->metrics_port(), "/metrics");
+  for (const char* line :
+       {"\ntissueform_sessions_held 1\n", "\ntissueform_sessions_lost_total 0\n",
+        "\ntissueform_lease_calls_total{call=\"take\",outcome=\"mine\"} 1\n",
+        "\ntissueform_lease_calls_total{call=\"renew\",outcome=\"failed\"} 0\n",
+        "\ntissueform_lease_renewal_age_seconds ", "\ntissueform_node_name_taken 0\n",
+        "\ntissueform_row_lookups_total ", "\ntissueform_store_latency_seconds_count "}) {
+    EXPECT_THAT(page, HasSubstr(line));
+  }
+}
+
 TEST_F(ClusterStartTest, ANodeThatWasCutOffFromTheDatabaseServesOnWhenItIsBack) {
   a_ = {};
   FrozenProxy proxy(TestDatabasePort());
@@ -122,7 +205,11 @@ TEST_F(ClusterStartTest, ANodeThatWasCutOffFromTheDatabaseServesOnWhenItIsBack) 
   const int64_t failed = counts.renewals_failed;
   EXPECT_TRUE(Eventually([&] { return counts.renewals_failed > failed; }));
   EXPECT_TRUE(Eventually([&] { return a_.server->cluster()->node().held() == 0; }));
+  // Proxies see it, and send calls to others.
+  EXPECT_TRUE(Eventually([&] { return !IsServing(a_); }));
+  EXPECT_TRUE(IsServing(b_));
   proxy.Thaw();
+  EXPECT_TRUE(Eventually([&] { return IsServing(a_); }));
   EXPECT_TRUE(Eventually([&] { return AskOnce(a_, session, 2).ok(); }));
   a_ = {};  // before the proxy
 }

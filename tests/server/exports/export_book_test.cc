@@ -121,6 +121,43 @@ TEST_F(ExportBookTest, NothingIsTheresThatWasNotKept) {
   EXPECT_EQ(changes_, 1);
 }
 
+TEST_F(ExportBookTest, WhatAnotherServerHasChangedIsLearntAndTold) {
+  ASSERT_OK_AND_ASSIGN(const ExportRecord made, Ask("p"));
+  ASSERT_OK_AND_ASSIGN(const ExportRecord stays, Ask("r"));
+  ExportRecord changed = made;
+  changed.state = ExportState::kStoring;
+  changed.version = 2;
+  ASSERT_THAT(kept_->Put(changed), IsOk());
+  ASSERT_THAT(kept_->Put({.id = "other", .prediction = "q", .owner = "bob"}), IsOk());
+  const int before = changes_;
+  ASSERT_THAT(book_->LearnAgain(), IsOk());
+  EXPECT_EQ(changes_, before + 2) << "what has not changed is not told";
+  EXPECT_TRUE(told_.at("q"));
+  ASSERT_OK_AND_ASSIGN(const ExportRecord found, book_->Find(made.id));
+  EXPECT_EQ(found, changed);
+  ASSERT_THAT(kept_->Erase({made.id}), IsOk());
+  ASSERT_THAT(book_->LearnAgain(), IsOk());
+  EXPECT_THAT(book_->Find(made.id), StatusIs(Code::kNotFound));
+  EXPECT_FALSE(told_.at("p"));
+  EXPECT_TRUE(told_.at("r"));
+}
+
+TEST_F(ExportBookTest, WhatNobodyHereKnowsIsAskedForOnce) {
+  int asked = 0;
+  book_->set_on_unknown([&](const std::string& /*id*/) {
+    ++asked;
+    return book_->LearnAgain();
+  });
+  ASSERT_THAT(kept_->Put({.id = "other", .prediction = "q", .owner = "bob"}), IsOk());
+  EXPECT_THAT(book_->Find("other"), IsOk());
+  EXPECT_THAT(book_->Find("other"), IsOk());
+  EXPECT_EQ(asked, 1);
+  EXPECT_THAT(book_->Find("nowhere"), StatusIs(Code::kNotFound));
+  EXPECT_EQ(asked, 2);
+  ASSERT_OK_AND_ASSIGN(const ExportRecord same, Ask("q", "bob"));
+  EXPECT_EQ(same.id, "other") << "one that is not done is given again, whoever has made it";
+}
+
 TEST_F(ExportBookTest, WhatIsTakenBackOpensNothingWhateverTheDiskSays) {
   ASSERT_OK_AND_ASSIGN(const ExportRecord made, Ask("p"));
   store_.broken = true;
