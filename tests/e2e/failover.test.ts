@@ -5,10 +5,11 @@ import { join } from "node:path";
 import type { Page } from "playwright-core";
 import { Planner, Program, type Hook, live, openCase, openPage, state, takeSegment, typeMove } from "./planner";
 
-// Two servers of a cluster, the one that holds the drag killed or drained. With TISSUEFORM_PICTURES=FOLDER also a picture of what
-// the page says meanwhile, moved.jpg. PostgreSQL is that of pg_virtualenv:
+// Two servers of a cluster, the one that holds the drag killed or drained. PostgreSQL is that of pg_virtualenv:
 //
 //   pg_virtualenv -t npm --prefix client/web run test:e2e -- failover.test.ts
+//
+// With TISSUEFORM_PICTURES=FOLDER also pictures of what the page says meanwhile and afterwards: moved.jpg, gone-on.jpg.
 
 const { PGHOST, PGPORT, PGUSER, PGPASSWORD, TISSUEFORM_PICTURES } = process.env;
 if (PGPORT === undefined) console.log("no PostgreSQL: run this with pg_virtualenv (package postgresql-common)");
@@ -71,8 +72,11 @@ function heard(page: Page): Promise<string[]> {
 /** Until the server has answered the newest poses and keeps them. */
 async function answered(page: Page): Promise<void> {
   await live(page);
-  await page.evaluate(() => ((globalThis as unknown as Hook).tissueform.bench.picture.value = null));
-  await page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.plan.change(1, { upMm: 0.5 * Math.random() }, true));
+  await page.evaluate(() => {
+    const { bench } = (globalThis as unknown as Hook).tissueform;
+    bench.picture.value = null;
+    bench.plan.change(1, { upMm: bench.plan.moves[1].upMm - 0.5 }, true);
+  });
   await page.waitForFunction(() => {
     const { bench } = (globalThis as unknown as Hook).tissueform;
     return bench.picture.value !== null && bench.live.isKept;
@@ -95,6 +99,11 @@ function drag(page: Page, forwardMm: number): Promise<number> {
   }, forwardMm);
 }
 
+async function picture(page: Page, name: string): Promise<void> {
+  if (TISSUEFORM_PICTURES === undefined) return;
+  await page.screenshot({ path: join(TISSUEFORM_PICTURES, `${name}.jpg`), type: "jpeg", quality: 85 });
+}
+
 describe.skipIf(PGPORT === undefined)("a drag in a cluster", () => {
   let cluster: Cluster;
   let opened: Awaited<ReturnType<typeof openCase>>;
@@ -102,14 +111,15 @@ describe.skipIf(PGPORT === undefined)("a drag in a cluster", () => {
 
   beforeAll(async () => {
     cluster = await Cluster.start();
-    opened = await openCase(await cluster.planner.browse(), cluster.planner);
+    const context = await cluster.planner.browse();
+    opened = await openCase(context, cluster.planner);
     const { page } = opened;
     await takeSegment(page, "Lower jaw");
     await typeMove(page, "Forward", "5");
     await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.localState.value.kind === "ready");
     const { session } = await state(page);
     const link = page.url().replace("#case=", `#follow=${session.replace("sessions/", "")}&case=`);
-    follower = await openPage(await cluster.planner.browse(), link);
+    follower = await openPage(context, link);
     await follower.page.getByText("Live", { exact: true }).waitFor();
   });
   afterAll(() => cluster?.stop());
@@ -122,15 +132,14 @@ describe.skipIf(PGPORT === undefined)("a drag in a cluster", () => {
     await listen(page);
     await cluster.end(before, "SIGKILL");
     await page.getByText("Moving to another server…").waitFor();
-    if (TISSUEFORM_PICTURES !== undefined) {
-      await page.screenshot({ path: join(TISSUEFORM_PICTURES, "moved.jpg"), type: "jpeg", quality: 90 });
-    }
     // The page answers the hand by itself, and a follower has its last picture.
     const seen = await drag(page, 8);
     expect((await state(page)).connection).toBe("moving");
     expect(seen).toBeGreaterThan(6);
-    expect((await follower.page.evaluate(() => (globalThis as unknown as Hook).tissueform.follower.positions.length))).toBeGreaterThan(0);
+    await picture(page, "moved");
+    expect(await follower.page.evaluate(() => (globalThis as unknown as Hook).tissueform.follower.positions.length)).toBeGreaterThan(0);
     await answered(page);
+    await picture(page, "gone-on");
     expect(await holder(page)).toBe(NODES.find((node) => node !== before));
     expect((await heard(page)).filter((text) => text !== "live" && text !== "moving")).toEqual([]);
   });

@@ -43,6 +43,8 @@ class FakeCall final : public grpc::ServerGenericBidiReactor {
       StartWriteAndFinish(&message_, grpc::WriteOptions(), grpc::Status::OK);
       finished_ = true;
     } else if (!absl::EndsWith(method, "/ListMeshes") && !absl::EndsWith(method, "/Stuck")) {
+      context->AddInitialMetadata("x-tissueform-node", server->name());
+      context->AddTrailingMetadata("x-tissueform-node", server->name());
       End(grpc::Status(grpc::StatusCode::NOT_FOUND, "not here: 5 %", "details"));
     }
   }

@@ -14,14 +14,16 @@ namespace tissueform::testing {
 
 // A gRPC server in this process that does by a method's name what a test wants:
 //
-//   DeformService/Deform, MeshService/GetMesh   sends every message back, ends with OK at the
-//   half-close; headers and trailers
-//                                               x-tissueform-node: its name, and secret: no
-//   MeshService/ListMeshes, DeformService/Stuck never answers; the second never reads, either
-//   CaseService/ReadCase, DeformService/Watch   sends messages of kEndlessBytes until it is
-//   cancelled SessionService/GetSession                   the names of the client's metadata that
-//   it saw, with their values others                                      NOT_FOUND, "not here: 5
-//   %", with details
+//   DeformService/Deform, MeshService/GetMesh    sends every message back, ends with OK at the
+//                                                half-close; headers and trailers
+//                                                x-tissueform-node: its name, and secret: no
+//   MeshService/ListMeshes, DeformService/Stuck  never answers; the second never reads, either
+//   CaseService/ReadCase, DeformService/Watch    sends messages of kEndlessBytes until it is
+//                                                cancelled
+//   SessionService/GetSession                    the names of the client's metadata that it saw,
+//                                                with their values
+//   others                                       NOT_FOUND, "not here: 5 %", with details, headers
+//                                                and trailers
 class FakeServer : public grpc::CallbackGenericService {
  public:
   static constexpr size_t kEndlessBytes = size_t{64} << 10;

@@ -201,6 +201,10 @@ TEST_F(GatewayHttpTest, AnErrorWithoutAnAnswerIsInTheHeader) {
   EXPECT_THAT(reply, HasSubstr("grpc-status: 5\r\n"));
   EXPECT_THAT(reply, HasSubstr("grpc-message: not here: 5 %25\r\n"));
   EXPECT_THAT(reply, HasSubstr("grpc-status-details-bin: ZGV0YWlscw==\r\n"));
+  // Of the server's header and of its end: browsers would join two fields of one name.
+  const std::string node = "x-tissueform-node: fake\r\n";
+  ASSERT_THAT(reply, HasSubstr(node));
+  EXPECT_EQ(reply.find(node), reply.rfind(node));
 }
 
 TEST_F(GatewayHttpTest, OnlyWhatIsAllowedReachesTheServer) {

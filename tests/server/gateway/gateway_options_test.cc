@@ -39,6 +39,12 @@ TEST(GatewayOptions, SeveralServersMayBeNamed) {
   EXPECT_EQ(parsed.options.port, 8080);
 }
 
+TEST(GatewayOptions, ServersOfAClusterHaveNames) {
+  const Parsed parsed = Parse("--server left=a:1 --server right=unix:/b");
+  EXPECT_EQ(parsed.error, "");
+  EXPECT_EQ(parsed.options.servers, (std::vector<std::string>{"left=a:1", "right=unix:/b"}));
+}
+
 TEST(GatewayOptions, OneServerAtLeastIsNeeded) { EXPECT_NE(Parse("").error, ""); }
 
 TEST(GatewayOptions, AddressesToListenOnAreHostAndPort) {

@@ -6,7 +6,7 @@ import { Backoff } from "./backoff";
 import { type CallError, toCallError } from "./call_error";
 import { NODE_HEADER, SESSION_HEADER, type SessionRoutes } from "./session_routes";
 
-/** How long a unary call is tried again: longer than another server needs to take a session over. */
+/** How long a call is tried again after it has failed first: longer than another server needs to take a session over. */
 const PATIENCE_MS = 15_000;
 /** Methods that do no more the second time than the first: they read, or carry an id of their request. */
 const REPEATABLE = /^(Get|List|Query)[A-Z]|^(WhoAmI|DeformOnce|Fit|CreatePrediction)$/;
@@ -44,23 +44,26 @@ export function withRoutes(routes: SessionRoutes, clock: RepetitionClock = BROWS
       }
     };
     if (request.stream) return ask();
-    const backoff = new Backoff();
-    const end = clock.now() + PATIENCE_MS;
-    for (;;) {
-      try {
-        return await ask();
-      } catch (thrown) {
-        const error = toCallError(thrown);
-        const delay = backoff.next(error);
-        if (request.signal.aborted || !mayRepeat(request.method.name, error) || clock.now() + delay > end) throw thrown;
-        await clock.wait(delay);
-      }
-    }
+    const isSafe = REPEATABLE.test(request.method.name);
+    return repeated(ask, (error) => !request.signal.aborted && (error.isElsewhere || (isSafe && error.isOfServer)), clock);
   };
 }
 
-function mayRepeat(method: string, error: CallError): boolean {
-  return error.isElsewhere || (error.isOfServer && REPEATABLE.test(method));
+/** What `ask` resolves with, which is called again while `mayRepeat` says so of its error, for up to 15 s. */
+export async function repeated<T>(ask: () => Promise<T>, mayRepeat: (error: CallError) => boolean, clock: RepetitionClock = BROWSER_CLOCK): Promise<T> {
+  const backoff = new Backoff();
+  let end: number | null = null;
+  for (;;) {
+    try {
+      return await ask();
+    } catch (thrown) {
+      const error = toCallError(thrown);
+      const delay = backoff.next(error);
+      end ??= clock.now() + PATIENCE_MS;
+      if (!mayRepeat(error) || clock.now() + delay > end) throw thrown;
+      await clock.wait(delay);
+    }
+  }
 }
 
 // A stream of answers ends within what the caller reads.

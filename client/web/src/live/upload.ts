@@ -4,6 +4,7 @@
 import { create } from "@bufbuild/protobuf";
 import { CallError } from "../calls/call_error";
 import { type Gateway, sessionMetadata } from "../calls/gateway";
+import { repeated } from "../calls/repetition";
 import { type CaseSource } from "../case/case_file";
 import type { Range } from "../case/container";
 import type { Manifest } from "../case/manifest";
@@ -19,8 +20,15 @@ const BUFFER_POLL_MS = 10;
 
 export type Progress = (share: number) => void;
 
-/** Sends a case, whose bytes have the SHA-256 `sha256`; done at once where the server has it. Rejects with a CallError. */
-export async function uploadCase(gateway: Gateway, source: CaseSource, sha256: string, title: string, onProgress: Progress): Promise<Case> {
+/**
+ * Sends a case, whose bytes have the SHA-256 `sha256`; done at once where the server has it. Sent once more where the server goes
+ * away meanwhile. Rejects with a CallError.
+ */
+export function uploadCase(gateway: Gateway, source: CaseSource, sha256: string, title: string, onProgress: Progress): Promise<Case> {
+  return repeated(() => sendCase(gateway, source, sha256, title, onProgress), (error) => error.isOfServer);
+}
+
+async function sendCase(gateway: Gateway, source: CaseSource, sha256: string, title: string, onProgress: Progress): Promise<Case> {
   let answer: UploadCaseResponse | null = null;
   await new Promise<void>((resolve, reject) => {
     const call = gateway.open(CaseService.method.uploadCase, {

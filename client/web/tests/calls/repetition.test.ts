@@ -7,6 +7,7 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { Bearer } from "../../src/calls/bearer";
 import { CallError, Code } from "../../src/calls/call_error";
 import { Gateway, sessionMetadata } from "../../src/calls/gateway";
+import { repeated } from "../../src/calls/repetition";
 import { ErrorInfoSchema } from "../../src/generated/google/rpc/error_details_pb";
 import { StatusSchema } from "../../src/generated/google/rpc/status_pb";
 import { DeformService, GetPreparedAnswersResponseSchema } from "../../src/generated/tissueform/v1/deform_service_pb";
@@ -134,6 +135,17 @@ test("after 15 s the error is said", async () => {
   expect(await codeOf(read())).toBe(Code.Unavailable);
   expect(asked[asked.length - 1].atMs).toBeGreaterThan(9000);
   expect(asked[asked.length - 1].atMs).toBeLessThan(15_000);
+});
+
+test("patience begins when the server has failed, not when it was asked", async () => {
+  let tries = 0;
+  const ask = async () => {
+    vi.advanceTimersByTime(20_000);
+    if (++tries === 1) throw new CallError(Code.Unavailable, "gone");
+    return tries;
+  };
+  const clock = { now: () => performance.now(), wait: async () => {} };
+  expect(await repeated(ask, () => true, clock)).toBe(2);
 });
 
 test("a download learns its server, and forgets it when that dies on the way", async () => {
