@@ -243,10 +243,14 @@ def main():
     print(f"two servers carry {ratios[2]:.2f} times what one carries, three {ratios[3]:.2f} times")
     print(f"sessions a GiB: {1024 / memory['session_mib']:.1f} that share nothing, {1024 / memory['shared_session_mib']:.0f} that share a preparation")
     said = runs[0]["load"]
+    common = {name: said[name] for name in ("machine", "compiler", "commit", "notice")}
+    for run in runs + rest:
+        run["load"] = {name: value for name, value in run["load"].items() if name not in common}
     if options.json:
-        options.json.write_text(json.dumps({"machine": said["machine"], "compiler": said["compiler"], "commit": said["commit"], "notice": said["notice"],
-                                            "load_average_before": load_before, "share": options.share,
-                                            "pinned": "servers one after the other to the cores 0 and 1 with one worker each, clients to 2, HAProxy and PostgreSQL to 3", "turns": options.turns, "ratio_2_to_1": ratios[2], "ratio_3_to_1": ratios[3], "memory": memory, "runs": runs + rest}, indent=1) + "\n")
+        options.json.write_text(json.dumps(common | {
+            "load_average_before": load_before, "share": options.share, "turns": options.turns,
+            "pinned": "servers one after the other to the cores 0 and 1 with one worker each, clients to 2, HAProxy and PostgreSQL to 3",
+            "ratio_2_to_1": ratios[2], "ratio_3_to_1": ratios[3], "memory": memory, "runs": runs + rest}, indent=1) + "\n")
 
 
 if __name__ == "__main__":
