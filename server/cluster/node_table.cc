@@ -15,6 +15,7 @@ namespace tissueform {
 namespace {
 
 constexpr std::chrono::seconds kPatience{2};
+constexpr std::chrono::milliseconds kSoon{200};  // after what has failed
 // Rows of servers that were killed.
 constexpr int64_t kForgottenAfterS = 3600;
 
@@ -123,7 +124,8 @@ void NodeTable::NoteAnswer(bool answered) {
   const auto now = std::chrono::steady_clock::now();
   MutexLock lock(mutex_);
   if (answered) answered_ = now;
-  const bool reached = now - answered_ < kCutOffAfter;
+  // What is not answered is known a try later: that may be too late.
+  const bool reached = answered || now + kPatience - answered_ < kCutOffAfter;
   if (reached == reached_) return;
   reached_ = reached;
   if (reached) {
@@ -138,13 +140,15 @@ void NodeTable::Loop() {
   bool was_taken = false;
   for (;;) {
     // What fails is tried again in a second; meanwhile nobody is thought to have room.
-    NoteAnswer(Exchange().ok());
+    const bool answered = Exchange().ok();
+    NoteAnswer(answered);
     const bool taken = IsNameTaken();
     if (taken && !was_taken) {
       spdlog::warn("another server of the cluster has this one's name; give each its --node-name");
     }
     was_taken = taken;
-    const auto next = std::chrono::steady_clock::now() + kEvery;
+    const auto next =
+        std::chrono::steady_clock::now() + (answered ? std::chrono::milliseconds(kEvery) : kSoon);
     MutexLock lock(mutex_);
     while (!ending_ && std::chrono::steady_clock::now() < next) changed_.WaitUntil(mutex_, next);
     if (ending_) return;
