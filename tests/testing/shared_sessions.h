@@ -215,13 +215,13 @@ class SharedSessionStore final : public SessionStore {
     shared_.store_.Get(id, std::move(done));
   }
   void Update(SessionRecord record, int64_t epoch, RecordCallback done) override {
-    absl::StatusOr<SessionRecord> updated = Fence(record.id, epoch);
-    if (absl::IsUnknown(updated.status())) {
-      const std::string id = record.id;
+    absl::StatusOr<SessionRecord> updated;
+    const std::string id = record.id;
+    const absl::Status outcome = Write(id, epoch, [&] {
       shared_.store_.Update(std::move(record), epoch, Into(&updated));
-      Count(id, epoch, updated.status());
-    }
-    done(std::move(updated));
+      return updated.status();
+    });
+    done(outcome.ok() ? std::move(updated) : outcome);
   }
   void CommitPoses(const std::string& id, std::vector<HandlePose> poses, int64_t epoch,
                    StatusCallback done) override {
@@ -233,25 +233,24 @@ class SharedSessionStore final : public SessionStore {
         return;
       }
     }
-    absl::Status committed = Fence(id, epoch);
-    if (absl::IsUnknown(committed)) {
+    done(Write(id, epoch, [&] {
+      absl::Status committed;
       shared_.store_.CommitPoses(id, std::move(poses), epoch, Into(&committed));
-      Count(id, epoch, committed);
-    }
-    done(std::move(committed));
+      return committed;
+    }));
   }
   void Delete(const std::string& id, const std::string& etag, int64_t epoch,
               StatusCallback done) override {
-    absl::Status deleted = Fence(id, epoch);
-    if (absl::IsUnknown(deleted)) {
-      Count(id, epoch, absl::OkStatus());
+    const absl::Status outcome = Write(id, epoch, [&] {
+      absl::Status deleted;
       shared_.store_.Delete(id, etag, epoch, Into(&deleted));
-    }
-    if (deleted.ok()) {
+      return deleted;
+    });
+    if (outcome.ok()) {
       MutexLock lock(shared_.mutex_);
       shared_.leases_.erase(id);
     }
-    done(std::move(deleted));
+    done(outcome);
   }
   void List(const ListRequest& request, PageCallback done) override {
     shared_.store_.List(request, std::move(done));
@@ -281,22 +280,21 @@ class SharedSessionStore final : public SessionStore {
     return [result](Result answer) { *result = std::move(answer); };
   }
 
-  // Unknown where the write may go on.
-  absl::Status Fence(const std::string& id, int64_t epoch) {
+  // One write, between which and the look at its epoch nobody takes the session.
+  absl::Status Write(const std::string& id, int64_t epoch,
+                     const std::function<absl::Status()>& write) {
     MutexLock lock(shared_.mutex_);
     const auto found = shared_.leases_.find(id);
     if (found == shared_.leases_.end()) return NoSession(id);
-    if (epoch >= found->second.epoch) return absl::UnknownError("go on");
-    ++shared_.refused_writes_;
-    return CheckSessionWrite(id, "", epoch, "", found->second.epoch);
-  }
-  void Count(const std::string& id, int64_t epoch, const absl::Status& outcome) {
-    MutexLock lock(shared_.mutex_);
-    const auto found = shared_.leases_.find(id);
-    if (!outcome.ok() || found == shared_.leases_.end()) return;
     const SharedSessions::Lease& lease = found->second;
+    if (epoch < lease.epoch) {
+      ++shared_.refused_writes_;
+      return CheckSessionWrite(id, "", epoch, "", lease.epoch);
+    }
+    absl::Status written = write();
     const bool taken = !lease.node.empty() && lease.node != node_;
-    if (taken || lease.epoch != epoch) ++shared_.stale_writes_;
+    if (written.ok() && (taken || lease.epoch != epoch)) ++shared_.stale_writes_;
+    return written;
   }
 
   SharedSessions& shared_;

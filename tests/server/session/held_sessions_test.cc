@@ -5,7 +5,9 @@
 
 #include <future>
 #include <memory>
+#include <random>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "gmock/gmock.h"
@@ -236,6 +238,70 @@ TEST_F(HeldSessionsTest, AServerThatHandsOverHasNothingLeftAndTakesNothingMore) 
   // Its client asks again with the same name, elsewhere.
   EXPECT_THAT(a_.Create("late"), IsOk()) << "the record is kept";
   EXPECT_THAT(b_.Open("late"), IsOk());
+}
+
+TEST_F(HeldSessionsTest, ServersThatDoEverythingAtOnceWriteNothingOfOthersAndEndWithNothing) {
+  const int64_t a_bytes = a_.reserved_bytes();
+  const int64_t b_bytes = b_.reserved_bytes();
+  // Each is made once: a record that was deleted leaves no epoch behind for the next of its name.
+  const std::vector<std::string> ids = {"q", "r", "s", "t", "u", "v", "w", "x", "y", "z"};
+  for (const std::string& id : ids) ASSERT_THAT(a_.Create(id), IsOk());
+  const auto work = [&](uint32_t seed) {
+    std::mt19937 random(seed);
+    Node& node = seed % 2 == 0 ? a_ : b_;
+    std::vector<std::shared_ptr<Session>> drags;
+    for (int step = 0; step < 300; ++step) {
+      const std::string& id = ids[random() % ids.size()];
+      absl::Status outcome;
+      switch (random() % 9) {
+        case 0:
+          outcome = node.Look(id).status();
+          break;
+        case 1:
+          if (random() % 16 == 0) outcome = node.Delete(id);
+          break;
+        case 2:
+          outcome = node.Update(id);
+          break;
+        case 3:
+          node.EvictAll();
+          break;
+        case 4:
+          drags.clear();
+          break;
+        case 5:
+          if (random() % 4 == 0) shared_.Wait(kPastTheLease / 2);
+          for (const std::string& lost : node.ownership.Renew()) node.registry.Lost(lost);
+          break;
+        default:
+          if (Node::Opened opened = node.Open(id); opened.ok()) {
+            outcome = node.Commit(*opened, step);
+            drags.push_back(*std::move(opened));
+          } else {
+            outcome = opened.status();
+          }
+      }
+      const std::string reason = outcome.ok() ? "" : ReasonOf(outcome);
+      EXPECT_THAT(reason, ::testing::AnyOf("", "SESSION_MOVED", "SESSION_NOT_FOUND",
+                                           "SESSION_UPDATED", "STALE_ETAG"))
+          << outcome;
+    }
+  };
+  std::vector<std::thread> threads;
+  for (uint32_t seed = 0; seed < 6; ++seed) threads.emplace_back(work, seed);
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(shared_.stale_writes(), 0);
+  for (Node* node : {&a_, &b_}) {
+    node->EvictAll();
+    node->Settle();
+  }
+  for (const std::string& id : ids) {
+    if (const auto lease = shared_.Find(id); lease.has_value()) {
+      EXPECT_TRUE(lease->node.empty() || lease->until <= shared_.now()) << "nobody needs it";
+    }
+  }
+  EXPECT_EQ(a_.reserved_bytes(), a_bytes);
+  EXPECT_EQ(b_.reserved_bytes(), b_bytes);
 }
 
 TEST_F(HeldSessionsTest, WhatIsGivenBackIsNotTakenFromWhoOpensItMeanwhile) {
