@@ -73,6 +73,7 @@ class Arena:
 
     def down(self):
         if self.twin is not None:
+            processes.send(self.twin, signal.SIGCONT)
             processes.send(self.twin, signal.SIGTERM)
         for link in self.links.values():
             processes.send(link, signal.SIGCONT)
@@ -100,6 +101,18 @@ class Arena:
 
     def held_by(self, node):
         return {session for session, (holder, _) in (self.holders() or {}).items() if holder == node}
+
+    def epoch_of(self, session):
+        """0: the database does not answer."""
+        return int((self.cluster.ask_database(f"SELECT epoch FROM sessions JOIN session_states USING (key) WHERE id = '{session.removeprefix('sessions/')}'") or [0])[0])
+
+    def name_at(self, address):
+        """Which server listens there, of those of one name too."""
+        return next((node for node in self.cluster.nodes if self.cluster.address(node) == address), TWIN)
+
+    def process_at(self, address):
+        name = self.name_at(address)
+        return self.twin if name == TWIN else self.cluster.process(name)
 
     # What is done
 

@@ -71,7 +71,7 @@ class Load:
         self.contested = first.new_session(mesh)
         self.drags = [drags.Drag(arena.address, session, handle_rest, ledger) for session in sessions]
         # One of them is a page's.
-        self.drags[-1] = browsers.SocketDrag(arena.cluster.address("browsers"), sessions[-1], handle_rest, ledger)
+        self.page = self.drags[-1] = browsers.SocketDrag(arena.cluster.address("browsers"), sessions[-1], handle_rest, ledger)
         self.web_reader = browsers.WebReader(arena.cluster.address("browsers"), sessions, ledger)
         numbers = itertools.count(1)
         places = [(node, arena.cluster.address(node)) for node in arena.cluster.nodes]

@@ -48,7 +48,7 @@ class Ledger:
 
     def commit_sent(self, stream, sequence):
         with self.lock:
-            self.sent[stream.drag.session][sequence] = stream.node
+            self.sent[stream.drag.session][sequence] = stream.server
 
     def sent_by(self, session, sequence):
         """The server that this commit was sent to; None: there was none."""

@@ -14,6 +14,7 @@ MARGIN_S = 1  # a server answers until so long before its lease ends
 RENEWAL_S = 3
 BEYOND_LEASE_S = arena_module.LEASE_S + 3
 CUT_OFF_S = 4  # a server without the database says so when its leases have ended, and proxies see it, so long after that
+PINGS_S = 22  # a gateway knows by then that a server is silent
 FOUND_AGAIN_S = 8  # and that it is there again, gateways and proxies
 LATE_S = 2  # for what was stopped to show what it does when it goes on
 
@@ -87,35 +88,44 @@ class Scenarios:
 
     # An owner that is stopped, another one that is cut off from the database
 
+    def _contested_owner(self):
+        """The drag whose server holds the contested session: the one that was shown a frame last."""
+        return max(self.load.rivals, key=lambda rival: rival.last_frame[0] if rival.last_frame else 0)
+
+    def _freeze(self, process, what, held, late_s):
+        """Stops a process. Whoever drags through a gateway hears of a silent server by the gateway's pings alone."""
+        page = held & {self.load.page.session}
+        stack.processes.send(process, signal.SIGSTOP)
+        return [self.arena.note(what, held - page, seen_after_s=late_s), self.arena.note(what, page, seen_after_s=max(late_s, PINGS_S))]
+
     def stop_and_split(self, stop=True, split=True):
-        contested = self.load.contested
-        owner, epoch = (self.arena.holders() or {}).get(contested, (self.arena.cluster.nodes[0], 0))
-        others = [node for node in self.arena.cluster.nodes if node != owner]
-        cut = [owner] if not stop else others[:1] if split else []
-        events = []
+        contested, rival = self.load.contested, self._contested_owner()
+        epoch = self.arena.epoch_of(contested)
+        process, frozen, events = self.arena.process_at(rival.address), [], []
         if stop:
-            events.append(self.arena.note(f"SIGSTOP {owner}", self.arena.held_by(owner)))
-            self.arena.cluster.kill(owner, signal.SIGSTOP)
-        for node in cut:
-            events.append(self.arena.note(f"database cut off from {node}", self.arena.held_by(node), seen_after_s=CUT_OFF_S))
-            stack.processes.send(self.arena.links[node], signal.SIGSTOP)
-        self.say(", ".join(event.what for event in events) + f"; {owner} holds the contested session under epoch {epoch}")
+            events += self._freeze(process, f"SIGSTOP {self.arena.name_at(rival.address)}", self.arena.held_by(rival.pinned), 0)
+        if split:
+            # Not one that is stopped; alone, the owner itself.
+            node = next(name for name in self.arena.cluster.nodes if (name != rival.pinned) == stop)
+            frozen.append(self.arena.links[node])
+            events += self._freeze(frozen[0], f"database cut off from {node}", self.arena.held_by(node), CUT_OFF_S)
+        self.say(", ".join(sorted({event.what for event in events})) + f"; {self.arena.name_at(rival.address)} holds the contested session under epoch {epoch}")
         time.sleep(BEYOND_LEASE_S)
         if stop:
-            self.arena.cluster.kill(owner, signal.SIGCONT)
-        time.sleep(CUT_OFF_S if cut else 0)
-        for node in cut:
-            stack.processes.send(self.arena.links[node], signal.SIGCONT)
+            stack.processes.send(process, signal.SIGCONT)
+        time.sleep(CUT_OFF_S if frozen else 0)
+        for link in frozen:
+            stack.processes.send(link, signal.SIGCONT)
         self.say("they go on")
         time.sleep(LATE_S)
         for event in events:
             event.back_at = time.monotonic()
-        now, newer = (self.arena.holders() or {}).get(contested, ("", 0))
-        self.check(newer > epoch and now != owner, f"{owner} was stopped beyond its lease, and {now} holds the contested session under epoch {newer} (it was {epoch})")
-        kept = self.load.kept_sequence(contested)
+        now, newer, kept = self._contested_owner(), self.arena.epoch_of(contested), self.load.kept_sequence(contested)
         by = self.ledger.sent_by(contested, kept)
-        self.check(by != owner, f"pose {kept} was sent to {owner} and is kept, though {now} holds the session")
-        self.say(f"{now} holds it under epoch {newer}, and the kept pose {kept} was sent to {by}")
+        self.check(newer > epoch and now is not rival, f"{self.arena.name_at(rival.address)} was stopped beyond its lease and holds the contested session under epoch {newer} "
+                   f"(it was {epoch})")
+        self.check(by != rival.address, f"pose {kept} was sent to {self.arena.name_at(rival.address)} and is kept, though {self.arena.name_at(now.address)} holds the session")
+        self.say(f"{self.arena.name_at(now.address)} holds it under epoch {newer}; the kept pose {kept} was sent to {self.arena.name_at(by)}")
 
     # A server that is updated
 

@@ -71,6 +71,7 @@ class Route:
         self.node = None
         self.hops = 0
         self.wait_s = FIRST_WAIT_S
+        self.was_answered = False
 
     def metadata(self):
         headers = [(SESSION_HEADER, self.session)] if self.session else []
@@ -78,7 +79,7 @@ class Route:
 
     def answered(self, initial_metadata):
         self.node = dict(initial_metadata or ()).get(NODE_HEADER, self.node) if self.session else None
-        self.hops, self.wait_s = 0, FIRST_WAIT_S
+        self.hops, self.wait_s, self.was_answered = 0, FIRST_WAIT_S, True
 
     def failed(self, error):
         """Seconds until it may be tried again; Refused where that is no use."""
@@ -89,9 +90,9 @@ class Route:
             return 0.0
         if reason not in LATER and not (code == grpc.StatusCode.UNAVAILABLE or (not reason and code in FROM_THE_WAY)):
             raise Refused(code, reason, error.details())
-        knew = self.node is not None
         self.node, self.hops = None, 0
-        if knew and reason == "SESSION_MOVED":
+        if reason == "SESSION_MOVED" and self.was_answered:
+            self.was_answered = False
             return 0.0
         wait_s, self.wait_s = self.wait_s, min(MOST_WAIT_S, self.wait_s * 1.6)
         return wait_s * random.uniform(0.8, 1.2)
