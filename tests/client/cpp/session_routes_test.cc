@@ -75,9 +75,9 @@ TEST(SessionRoutesTest, AnErrorSaysWhereToGoOrThatItIsNotThere) {
 TEST(SessionRoutesTest, WhatTheServerRefusesIsStillThere) {
   SessionRoutes routes;
   routes.Remember("sessions/a", "one");
-  for (const absl::Status& error : {absl::OkStatus(), absl::NotFoundError(""),
-                                    absl::CancelledError(""), absl::InvalidArgumentError(""),
-                                    absl::ResourceExhaustedError("")}) {
+  for (const absl::Status& error :
+       {absl::OkStatus(), absl::NotFoundError(""), absl::CancelledError(""),
+        absl::InvalidArgumentError(""), absl::ResourceExhaustedError("")}) {
     routes.LearnFrom(error, "sessions/a");
     EXPECT_EQ(routes.NodeOf("sessions/a"), "one") << error;
   }
@@ -88,9 +88,9 @@ TEST(SessionRoutesTest, OnlyWhatMeansAnotherServerIsFollowed) {
   EXPECT_EQ(NodeIn(WithReason(absl::ResourceExhaustedError(""), ErrorReason::kMemoryBudgetFull,
                               {{"node", "two"}})),
             "two");
-  EXPECT_EQ(NodeIn(WithReason(absl::NotFoundError(""), ErrorReason::kSessionNotFound,
-                              {{"node", "two"}})),
-            "");
+  EXPECT_EQ(
+      NodeIn(WithReason(absl::NotFoundError(""), ErrorReason::kSessionNotFound, {{"node", "two"}})),
+      "");
   EXPECT_EQ(NodeIn(absl::UnavailableError("")), "");
 }
 
