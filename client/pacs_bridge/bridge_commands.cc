@@ -4,6 +4,7 @@
 #include "client/pacs_bridge/bridge_commands.h"
 
 #include <algorithm>
+#include <csignal>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -24,6 +25,15 @@ namespace {
 
 // More than the steps that anything has.
 constexpr int kMostSteps = 16;
+
+// Ctrl-C ends a command at once: each of its steps may be repeated, and its children end with it.
+void UnblockEndingSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+}
 
 PlanWork PlanWorkOf(BridgeParts* parts, const BridgeOptions& options) {
   PlanWorkOptions work = options.plan;
@@ -84,6 +94,7 @@ BridgeCommands::BridgeCommands(CLI::App& app, const BridgeOptions* options) : op
 int BridgeCommands::Run() const {
   if (run_->parsed()) return RunBridge(*options_, BridgeRunKind::kEverything);
   if (listen_->parsed()) return RunBridge(*options_, BridgeRunKind::kReceiving);
+  UnblockEndingSignals();
   const std::vector<std::pair<const CLI::App*, absl::Status (BridgeCommands::*)() const>> steps = {
       {fetch_, &BridgeCommands::Fetch}, {series_, &BridgeCommands::Series},
       {build_, &BridgeCommands::Build}, {publish_, &BridgeCommands::Publish},

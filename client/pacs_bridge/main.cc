@@ -26,7 +26,9 @@ constexpr char kDescription[] =
     "the patient's study (docs/pacs.md).\n"
     "Begin with: tissueform-pacs run --allow-ae SCANNER --recipe recipe.json --server "
     "localhost:50051 --pacs pacs:104 --pacs-ae-title PACS\n"
-    "SIGTERM or SIGINT: ends between two steps, which may be repeated; exit code 0.\n"
+    "SIGTERM or SIGINT: run and listen end between two steps, with exit code 0, the others at "
+    "once; "
+    "what they were doing may be repeated.\n"
     "Research software, not a medical device: not for diagnosis or treatment.";
 
 constexpr char kFooter[] =

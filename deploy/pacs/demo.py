@@ -11,6 +11,7 @@ import collections
 import json
 import pathlib
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -122,6 +123,9 @@ def main():
     missing = stack.missing_programs()
     if missing:
         sys.exit(f"missing: {', '.join(missing)}; deploy/install_packages.sh build installs them")
+    # Whoever ends this ends what it has started: also by SIGTERM, and where a shell has it pass over Ctrl-C.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     folder = words.folder or tempfile.mkdtemp(prefix="tissueform-pacs-")
     with stack.Stack(pathlib.Path(words.programs).resolve(), pathlib.Path(folder).resolve(), HERE / "recipe.json") as programs:
         run(programs, pathlib.Path(words.web).resolve())

@@ -57,6 +57,20 @@ def free_ports(count):
     return ports
 
 
+def children_of(process):
+    """Pids of all that a process has started, and of what those have."""
+    found = [int(pid) for path in pathlib.Path(f"/proc/{process}/task").glob("*/children") for pid in path.read_text().split()]
+    return found + [pid for child in found for pid in children_of(child)]
+
+
+def runs(pid):
+    """Not ended, or ended and not asked for."""
+    try:
+        return pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
 class Authority:
     """An authority of certificates that nobody else trusts, in a folder."""
 

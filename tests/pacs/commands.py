@@ -14,6 +14,7 @@ import json
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import sys
 
@@ -53,6 +54,14 @@ class Bridge:
     def run(self, *words):
         command = [self.program, *words, *self.options, "--state-dir", self.state]
         return subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=BUILD_S, check=False)
+
+    def break_off(self, programs, *words):
+        """Begins a command and ends it by SIGTERM once it has children: its exit code, and their pids."""
+        command = [self.program, *words, *self.options, "--state-dir", self.state]
+        with subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+            children = programs.wait_for("a child", lambda: stack.children_of(process.pid))
+            process.terminate()
+            return process.wait(stack.PATIENCE_S), children
 
     def status(self):
         return json.loads(self.run("status", "--json").stdout)
@@ -98,11 +107,14 @@ def check_refused(what, end, words):
     check(f"{what} is refused in one line", end.returncode == 1 and len(line.splitlines()) == 1 and words in line, f"{end.returncode} {line}")
 
 
-def check_way_to_the_server(bridge):
+def check_way_to_the_server(programs, bridge):
     """From a fetched series to a case; its key."""
     key = bridge.status()["series"][0]["key"]
     check_refused("publishing what is not built", bridge.run("publish", key), "is chosen: build its case first")
     check_refused("building what is not there", bridge.run("build", "0" * 32), "no such series")
+    end, children = bridge.break_off(programs, "build", key)
+    programs.wait_for("the end of what builds the plan", lambda: not any(stack.runs(pid) for pid in children))
+    check("SIGTERM breaks off a build", end == -signal.SIGTERM and bridge.status()["series"][0]["state"] == "chosen", str(end))
     built = bridge.run("build", key)
     check("build makes a plan and a case", built.returncode == 0 and "is packed: cases/" in built.stdout, built.stdout + built.stderr[-500:])
     published = bridge.run("publish", key)
@@ -203,7 +215,7 @@ def run(programs):
         check_fetched(way, by_way, study, programs.folder / "ct")
         check_refused(f"a study that the PACS has not, by {way}", by_way.run("fetch", "1.2.3"), "no such study")
     check_series(bridge)
-    case = check_way_to_the_server(bridge)
+    case = check_way_to_the_server(programs, bridge)
     check_store(programs, bridge, case, lambda: len(programs.instances_of(study)))
     certificate, key = programs.identities["bridge"]
     server = ["--server", f"localhost:{programs.server_port}", "--server-ca", programs.authority.certificate, "--server-cert", certificate,

@@ -251,27 +251,13 @@ def kill(programs, victim):
     {"orthanc": programs.start_orthanc, "server": programs.start_server, "bridge": programs.start_bridge}[victim]()
 
 
-def children_of(process):
-    """Pids of all that a process has started, and of what those have."""
-    found = [int(pid) for path in pathlib.Path(f"/proc/{process}/task").glob("*/children") for pid in path.read_text().split()]
-    return found + [pid for child in found for pid in children_of(child)]
-
-
-def runs(pid):
-    """Not ended, or ended and not asked for."""
-    try:
-        return pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
-
-
 def check_end_while_building(programs):
     """SIGTERM while a plan is built: the bridge ends, and so do its children, if later by what it takes them to see that."""
     bridge = programs.running["bridge"]
-    building = programs.wait_for("a plan that is built", lambda: children_of(bridge.pid), needs="bridge")
+    building = programs.wait_for("a plan that is built", lambda: stack.children_of(bridge.pid), needs="bridge")
     programs.stop("bridge")
     check("SIGTERM while a plan is built ends the bridge with exit code 0", bridge.returncode == 0, str(bridge.returncode))
-    programs.wait_for("the end of what builds the plan", lambda: not any(runs(pid) for pid in building))
+    programs.wait_for("the end of what builds the plan", lambda: not any(stack.runs(pid) for pid in building))
     programs.start_bridge()
 
 

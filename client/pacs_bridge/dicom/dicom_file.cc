@@ -66,10 +66,13 @@ absl::Status CheckBytes(const std::string& path, const DicomLimits& limits) {
   return absl::OkStatus();
 }
 
-void RemovePrivate(DcmItem* item) {
+// Curves and overlays, in groups that repeat: what is drawn over pixels.
+bool IsDrawn(Uint16 group) { return (group & 0xFF00) == 0x5000 || (group & 0xFF00) == 0x6000; }
+
+void RemovePrivateAndDrawn(DcmItem* item) {
   for (unsigned long i = item->card(); i > 0; --i) {
-    DcmElement* element = item->getElement(i - 1);
-    if (element->getGTag() % 2 == 1) delete item->remove(i - 1);
+    const Uint16 group = item->getElement(i - 1)->getGTag();
+    if (group % 2 == 1 || IsDrawn(group)) delete item->remove(i - 1);
   }
 }
 
@@ -124,7 +127,7 @@ absl::Status CopyHeaderOnly(const std::string& from, const std::string& to,
                             const DicomLimits& limits) {
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<DcmFileFormat> file, LoadDicomHeader(from, limits));
   DcmDataset* dataset = file->getDataset();
-  RemovePrivate(dataset);
+  RemovePrivateAndDrawn(dataset);
   delete dataset->remove(DCM_IconImageSequence);  // pixels too
   return SaveDicomFile(to, dataset);
 }

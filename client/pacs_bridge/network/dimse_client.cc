@@ -258,7 +258,11 @@ class DimseClient : public PacsClient {
   }
 
   absl::Status StatusOfStore(const OutgoingObject& object, DIC_US status) const {
-    if (status == STATUS_Success || (status & 0xF000) == kWarningClass) return absl::OkStatus();
+    // A UID of ours that it knows is this object, sent before a crash.
+    const bool there = status == STATUS_N_DuplicateSOPInstance;
+    if (status == STATUS_Success || there || (status & 0xF000) == kWarningClass) {
+      return absl::OkStatus();
+    }
     const std::string message =
         absl::StrFormat("the PACS '%s' does not take the object %s: status 0x%04x", peer_.name,
                         object.instance_uid, status);

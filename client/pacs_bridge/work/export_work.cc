@@ -160,6 +160,8 @@ absl::Status ExportWork::Fetch(QueuedExport* queued) {
     return absl::OkStatus();
   }
   // Whoever confirmed has seen somebody else: once more, with what the PACS says now.
+  std::error_code ignored;
+  fs::remove(path, ignored);  // it may wait for long, and the header is the patient's
   TF_ASSIGN_OR_RETURN(const QueuedStudy study, received_.GetStudy(series.study_uid));
   const std::string note = WhatHasChanged(study.patient, now);
   TF_RETURN_IF_ERROR(received_.UpdatePatient(series.study_uid, now));

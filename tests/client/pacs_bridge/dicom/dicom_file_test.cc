@@ -59,6 +59,23 @@ TEST(DicomFile, AHeaderHasNeitherPixelsNorPrivateElementsAndOneReader) {
   EXPECT_EQ(ReadInstanceHeader(header)->instance_uid, series.instance_uids[0]);
 }
 
+TEST(DicomFile, AHeaderHasNothingThatIsDrawnOverPixels) {
+  const fs::path folder = EmptyTestFolder("dicom_header_drawn");
+  const CtSeries series = OneSlice(folder);
+  const DcmTagKey overlay(0x6002, 0x3000);
+  DcmFileFormat file;
+  ASSERT_TRUE(file.loadFile(series.files[0].c_str()).good());
+  const std::vector<Uint8> bits(64, 0xFF);
+  auto* element = new DcmOtherByteOtherWord(DcmTag(overlay, EVR_OW));
+  element->putUint8Array(bits.data(), static_cast<unsigned long>(bits.size()));
+  ASSERT_TRUE(file.getDataset()->insert(element).good());
+  ASSERT_TRUE(file.saveFile(series.files[0].c_str()).good());
+  const fs::path header = folder / "header";
+  ASSERT_THAT(CopyHeaderOnly(series.files[0], header), IsOk());
+  EXPECT_TRUE((*LoadDicomHeader(series.files[0]))->getDataset()->tagExists(overlay));
+  EXPECT_FALSE((*LoadDicomHeader(header))->getDataset()->tagExists(overlay));
+}
+
 TEST(DicomFile, PatientAndStudyAreCopiedWholeAndNothingElse) {
   const fs::path folder = EmptyTestFolder("dicom_modules");
   CtSeriesOptions options;

@@ -61,10 +61,10 @@ CutWire::CutWire(int port, int64_t bytes, WireEnd end)
       listener_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
   sockaddr_in place = Loopback(0);
   socklen_t length = sizeof(place);
-  bind(listener_, reinterpret_cast<sockaddr*>(&place), length);
-  listen(listener_, 1);
-  getsockname(listener_, reinterpret_cast<sockaddr*>(&place), &length);
-  port_ = ntohs(place.sin_port);
+  const bool listens = bind(listener_, reinterpret_cast<sockaddr*>(&place), length) == 0 &&
+                       listen(listener_, 1) == 0 &&
+                       getsockname(listener_, reinterpret_cast<sockaddr*>(&place), &length) == 0;
+  port_ = listens ? ntohs(place.sin_port) : 0;
   thread_ = std::thread([this] { Run(); });
 }
 

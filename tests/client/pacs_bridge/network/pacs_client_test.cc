@@ -342,6 +342,10 @@ TEST(PacsClient, AnObjectThatIsRefusedIsToldByItsUid) {
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr(series.instance_uids[0])));
   EXPECT_THAT((*stored)[0].status,
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("0x0110")));
+  sink.Answer(absl::AlreadyExistsError("it is there"));
+  const auto again = (*MakePacsClient(peer))->Store(series.files);
+  ASSERT_THAT(again.status(), IsOk());
+  EXPECT_THAT((*again)[0].status, IsOk()) << "a duplicate of our own UID is what was sent before";
 }
 
 TEST(PacsClient, PeersThatCannotBeAreTold) {

@@ -161,6 +161,8 @@ TEST_F(ExportWorkTest, AMergedPatientGoesBackToThePerson) {
       testing::WriteCtSeries(root_ / "merged", merged).files.front();
   EXPECT_THAT(Work("exports/1"), IsOk());
   EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kAsked);
+  EXPECT_FALSE(
+      fs::exists(fs::path(queue_->object_folder(exports_.Get("exports/1")->key)) / "header.dcm"));
   EXPECT_THAT(exports_.Get("exports/1")->note, HasSubstr("another patient ID"));
   EXPECT_THAT(exports_.Get("exports/1")->note, Not(HasSubstr("MERGED-1")));
   EXPECT_EQ(rows_.GetStudy(series.study_uid)->patient.id, "MERGED-1");
