@@ -154,8 +154,8 @@ absl::StatusOr<std::shared_ptr<const SharedResponse>> SharedPreparation::Prepare
   int64_t bytes = shared->response->bytes_held();
   if (request.ranges.has_value()) {
     if (band == nullptr) {
-      TF_ASSIGN_OR_RETURN(band, BandColumns::Create(preparation_, *request.ranges,
-                                                    request.vertices, admission, cancellation));
+      TF_ASSIGN_OR_RETURN(band, BandColumns::Create(preparation_, *request.ranges, request.vertices,
+                                                    admission, cancellation));
     }
     bytes += band->bytes_held();
     shared->band = std::move(band);
