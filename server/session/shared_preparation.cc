@@ -130,6 +130,7 @@ absl::StatusOr<std::shared_ptr<const SharedResponse>> SharedPreparation::Prepare
   }
   feed_.Begin(TopicOf(request));
   const absl::Cleanup end_of_topic = [this] { feed_.End(); };
+  std::shared_ptr<const BandColumns> band = FindBand(request);
   // Before the new one is made, so that old and new need not fit together.
   while (responses_.size() >= kMostResponses) responses_.pop_back();
   Settle();
@@ -152,15 +153,27 @@ absl::StatusOr<std::shared_ptr<const SharedResponse>> SharedPreparation::Prepare
   shared->response = *std::move(response);
   int64_t bytes = shared->response->bytes_held();
   if (request.ranges.has_value()) {
-    TF_ASSIGN_OR_RETURN(shared->band,
-                        BandColumns::Create(preparation_, *request.ranges, request.vertices,
-                                            admission, cancellation));
-    bytes += shared->band->bytes_held();
+    if (band == nullptr) {
+      TF_ASSIGN_OR_RETURN(band, BandColumns::Create(preparation_, *request.ranges, request.vertices,
+                                                    admission, cancellation));
+    }
+    bytes += band->bytes_held();
+    shared->band = std::move(band);
   }
   TF_RETURN_IF_ERROR(shared->reservation.Resize(bytes, "prepared answers"));
   responses_.push_front(std::move(shared));
   Settle();
   return responses_.front();
+}
+
+std::shared_ptr<const BandColumns> SharedPreparation::FindBand(
+    const ResponseRequest& request) const {
+  if (!request.ranges.has_value()) return nullptr;
+  for (const auto& prepared : responses_) {
+    const ResponseRequest& made = prepared->request;
+    if (made.ranges == request.ranges && made.vertices == request.vertices) return prepared->band;
+  }
+  return nullptr;
 }
 
 std::shared_ptr<const ProgressFeed::Follower> SharedPreparation::Follow(DeformationModel model,

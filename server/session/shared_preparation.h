@@ -48,7 +48,9 @@ struct SharedResponse {
   ResponseRequest request;
   MemoryReservation reservation;  // given back after the response is gone
   std::unique_ptr<const VertexResponse> response;
-  std::unique_ptr<const BandColumns> band;  // null where no ranges were given
+  // Null where no ranges were given. It knows no model: answers of another one may have the same,
+  // and each is charged for it.
+  std::shared_ptr<const BandColumns> band;
 };
 
 // The operators, factors and prepared answers of one mesh, one stiffness and one constraint set,
@@ -105,6 +107,8 @@ class SharedPreparation {
   // What a model takes that is still to be made, the factor apart.
   int64_t BytesBesideFactor(const DeformerOptions& options) const;
   absl::Status Admit(int64_t more_bytes);
+  // That of answers that are kept; null where none has it.
+  std::shared_ptr<const BandColumns> FindBand(const ResponseRequest& request) const;
   // After something was made or given up: what is held, no longer what was expected.
   void Settle();
 

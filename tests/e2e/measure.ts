@@ -63,14 +63,16 @@ async function chooseOwnAnswers(name: string) {
 async function drag(seconds: number) {
   const { bench, view } = (globalThis as unknown as { tissueform: { bench: any; view: any } }).tissueform;
   view.stage.setDrawing(false);
-  const times: number[] = [];
+  // Of pictures of the page's own, and of those that only the server could answer.
+  const [times, late]: number[][] = [[], []];
   const shape = view.head.skins[0].shape;
   const { lay } = Object.getPrototypeOf(bench);
   let sentAt = 0;
   // After the picture was laid positions and normals are in the buffers.
   bench.lay = function (...words: unknown[]) {
     lay.apply(this, words);
-    if (sentAt > 0) times.push(performance.now() - sentAt);
+    const isOwn = bench.localState.value.kind !== "ready" || bench.localState.value.coverage === "covered";
+    if (sentAt > 0) (isOwn ? times : late).push(performance.now() - sentAt);
     sentAt = 0;
   };
   const end = performance.now() + 1000 * seconds;
@@ -89,7 +91,7 @@ async function drag(seconds: number) {
   view.stage.setDrawing(true);
   times.sort((a, b) => a - b);
   const at = (share: number) => Math.round(100 * times[Math.floor(share * (times.length - 1))]) / 100;
-  return { pictures: times.length, p50Ms: at(0.5), p99Ms: at(0.99), maxMs: at(1), longestGapMs, movingVertices: shape.movingCount, skinVertices: shape.positions.length / 3 };
+  return { pictures: times.length, beyond: late.length, p50Ms: at(0.5), p99Ms: at(0.99), maxMs: at(1), longestGapMs, movingVertices: shape.movingCount, skinVertices: shape.positions.length / 3 };
 }
 
 interface Tracing {

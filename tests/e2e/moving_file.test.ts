@@ -1,16 +1,17 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { execFileSync } from "node:child_process";
+import { execFile, execFileSync } from "node:child_process";
 import { chmodSync, existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createServer } from "node:http";
 import type { AddressInfo } from "node:net";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
+import { promisify } from "node:util";
 import { type Browser, type Page, chromium } from "playwright-core";
 import puppeteer, { type Browser as Firefox, type Page as FirefoxPage } from "puppeteer-core";
-import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
 import { readMovingData } from "../../client/web/src/movingdata/moving_data";
 import { fromBase64, unseal } from "../../client/web/src/movingdata/sealed_payload";
 import { Planner, openCase, seriousFindings, typeMove } from "./planner";
@@ -41,13 +42,12 @@ chmodSync(folder, 0o700);
 const path = (name: string) => join(folder, name);
 const url = (name: string) => pathToFileURL(path(name)).href;
 const make = (name: string, model: string, ...options: string[]) =>
-  execFileSync(join(BIN, "tissueform"), ["export", PLAN, "--html", path(name), "--model", model, ...options]);
+  promisify(execFile)(join(BIN, "tissueform"), ["export", PLAN, "--html", path(name), "--model", model, ...options]);
 let browser: Browser;
 
 beforeAll(async () => {
   writeFileSync(path("password"), PASSWORD);
-  make("face.html", MODEL);
-  make("locked.html", MODEL, "--password-file", path("password"));
+  await Promise.all([make("face.html", MODEL), make("locked.html", MODEL, "--password-file", path("password")), make("banded.html", "linear_elastic")]);
   const args = ["--no-sandbox", "--enable-unsafe-swiftshader", "--disable-background-networking"];
   browser = await chromium.launch({ executablePath: CHROMIUM, args });
 });
@@ -56,6 +56,9 @@ afterAll(async () => {
   await browser?.close();
   rmSync(folder, { recursive: true, force: true });
 });
+
+// A page draws without a graphics card as long as it is open.
+afterEach(() => Promise.all(browser.contexts().map((context) => context.close())));
 
 /** A page that has no network; `requests` are all that it asks for but the file itself. */
 async function openPage(name: string, before = "", offline = true): Promise<{ page: Page; requests: string[]; errors: string[] }> {
@@ -154,7 +157,6 @@ describe("in Chromium", () => {
   });
 
   test("where the plan knows how uncertain the material is, no number stands without its band", async () => {
-    make("banded.html", "linear_elastic");
     const { page } = await openPage("banded.html");
     await answered(page as Opened);
     await page.getByText(/Largest movement of the skin: [0-9.]+ mm, [0-9.]+ to [0-9.]+ in 95 of 100 cases/).waitFor();
@@ -245,6 +247,48 @@ describe("in Chromium", () => {
     await attempt(page);
     expect(reached).toBe(0);
     server.close();
+  });
+
+  test("its policy runs WebAssembly, and no text beside the script that it holds", async () => {
+    const { page } = await openPage("face.html");
+    await answered(page as Opened);
+    const ran = await page.evaluate(async () => {
+      const seen = globalThis as unknown as Record<string, unknown>;
+      const attempt = async (run: () => unknown) => {
+        try {
+          return Boolean(await run());
+        } catch {
+          return false;
+        }
+      };
+      // One with its text in it runs as it is added, or never.
+      const script = (fill: Partial<HTMLScriptElement>) => () =>
+        new Promise<boolean>((done) => {
+          seen.ran = false;
+          const element = Object.assign(document.createElement("script"), fill);
+          element.onload = element.onerror = () => done(seen.ran === true);
+          document.body.append(element);
+          if (element.src === "") done(seen.ran === true);
+        });
+      const emptyModule = Uint8Array.of(0, 0x61, 0x73, 0x6d, 1, 0, 0, 0);
+      return {
+        webAssembly: await attempt(() => WebAssembly.instantiate(emptyModule)),
+        eval: await attempt(() => (0, eval)("1")),
+        text: await attempt(() => new Function("return 1")()),
+        inline: await attempt(script({ textContent: "globalThis.ran = true" })),
+        data: await attempt(script({ src: "data:text/javascript,globalThis.ran=true" })),
+        blob: await attempt(script({ src: URL.createObjectURL(new Blob(["globalThis.ran = true"])) })),
+        dataWorker: await attempt(
+          () =>
+            new Promise((done) => {
+              const worker = new Worker("data:text/javascript,postMessage(1)");
+              worker.onmessage = () => done(true);
+              worker.onerror = () => done(false);
+            }),
+        ),
+      };
+    });
+    expect(ran).toEqual({ webAssembly: true, eval: false, text: false, inline: false, data: false, blob: false, dataWorker: false });
   });
 });
 

@@ -252,6 +252,28 @@ TEST_F(SharedPreparationTest, PreparedAnswersMayBeAskedByManyAtOnce) {
   }
 }
 
+// Two factorisations more where Poisson's ratio is in doubt.
+TEST_F(SharedPreparationTest, TheBandIsMadeOnceForTheModelsOfTheSameVerticesAndRanges) {
+  ResponseRequest request = Request(1.0);
+  request.ranges.emplace().tissues = {{"all", 2}};
+  request.ranges->tissue_of_tet.assign(static_cast<size_t>(mesh_.num_tets()), 0);
+  ASSERT_OK_AND_ASSIGN(const auto linear, Respond(request));
+  request.model = DeformationModel::kNeoHookean;
+  ASSERT_OK_AND_ASSIGN(const auto neo_hookean, Respond(request));
+  ASSERT_NE(linear->band, nullptr);
+  EXPECT_EQ(neo_hookean->band, linear->band);
+  EXPECT_NE(neo_hookean->response, linear->response);
+  request.vertices.pop_back();
+  ASSERT_OK_AND_ASSIGN(const auto fewer, Respond(request));
+  EXPECT_NE(fewer->band, linear->band);
+  request.ranges->tissues[0].factor_95 = 3;
+  ASSERT_OK_AND_ASSIGN(const auto wider, Respond(request));
+  EXPECT_NE(wider->band, fewer->band);
+  request.ranges.reset();
+  ASSERT_OK_AND_ASSIGN(const auto without, Respond(request));
+  EXPECT_EQ(without->band, nullptr);
+}
+
 TEST_F(SharedPreparationTest, WhatIsRefusedLeavesWhatWasThereAndMayBeAskedForAgain) {
   ASSERT_THAT(Make(DeformationModel::kGradientField), IsOk());
   const int64_t held = preparation_.bytes_held();

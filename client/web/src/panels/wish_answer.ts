@@ -21,7 +21,7 @@ export function wishAnswer(bench: Workbench): HTMLElement {
   const show = () => {
     const { response, milliseconds } = fit.fitted.value ?? { response: null, milliseconds: 0 };
     box.hidden = !fit.isActive;
-    accept.disabled = response === null || fit.problem.value !== null;
+    accept.disabled = !fit.isSettled;
     details.hidden = response === null;
     const lines = response === null ? [] : wishSentences(response, fit.wishes.value, bench.plan.handles);
     if (fit.problem.value !== null) lines.unshift(`This cannot be asked: ${sentenceOf(fit.problem.value)}`);
@@ -34,6 +34,7 @@ export function wishAnswer(bench: Workbench): HTMLElement {
   fit.wishes.watch(show);
   fit.fitted.watch(show);
   fit.problem.watch(show);
+  fit.isAsking.watch(() => (accept.disabled = !fit.isSettled));
   return box;
 }
 

@@ -82,6 +82,11 @@ export class WishFit {
     this.isAsking.value = false;
   }
 
+  /** What was found is for the newest wishes. */
+  get isSettled(): boolean {
+    return this.found !== null && this.problem.value === null && !this.isAsking.value;
+  }
+
   /** What was found is a step of the plan. */
   accept(): void {
     if (this.found !== null) this.plan.setPoses(this.found);

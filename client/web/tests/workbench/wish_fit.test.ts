@@ -57,6 +57,23 @@ test("what is found is shown at once, and accepting makes one step of it all", a
   expect([plan.moves[0].forwardMm, plan.canUndo]).toEqual([0, false]);
 });
 
+test("what was found for older wishes is not to be accepted for the newest", async () => {
+  const { fit, answers, wish } = await bench();
+  const seen: boolean[] = [];
+  fit.isAsking.watch(() => seen.push(fit.isSettled));
+  fit.set([wish(1)]);
+  fit.set([wish(2)]);
+  await answers[0](1);
+  expect(fit.isSettled).toBe(false);
+  await answers[1](2);
+  expect(fit.isSettled).toBe(true);
+  fit.set([wish(9)]);
+  expect(fit.isSettled).toBe(false);
+  await answers[2](new Error("away"));
+  expect(fit.isSettled).toBe(false);
+  expect(seen).toEqual([false, false, true, false, false]);
+});
+
 test("rejecting brings the plan back, and an answer that comes later changes nothing", async () => {
   const { plan, fit, answers, wish } = await bench();
   plan.change(0, { upMm: 1 }, true);
