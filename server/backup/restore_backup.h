@@ -21,8 +21,7 @@ absl::StatusOr<BackupSummary> VerifyBackup(const std::string& backup);
 // Copies a backup, checked on the way, into a data folder that is empty or not there yet, and which
 // no server holds. The database comes last; what fails leaves the folder empty.
 //
-// Errors: those of VerifyBackup and of DataFolder::Open, AlreadyExists (the folder holds
-// something).
+// Errors: those of VerifyBackup and of DataFolder::Open, AlreadyExists (it holds something).
 absl::StatusOr<BackupSummary> RestoreBackup(const std::string& backup,
                                             const std::string& data_folder);
 

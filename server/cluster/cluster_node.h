@@ -18,7 +18,7 @@
 #include "server/postgres_store/lease_keeper.h"
 #include "server/postgres_store/postgres_pool.h"
 #include "server/postgres_store/postgres_session_leases.h"
-#include "server/store/session_ownership.h"
+#include "server/session/session_ownership.h"
 
 namespace tissueform {
 

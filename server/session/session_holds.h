@@ -17,7 +17,7 @@
 
 #include "core/base/mutex.h"
 #include "server/session/worker_pool.h"
-#include "server/store/session_ownership.h"
+#include "server/session/session_ownership.h"
 
 namespace tissueform {
 

@@ -30,7 +30,7 @@
 #include "server/session/session_table.h"
 #include "server/session/session_updates.h"
 #include "server/session/worker_pool.h"
-#include "server/store/session_ownership.h"
+#include "server/session/session_ownership.h"
 #include "server/store/session_store.h"
 
 namespace tissueform {

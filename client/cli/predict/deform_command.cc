@@ -127,7 +127,6 @@ void AddDeformCommand(CLI::App& app, CommandWork* work) {
   command->footer(
       "Examples:\n"
       "  tissueform deform plan.json --out after.vtu\n"
-      "  tissueform deform plan.json --out after.vtu --stats stats.json\n"
       "  tissueform deform plan.json --out after.vtu --model neo_hookean --stats stats.json\n"
       "Open after.vtu in ParaView or 3D Slicer; displacement_mm is how far each vertex moved.\n"
       "Elastic models add stress, energy and the forces that bone bears (docs/plan-format.md).");
