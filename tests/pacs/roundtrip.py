@@ -112,7 +112,11 @@ class Written(threading.Thread):
 
     def run(self):
         while not self.ended.wait(0.02):
-            for path in [path for path in self.folder.rglob("*.dcm") if path not in self.seen]:
+            try:
+                new = [path for path in self.folder.rglob("*.dcm") if path not in self.seen]
+            except FileNotFoundError:
+                continue  # a folder went while it was looked into
+            for path in new:
                 try:
                     item = pydicom.dcmread(path)
                     if item.SOPClassUID == STL:
