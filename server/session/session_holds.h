@@ -16,8 +16,8 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/mutex.h"
-#include "server/session/worker_pool.h"
 #include "server/session/session_ownership.h"
+#include "server/session/worker_pool.h"
 
 namespace tissueform {
 

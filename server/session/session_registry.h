@@ -26,11 +26,11 @@
 #include "server/session/session_maker.h"
 #include "server/session/session_makings.h"
 #include "server/session/session_news.h"
+#include "server/session/session_ownership.h"
 #include "server/session/session_progress.h"
 #include "server/session/session_table.h"
 #include "server/session/session_updates.h"
 #include "server/session/worker_pool.h"
-#include "server/session/session_ownership.h"
 #include "server/store/session_store.h"
 
 namespace tissueform {

@@ -14,8 +14,8 @@
 
 #include "core/base/error_reason.h"
 #include "core/base/mutex.h"
-#include "server/store/in_memory_session_store.h"
 #include "server/session/session_ownership.h"
+#include "server/store/in_memory_session_store.h"
 #include "server/store/store_errors.h"
 
 // Servers that share a store, in one process: who holds a session by leases on a clock that a test
