@@ -20,6 +20,7 @@ build_what_is_missing() {
   local program
   for program in tissueform tissueform-server tissueform-gateway; do
     if [[ ! -x $TISSUEFORM_BUILD_DIR/bin/$program ]]; then
+      deploy/install_packages.sh build
       deploy/build.sh release tissueform tissueform-server tissueform-gateway
       return
     fi
@@ -36,6 +37,11 @@ case ${1:-} in
     [[ " $* " == *" --help "* || " $* " == *" -h "* ]] || build_what_is_missing
     exec /usr/bin/python3 -B tests/cluster/chaos.py --programs "$TISSUEFORM_BUILD_DIR/bin" "$@"
     ;;
-  up) [[ " $* " == *" --help "* || " $* " == *" -h "* ]] || build_what_is_missing ;;
+  up)
+    if [[ " $* " != *" --help "* && " $* " != *" -h "* ]]; then
+      build_what_is_missing
+      [[ -e build/web/index.html ]] || deploy/build_web.sh
+    fi
+    ;;
 esac
 exec /usr/bin/python3 -B deploy/cluster/command.py --programs "$TISSUEFORM_BUILD_DIR/bin" --web "$PWD/build/web" "$@"

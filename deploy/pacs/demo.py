@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""What deploy/pacs/demo.sh shows, once everything is built.
+"""From the PACS and back on this machine: what deploy/pacs/demo.sh does once everything is built.
 
-  demo.py PROGRAMS WEB [--serve] [--folder DIR]
+Orthanc, the server, the gateway and the bridge start on loopback, with TLS between them. A scanner sends the bundled head to
+Orthanc, Orthanc sends it on to the bridge, which makes a case of it; a prediction goes back into the patient's study and is
+listed by DICOMweb. docs/pacs.md tells what there is to see. Research software, not a medical device.
 """
 
 import argparse
@@ -114,11 +116,11 @@ def run(programs, web):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("programs")
-    parser.add_argument("web")
-    parser.add_argument("--serve", action="store_true")
-    parser.add_argument("--folder")
+    parser = argparse.ArgumentParser(prog="deploy/pacs/demo.sh", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--programs", required=True, help=argparse.SUPPRESS)
+    parser.add_argument("--web", required=True, help=argparse.SUPPRESS)
+    parser.add_argument("--serve", action="store_true", help="keep all of it running until Ctrl-C; the last lines say where work list and planner are")
+    parser.add_argument("--folder", metavar="DIR", help="where logs, pictures, objects and the keys of this one time go (default: a new temporary folder)")
     words = parser.parse_args()
     missing = stack.missing_programs()
     if missing:

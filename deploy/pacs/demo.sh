@@ -18,7 +18,9 @@ cd "$(dirname "$0")/../.."
 
 export TISSUEFORM_BUILD_DIR=${TISSUEFORM_BUILD_DIR:-$PWD/build/release}
 
-deploy/install_packages.sh build
-deploy/build_web.sh
-deploy/build.sh release tissueform tissueform-server tissueform-gateway tissueform-pacs
-exec /usr/bin/python3 -B deploy/pacs/demo.py "$TISSUEFORM_BUILD_DIR/bin" build/web "$@"
+if [[ " $* " != *" --help "* && " $* " != *" -h "* ]]; then
+  deploy/install_packages.sh build
+  deploy/build_web.sh
+  deploy/build.sh release tissueform tissueform-server tissueform-gateway tissueform-pacs
+fi
+exec /usr/bin/python3 -B deploy/pacs/demo.py --programs "$TISSUEFORM_BUILD_DIR/bin" --web build/web "$@"

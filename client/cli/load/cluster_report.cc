@@ -3,14 +3,11 @@
 
 #include "client/cli/load/cluster_report.h"
 
-#include <algorithm>
-
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
 #include "client/cli/load/load_report.h"
 #include "client/cli/shared/circumstances.h"
-#include "core/base/error_reason.h"
 
 namespace tissueform {
 namespace {
@@ -66,12 +63,7 @@ std::string ClusterLoadText(const ClusterLoadOptions& options, const ClusterLoad
   absl::StrAppendFormat(
       &text, "reattachments: %d of drags, %d of watches; longest time without a frame: %.0f ms\n",
       result.reattachments, result.watch_reattachments, result.longest_gap_ms);
-  absl::StrAppendFormat(&text, "errors: %d\n", result.errors.size());
-  for (size_t i = 0; i < std::min<size_t>(result.errors.size(), 3); ++i) {
-    const absl::Status& error = result.errors[i];
-    absl::StrAppend(&text, "  ", ReasonOf(error), ": ", error.message(), "\n");
-  }
-  return text;
+  return absl::StrCat(text, ErrorsText(result.errors));
 }
 
 Json ClusterLoadJson(const ClusterLoadOptions& options, const ClusterLoadResult& result) {

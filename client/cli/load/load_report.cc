@@ -19,6 +19,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kPercents[] = {50, 90, 99, 100};
+constexpr size_t kErrorsPrinted = 3;
 
 std::vector<double> Rising(std::vector<double> values) {
   std::sort(values.begin(), values.end());
@@ -64,6 +65,14 @@ Json PercentilesJson(const std::vector<double>& values) {
           {"largest", rising.back()}};
 }
 
+std::string ErrorsText(const std::vector<absl::Status>& errors) {
+  std::string text = absl::StrFormat("errors: %d\n", errors.size());
+  for (size_t i = 0; i < std::min(errors.size(), kErrorsPrinted); ++i) {
+    absl::StrAppend(&text, "  ", ReasonOf(errors[i]), ": ", errors[i].message(), "\n");
+  }
+  return text;
+}
+
 std::string LoadText(const LoadOptions& options, const LoadResult& result) {
   std::string text =
       absl::StrFormat("%-12s %5s  %31s  %31s  %12s  %7s  %6s  %6s\n", "drags", "count",
@@ -82,12 +91,7 @@ std::string LoadText(const LoadOptions& options, const LoadResult& result) {
         &text, "gRPC alone, one stream: latency ms 50/90/99/most %s; %s take %.2f times that\n",
         PercentilesText(result.bare_latencies_ms, 2), result.drags.front().kind, ratio);
   }
-  absl::StrAppendFormat(&text, "errors: %d\n", result.errors.size());
-  for (size_t i = 0; i < std::min<size_t>(result.errors.size(), 3); ++i) {
-    const absl::Status& error = result.errors[i];
-    absl::StrAppend(&text, "  ", ReasonOf(error), ": ", error.message(), "\n");
-  }
-  return text;
+  return absl::StrCat(text, ErrorsText(result.errors));
 }
 
 Json LoadJson(const LoadOptions& options, const LoadResult& result) {

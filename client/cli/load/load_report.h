@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "nlohmann/json.hpp"
 
 #include "client/cli/load/load_run.h"
@@ -16,6 +17,8 @@ namespace tissueform {
 std::string PercentilesText(const std::vector<double>& values, int digits);
 // The same with their count, or null.
 nlohmann::ordered_json PercentilesJson(const std::vector<double>& values);
+// How many there are, and the first ones' reasons and messages, a line each.
+std::string ErrorsText(const std::vector<absl::Status>& errors);
 
 // A table of the drags, a line on churn and one on errors.
 std::string LoadText(const LoadOptions& options, const LoadResult& result);
