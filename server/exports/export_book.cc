@@ -139,6 +139,7 @@ absl::StatusOr<ExportRecord> ExportBook::Create(ExportRecord wanted) {
   wanted.state = ExportState::kWaiting;
   wanted.created_s = wanted.updated_s = clock_();
   wanted.version = 1;
+  wanted.change = RandomId();
   TF_RETURN_IF_ERROR(Keep(wanted));
   return wanted;
 }
@@ -219,6 +220,7 @@ absl::StatusOr<ExportRecord> ExportBook::Update(const std::string& id, const Cha
   record.stored_objects = change.stored_objects;
   record.updated_s = clock_();
   ++record.version;
+  record.change = RandomId();
   const absl::Status kept = Keep(record);
   // Another server was faster: who tries again sees what it has done.
   if (absl::IsAborted(kept)) Refresh().IgnoreError();

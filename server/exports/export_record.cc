@@ -26,6 +26,7 @@ std::string SerializeExport(const ExportRecord& record) {
   proto.set_request_key(record.request_key);
   proto.set_request_fingerprint(record.request_fingerprint);
   proto.set_measures(record.measures);
+  proto.set_change(record.change);
   return proto.SerializeAsString();
 }
 
@@ -50,7 +51,8 @@ absl::StatusOr<ExportRecord> ParseExport(absl::string_view bytes) {
                       .version = proto.version(),
                       .request_key = proto.request_key(),
                       .request_fingerprint = proto.request_fingerprint(),
-                      .measures = proto.measures()};
+                      .measures = proto.measures(),
+                      .change = proto.change()};
 }
 
 bool MayFollow(ExportState before, ExportState after) {

@@ -35,6 +35,9 @@ struct ExportRecord {
   std::string request_key = {};
   std::string request_fingerprint = {};
   std::string measures = {};  // the server's bytes
+  // Random, new with every change: two servers that write the same words in the same second do not
+  // write the same record.
+  std::string change = {};
 
   friend bool operator==(const ExportRecord&, const ExportRecord&) = default;
 };

@@ -16,6 +16,7 @@
 #include "gtest/gtest.h"
 
 #include "core/base/error_reason.h"
+#include "server/exports/export_book.h"
 #include "server/postgres_store/postgres_access_store.h"
 #include "server/postgres_store/postgres_blobs.h"
 #include "server/postgres_store/postgres_export_store.h"
@@ -454,6 +455,19 @@ TEST_F(PostgresStoresTest, AnExportThatAnotherServerHasChangedIsNotOverwritten) 
   ASSERT_THAT(there.Erase({"a"}), IsOk());
   record.version = 3;
   EXPECT_THAT(here.Put(record), StatusIs(Code::kAborted)) << "what is gone does not come back";
+}
+
+TEST_F(PostgresStoresTest, OfTwoServersThatWriteTheSameWordsInTheSameSecondOneIsToldSo) {
+  PostgresExportStore store(stores_->pool());
+  const auto clock = [] { return int64_t{1'800'000'000}; };
+  ExportBook here({}, &store, clock);
+  ExportBook there({}, &store, clock);
+  ASSERT_OK_AND_ASSIGN(const ExportRecord made, here.Create({.prediction = "p"}));
+  ASSERT_THAT(there.LearnAgain(), IsOk());
+  const ExportBook::Change change = {.etag = ExportBook::EtagOf(made),
+                                     .state = ExportState::kStoring};
+  ASSERT_THAT(there.Update(made.id, change), IsOk());
+  EXPECT_TRUE(HasReason(here.Update(made.id, change).status(), ErrorReason::kStaleEtag));
 }
 
 TEST_F(PostgresStoresTest, AMeshThatASessionIsMadeFromCannotBeDeleted) {
