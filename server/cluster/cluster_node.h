@@ -52,6 +52,7 @@ class ClusterNode final : public SessionOwnership {
   bool is_shared() const override { return true; }
   absl::StatusOr<int64_t> Acquire(const std::string& id) override;
   std::optional<int64_t> EpochOf(const std::string& id) override { return keeper_.EpochOf(id); }
+  void Forget(const std::string& id) override { keeper_.Forget(id); }
   void Release(const std::string& id) override;
 
   // `refusal`, with the node that has room where it says that memory is full here.

@@ -48,6 +48,8 @@ class LeaseKeeper {
   // As SessionLeases::Acquire; where it is mine it is kept.
   absl::StatusOr<LeaseAnswer> Acquire(const std::string& session);
   absl::Status Release(const std::string& session);
+  // The session is gone. Fast; nobody is told of its lease.
+  void Forget(const std::string& session) { held_.Take(session); }
   // So that others go on at once: at the end of a drain. Errors: the first; tries all.
   absl::Status ReleaseAll();
 

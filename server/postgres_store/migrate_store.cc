@@ -19,6 +19,7 @@
 #include "server/postgres_store/postgres_access_store.h"
 #include "server/postgres_store/postgres_blobs.h"
 #include "server/postgres_store/postgres_export_store.h"
+#include "server/postgres_store/postgres_schema.h"
 #include "server/postgres_store/postgres_session_rows.h"
 
 namespace tissueform {
@@ -51,9 +52,9 @@ Result AnswerOf(Call call) {
 absl::Status InsertAll(const std::vector<SessionRecord>& records, PostgresPool* to) {
   return to->Run([&](PostgresTransaction& transaction) -> absl::Status {
     for (const SessionRecord& record : records) {
-      TF_RETURN_IF_ERROR(InsertSession(transaction, record));
+      TF_RETURN_IF_ERROR(InsertSession(transaction, record).status());
     }
-    return absl::OkStatus();
+    return RaiseSessionEpochs(transaction);
   });
 }
 

@@ -116,6 +116,7 @@ CREATE TRIGGER tell_changed AFTER INSERT OR UPDATE OR DELETE ON exports FOR EACH
   EXECUTE FUNCTION tissueform_tell('exports_changed');
 CREATE TABLE nodes (holder text PRIMARY KEY, name text COLLATE "C" NOT NULL,
   free_bytes bigint NOT NULL, draining boolean NOT NULL, seen timestamptz NOT NULL);
+CREATE SEQUENCE session_epochs MINVALUE 2;
 )sql";
 
 absl::Status ChangeSchema(const std::string& name, PostgresTransaction& transaction) {
@@ -128,7 +129,10 @@ absl::Status ChangeSchema(const std::string& name, PostgresTransaction& transact
   }
   if (version == kSchemaVersion) return absl::OkStatus();
   if (version < 4) TF_RETURN_IF_ERROR(transaction.Execute(kTablesOfVersion4));
-  if (version < 5) TF_RETURN_IF_ERROR(transaction.Execute(kVersion5));
+  if (version < 5) {
+    TF_RETURN_IF_ERROR(transaction.Execute(kVersion5));
+    TF_RETURN_IF_ERROR(RaiseSessionEpochs(transaction));
+  }
   return transaction.Run("UPDATE tissueform_version SET version = $1", {kSchemaVersion});
 }
 
@@ -142,6 +146,13 @@ absl::StatusOr<int64_t> PostgresSchemaVersion(PostgresTransaction& transaction) 
   TF_ASSIGN_OR_RETURN(const PostgresRows rows,
                       transaction.Query("SELECT max(version) FROM tissueform_version", {}));
   return rows.Integer(0, 0);
+}
+
+absl::Status RaiseSessionEpochs(PostgresTransaction& transaction) {
+  return transaction.Run(
+      "SELECT setval('session_epochs', newest) FROM (SELECT max(epoch) AS newest FROM "
+      "session_states) AS found WHERE newest >= (SELECT last_value FROM session_epochs)",
+      {});
 }
 
 absl::Status PreparePostgresSchema(PostgresPool* pool) {

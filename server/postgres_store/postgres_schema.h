@@ -20,6 +20,9 @@ namespace tissueform {
 //                       of the lease is that of the writes, so that one row decides.
 //   sessions            beside the rest the mesh that it is made from, which cannot be deleted
 //                       meanwhile; null when that was damaged and is gone
+//   session_epochs      a sequence: what the next epoch is, of whatever session. It does not go
+//   back,
+//                       so nothing is written under the epoch of an earlier session of the same id
 //   nodes               servers that use the store now (node_table.h)
 //   blobs, blob_pieces  what a data folder keeps as files: rows of 1 MiB, each with its SHA-256
 //
@@ -33,6 +36,10 @@ namespace tissueform {
 //
 // Errors: FailedPrecondition (a newer version), or those of the pool.
 absl::Status PreparePostgresSchema(PostgresPool* pool);
+
+// Epochs that are given from now on are greater than those of all sessions that there are. After
+// rows with epochs of another store have been written.
+absl::Status RaiseSessionEpochs(PostgresTransaction& transaction);
 
 // The version of the tables; 0 where there are none.
 absl::StatusOr<int64_t> PostgresSchemaVersion(PostgresTransaction& transaction);

@@ -52,11 +52,11 @@ absl::StatusOr<LeaseAnswer> PostgresSessionLeases::Acquire(const std::string& se
         const PostgresRows taken,
         transaction.Query(
             "UPDATE session_states SET epoch = CASE WHEN holder = $2 AND lease_until > "
-            "tissueform_now() THEN epoch ELSE epoch + 1 END, holder = $2, node = $3, lease_until = "
-            "tissueform_now() + $4::bigint * interval '1 millisecond' WHERE key = (SELECT key FROM "
-            "sessions WHERE id = $1) AND (holder = $2 OR lease_until <= tissueform_now()) "
-            "RETURNING "
-            "epoch",
+            "tissueform_now() THEN epoch ELSE nextval('session_epochs') END, holder = $2, node = "
+            "$3, lease_until = tissueform_now() + $4::bigint * interval '1 millisecond' WHERE key "
+            "= "
+            "(SELECT key FROM sessions WHERE id = $1) AND (holder = $2 OR lease_until <= "
+            "tissueform_now()) RETURNING epoch",
             {session, holder_, node_, int64_t{options_.duration.count()}}));
     answer = {};
     if (!taken.empty()) {

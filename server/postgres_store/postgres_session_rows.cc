@@ -4,6 +4,7 @@
 #include "server/postgres_store/postgres_session_rows.h"
 
 #include "core/base/status_macros.h"
+#include "server/store/session_store.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_records.h"
 #include "server/store/store_rows.h"
@@ -55,7 +56,8 @@ absl::Status LockMeshOfSession(PostgresTransaction& transaction, const SessionRe
   return rows.empty() ? NoMesh(record.mesh_sha256) : absl::OkStatus();
 }
 
-absl::Status InsertSession(PostgresTransaction& transaction, const SessionRecord& record) {
+absl::StatusOr<int64_t> InsertSession(PostgresTransaction& transaction,
+                                      const SessionRecord& record) {
   const SealedSession sealed(record);
   TF_ASSIGN_OR_RETURN(
       const PostgresRows rows,
@@ -64,12 +66,18 @@ absl::Status InsertSession(PostgresTransaction& transaction, const SessionRecord
                         "(id) DO NOTHING RETURNING key",
                         {record.id, record.owner, sealed.record, record.mesh_sha256}));
   if (rows.empty()) return SessionExists(record.id);
-  return transaction.Run(
-      "INSERT INTO session_states (key, etag, epoch, handles, poses, created_s, last_used_s) "
-      "VALUES "
-      "($1, $2, $3, $4, $5, $6, $7)",
-      {rows.Integer(0, 0), record.etag, record.epoch, static_cast<int64_t>(record.handles.size()),
-       sealed.poses, record.created_s, record.last_used_s});
+  // Only now, that the id is free: whoever held a session of it before has got its epoch by now.
+  static_assert(kFreshEpoch == 0);
+  TF_ASSIGN_OR_RETURN(
+      const PostgresRows state,
+      transaction.Query(
+          "INSERT INTO session_states (key, etag, epoch, handles, poses, created_s, last_used_s) "
+          "VALUES ($1, $2, CASE WHEN $3::bigint = 0 THEN nextval('session_epochs') ELSE $3::bigint "
+          "END, $4, $5, $6, $7) RETURNING epoch",
+          {rows.Integer(0, 0), record.etag, record.epoch,
+           static_cast<int64_t>(record.handles.size()), sealed.poses, record.created_s,
+           record.last_used_s}));
+  return state.Integer(0, 0);
 }
 
 absl::Status ReplaceSession(PostgresTransaction& transaction, int64_t key,

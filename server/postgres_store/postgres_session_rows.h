@@ -39,8 +39,10 @@ absl::StatusOr<LockedState> LockState(PostgresTransaction& transaction, const st
 // The mesh that it is made from is not deleted until the transaction's end. Errors: NotFound.
 absl::Status LockMeshOfSession(PostgresTransaction& transaction, const SessionRecord& record);
 
-// Its mesh cannot be deleted any longer, where it is there. Errors: AlreadyExists.
-absl::Status InsertSession(PostgresTransaction& transaction, const SessionRecord& record);
+// Under the record's epoch, or one that is given (kFreshEpoch): returns it. Its mesh cannot be
+// deleted any longer, where it is there. Errors: AlreadyExists.
+absl::StatusOr<int64_t> InsertSession(PostgresTransaction& transaction,
+                                      const SessionRecord& record);
 
 absl::Status ReplaceSession(PostgresTransaction& transaction, int64_t key,
                             const SessionRecord& record);

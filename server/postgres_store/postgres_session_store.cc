@@ -73,8 +73,9 @@ void PostgresSessionStore::Create(SessionRecord record, int64_t epoch, RecordCal
       [record =
            std::move(record)](PostgresTransaction& transaction) -> absl::StatusOr<SessionRecord> {
         TF_RETURN_IF_ERROR(LockMeshOfSession(transaction, record));
-        TF_RETURN_IF_ERROR(InsertSession(transaction, record));
-        return record;
+        SessionRecord kept = record;
+        TF_ASSIGN_OR_RETURN(kept.epoch, InsertSession(transaction, record));
+        return kept;
       },
       std::move(done));
 }

@@ -41,8 +41,10 @@ struct LeaseAnswer {
 };
 
 // Who of several servers holds a session: one at a time, by a lease on the store's clock. An epoch
-// belongs to one holder: whoever takes a session over gets the next one, and the store refuses
-// writes under any before. A lease that has run out is lost even when nobody has taken the session
+// belongs to one holder: whoever takes a session over gets one that is greater than every one given
+// before, of whatever session, and the store refuses writes under any lower one. Were they counted
+// for each session, one that is deleted and made again would begin with epochs that an earlier
+// holder still has. A lease that has run out is lost even when nobody has taken the session
 // over; whoever wants it acquires it again.
 //
 // An object of this kind is one holder. Calls block; thread-safe. Errors: what the store says,
@@ -52,7 +54,7 @@ class SessionLeases {
  public:
   virtual ~SessionLeases() = default;
 
-  // Takes a session that nobody holds, or whose lease has run out, under the next epoch; of one
+  // Takes a session that nobody holds, or whose lease has run out, under a new epoch; of one
   // that this holds already the lease begins anew. Errors: NotFound.
   virtual absl::StatusOr<LeaseAnswer> Acquire(const std::string& session) = 0;
 

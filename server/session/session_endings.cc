@@ -97,6 +97,8 @@ void SessionEndings::Forget(const std::string& id, const SessionHoldPtr& hold,
     // that is shared, whose record is still there, is found by whoever asks for it next.
     const bool is_kept = hold != nullptr && !status.ok() && !absl::IsNotFound(status);
     observer_(id, is_kept ? SessionEvent::kMoved : SessionEvent::kDeleted);
+    // Before its id is free: the lease of this one says nothing of the next.
+    if (hold != nullptr && !is_kept) holds_->Forget(id);
     {
       MutexLock lock(sessions_->mutex);
       sessions_->table.Ended(id);

@@ -101,6 +101,8 @@ class SessionHolds : public std::enable_shared_from_this<SessionHolds> {
   std::vector<std::string> Held() const;
   // From now on this server does not answer the session, though its lease is not given back.
   void GiveUp(const std::string& id);
+  // Its record is gone; never blocks.
+  void Forget(const std::string& id) { ownership_->Forget(id); }
   // Gives it back, whoever holds it; blocks.
   void Release(const std::string& id) { ownership_->Release(id); }
 

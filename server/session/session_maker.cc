@@ -52,7 +52,7 @@ void SessionMaker::Create(SessionRecord record, std::shared_ptr<const StoredMesh
       return;
     }
     if (tell) tell({SessionStage::kKeeping});
-    store_->Create(std::move(made->record), kSoleEpoch,
+    store_->Create(std::move(made->record), holds_->shared() ? kFreshEpoch : kSoleEpoch,
                    [this, session = std::move(made->session),
                     done = std::move(done)](const absl::StatusOr<SessionRecord>& stored) mutable {
                      if (stored.ok()) {

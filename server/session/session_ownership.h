@@ -39,6 +39,9 @@ class SessionOwnership {
   // blocks.
   virtual std::optional<int64_t> EpochOf(const std::string& id) = 0;
 
+  // Its record is gone: nothing is held of it, nor of the next one of its id. Never blocks.
+  virtual void Forget(const std::string& id) = 0;
+
   // Others may take it at once. Blocks on the store; nothing happens where it is not held.
   virtual void Release(const std::string& id) = 0;
 };
@@ -49,6 +52,7 @@ class SoleOwnership final : public SessionOwnership {
   bool is_shared() const override { return false; }
   absl::StatusOr<int64_t> Acquire(const std::string& /*id*/) override { return kSoleEpoch; }
   std::optional<int64_t> EpochOf(const std::string& /*id*/) override { return kSoleEpoch; }
+  void Forget(const std::string& /*id*/) override {}
   void Release(const std::string& /*id*/) override {}
 
   // Has no state.

@@ -17,6 +17,11 @@
 
 namespace tissueform {
 
+// For Create in a store that several servers share: the store gives an epoch itself, greater than
+// every one that it has given before. So a server that has lost a session writes nothing of the
+// next one of the same id either.
+inline constexpr int64_t kFreshEpoch = 0;
+
 // Where session records are kept. tests/server/store/session_store_contract_test.cc is the contract
 // in full; every store passes it.
 //
@@ -27,7 +32,7 @@ namespace tissueform {
 // Two writers cannot overwrite each other: an update names the etag of the version that it was made
 // from. A writer who no longer owns a session cannot write to it: every write carries an epoch, and
 // one that is lower than that of the last write is refused (a node that takes a session over writes
-// under a higher one). A record that was deleted leaves no epoch behind.
+// under a higher one). A record that was deleted leaves no epoch behind (but see kFreshEpoch).
 //
 // Thread-safe. Must outlive its calls.
 class SessionStore {

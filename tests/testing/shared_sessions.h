@@ -29,7 +29,7 @@ class SharedSessions {
 
   struct Lease {
     std::string node = "";  // empty: nobody's
-    int64_t epoch = kSoleEpoch;
+    int64_t epoch = 0;
     int until = 0;
   };
 
@@ -62,7 +62,11 @@ class SharedSessions {
   friend class FakeOwnership;
   friend class SharedSessionStore;
 
+  // Greater than every one before, of whatever session.
+  int64_t NextEpoch() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return ++newest_epoch_; }
+
   mutable Mutex mutex_;
+  int64_t newest_epoch_ ABSL_GUARDED_BY(mutex_) = kSoleEpoch;
   int now_ ABSL_GUARDED_BY(mutex_) = 0;
   int stale_writes_ ABSL_GUARDED_BY(mutex_) = 0;
   int refused_writes_ ABSL_GUARDED_BY(mutex_) = 0;
@@ -105,13 +109,20 @@ class FakeOwnership final : public SessionOwnership {
     return found->second.epoch;
   }
 
+  void Forget(const std::string& id) override {
+    MutexLock lock(shared_.mutex_);
+    known_.erase(id);
+  }
+
   void Release(const std::string& id) override {
     MutexLock lock(shared_.mutex_);
-    if (!known_.contains(id)) return;
+    const auto known = known_.find(id);
+    if (known == known_.end()) return;
     ++releases_;
-    known_.erase(id);
+    const int64_t epoch = known->second.epoch;
+    known_.erase(known);
     const auto found = shared_.leases_.find(id);
-    if (found == shared_.leases_.end() || found->second.node != node_) return;
+    if (found == shared_.leases_.end() || found->second.epoch != epoch) return;
     found->second.node = "";
     found->second.until = 0;
   }
@@ -169,6 +180,10 @@ class FakeOwnership final : public SessionOwnership {
  private:
   absl::StatusOr<int64_t> TakeLease(const std::string& id) {
     MutexLock lock(shared_.mutex_);
+    if (const auto known = known_.find(id);
+        known != known_.end() && known->second.until > shared_.now_) {
+      return known->second.epoch;  // the store is not asked
+    }
     const auto found = shared_.leases_.find(id);
     if (found == shared_.leases_.end()) return NoSession(id);
     SharedSessions::Lease& lease = found->second;
@@ -177,7 +192,7 @@ class FakeOwnership final : public SessionOwnership {
       return WithReason(absl::UnavailableError("another server holds the session"),
                         ErrorReason::kSessionMoved, {{"node", lease.node}});
     }
-    if (!runs) ++lease.epoch;
+    if (!runs) lease.epoch = shared_.NextEpoch();
     lease.node = node_;
     lease.until = shared_.now_ + SharedSessions::kLeaseSeconds;
     known_[id] = lease;
@@ -204,10 +219,11 @@ class SharedSessionStore final : public SessionStore {
   void Create(SessionRecord record, int64_t epoch, RecordCallback done) override {
     const std::string id = record.id;
     absl::StatusOr<SessionRecord> created;
-    shared_.store_.Create(std::move(record), epoch, Into(&created));
-    if (created.ok()) {
+    {
       MutexLock lock(shared_.mutex_);
-      shared_.leases_[id] = {};
+      if (epoch == kFreshEpoch) epoch = shared_.NextEpoch();
+      shared_.store_.Create(std::move(record), epoch, Into(&created));
+      if (created.ok()) shared_.leases_[id] = {.epoch = epoch};
     }
     done(std::move(created));
   }
@@ -241,16 +257,14 @@ class SharedSessionStore final : public SessionStore {
   }
   void Delete(const std::string& id, const std::string& etag, int64_t epoch,
               StatusCallback done) override {
-    const absl::Status outcome = Write(id, epoch, [&] {
-      absl::Status deleted;
-      shared_.store_.Delete(id, etag, epoch, Into(&deleted));
-      return deleted;
-    });
-    if (outcome.ok()) {
-      MutexLock lock(shared_.mutex_);
-      shared_.leases_.erase(id);
-    }
-    done(outcome);
+    done(Write(
+        id, epoch,
+        [&] {
+          absl::Status deleted;
+          shared_.store_.Delete(id, etag, epoch, Into(&deleted));
+          return deleted;
+        },
+        /*is_last=*/true));
   }
   void List(const ListRequest& request, PageCallback done) override {
     shared_.store_.List(request, std::move(done));
@@ -282,11 +296,11 @@ class SharedSessionStore final : public SessionStore {
 
   // One write, between which and the look at its epoch nobody takes the session.
   absl::Status Write(const std::string& id, int64_t epoch,
-                     const std::function<absl::Status()>& write) {
+                     const std::function<absl::Status()>& write, bool is_last = false) {
     MutexLock lock(shared_.mutex_);
     const auto found = shared_.leases_.find(id);
     if (found == shared_.leases_.end()) return NoSession(id);
-    const SharedSessions::Lease& lease = found->second;
+    const SharedSessions::Lease lease = found->second;
     if (epoch < lease.epoch) {
       ++shared_.refused_writes_;
       return CheckSessionWrite(id, "", epoch, "", lease.epoch);
@@ -294,6 +308,7 @@ class SharedSessionStore final : public SessionStore {
     absl::Status written = write();
     const bool taken = !lease.node.empty() && lease.node != node_;
     if (written.ok() && (taken || lease.epoch != epoch)) ++shared_.stale_writes_;
+    if (written.ok() && is_last) shared_.leases_.erase(found);
     return written;
   }
 

@@ -22,6 +22,10 @@ const char* NameOf(LeaseAction action) {
       return "commits";
     case LeaseAction::kCommitOld:
       return "commits under its last epoch";
+    case LeaseAction::kDelete:
+      return "deletes";
+    case LeaseAction::kMakeAgain:
+      return "it is made again";
     case LeaseAction::kWait:
       return "time passes";
   }
@@ -29,17 +33,19 @@ const char* NameOf(LeaseAction action) {
 }
 
 std::string ToWords(const LeaseStep& step) {
-  if (step.action == LeaseAction::kWait) return NameOf(step.action);
+  if (step.action == LeaseAction::kWait || step.action == LeaseAction::kMakeAgain) {
+    return NameOf(step.action);
+  }
   return absl::StrCat(step.server == 0 ? "A " : "B ", NameOf(step.action));
 }
 
 }  // namespace
 
 LeaseSteps AllLeaseSteps() {
-  LeaseSteps steps = {{LeaseAction::kWait, 0}};
+  LeaseSteps steps = {{LeaseAction::kWait, 0}, {LeaseAction::kMakeAgain, 0}};
   for (const LeaseAction action :
        {LeaseAction::kAcquire, LeaseAction::kRenew, LeaseAction::kRelease, LeaseAction::kCommit,
-        LeaseAction::kCommitOld}) {
+        LeaseAction::kCommitOld, LeaseAction::kDelete}) {
     for (const int server : {0, 1}) steps.push_back({action, server});
   }
   return steps;
@@ -51,7 +57,7 @@ std::string ToString(const LeaseSteps& steps) {
   return words;
 }
 
-LeaseServers::LeaseServers(LeaseWorld* world) : world_(world) {
+LeaseServers::LeaseServers(LeaseWorld* world) : world_(world), given_{world->FirstEpoch()} {
   for (size_t server : {0, 1}) {
     keepers_[server] = std::make_unique<LeaseKeeper>(
         world->leases(static_cast<int>(server)),
@@ -86,6 +92,10 @@ std::string LeaseServers::TakeOne(const LeaseStep& step) {
     case LeaseAction::kCommitOld:
       if (last_epochs_[server] == 0) return "has none";
       return Commit(step.server, last_epochs_[server]);
+    case LeaseAction::kDelete:
+      return Delete(step.server);
+    case LeaseAction::kMakeAgain:
+      return MakeAgain();
     case LeaseAction::kWait:
       world_->Wait(kLeaseWait);
       return "";
@@ -95,28 +105,56 @@ std::string LeaseServers::TakeOne(const LeaseStep& step) {
 
 std::string LeaseServers::Acquire(size_t server) {
   const absl::StatusOr<LeaseAnswer> answer = keepers_[server]->Acquire(world_->session());
-  if (!answer.ok()) return answer.status().ToString();
+  if (!answer.ok()) return absl::StatusCodeToString(answer.status().code());
   if (!answer->mine) return absl::StrCat("held by ", answer->node);
+  const bool held_before =
+      until_[server].has_value() && last_epochs_[server] == answer->lease.epoch;
   last_epochs_[server] = answer->lease.epoch;
   until_[server] = answer->lease.answers_until;
-  return absl::StrCat("epoch ", answer->lease.epoch);
+  return held_before ? "holds it" : Given(answer->lease.epoch);
+}
+
+std::string LeaseServers::Given(int64_t epoch) {
+  if (epoch <= given_.back()) return "an epoch that is not greater than all before";
+  given_.push_back(epoch);
+  return absl::StrCat("the ", NameOf(epoch), " epoch");
+}
+
+std::string LeaseServers::NameOf(int64_t epoch) const {
+  const auto found = std::find(given_.begin(), given_.end(), epoch);
+  return found == given_.end() ? "unknown" : absl::StrCat(found - given_.begin() + 1, ".");
 }
 
 std::string LeaseServers::Commit(int server, std::optional<int64_t> epoch) {
   if (!epoch.has_value()) return "may not";
-  if (!world_->Commit(*epoch)) return absl::StrCat("refused under ", *epoch);
-  commits_.emplace_back(server, *epoch);
-  return absl::StrCat("kept under ", *epoch);
+  if (!world_->Commit(*epoch)) return absl::StrCat("refused under the ", NameOf(*epoch));
+  writes_.push_back({server, *epoch, given_.back()});
+  return absl::StrCat("kept under the ", NameOf(*epoch));
 }
 
-std::string LeaseServers::Knowledge(int64_t epoch,
-                                    std::chrono::steady_clock::time_point now) const {
+std::string LeaseServers::Delete(int server) {
+  const std::optional<int64_t> epoch = EpochOf(server);
+  if (!epoch.has_value()) return "may not";
+  if (!world_->Delete(*epoch)) return absl::StrCat("refused under the ", NameOf(*epoch));
+  exists_ = false;
+  until_[static_cast<size_t>(server)].reset();
+  keepers_[static_cast<size_t>(server)]->Forget(world_->session());
+  return "gone";
+}
+
+std::string LeaseServers::MakeAgain() {
+  if (exists_) return "is there";
+  exists_ = true;
+  return Given(world_->MakeAgain());
+}
+
+std::string LeaseServers::Knowledge(std::chrono::steady_clock::time_point now) const {
   std::string words;
   for (const size_t server : {0, 1}) {
     // An old epoch is as bad as an older one.
-    const char* behind = last_epochs_[server] == 0       ? "none"
-                         : last_epochs_[server] == epoch ? "newest"
-                                                         : "old";
+    const char* behind = last_epochs_[server] == 0               ? "none"
+                         : last_epochs_[server] == given_.back() ? "newest"
+                                                                 : "old";
     const int64_t left =
         !until_[server].has_value()
             ? -99

@@ -9,7 +9,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "server/postgres_store/lease_keeper.h"
@@ -25,12 +24,14 @@ enum class LeaseAction {
   kRelease,
   kCommit,     // as a server does that may answer
   kCommitOld,  // as one that was stopped goes on with, under the epoch that it had last
+  kDelete,     // as a server does that may answer
+  kMakeAgain,  // under the same id, where it was deleted: whoever is asked to
   kWait,
 };
 
 struct LeaseStep {
   LeaseAction action = LeaseAction::kWait;
-  int server = 0;  // 0 or 1; for kWait nobody's
+  int server = 0;  // 0 or 1; for kWait and kMakeAgain nobody's
 };
 using LeaseSteps = std::vector<LeaseStep>;
 
@@ -49,6 +50,10 @@ class LeaseWorld {
   virtual std::string session() const = 0;
   // Whether a write under this epoch was kept.
   virtual bool Commit(int64_t epoch) = 0;
+  virtual bool Delete(int64_t epoch) = 0;
+  // A session of the same id; its epoch. REQUIRES: it was deleted.
+  virtual int64_t MakeAgain() = 0;
+  virtual int64_t FirstEpoch() const = 0;  // of the one that there is at the beginning
   virtual void Wait(std::chrono::milliseconds duration) = 0;
   virtual std::chrono::steady_clock::time_point Now() const = 0;
 };
@@ -60,10 +65,19 @@ class ModelLeaseWorld final : public LeaseWorld {
   SessionLeases* leases(int server) override { return &leases_[static_cast<size_t>(server)]; }
   std::string session() const override { return "s"; }
   bool Commit(int64_t epoch) override { return store_.Commits("s", epoch); }
+  bool Delete(int64_t epoch) override { return Commit(epoch) && store_.sessions.erase("s") == 1; }
+  int64_t MakeAgain() override {
+    return (store_.sessions["s"] = {.epoch = store_.NextEpoch()}).epoch;
+  }
+  int64_t FirstEpoch() const override { return ModelStore::Session().epoch; }
   void Wait(std::chrono::milliseconds duration) override { store_.now += duration; }
   std::chrono::steady_clock::time_point Now() const override { return store_.now; }
 
-  const ModelStore::Session& row() const { return store_.sessions.at("s"); }
+  // Null where it was deleted.
+  const ModelStore::Session* row() const {
+    const auto found = store_.sessions.find("s");
+    return found == store_.sessions.end() ? nullptr : &found->second;
+  }
 
  private:
   ModelStore store_;
@@ -79,10 +93,15 @@ class LeaseServers {
   std::string Take(const LeaseStep& step);
 
   bool MayAnswer(int server) { return EpochOf(server).has_value(); }
-  // Writes that were kept, as server and epoch, in their order.
-  const std::vector<std::pair<int, int64_t>>& commits() const { return commits_; }
-  // What the servers know, with epochs and times as they differ from these.
-  std::string Knowledge(int64_t epoch, std::chrono::steady_clock::time_point now) const;
+  struct Write {
+    int server = 0;
+    int64_t epoch = 0;
+    int64_t newest_epoch = 0;  // that had been given then
+  };
+  // Those that were kept, in their order.
+  const std::vector<Write>& writes() const { return writes_; }
+  // What the servers know, with epochs and times as they differ from now's.
+  std::string Knowledge(std::chrono::steady_clock::time_point now) const;
 
  private:
   std::optional<int64_t> EpochOf(int server) {
@@ -91,13 +110,21 @@ class LeaseServers {
   std::string TakeOne(const LeaseStep& step);
   std::string Acquire(size_t server);
   std::string Commit(int server, std::optional<int64_t> epoch);
+  std::string Delete(int server);
+  std::string MakeAgain();
+  // Epochs by their order, since others are given in between: "2nd". One that does not rise is
+  // called so.
+  std::string Given(int64_t epoch);
+  std::string NameOf(int64_t epoch) const;
 
   LeaseWorld* const world_;
   std::array<std::unique_ptr<LeaseKeeper>, 2> keepers_;
   std::array<int64_t, 2> last_epochs_ = {0, 0};
   // Until when each has its lease in mind; nothing when it has none.
   std::array<std::optional<std::chrono::steady_clock::time_point>, 2> until_ = {};
-  std::vector<std::pair<int, int64_t>> commits_;
+  std::vector<Write> writes_;
+  bool exists_ = true;
+  std::vector<int64_t> given_;  // epochs, in their order
 };
 
 }  // namespace tissueform::testing

@@ -13,6 +13,7 @@
 
 #include "server/postgres_store/postgres_access_store.h"
 #include "server/postgres_store/postgres_export_store.h"
+#include "server/postgres_store/postgres_session_leases.h"
 #include "server/store/data_folder.h"
 #include "server/store/durable_store.h"
 #include "tests/server/postgres_store/test_database.h"
@@ -80,6 +81,9 @@ TEST_F(MigrateStoreTest, WhatOneServerHasKeptIsThereAsItWas) {
     EXPECT_EQ(after.created_s, 777);
     EXPECT_EQ(after.last_used_s, 777);
   }
+  PostgresSessionLeases leases(to_->pool(), "A");
+  ASSERT_OK_AND_ASSIGN(const LeaseAnswer taken, leases.Acquire("s7"));
+  EXPECT_GT(taken.lease.epoch, 4) << "whoever takes one has a greater epoch than all before";
   ASSERT_OK_AND_ASSIGN(const MeshPayload payload, to_->meshes().Read(RecordOf(mesh).sha256));
   EXPECT_EQ(payload.View().segments, mesh.View().segments);
   ASSERT_OK_AND_ASSIGN(const std::string positions, to_->predictions().Positions("p"));

@@ -21,7 +21,7 @@ namespace tissueform::testing {
 
 struct ModelStore {
   struct Session {
-    int64_t epoch = 1;
+    int64_t epoch = 2;  // the first that is given
     std::string holder = {};
     std::string node = {};
     std::chrono::steady_clock::time_point lease_until = {};
@@ -29,11 +29,15 @@ struct ModelStore {
 
   // A write under this epoch is kept.
   bool Commits(const std::string& session, int64_t epoch) {
-    return epoch >= sessions.at(session).epoch;
+    const auto found = sessions.find(session);
+    return found != sessions.end() && epoch >= found->second.epoch;
   }
+  // Greater than every one before, of whatever session.
+  int64_t NextEpoch() { return ++newest_epoch; }
 
   std::chrono::steady_clock::time_point now{std::chrono::hours(1)};
   std::map<std::string, Session> sessions = {};
+  int64_t newest_epoch = Session().epoch;
   absl::Status failure = {};  // of all calls, which change nothing then
 };
 
@@ -49,7 +53,7 @@ class ModelLeases final : public SessionLeases {
     ModelStore::Session& row = found->second;
     const bool free = row.lease_until <= store_->now;
     if (!free && row.holder != holder_) return LeaseAnswer{.node = row.node};
-    if (free) ++row.epoch;
+    if (free) row.epoch = store_->NextEpoch();
     row.holder = holder_;
     row.node = holder_;
     return LeaseAnswer{.mine = true, .lease = Begin(session, &row)};

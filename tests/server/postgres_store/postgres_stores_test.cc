@@ -196,14 +196,19 @@ TEST_F(PostgresStoresTest, TablesOfANewerServerAreLeftAlone) {
 }
 
 TEST_F(PostgresStoresTest, TablesOfTheVersionBeforeAreBroughtUpToDateWithWhatTheyHold) {
-  ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1)), IsOk());
+  ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1), 7), IsOk());
   const std::string mesh = PutMesh(1);
   stores_.reset();
-  RunSql("DROP TABLE exports, nodes; UPDATE tissueform_version SET version = 4;");
+  RunSql(
+      "DROP TABLE exports, nodes; DROP SEQUENCE session_epochs; UPDATE tissueform_version SET "
+      "version = 4;");
   stores_ = OpenTestStores();
   EXPECT_EQ(RunSql("SELECT version FROM tissueform_version").Integer(0, 0), kSchemaVersion);
   EXPECT_EQ(Count("exports"), 0);
   EXPECT_THAT(GetSession(stores_->sessions(), "s"), IsOk());
+  ASSERT_OK_AND_ASSIGN(const SessionRecord next,
+                       CreateSession(stores_->sessions(), SampleSession("t", 1), kFreshEpoch));
+  EXPECT_EQ(next.epoch, 8) << "greater than those that were counted for each session";
   EXPECT_THAT(stores_->meshes().Read(mesh), IsOk());
 }
 

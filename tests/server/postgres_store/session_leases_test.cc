@@ -55,7 +55,7 @@ class PostgresLeaseWorld final : public LeaseWorld {
         session_(absl::StrCat("s", number)),
         a_(stores->pool(), "A", {}, [this] { return now_; }),
         b_(stores->pool(), "B", {}, [this] { return now_; }) {
-    EXPECT_THAT(CreateSession(stores->sessions(), SampleSession(session_, 1)), IsOk());
+    first_epoch_ = MakeAgain();
   }
 
   SessionLeases* leases(int server) override { return server == 0 ? &a_ : &b_; }
@@ -63,6 +63,15 @@ class PostgresLeaseWorld final : public LeaseWorld {
   bool Commit(int64_t epoch) override {
     return CommitPoses(stores_->sessions(), session_, SamplePoses(1), epoch).ok();
   }
+  bool Delete(int64_t epoch) override {
+    return DeleteSession(stores_->sessions(), session_, "", epoch).ok();
+  }
+  int64_t MakeAgain() override {
+    const auto made = CreateSession(stores_->sessions(), SampleSession(session_, 1), kFreshEpoch);
+    EXPECT_THAT(made, IsOk());
+    return made.ok() ? made->epoch : 0;
+  }
+  int64_t FirstEpoch() const override { return first_epoch_; }
   void Wait(milliseconds duration) override {
     now_ += duration;
     EXPECT_THAT(stores_->pool()->Run([duration](PostgresTransaction& transaction) {
@@ -78,6 +87,7 @@ class PostgresLeaseWorld final : public LeaseWorld {
   PostgresStores* const stores_;
   const std::string session_;
   std::chrono::steady_clock::time_point now_{std::chrono::hours(1)};
+  int64_t first_epoch_ = 0;
   PostgresSessionLeases a_;
   PostgresSessionLeases b_;
 };
@@ -88,9 +98,12 @@ std::pair<std::string, std::string> ModelAfter(const LeaseSteps& steps) {
   LeaseServers servers(&world);
   std::string seen;
   for (const LeaseStep& step : steps) absl::StrAppend(&seen, servers.Take(step), "\n");
-  const int64_t left = (world.row().lease_until - world.Now()) / milliseconds(1);
-  return {seen, absl::StrCat(world.row().holder, " ", std::max<int64_t>(left, 0), " ",
-                             servers.Knowledge(world.row().epoch, world.Now()))};
+  std::string row = "none";
+  if (world.row() != nullptr) {
+    const int64_t left = (world.row()->lease_until - world.Now()) / milliseconds(1);
+    row = absl::StrCat(world.row()->holder, " ", std::max<int64_t>(left, 0));
+  }
+  return {seen, absl::StrCat(row, " ", servers.Knowledge(world.Now()))};
 }
 
 TEST_F(PostgresLeasesTest, FromEveryStateThatThereIsTheDatabaseTakesEveryStepAsTheModelDoes) {
@@ -118,10 +131,13 @@ TEST_F(PostgresLeasesTest, FromEveryStateThatThereIsTheDatabaseTakesEveryStepAsT
 }
 
 TEST_F(PostgresLeasesTest, OfServersThatTakeASessionOverAtOnceOneGetsIt) {
-  ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1)), IsOk());
+  ASSERT_OK_AND_ASSIGN(const SessionRecord made,
+                       CreateSession(stores_->sessions(), SampleSession("s", 1), kFreshEpoch));
+  int64_t newest = made.epoch;
   for (int round = 1; round <= 10; ++round) {
     std::vector<std::thread> threads;
     std::atomic<int> winners = 0;
+    std::atomic<int64_t> epoch = 0;
     threads.reserve(6);
     for (int i = 0; i < 6; ++i) {
       threads.emplace_back([&] {
@@ -130,12 +146,14 @@ TEST_F(PostgresLeasesTest, OfServersThatTakeASessionOverAtOnceOneGetsIt) {
         EXPECT_THAT(answer, IsOk());
         if (answer.ok() && answer->mine) {
           ++winners;
-          EXPECT_EQ(answer->lease.epoch, round + 1);
+          epoch = answer->lease.epoch;
         }
       });
     }
     for (std::thread& thread : threads) thread.join();
     EXPECT_EQ(winners, 1);
+    EXPECT_GT(epoch, newest);
+    newest = epoch;
     RunSql("UPDATE test_clock SET now = now + interval '10 seconds';");
   }
 }
@@ -160,6 +178,30 @@ TEST_F(PostgresLeasesTest, WhoHasLostASessionWritesNothingOfItAnyMore) {
       << "a lease is no version of the record";
   ASSERT_OK_AND_ASSIGN(record, GetSession(stores_->sessions(), "s"));
   EXPECT_EQ(record.epoch, second.lease.epoch);
+}
+
+TEST_F(PostgresLeasesTest, WhoHeldASessionWritesNothingOfTheNextOneOfItsName) {
+  ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1), kFreshEpoch), IsOk());
+  PostgresSessionLeases old_owner(stores_->pool(), "A");
+  ASSERT_OK_AND_ASSIGN(const LeaseAnswer before, old_owner.Acquire("s"));
+  RunSql("DELETE FROM sessions");
+  ASSERT_OK_AND_ASSIGN(SessionRecord next,
+                       CreateSession(stores_->sessions(), SampleSession("s", 2), kFreshEpoch));
+  EXPECT_GT(next.epoch, before.lease.epoch);
+  const auto refused = StatusIs(absl::StatusCode::kFailedPrecondition);
+  const auto check = [&] {
+    const int64_t old = before.lease.epoch;
+    EXPECT_THAT(CommitPoses(stores_->sessions(), "s", SamplePoses(3), old), refused);
+    EXPECT_THAT(UpdateSession(stores_->sessions(), next, old), refused);
+    EXPECT_THAT(DeleteSession(stores_->sessions(), "s", "", old), refused);
+  };
+  check();
+  PostgresSessionLeases new_owner(stores_->pool(), "B");
+  ASSERT_OK_AND_ASSIGN(const LeaseAnswer after, new_owner.Acquire("s"));
+  check();
+  ASSERT_THAT(old_owner.Release("s", before.lease.epoch), IsOk());
+  ASSERT_OK_AND_ASSIGN(const LeaseAnswer still, new_owner.Acquire("s"));
+  EXPECT_EQ(still.lease.epoch, after.lease.epoch);
 }
 
 TEST_F(PostgresLeasesTest, AnUnknownSessionIsNotFound) {

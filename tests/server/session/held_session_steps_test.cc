@@ -34,11 +34,12 @@ enum class Action {
   kCommitOld,  // of the oldest one, as a server does that was stopped
   kUpdate,
   kDelete,
+  kMakeAgain,  // under the same name, when it was deleted
   kEvict,
   kWait,
 };
-constexpr std::array kNames = {"open",   "renew",  "tell",  "commit", "commit old",
-                               "update", "delete", "evict", "wait"};
+constexpr std::array kNames = {"open",   "renew",  "tell",       "commit", "commit old",
+                               "update", "delete", "make again", "evict",  "wait"};
 // After two of them a lease has run out.
 constexpr int kWaitSeconds = 6;
 
@@ -83,9 +84,17 @@ class HeldSessionStepsTest : public ::testing::Test {
     kept_z_ = 0;
     deleted_ = false;
     drags_ = {};
-    const Node::Opened created = a_.Create(id_);
+    ended_ = {};
+    Make(0);
+  }
+
+  void Make(size_t node) {
+    node_(node).registry.Forget(id_);  // it has heard that the one before is gone
+    const Node::Opened created = node_(node).Create(id_);
     ASSERT_THAT(created, IsOk());
-    drags_[0].push_back(*created);
+    drags_[node].push_back(*created);
+    kept_z_ = 0;
+    deleted_ = false;
   }
 
   void Take(const Step& step) {
@@ -122,8 +131,13 @@ class HeldSessionStepsTest : public ::testing::Test {
         EXPECT_TRUE(gone.ok() || IsRefusal(gone)) << gone;
         EXPECT_FALSE(gone.ok() && deleted_) << "it was gone already";
         deleted_ |= gone.ok();
+        if (!gone.ok()) break;
+        for (const auto& of_node : drags_) ended_.insert(of_node.begin(), of_node.end());
         break;
       }
+      case Action::kMakeAgain:
+        if (deleted_) Make(step.node);
+        break;
       case Action::kEvict:
         node.EvictAll();
         break;
@@ -138,10 +152,11 @@ class HeldSessionStepsTest : public ::testing::Test {
     const double z = ++z_;
     const absl::Status committed = node->Commit(session, z);
     EXPECT_TRUE(committed.ok() || IsRefusal(committed)) << committed;
+    EXPECT_FALSE(committed.ok() && ended_.contains(session)) << "of a session that was deleted";
     if (committed.ok()) kept_z_ = z;
   }
 
-  // Moved, or deleted.
+  // Moved, or deleted. What was deleted and made again has moved, for who held it before.
   bool IsRefusal(const absl::Status& status) const {
     return HasReason(status, ErrorReason::kSessionMoved) ||
            (deleted_ && HasReason(status, ErrorReason::kSessionNotFound));
@@ -157,6 +172,7 @@ class HeldSessionStepsTest : public ::testing::Test {
 
   void Check() {
     EXPECT_FALSE(MayAnswer(0) && MayAnswer(1)) << "frames of both";
+    for (const auto& drag : ended_) EXPECT_FALSE(drag->CheckHeld().ok()) << "it was deleted";
     EXPECT_EQ(shared_.stale_writes(), 0);
     const std::optional<SharedSessions::Lease> lease = shared_.Find(id_);
     EXPECT_EQ(lease.has_value(), !deleted_);
@@ -188,7 +204,7 @@ class HeldSessionStepsTest : public ::testing::Test {
       std::set<std::string> drags;
       for (const auto& drag : drags_[node]) {
         drags.insert(absl::StrCat(drag->CheckHeld().ok(), drag->moved(), drag->evicted(),
-                                  drag->updated(),
+                                  drag->updated(), ended_.contains(drag),
                                   lease.has_value() && lease->epoch == drag->epoch()));
       }
       for (const std::string& drag : drags) absl::StrAppend(&state, " ", drag);
@@ -201,6 +217,7 @@ class HeldSessionStepsTest : public ::testing::Test {
 
   void End() {
     drags_ = {};
+    ended_ = {};
     shared_.Wait(2 * SharedSessions::kLeaseSeconds);
     if (!deleted_) {
       EXPECT_THAT(a_.Delete(id_), IsOk());
@@ -225,6 +242,7 @@ class HeldSessionStepsTest : public ::testing::Test {
   double kept_z_ = 0;
   bool deleted_ = false;
   std::array<std::vector<std::shared_ptr<Session>>, 2> drags_;
+  std::set<std::shared_ptr<Session>> ended_;  // of sessions that were deleted
 };
 
 // All orders of three steps, and on from every state that there is, up to six.
