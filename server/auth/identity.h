@@ -24,7 +24,4 @@ struct Principal {
   friend bool operator==(const Principal&, const Principal&) = default;
 };
 
-// 128 random bits in 32 hexadecimal digits: who does not know an id does not guess it.
-std::string RandomId();
-
 }  // namespace tissueform

@@ -14,6 +14,7 @@
 #include "spdlog/spdlog.h"
 
 #include "core/base/error_reason.h"
+#include "core/base/random_id.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/session_conversion.h"
 #include "server/auth/identity.h"

@@ -10,8 +10,8 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 
+#include "core/base/random_id.h"
 #include "core/base/status_macros.h"
-#include "server/auth/identity.h"
 
 namespace tissueform {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "spdlog/spdlog.h"
 
+#include "core/base/random_id.h"
 #include "core/base/status_macros.h"
-#include "server/auth/identity.h"
 
 namespace tissueform {
 namespace {

@@ -11,8 +11,8 @@
 #include "absl/strings/str_format.h"
 
 #include "core/base/error_reason.h"
+#include "core/base/random_id.h"
 #include "core/base/status_macros.h"
-#include "server/auth/identity.h"
 
 namespace tissueform {
 namespace {

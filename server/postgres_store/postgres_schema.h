@@ -20,9 +20,8 @@ namespace tissueform {
 //                       of the lease is that of the writes, so that one row decides.
 //   sessions            beside the rest the mesh that it is made from, which cannot be deleted
 //                       meanwhile; null when that was damaged and is gone
-//   session_epochs      a sequence: what the next epoch is, of whatever session. It does not go
-//   back,
-//                       so nothing is written under the epoch of an earlier session of the same id
+//   session_epochs      a sequence: the next epoch, of whatever session. It does not go back, so
+//                       nothing is written under the epoch of an earlier session of the same id
 //   nodes               servers that use the store now (node_table.h)
 //   blobs, blob_pieces  what a data folder keeps as files: rows of 1 MiB, each with its SHA-256
 //

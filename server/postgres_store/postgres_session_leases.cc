@@ -3,32 +3,19 @@
 
 #include "server/postgres_store/postgres_session_leases.h"
 
-#include <array>
-#include <cstdlib>
 #include <utility>
 
-#include "absl/strings/escaping.h"
-#include <sys/random.h>
-
+#include "core/base/random_id.h"
 #include "core/base/status_macros.h"
 #include "server/store/store_errors.h"
 
 namespace tissueform {
-namespace {
-
-std::string RandomHolder() {
-  std::array<char, 16> bytes{};
-  if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) std::abort();
-  return absl::BytesToHexString({bytes.data(), bytes.size()});
-}
-
-}  // namespace
 
 PostgresSessionLeases::PostgresSessionLeases(PostgresPool* pool, std::string node,
                                              LeaseOptions options, SteadyClock clock)
     : pool_(pool),
       node_(std::move(node)),
-      holder_(RandomHolder()),
+      holder_(RandomId()),
       options_(options),
       clock_(std::move(clock)) {}
 

@@ -4,14 +4,10 @@
 #include "server/postgres_store/postgres_session_store.h"
 
 #include <algorithm>
-#include <array>
-#include <cstdlib>
 #include <memory>
 #include <utility>
 
-#include "absl/strings/escaping.h"
-#include <sys/random.h>
-
+#include "core/base/random_id.h"
 #include "core/base/status_macros.h"
 #include "server/postgres_store/postgres_pages.h"
 #include "server/postgres_store/postgres_session_rows.h"
@@ -19,16 +15,6 @@
 #include "server/store/store_records.h"
 
 namespace tissueform {
-namespace {
-
-// Random, so that an etag never comes again, on whatever server it is made.
-std::string RandomEtag() {
-  std::array<char, 8> bytes{};
-  if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) std::abort();
-  return absl::BytesToHexString({bytes.data(), bytes.size()});
-}
-
-}  // namespace
 
 PostgresSessionStore::PostgresSessionStore(PostgresPool* pool, UnixClock clock)
     // Half of the connections: reads and writes of blobs find some, too.
@@ -64,7 +50,7 @@ void PostgresSessionStore::Create(SessionRecord record, int64_t epoch, RecordCal
     return;
   }
   record.epoch = epoch;
-  record.etag = RandomEtag();
+  record.etag = RandomId();
   record.created_s = clock_();
   record.last_used_s = record.created_s;
   const std::string id = record.id;
@@ -103,7 +89,7 @@ void PostgresSessionStore::Update(SessionRecord record, int64_t epoch, RecordCal
         TF_RETURN_IF_ERROR(CheckSessionWrite(record.id, record.etag.empty() ? "none" : record.etag,
                                              epoch, state.etag, state.epoch));
         SessionRecord next = record;
-        next.etag = RandomEtag();
+        next.etag = RandomId();
         next.epoch = epoch;
         next.created_s = state.created_s;
         next.last_used_s = std::max(state.last_used_s, now_s);

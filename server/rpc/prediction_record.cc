@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/random_id.h"
 #include "core/base/software_version.h"
 #include "core/base/status_macros.h"
 #include "core/deformation/deformation_quality.h"

@@ -10,10 +10,10 @@
 #include "grpcpp/impl/codegen/proto_utils.h"
 
 #include "core/base/error_reason.h"
+#include "core/base/random_id.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "proto/conversion/session_conversion.h"
-#include "server/auth/identity.h"
 #include "server/rpc/allowed_resource.h"
 
 namespace tissueform {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/base/error_reason.h"
-#include "server/auth/identity.h"
+#include "core/base/random_id.h"
 #include "server/session/session_refusals.h"
 
 namespace tissueform {

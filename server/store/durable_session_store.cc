@@ -4,14 +4,10 @@
 #include "server/store/durable_session_store.h"
 
 #include <algorithm>
-#include <array>
-#include <cstdlib>
 #include <functional>
 #include <memory>
 
-#include "absl/strings/escaping.h"
-#include <sys/random.h>
-
+#include "core/base/random_id.h"
 #include "core/base/status_macros.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_rows.h"
@@ -20,11 +16,7 @@ namespace tissueform {
 namespace {
 
 // Random, so that an etag never comes again, without a counter that every write would have to keep.
-std::string NewEtag() {
-  std::array<char, 8> bytes{};
-  if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) std::abort();
-  return absl::BytesToHexString({bytes.data(), bytes.size()});
-}
+std::string NewEtag() { return RandomId(); }
 
 // What decides about a write.
 struct State {
