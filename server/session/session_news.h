@@ -9,7 +9,6 @@
 #include "absl/status/status.h"
 
 #include "server/session/clock.h"
-#include "server/session/session_holds.h"
 #include "server/session/session_table.h"
 #include "server/store/session_record.h"
 #include "server/store/session_store.h"
@@ -23,9 +22,8 @@ namespace tissueform {
 class SessionNews {
  public:
   // All must outlive it.
-  SessionNews(SharedSessionTable* sessions, SessionStore* store, SessionHolds* holds,
-              const Clock* clock)
-      : sessions_(sessions), store_(store), holds_(holds), clock_(clock) {}
+  SessionNews(SharedSessionTable* sessions, SessionStore* store, const Clock* clock)
+      : sessions_(sessions), store_(store), clock_(clock) {}
 
   // All that the store has. Blocks. Errors: those of SessionStore::List.
   absl::Status LearnKnown() ABSL_LOCKS_EXCLUDED(sessions_->mutex);
@@ -44,7 +42,6 @@ class SessionNews {
 
   SharedSessionTable* const sessions_;
   SessionStore* const store_;
-  SessionHolds* const holds_;
   const Clock* const clock_;
 };
 

@@ -28,7 +28,7 @@ SessionRegistry::SessionRegistry(const ServiceLimits& limits, MemoryBudget* budg
                [this](const SessionMaker::Made& remade, bool other_handles) {
                  return Replace(remade, other_handles);
                }),
-      news_(&sessions_, store, holds_.get(), clock) {}
+      news_(&sessions_, store, clock) {}
 
 void SessionRegistry::HandOver(std::chrono::steady_clock::time_point deadline) {
   holds_->StopTaking();
