@@ -38,13 +38,13 @@ TEST(OrderedJobsTest, JobsOfOneKeyRunInTheirOrder) {
 }
 
 TEST(OrderedJobsTest, AJobThatWaitsHoldsUpItsOwnKeyAlone) {
-  OrderedJobs jobs(2);
   std::promise<void> released;
   std::shared_future<void> release = released.get_future().share();
   std::promise<void> other_ran;
+  std::atomic<bool> told = false;
+  OrderedJobs jobs(2);  // ends first: its last jobs use the rest
   jobs.Submit("a", [release] { release.wait(); });
   // Some key is on the other thread.
-  std::atomic<bool> told = false;
   for (int i = 0; i < 32; ++i) {
     jobs.Submit(absl::StrCat("b", i), [&] {
       if (!told.exchange(true)) other_ran.set_value();
