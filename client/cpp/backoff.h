@@ -24,6 +24,8 @@ class Backoff {
   explicit Backoff(const Options& options) : options_(options), wait_(options.first) {}
 
   std::chrono::milliseconds Next();
+  // As at the beginning.
+  void Reset() { wait_ = options_.first; }
 
  private:
   const Options options_;
