@@ -390,5 +390,82 @@ TEST_F(FailoverTest, AFrameIsAcknowledgedWhereItCameFrom) {
   EXPECT_THAT(script_.meant(), ElementsAre("-", kOwnName));
 }
 
+// Through a proxy an error that ends a call early arrives under another code, with the server's
+// details or without any.
+class ProxiedFailoverTest : public FailoverTest,
+                            public ::testing::WithParamInterface<grpc::StatusCode> {
+ protected:
+  grpc::Status AsProxied(const grpc::Status& error) const {
+    return {GetParam(), "Received RST_STREAM with error code 8", error.error_details()};
+  }
+};
+
+const grpc::Status kCutOff(grpc::StatusCode::UNAVAILABLE, "");
+
+TEST_P(ProxiedFailoverTest, ADragGoesOnWhereTheReasonSays) {
+  streams_.PlanEnds({AsProxied(Moved("two:1")), AsProxied(kCutOff)});
+  const auto drag = OpenDrag();
+  ASSERT_NE(drag, nullptr);
+  drag->SendPoses(1, {});
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(drag->Receive().has_value()) << i;
+  EXPECT_THAT(script_.meant(), ElementsAre("-", "two:1", "-"));
+  drag->Cancel();
+  EXPECT_EQ(drag->Receive(), std::nullopt);
+  EXPECT_TRUE(absl::IsCancelled(drag->Finish())) << "it was";
+}
+
+TEST_P(ProxiedFailoverTest, AWatchDoesToo) {
+  streams_.PlanEnds({AsProxied(Moved("two:1")), AsProxied(kCutOff), kNotFound});
+  ASSERT_OK_AND_ASSIGN(const auto watch, ReattachingWatch::Open(client_.get(), kSession, {}));
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(watch->Receive().has_value()) << i;
+  EXPECT_EQ(watch->Receive(), std::nullopt);
+  EXPECT_THAT(script_.meant(), ElementsAre("-", "two:1", "-"));
+}
+
+TEST_P(ProxiedFailoverTest, ACallThatMayBeRepeatedIs) {
+  EXPECT_TRUE(client_->GetSession(kSession).ok());
+  script_.Plan({AsProxied(kCutOff)});
+  EXPECT_TRUE(client_->GetSession(kSession).ok());
+  EXPECT_THAT(script_.meant(), ElementsAre("-", kOwnName, "-"));
+}
+
+TEST_P(ProxiedFailoverTest, WhatWasRefusedBeforeItBeganIsRepeatedWhateverItIs) {
+  EXPECT_TRUE(client_->GetSession(kSession).ok());
+  v1::UpdateSessionRequest request;
+  request.set_name(kSession);
+  request.set_etag("1");
+  for (const ErrorReason reason :
+       {ErrorReason::kSessionMoved, ErrorReason::kWrongNode, ErrorReason::kServerDraining}) {
+    script_.Plan({AsProxied(Refusal(grpc::StatusCode::UNAVAILABLE, reason, ""))});
+    EXPECT_TRUE(client_->UpdateSession(request).ok()) << ReasonName(reason);
+  }
+}
+
+TEST_P(ProxiedFailoverTest, WhatTheServerRefusesForGoodIsSaidAsTheServerSaidIt) {
+  script_.Plan(
+      {AsProxied(Refusal(grpc::StatusCode::NOT_FOUND, ErrorReason::kSessionNotFound, ""))});
+  const absl::Status refused = client_->GetSession(kSession).status();
+  EXPECT_TRUE(absl::IsNotFound(refused)) << refused;
+  EXPECT_TRUE(HasReason(refused, ErrorReason::kSessionNotFound)) << refused;
+}
+
+std::string NameOfCode(const ::testing::TestParamInfo<grpc::StatusCode>& code) {
+  switch (code.param) {
+    case grpc::StatusCode::CANCELLED:
+      return "Cancelled";
+    case grpc::StatusCode::UNKNOWN:
+      return "Unknown";
+    case grpc::StatusCode::INTERNAL:
+      return "Internal";
+    default:
+      return "Unavailable";
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Codes, ProxiedFailoverTest,
+                         ::testing::Values(grpc::StatusCode::CANCELLED, grpc::StatusCode::UNKNOWN,
+                                           grpc::StatusCode::INTERNAL,
+                                           grpc::StatusCode::UNAVAILABLE),
+                         NameOfCode);
+
 }  // namespace
 }  // namespace tissueform::testing
