@@ -18,6 +18,7 @@
 #include "grpcpp/server_builder.h"
 #include "gtest/gtest.h"
 
+#include "client/cpp/backoff.h"
 #include "client/cpp/reattaching_stream.h"
 #include "client/cpp/reattaching_watch.h"
 #include "client/cpp/tissueform_client.h"
@@ -194,6 +195,22 @@ class ScriptedStreams final : public v1::DeformService::Service {
   std::vector<std::string> poses_ ABSL_GUARDED_BY(mutex_);
 };
 
+// Hears of exports until its turn to end has come.
+class ScriptedExports final : public v1::ExportService::Service {
+ public:
+  explicit ScriptedExports(Script* script) : script_(script) {}
+
+  grpc::Status WatchExports(grpc::ServerContext* context, const v1::WatchExportsRequest*,
+                            grpc::ServerWriter<v1::WatchExportsResponse>* stream) override {
+    const grpc::Status end = script_->Take(context);
+    stream->Write({});
+    return end;
+  }
+
+ private:
+  Script* const script_;
+};
+
 SessionRequest SomeRequest() {
   SessionRequest request;
   request.stiffness = 1e3;
@@ -208,6 +225,7 @@ class FailoverTest : public ::testing::Test {
     builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
     builder.RegisterService(&sessions_);
     builder.RegisterService(&streams_);
+    builder.RegisterService(&exports_);
     server_ = builder.BuildAndStart();
     ASSERT_NE(server_, nullptr);
     ASSERT_OK_AND_ASSIGN(client_, TissueformClient::Connect(absl::StrCat("127.0.0.1:", port), {}));
@@ -226,6 +244,7 @@ class FailoverTest : public ::testing::Test {
   Script script_;
   ScriptedSessions sessions_{&script_};
   ScriptedStreams streams_{&script_};
+  ScriptedExports exports_{&script_};
   std::unique_ptr<grpc::Server> server_;
   std::unique_ptr<TissueformClient> client_;
   int detached_ = 0;
@@ -420,6 +439,15 @@ TEST_P(ProxiedFailoverTest, AWatchDoesToo) {
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(watch->Receive().has_value()) << i;
   EXPECT_EQ(watch->Receive(), std::nullopt);
   EXPECT_THAT(script_.meant(), ElementsAre("-", "two:1", "-"));
+}
+
+TEST_P(ProxiedFailoverTest, AWatchOfExportsThatWasCutOffMayBeBegunAgain) {
+  script_.Plan({AsProxied(kCutOff)});
+  const auto watch = client_->exports().Watch();
+  EXPECT_TRUE(watch->Receive().has_value());
+  EXPECT_EQ(watch->Receive(), std::nullopt);
+  const absl::Status end = watch->Finish();
+  EXPECT_TRUE(IsTransient(end)) << end;
 }
 
 TEST_P(ProxiedFailoverTest, ACallThatMayBeRepeatedIs) {
