@@ -39,8 +39,9 @@ class Pace(unittest.TestCase):
             patch.start()
             self.addCleanup(patch.stop)
 
-    def tries(self, error, stream_lasts_s=None):
-        """In 40 s, by a client that does what the route says. `stream_lasts_s`: streams begin, and end with the error after so long."""
+    def tries(self, *errors, stream_lasts_s=None):
+        """In 40 s, by a client that does what the route says, of calls that end with these errors in turn. `stream_lasts_s`: streams
+        begin, and end so after so long."""
         count, end = 0, self.now + SECONDS
         while self.now < end and count < 10_000:
             count += 1
@@ -48,7 +49,7 @@ class Pace(unittest.TestCase):
             if stream_lasts_s is not None:
                 self.route.answered(())
                 self.now += stream_lasts_s
-            self.now += self.route.failed(error)
+            self.now += self.route.failed(errors[count % len(errors)])
         return count
 
     def test_streams_that_begin_and_end_are_not_opened_without_pause(self):
@@ -63,6 +64,10 @@ class Pace(unittest.TestCase):
 
     def test_servers_that_name_each_other_are_asked_a_few_times_between_waits(self):
         self.assertLess(self.tries(Error(grpc.StatusCode.UNAVAILABLE, "SESSION_MOVED", "node1"), stream_lasts_s=0), (stranger.MOST_HOPS + 1) * A_FEW_TIMES * SECONDS)
+
+    def test_a_server_that_is_named_and_knows_nobody_is_not_asked_without_pause(self):
+        moved = [Error(grpc.StatusCode.CANCELLED, "SESSION_MOVED", node) for node in ("node1", "")]
+        self.assertLess(self.tries(*moved), 2 * A_FEW_TIMES * SECONDS)
 
     def test_after_a_stream_that_lasted_the_next_is_opened_at_once(self):
         moved = Error(grpc.StatusCode.CANCELLED, "SESSION_MOVED")

@@ -113,6 +113,11 @@ test("after a success that lasted, and only then, tries begin anew", () => {
   expect([failure(0), failure(100), failure(1900), failure(2000), failure(0)]).toEqual([0, 250, 500, 0, 250]);
 });
 
+test("servers of which one names the other, and that knows nobody, are not asked without pause", () => {
+  const backoff = new Backoff(() => 0);
+  expect([1, 2, 3, 4].flatMap(() => [backoff.next(moved("b")), backoff.next(moved())])).toEqual([0, 0, 0, 250, 0, 500, 0, 800]);
+});
+
 test("a session that nobody may take yet is tried again within a second for as long as that lasts", () => {
   const backoff = new Backoff(() => 0);
   const delays = Array.from({ length: 20 }, () => backoff.next(WRONG_NODE));
