@@ -37,7 +37,7 @@ absl::Status Reattachment::After(absl::Status why, const std::function<absl::Sta
       std::exchange(may_be_at_once_, false) && HasReason(why, ErrorReason::kSessionMoved);
   while (true) {
     const std::chrono::milliseconds wait =
-        std::exchange(at_once, false) ? std::chrono::milliseconds(0) : backoff_.Next();
+        std::exchange(at_once, false) ? std::chrono::milliseconds(0) : backoff_.After(why);
     if (std::chrono::steady_clock::now() + wait > give_up) return why;
     if (!Wait(wait)) return absl::CancelledError("the stream was cancelled");
     why = open();

@@ -59,13 +59,13 @@ std::optional<std::chrono::milliseconds> SessionAttempts::AfterError(const absl:
       !std::exchange(tried_at_once_, true)) {
     return kAtOnce;
   }
-  return Wait();
+  return Wait(error);
 }
 
-std::optional<std::chrono::milliseconds> SessionAttempts::Wait() {
+std::optional<std::chrono::milliseconds> SessionAttempts::Wait(const absl::Status& error) {
   const auto now = std::chrono::steady_clock::now();
   if (!give_up_.has_value()) give_up_ = now + patience_;
-  const std::chrono::milliseconds wait = backoff_.Next();
+  const std::chrono::milliseconds wait = backoff_.After(error);
   if (now + wait > *give_up_) return std::nullopt;
   return wait;
 }

@@ -61,7 +61,7 @@ class SessionAttempts {
   std::optional<std::chrono::milliseconds> AfterError(const absl::Status& error);
 
  private:
-  std::optional<std::chrono::milliseconds> Wait();
+  std::optional<std::chrono::milliseconds> Wait(const absl::Status& error);
 
   SessionRoutes* const routes_;
   const std::string session_;

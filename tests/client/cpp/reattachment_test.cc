@@ -19,7 +19,7 @@ absl::Status MovedToNobody() {
 Reattachment::Options AtOnceOrNever(std::chrono::milliseconds lasting) {
   return {.backoff = {.first = std::chrono::hours(1), .most = std::chrono::hours(1)},
           .lasting = lasting,
-          .give_up_after = std::chrono::minutes(1)};
+          .give_up_after = kLongestMovingWait / 4};
 }
 
 class ReattachmentTest : public ::testing::Test {
