@@ -25,7 +25,7 @@ absl::StatusOr<v1::Caller> AccessCalls::WhoAmI() {
   grpc::ClientContext context;
   SetDeadline(&context);
   v1::Caller caller;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->WhoAmI(&context, {}, &caller)));
+  TF_RETURN_IF_ERROR(EndOfCall(stub_->WhoAmI(&context, {}, &caller)));
   return caller;
 }
 
@@ -35,7 +35,7 @@ absl::StatusOr<v1::Share> AccessCalls::Share(const v1::Share& share) {
   v1::CreateShareRequest request;
   *request.mutable_share() = share;
   v1::Share made;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->CreateShare(&context, request, &made)));
+  TF_RETURN_IF_ERROR(EndOfCall(stub_->CreateShare(&context, request, &made)));
   return made;
 }
 
@@ -45,7 +45,7 @@ absl::StatusOr<std::vector<v1::Share>> AccessCalls::ListShares(const std::string
   v1::ListSharesRequest request;
   request.set_resource(resource);
   v1::ListSharesResponse response;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->ListShares(&context, request, &response)));
+  TF_RETURN_IF_ERROR(EndOfCall(stub_->ListShares(&context, request, &response)));
   return std::vector<v1::Share>(response.shares().begin(), response.shares().end());
 }
 
@@ -56,7 +56,7 @@ absl::Status AccessCalls::DeleteShare(const std::string& resource, const std::st
   request.set_resource(resource);
   request.set_principal(principal);
   google::protobuf::Empty response;
-  return FromGrpcStatus(stub_->DeleteShare(&context, request, &response));
+  return EndOfCall(stub_->DeleteShare(&context, request, &response));
 }
 
 absl::StatusOr<v1::FollowLink> AccessCalls::CreateFollowLink(
@@ -90,7 +90,7 @@ absl::StatusOr<v1::Usage> AccessCalls::GetUsage(const std::string& principal) {
   v1::GetUsageRequest request;
   request.set_principal(principal);
   v1::Usage usage;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->GetUsage(&context, request, &usage)));
+  TF_RETURN_IF_ERROR(EndOfCall(stub_->GetUsage(&context, request, &usage)));
   return usage;
 }
 

@@ -38,7 +38,7 @@ bool WriteChunks(absl::string_view bytes, const UploadOptions& options,
 }
 
 bool MaySendAgain(const absl::Status& status) {
-  return !absl::IsResourceExhausted(status) && (IsTransient(status) || absl::IsCancelled(status));
+  return !absl::IsResourceExhausted(status) && IsTransient(status);
 }
 
 }  // namespace
@@ -80,7 +80,7 @@ absl::StatusOr<v1::Case> CaseCalls::TryUpload(absl::string_view bytes, const v1:
   v1::UploadCaseRequest request;
   *request.mutable_header() = header;
   if (writer->Write(request) && WriteChunks(bytes, options, writer.get())) writer->WritesDone();
-  TF_RETURN_IF_ERROR(FromGrpcStatus(writer->Finish()));
+  TF_RETURN_IF_ERROR(EndOfCall(writer->Finish()));
   return std::move(*response.mutable_case_());
 }
 
@@ -90,7 +90,7 @@ absl::StatusOr<v1::Case> CaseCalls::Get(const std::string& name) {
   v1::GetCaseRequest request;
   request.set_name(name);
   v1::Case found;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->GetCase(&context, request, &found)));
+  TF_RETURN_IF_ERROR(EndOfCall(stub_->GetCase(&context, request, &found)));
   return found;
 }
 
@@ -101,7 +101,7 @@ absl::StatusOr<std::vector<v1::Case>> CaseCalls::List() {
     grpc::ClientContext context;
     SetDeadline(&context);
     v1::ListCasesResponse response;
-    TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->ListCases(&context, request, &response)));
+    TF_RETURN_IF_ERROR(EndOfCall(stub_->ListCases(&context, request, &response)));
     cases.insert(cases.end(), response.cases().begin(), response.cases().end());
     request.set_page_token(response.next_page_token());
   } while (!request.page_token().empty());
@@ -114,7 +114,7 @@ absl::Status CaseCalls::Delete(const std::string& name) {
   v1::DeleteCaseRequest request;
   request.set_name(name);
   google::protobuf::Empty response;
-  return FromGrpcStatus(stub_->DeleteCase(&context, request, &response));
+  return EndOfCall(stub_->DeleteCase(&context, request, &response));
 }
 
 absl::Status CaseCalls::ReadOn(const std::string& name, std::string* bytes) {
@@ -131,7 +131,7 @@ absl::Status CaseCalls::ReadOn(const std::string& name, std::string* bytes) {
     if (follows) *bytes += response.data();
   }
   if (!follows) context.TryCancel();
-  const absl::Status ended = FromGrpcStatus(reader->Finish());
+  const absl::Status ended = EndOfCall(reader->Finish());
   if (follows) return ended;
   return absl::DataLossError("the server's chunks do not follow each other; read the case again");
 }

@@ -12,11 +12,23 @@
 
 namespace tissueform {
 
+namespace {
+
+constexpr int kLastCode = static_cast<int>(grpc::StatusCode::UNAUTHENTICATED);
+
+bool TellsAnotherCode(const google::rpc::Status& details, const grpc::Status& status) {
+  return details.code() > 0 && details.code() <= kLastCode && details.code() != status.error_code();
+}
+
+}  // namespace
+
 absl::Status FromGrpcStatus(const grpc::Status& status) {
-  const absl::Status plain(static_cast<absl::StatusCode>(status.error_code()),
-                           status.error_message());
+  absl::Status plain(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
   google::rpc::Status details;
-  if (!details.ParseFromString(status.error_details())) return plain;
+  if (status.ok() || !details.ParseFromString(status.error_details())) return plain;
+  if (TellsAnotherCode(details, status)) {
+    plain = absl::Status(static_cast<absl::StatusCode>(details.code()), details.message());
+  }
   for (const google::protobuf::Any& detail : details.details()) {
     google::rpc::ErrorInfo info;
     if (detail.UnpackTo(&info)) {
@@ -25,6 +37,14 @@ absl::Status FromGrpcStatus(const grpc::Status& status) {
     }
   }
   return plain;
+}
+
+absl::Status EndOfCall(const grpc::Status& status, bool was_cancelled) {
+  const absl::Status end = FromGrpcStatus(status);
+  if (was_cancelled || !absl::IsCancelled(end)) return end;
+  const ErrorInfo info = ErrorInfoOf(end);
+  const absl::Status lost = absl::UnavailableError(end.message());
+  return info.reason == ReasonName(ErrorReason::kCancelled) ? lost : WithErrorInfo(lost, info);
 }
 
 void AddSessionHeader(const std::string& session, grpc::ClientContext* context) {

@@ -12,8 +12,13 @@
 namespace tissueform {
 
 // The same code and message, and the reason that the server gave (ErrorInfoOf in
-// core/base/error_reason.h).
+// core/base/error_reason.h). Where the details tell another code they count: proxies may end a call
+// in words of their own, but leave the server's details.
 absl::Status FromGrpcStatus(const grpc::Status& status);
+
+// How a call has ended. CANCELLED is the client's word alone: of a call that it has not cancelled
+// something between here and there has gone, and it is Unavailable.
+absl::Status EndOfCall(const grpc::Status& status, bool was_cancelled = false);
 
 // Lets a proxy send the call to the server of `session` ("sessions/{id}"); see kSessionHeader.
 void AddSessionHeader(const std::string& session, grpc::ClientContext* context);

@@ -105,7 +105,10 @@ void DeformStream::Tell(const v1::DeformNotice& notice) {
   if (on_notice_) on_notice_(notice);
 }
 
-void DeformStream::Cancel() { context_.TryCancel(); }
+void DeformStream::Cancel() {
+  was_cancelled_ = true;
+  context_.TryCancel();
+}
 
 absl::Status DeformStream::Finish() {
   // gRPC tells the status of a call only after everything before it was read.
@@ -115,7 +118,7 @@ absl::Status DeformStream::Finish() {
   }
   renewal_.reset();
   finished_ = true;
-  const absl::Status end = FromGrpcStatus(call_->Finish());
+  const absl::Status end = EndOfCall(call_->Finish(), was_cancelled_);
   routes_->LearnFrom(end, session_);
   return end;
 }

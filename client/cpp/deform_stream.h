@@ -97,6 +97,7 @@ class DeformStream {
   // Self-synchronised.
   grpc::ClientContext context_;
   std::atomic<bool> server_is_draining_ = false;
+  std::atomic<bool> was_cancelled_ = false;
 
   void Tell(const v1::DeformNotice& notice);
 

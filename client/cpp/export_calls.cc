@@ -24,7 +24,7 @@ absl::Status ExportWatchStream::Finish() {
   while (Receive().has_value()) {
   }
   finished_ = true;
-  return FromGrpcStatus(call_->Finish());
+  return EndOfCall(call_->Finish(), was_cancelled_);
 }
 
 ExportCalls::ExportCalls(const std::shared_ptr<grpc::Channel>& channel,
@@ -45,7 +45,7 @@ absl::StatusOr<v1::Export> ExportCalls::Create(const std::string& prediction,
   request.mutable_measures()->Add(measures.begin(), measures.end());
   request.set_request_id(request_id);
   v1::Export made;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->CreateExport(&context, request, &made)));
+  TF_RETURN_IF_ERROR(EndOfCall(stub_->CreateExport(&context, request, &made)));
   return made;
 }
 
@@ -55,7 +55,7 @@ absl::StatusOr<v1::Export> ExportCalls::Get(const std::string& name) {
   v1::GetExportRequest request;
   request.set_name(name);
   v1::Export found;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->GetExport(&context, request, &found)));
+  TF_RETURN_IF_ERROR(EndOfCall(stub_->GetExport(&context, request, &found)));
   return found;
 }
 
@@ -69,7 +69,7 @@ absl::StatusOr<std::vector<v1::Export>> ExportCalls::List(const std::string& pre
     grpc::ClientContext context;
     SetDeadline(&context);
     v1::ListExportsResponse response;
-    TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->ListExports(&context, request, &response)));
+    TF_RETURN_IF_ERROR(EndOfCall(stub_->ListExports(&context, request, &response)));
     exports.insert(exports.end(), response.exports().begin(), response.exports().end());
     request.set_page_token(response.next_page_token());
   } while (!request.page_token().empty());
@@ -80,7 +80,7 @@ absl::StatusOr<v1::Export> ExportCalls::Update(const v1::UpdateExportRequest& re
   grpc::ClientContext context;
   SetDeadline(&context);
   v1::Export changed;
-  TF_RETURN_IF_ERROR(FromGrpcStatus(stub_->UpdateExport(&context, request, &changed)));
+  TF_RETURN_IF_ERROR(EndOfCall(stub_->UpdateExport(&context, request, &changed)));
   return changed;
 }
 
@@ -90,7 +90,7 @@ absl::Status ExportCalls::Delete(const std::string& name) {
   v1::DeleteExportRequest request;
   request.set_name(name);
   google::protobuf::Empty response;
-  return FromGrpcStatus(stub_->DeleteExport(&context, request, &response));
+  return EndOfCall(stub_->DeleteExport(&context, request, &response));
 }
 
 std::unique_ptr<ExportWatchStream> ExportCalls::Watch() {

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -32,7 +33,10 @@ class ExportWatchStream {
   std::optional<v1::WatchExportsResponse> Receive();
 
   // Ends the watch at once. Any thread, any time.
-  void Cancel() { context_.TryCancel(); }
+  void Cancel() {
+    was_cancelled_ = true;
+    context_.TryCancel();
+  }
 
   // Drops what is still to come and returns how the watch ended. Call it once.
   absl::Status Finish();
@@ -43,7 +47,8 @@ class ExportWatchStream {
   explicit ExportWatchStream(v1::ExportService::Stub* stub)
       : call_(stub->WatchExports(&context_, {})) {}
 
-  grpc::ClientContext context_;  // self-synchronised
+  grpc::ClientContext context_;  // self-synchronised, as the next
+  std::atomic<bool> was_cancelled_ = false;
   std::unique_ptr<grpc::ClientReader<v1::WatchExportsResponse>> call_;
   bool finished_ = false;
 };

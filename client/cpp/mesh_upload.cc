@@ -70,7 +70,7 @@ class Sending {
     *request.mutable_header() = ToProto(payload_.shape, sha256_);
     // Where a write fails the server has ended the call, often with a reason: Finish has it.
     if (writer->Write(request) && WriteFrom(from, writer.get())) writer->WritesDone();
-    TF_RETURN_IF_ERROR(FromGrpcStatus(writer->Finish()));
+    TF_RETURN_IF_ERROR(EndOfCall(writer->Finish()));
     return std::move(*response.mutable_mesh());
   }
 
@@ -80,8 +80,7 @@ class Sending {
     v1::QueryUploadRequest request;
     request.set_name(MeshName(sha256_));
     v1::QueryUploadResponse response;
-    const absl::Status status =
-        FromGrpcStatus(meshes_->QueryUpload(context.get(), request, &response));
+    const absl::Status status = EndOfCall(meshes_->QueryUpload(context.get(), request, &response));
     if (absl::IsNotFound(status) || absl::IsUnimplemented(status) || absl::IsDataLoss(status)) {
       return 0;
     }
@@ -116,13 +115,13 @@ class Sending {
     return true;
   }
 
-  // Whether the same bytes may be taken another time. CANCELLED comes from a server that ends;
-  // damage on the way is mended by sending again, but not for ever.
+  // Whether the same bytes may be taken another time. Damage on the way is mended by
+  // sending again, but not for ever.
   bool MayRepeat(const absl::Status& status) {
     if (absl::IsResourceExhausted(status)) return false;
     if (absl::IsDataLoss(status)) return !std::exchange(damaged_before_, true);
-    return IsTransient(status) || absl::IsCancelled(status) || absl::IsAborted(status) ||
-           absl::IsDeadlineExceeded(status) || HasReason(status, ErrorReason::kUploadNotFound) ||
+    return IsTransient(status) || absl::IsAborted(status) || absl::IsDeadlineExceeded(status) ||
+           HasReason(status, ErrorReason::kUploadNotFound) ||
            HasReason(status, ErrorReason::kChunkOutOfPlace);
   }
 

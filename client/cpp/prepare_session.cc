@@ -55,7 +55,7 @@ class Call {
     grpc::Status status;
     reader_->Finish(&status, this);
     Wait();
-    TF_RETURN_IF_ERROR(FromGrpcStatus(status));
+    TF_RETURN_IF_ERROR(EndOfCall(status, was_cancelled_));
     if (session.has_value()) return *std::move(session);
     return absl::InternalError(
         "the preparation ended without a session; the server speaks another version");
@@ -65,7 +65,10 @@ class Call {
   // Until what was begun has ended; false when there is no more to come.
   bool Wait() {
     while (true) {
-      if (wait_.cancellation.requested()) context_.TryCancel();
+      if (wait_.cancellation.requested()) {
+        was_cancelled_ = true;
+        context_.TryCancel();
+      }
       void* tag = nullptr;
       bool ok = false;
       const auto next = queue_.AsyncNext(&tag, &ok, std::chrono::system_clock::now() + kAsk);
@@ -76,6 +79,7 @@ class Call {
 
   const PreparationWait& wait_;
   grpc::ClientContext context_;
+  bool was_cancelled_ = false;
   grpc::CompletionQueue queue_;
   std::unique_ptr<grpc::ClientAsyncReader<v1::PrepareSessionResponse>> reader_;
 };

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
+#include <optional>
 
 #include "absl/status/status.h"
 
@@ -20,6 +21,8 @@ class Reattachment {
  public:
   struct Options {
     Backoff::Options backoff = {};
+    // A stream that ends sooner has come to nothing: waits go on growing from where they were.
+    std::chrono::milliseconds lasting{2'000};
     // Without a stream for so long it ends, with the last error.
     std::chrono::milliseconds give_up_after{60'000};
     // The stream broke, and it goes on.
@@ -29,8 +32,8 @@ class Reattachment {
 
   explicit Reattachment(Options options);
 
-  // Calls `open` until it is OK: at once when the session has moved to another server, else after a
-  // wait, and with waits in between.
+  // Calls `open` until it is OK: at once when the session has moved to another server after a
+  // stream that lasted, else after a wait, and with waits in between.
   //
   // Errors: `why`, or that of the last attempt, when another stream would not do better, when it
   // was cancelled and when time is up.
@@ -43,10 +46,17 @@ class Reattachment {
   int count() const { return count_; }
 
  private:
+  // The stream that was there has ended: waits begin anew where it has lasted.
+  void JudgeLastStream();
   // False when it was cancelled meanwhile.
   bool Wait(std::chrono::milliseconds time) ABSL_LOCKS_EXCLUDED(mutex_);
 
   const Options options_;
+
+  // The attaching thread's.
+  Backoff backoff_;
+  bool may_be_at_once_ = true;
+  std::optional<std::chrono::steady_clock::time_point> attached_at_;  // since the first loss
 
   // Self-synchronised.
   std::atomic<bool> cancelled_ = false;  // set under the mutex, so that no wait misses it

@@ -24,10 +24,9 @@ bool NothingWasDone(const absl::Status& error) {
          HasReason(error, ErrorReason::kServerDraining);
 }
 
-// Nobody knows whether it was done. CANCELLED: by a proxy, whose server has gone.
+// Nobody knows whether it was done.
 bool IsLost(const absl::Status& error) {
-  return absl::IsUnavailable(error) || absl::IsUnknown(error) || absl::IsInternal(error) ||
-         absl::IsCancelled(error);
+  return absl::IsUnavailable(error) || absl::IsUnknown(error) || absl::IsInternal(error);
 }
 
 }  // namespace
@@ -55,17 +54,18 @@ std::optional<std::chrono::milliseconds> SessionAttempts::AfterError(const absl:
   if (!routes_->in_cluster()) return std::nullopt;
   if (!NothingWasDone(error) && !(repeat_ == CallRepeat::kAlways && IsLost(error)))
     return std::nullopt;
-  if (HasReason(error, ErrorReason::kSessionMoved) && node_.empty() &&
+  // Who has no patience waits between its calls.
+  if (HasReason(error, ErrorReason::kSessionMoved) && node_.empty() && patience_ > kNoPatience &&
       !std::exchange(tried_at_once_, true)) {
     return kAtOnce;
   }
-  return Wait();
+  return Wait(error);
 }
 
-std::optional<std::chrono::milliseconds> SessionAttempts::Wait() {
+std::optional<std::chrono::milliseconds> SessionAttempts::Wait(const absl::Status& error) {
   const auto now = std::chrono::steady_clock::now();
   if (!give_up_.has_value()) give_up_ = now + patience_;
-  const std::chrono::milliseconds wait = backoff_.Next();
+  const std::chrono::milliseconds wait = backoff_.After(error);
   if (now + wait > *give_up_) return std::nullopt;
   return wait;
 }
@@ -78,7 +78,7 @@ absl::Status RunSessionCall(SessionRoutes* routes, const std::string& session, C
     grpc::ClientContext context;
     context.set_deadline(deadline);
     attempts.AddHeaders(&context);
-    const absl::Status status = FromGrpcStatus(attempt(&context));
+    const absl::Status status = EndOfCall(attempt(&context));
     if (status.ok()) {
       attempts.Succeeded(context);
       return status;

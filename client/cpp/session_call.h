@@ -40,8 +40,10 @@ inline constexpr std::chrono::milliseconds kNoPatience{0};
 //   SESSION_MOVED, MEMORY_BUDGET_FULL + node    there, at once; kMostHops times  (never said)
 //   SESSION_MOVED without node                  at once, then after a wait       (never said)
 //   WRONG_NODE, SERVER_DRAINING                 after a wait                     over
-//   UNAVAILABLE, UNKNOWN, INTERNAL, CANCELLED   after a wait if kAlways          over
+//   UNAVAILABLE, UNKNOWN, INTERNAL              after a wait if kAlways          over
 //   any other                                   over                             over
+//
+// (CANCELLED by somebody else is UNAVAILABLE here: EndOfCall.)
 //
 // Waits grow and differ by chance (Backoff); it is over when `patience` has passed since the first
 // error. One thread at a time.
@@ -59,7 +61,7 @@ class SessionAttempts {
   std::optional<std::chrono::milliseconds> AfterError(const absl::Status& error);
 
  private:
-  std::optional<std::chrono::milliseconds> Wait();
+  std::optional<std::chrono::milliseconds> Wait(const absl::Status& error);
 
   SessionRoutes* const routes_;
   const std::string session_;

@@ -25,7 +25,7 @@ bool IsNodeName(absl::string_view name) {
 }
 
 // A session that another server holds, and a server that is away or says that it is not meant. Not
-// CANCELLED, which mostly is one's own.
+// CANCELLED, which is one's own.
 bool IsElsewhere(const absl::Status& error) {
   return absl::IsUnavailable(error) || absl::IsUnknown(error) || absl::IsInternal(error);
 }

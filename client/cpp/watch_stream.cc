@@ -59,7 +59,7 @@ absl::Status WatchStream::Ack(const v1::WatchFrame& frame) {
   request.set_watch(name_);
   request.set_number(frame.number());
   google::protobuf::Empty response;
-  return FromGrpcStatus(stub_->AcknowledgeWatch(&context, request, &response));
+  return EndOfCall(stub_->AcknowledgeWatch(&context, request, &response));
 }
 
 absl::Status WatchStream::Finish() {
@@ -68,7 +68,7 @@ absl::Status WatchStream::Finish() {
     if (dropped.has_notice() && options_.on_notice) options_.on_notice(dropped.notice());
   }
   finished_ = true;
-  const absl::Status end = FromGrpcStatus(call_->Finish());
+  const absl::Status end = EndOfCall(call_->Finish(), was_cancelled_);
   routes_->LearnFrom(end, session_);
   return end;
 }

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -49,7 +50,10 @@ class WatchStream {
   absl::Status Ack(const v1::WatchFrame& frame);
 
   // Ends the watch at once. Any thread, any time.
-  void Cancel() { context_.TryCancel(); }
+  void Cancel() {
+    was_cancelled_ = true;
+    context_.TryCancel();
+  }
 
   // Receives and drops what is still to come and returns how the watch ended. Call it once, when no
   // other thread uses it.
@@ -69,7 +73,8 @@ class WatchStream {
   SessionRoutes* const routes_;
   const std::string session_;
   const Options options_;
-  grpc::ClientContext context_;  // self-synchronised
+  grpc::ClientContext context_;  // self-synchronised, as the next
+  std::atomic<bool> was_cancelled_ = false;
   std::unique_ptr<grpc::ClientReader<v1::WatchResponse>> call_;
   std::string name_;  // constant after Start, as the next
   std::string node_;

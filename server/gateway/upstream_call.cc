@@ -5,11 +5,32 @@
 
 #include <utility>
 
+#include "google/rpc/status.pb.h"
 #include "grpcpp/support/slice.h"
 
 #include "server/gateway/call_metadata.h"
 
 namespace tissueform {
+namespace {
+
+constexpr int kLastCode = static_cast<int>(grpc::StatusCode::UNAUTHENTICATED);
+
+// Where a proxy stands before the servers it may end a call in words of its own, and leave the
+// server's details: these count. CANCELLED is the gateway's word alone, and it has not said it.
+grpc::Status AsTheServerSaid(const grpc::Status& status) {
+  google::rpc::Status details;
+  grpc::StatusCode code = status.error_code();
+  std::string message = status.error_message();
+  const bool is_read = !status.ok() && details.ParseFromString(status.error_details());
+  if (is_read && details.code() > 0 && details.code() <= kLastCode && details.code() != code) {
+    code = static_cast<grpc::StatusCode>(details.code());
+    message = details.message();
+  }
+  if (code == grpc::StatusCode::CANCELLED) code = grpc::StatusCode::UNAVAILABLE;
+  return {code, message, status.error_details()};
+}
+
+}  // namespace
 
 std::shared_ptr<UpstreamCall> UpstreamCall::Begin(CallSlot slot, const CallStart& start,
                                                   std::shared_ptr<ConnectionStrand> strand,
@@ -89,7 +110,7 @@ void UpstreamCall::OnWriteDone(bool /*ok*/) {
 
 void UpstreamCall::OnDone(const grpc::Status& status) {
   if (!begun_) return;
-  CallEnd end = {.status = status,
+  CallEnd end = {.status = AsTheServerSaid(status),
                  .trailers = AllowedMetadata(context_.GetServerTrailingMetadata())};
   // `this` may be gone before Post returns.
   const std::shared_ptr<ConnectionStrand> strand = strand_;

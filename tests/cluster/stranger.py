@@ -18,6 +18,7 @@ GOOGLE_PROTOS = pathlib.Path("/usr/share/gocode/src/github.com/gogo/googleapis")
 SESSION_HEADER, NODE_HEADER = "x-tissueform-session", "x-tissueform-node"
 MOST_HOPS = 4
 FIRST_WAIT_S, MOST_WAIT_S = 0.05, 0.4
+LASTING_S = 2  # what ends sooner after an answer has come to nothing: a server may let streams begin and end them at once
 ATTEMPT_S = 15
 ELSEWHERE = {"SESSION_MOVED", "MEMORY_BUDGET_FULL"}
 # Whatever the code: through HAProxy an error that ends a stream early may arrive as CANCELLED, with the server's details.
@@ -71,7 +72,8 @@ class Route:
         self.node = None
         self.hops = 0
         self.wait_s = FIRST_WAIT_S
-        self.was_answered = False
+        self.may_be_at_once = True
+        self.answered_at = None  # the first time since the last failure
 
     def metadata(self):
         headers = [(SESSION_HEADER, self.session)] if self.session else []
@@ -79,11 +81,14 @@ class Route:
 
     def answered(self, initial_metadata):
         self.node = dict(initial_metadata or ()).get(NODE_HEADER, self.node) if self.session else None
-        self.hops, self.wait_s, self.was_answered = 0, FIRST_WAIT_S, True
+        self.answered_at = self.answered_at or time.monotonic()
 
     def failed(self, error):
         """Seconds until it may be tried again; Refused where that is no use."""
         code, reason, metadata = why(error)
+        if self.answered_at is not None and time.monotonic() - self.answered_at >= LASTING_S:
+            self.hops, self.wait_s, self.may_be_at_once = 0, FIRST_WAIT_S, True
+        self.answered_at = None
         node = metadata.get("node")
         if reason in ELSEWHERE and node and self.hops < MOST_HOPS:
             self.node, self.hops = node, self.hops + 1
@@ -91,8 +96,8 @@ class Route:
         if reason not in LATER and not (code == grpc.StatusCode.UNAVAILABLE or (not reason and code in FROM_THE_WAY)):
             raise Refused(code, reason, error.details())
         self.node, self.hops = None, 0
-        if reason == "SESSION_MOVED" and self.was_answered:
-            self.was_answered = False
+        if reason == "SESSION_MOVED" and self.may_be_at_once:
+            self.may_be_at_once = False
             return 0.0
         wait_s, self.wait_s = self.wait_s, min(MOST_WAIT_S, self.wait_s * 1.6)
         return wait_s * random.uniform(0.8, 1.2)

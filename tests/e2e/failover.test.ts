@@ -3,9 +3,11 @@
 
 import { join } from "node:path";
 import type { Page } from "playwright-core";
-import { Planner, Program, type Hook, live, openCase, openPage, state, takeSegment, typeMove } from "./planner";
+import { Front, freeAddress, hasHaproxy } from "./front";
+import { Planner, Program, type Hook, live, openCase, openPage, startGateway, state, takeSegment, typeMove } from "./planner";
 
-// Two servers of a cluster, the one that holds the drag killed or drained. PostgreSQL is that of pg_virtualenv:
+// Two servers of a cluster, the one that holds the drag killed or drained; two gateways behind HAProxy, the page's own killed.
+// PostgreSQL is that of pg_virtualenv:
 //
 //   pg_virtualenv -t npm --prefix client/web run test:e2e -- failover.test.ts
 //
@@ -13,20 +15,38 @@ import { Planner, Program, type Hook, live, openCase, openPage, state, takeSegme
 
 const { PGHOST, PGPORT, PGUSER, PGPASSWORD, TISSUEFORM_PICTURES } = process.env;
 if (PGPORT === undefined) console.log("no PostgreSQL: run this with pg_virtualenv (package postgresql-common)");
+if (!hasHaproxy) console.log("no HAProxy: install it (package haproxy)");
 
 const NODES = ["left", "right"];
 
 class Cluster {
   private readonly servers = new Map<string, Program>();
+  private front: Front | null = null;
+  private readonly gateways: Program[] = [];
   planner!: Planner;
 
   static async start(): Promise<Cluster> {
     const cluster = new Cluster();
     // One after the other: the first makes the tables.
     for (const node of NODES) await cluster.startNode(node);
-    const servers = NODES.map((node) => `${node}=${cluster.servers.get(node)?.address}`);
-    cluster.planner = await Planner.start(undefined, { servers });
+    cluster.planner = await Planner.start(undefined, { servers: cluster.named });
     return cluster;
+  }
+
+  private get named(): string[] {
+    return NODES.map((node) => `${node}=${this.servers.get(node)?.address}`);
+  }
+
+  /** HAProxy before two gateways, of which the first alone is there yet; where pages come from. `next` starts the other one. */
+  async startFront(): Promise<{ url: string; next(): Promise<void>; killFirst(): Promise<void> }> {
+    const addresses = [await freeAddress(), await freeAddress()];
+    const front = (this.front = await Front.start(this.planner.folder, addresses));
+    const next = async () => {
+      this.gateways.push(await startGateway(this.named, addresses[this.gateways.length]));
+      await front.hasGateways(this.gateways.length);
+    };
+    await next();
+    return { url: front.url, next, killFirst: () => this.gateways[0].stop("SIGKILL") };
   }
 
   /** At the same address as before. */
@@ -42,6 +62,8 @@ class Cluster {
   }
 
   async stop(): Promise<void> {
+    await this.front?.stop();
+    for (const gateway of this.gateways) await gateway.stop("SIGKILL");
     await this.planner?.stop();
     for (const server of this.servers.values()) await server.stop("SIGKILL");
   }
@@ -99,12 +121,49 @@ function drag(page: Page, forwardMm: number): Promise<number> {
   }, forwardMm);
 }
 
+/** From now on the lower jaw goes to and fro, and the header's words are written down. */
+function moveOn(page: Page): Promise<void> {
+  return page.evaluate(() => {
+    const { bench } = (globalThis as unknown as Hook).tissueform;
+    const words: string[] = ((globalThis as any).words = []);
+    new MutationObserver(() => words.push(document.querySelector("header")?.textContent ?? "")).observe(document.body, { subtree: true, childList: true, characterData: true });
+    bench.picture.watch(() => ((globalThis as any).pictures = ((globalThis as any).pictures ?? 0) + 1));
+    let moves = 0;
+    (globalThis as any).hand = setInterval(() => bench.plan.change(1, { forwardMm: 5 + 3 * Math.sin(0.1 * ++moves) }, false), 33);
+  });
+}
+
+/** So many more pictures of the server's come while the hand moves. */
+function goesOn(page: Page, pictures: number): Promise<unknown> {
+  return page.evaluate(() => (globalThis as any).pictures).then((before) => page.waitForFunction((least) => (globalThis as any).pictures >= least, before + pictures));
+}
+
+/** The hand comes to rest; where the lower jaw is by the page, and by what the server keeps. */
+async function comeToRest(page: Page): Promise<{ planned: number[]; kept: number[] }> {
+  await page.evaluate(() => {
+    const { bench } = (globalThis as unknown as Hook).tissueform;
+    clearInterval((globalThis as any).hand);
+    bench.plan.change(1, { forwardMm: 7.25 }, true);
+  });
+  await page.waitForFunction(() => {
+    const { bench } = (globalThis as unknown as Hook).tissueform;
+    return bench.live.isKept && bench.waitingMs === 0;
+  });
+  return page.evaluate(async () => {
+    const { bench } = (globalThis as unknown as Hook).tissueform;
+    const { committedPoses } = await bench.live.gateway.sessions.getSession({ name: bench.live.session });
+    const { handle, translationMm } = committedPoses[1];
+    const place = bench.plan.handles.findIndex(({ name }: { name: string }) => name === handle);
+    return { planned: bench.plan.poses()[place].translationMm, kept: [translationMm.x, translationMm.y, translationMm.z] };
+  });
+}
+
 async function picture(page: Page, name: string): Promise<void> {
   if (TISSUEFORM_PICTURES === undefined) return;
   await page.screenshot({ path: join(TISSUEFORM_PICTURES, `${name}.jpg`), type: "jpeg", quality: 85 });
 }
 
-describe.skipIf(PGPORT === undefined)("a drag in a cluster", () => {
+describe.skipIf(PGPORT === undefined || !hasHaproxy)("a drag in a cluster", () => {
   let cluster: Cluster;
   let opened: Awaited<ReturnType<typeof openCase>>;
   let follower: Awaited<ReturnType<typeof openPage>>;
@@ -169,5 +228,24 @@ describe.skipIf(PGPORT === undefined)("a drag in a cluster", () => {
     await ended;
     expect(await holder(page)).not.toBe(before);
     expect((await heard(page)).filter((text) => text !== "live" && text !== "moving")).toEqual([]);
+  });
+
+  test("whose gateway is killed goes on through the other one, with the newest pose", async () => {
+    const { url, next, killFirst } = await cluster.startFront();
+    const { page, faults } = await openCase(opened.page.context(), { url, casePath: cluster.planner.casePath });
+    await next();
+    await listen(page);
+    await moveOn(page);
+    await goesOn(page, 5);
+    await killFirst();
+    await page.waitForFunction(() => (globalThis as any).heard.includes("moving"));
+    await live(page);
+    await goesOn(page, 5);
+    const { planned, kept } = await comeToRest(page);
+    expect(kept).toEqual(planned.map((mm) => expect.closeTo(mm, 9)));
+    const words: string[] = await page.evaluate(() => (globalThis as any).words);
+    expect(words.some((word) => word.includes("Moving to another server…"))).toBe(true);
+    expect((await heard(page)).filter((text) => text !== "live" && text !== "moving")).toEqual([]);
+    expect(faults).toEqual([]);
   });
 });

@@ -76,6 +76,12 @@ export function startCommand(options: string[]): { said(text: string): Promise<s
   return { said, ended: () => ended };
 }
 
+/** A gateway with the planner before these servers. */
+export function startGateway(servers: string[], listen: string, options: string[] = []): Promise<Program> {
+  const named = servers.flatMap((server) => ["--server", server]);
+  return Program.start("tissueform-gateway", [...named, "--listen", listen, "--web", WEB, "--drain-seconds", "1", ...options]);
+}
+
 /** Server and gateway with a case of the bundled head, and a browser. */
 export class Planner {
   readonly folder = mkdtempSync(join(tmpdir(), "tissueform-e2e-"));
@@ -96,11 +102,7 @@ export class Planner {
     if (casePath !== undefined) planner.casePath = casePath;
     else execFileSync(join(BIN, "tissueform"), ["case", "pack", planner.writePlan(false), "--out", planner.casePath]);
     if (options.servers === undefined) await planner.startServer();
-    const servers = options.servers ?? [planner.serverAddress];
-    planner.gateway = await Program.start("tissueform-gateway", [
-      ...servers.flatMap((server) => ["--server", server]), "--listen", "127.0.0.1:0", "--web", WEB, "--drain-seconds", "1",
-      ...(options.gateway ?? []),
-    ]);
+    planner.gateway = await startGateway(options.servers ?? [planner.serverAddress], "127.0.0.1:0", options.gateway);
     return planner;
   }
 
@@ -206,7 +208,7 @@ export async function live(page: Page): Promise<void> {
 }
 
 /** The planner of the case, opened by its file. */
-export async function openCase(context: BrowserContext, planner: Planner, path = planner.casePath): Promise<{ page: Page; faults: string[] }> {
+export async function openCase(context: BrowserContext, planner: Pick<Planner, "url" | "casePath">, path = planner.casePath): Promise<{ page: Page; faults: string[] }> {
   const opened = await openPage(context, planner.url);
   await opened.page.setInputFiles("input[type=file]", path);
   await live(opened.page);

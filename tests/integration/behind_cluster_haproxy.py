@@ -31,6 +31,7 @@ except ImportError:
 PATIENCE_S = 30
 SESSION, NODE = "x-tissueform-session", "x-tissueform-node"
 SERVING, NOT_SERVING = b"\x08\x01", b"\x08\x02"
+CROWD = 5
 MANY_KEYS = 20_000
 MOST_GROWTH_KB = 64 << 10
 
@@ -166,6 +167,24 @@ def check_death(haproxy, nodes, first):
     expect(haproxy.ask(node=nodes[0].name) == grpc.StatusCode.UNAVAILABLE, "the header of a dead server is answered UNAVAILABLE")
     nodes[0].start()
     haproxy.wait(nodes[0].name, "UP")
+    check_crowd(haproxy, nodes[0])
+
+
+def check_crowd(haproxy, node):
+    """Streams last: of a server that has just come back none waits until another one ends."""
+    stays = threading.Event()
+
+    def poses():
+        yield b""
+        stays.wait(PATIENCE_S)
+
+    streams = [haproxy.stream(poses(), metadata=[(NODE, node.name)], timeout=PATIENCE_S) for _ in range(CROWD)]
+    try:
+        answered = [next(stream).decode() for stream in streams]
+    except grpc.RpcError as error:
+        answered = error.details()
+    stays.set()
+    expect(answered == [node.name] * CROWD, f"a server that has come back takes {CROWD} streams at once ({answered})")
 
 
 def check_header(haproxy, nodes):
@@ -202,7 +221,7 @@ def check_drain(haproxy, nodes):
 
 def check_added(haproxy, node):
     server = f"servers/{node.name}"
-    haproxy.tell(f"add server {server} 127.0.0.1:{node.port} id 9 proto h2 check inter 500ms fastinter 200ms fall 2 rise 1 maxconn 4000;"
+    haproxy.tell(f"add server {server} 127.0.0.1:{node.port} id 9 proto h2 check inter 500ms fastinter 200ms fall 2 rise 1;"
                  f"enable health {server}; enable server {server}")
     haproxy.wait(node.name, "UP")
     expect(haproxy.ask(node=node.name) == node.name, "a server that is added has its header")

@@ -3,10 +3,13 @@
 
 #include "client/pacs_bridge/work/bridge_service.h"
 
+#include <algorithm>
 #include <ctime>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+
+#include "client/cpp/backoff.h"
 
 namespace tissueform {
 namespace {
@@ -153,11 +156,31 @@ void BridgeService::TakeHeard() {
     MutexLock lock(mutex_);
     heard.swap(heard_);
   }
-  for (const v1::Export& told : heard) {
-    const absl::Status status = parts_.exports->Take(told);
-    if (!status.ok()) Tell(status, "an export cannot be taken into the queue");
+  std::deque<v1::Export> later;
+  for (v1::Export& told : heard) {
+    if (!TakeNow(told)) later.push_back(std::move(told));
   }
-  if (!heard.empty()) Wake();
+  if (later.size() < heard.size()) Wake();
+  MutexLock lock(mutex_);
+  for (v1::Export& told : later) {
+    const bool is_told_anew =
+        std::any_of(heard_.begin(), heard_.end(),
+                    [&told](const v1::Export& newer) { return newer.name() == told.name(); });
+    if (!is_told_anew && heard_.size() < kMostHeard) heard_.push_back(std::move(told));
+  }
+}
+
+// The watch may go on although another server, which the taking was told to, has gone.
+bool BridgeService::TakeNow(const v1::Export& told) {
+  if (!take_retries_.Due(told.name())) return false;
+  const absl::Status status = parts_.exports->Take(told);
+  if (!status.ok()) Tell(status, "an export cannot be taken into the queue");
+  if (IsTransient(status)) {
+    take_retries_.Failed(told.name());
+    return false;
+  }
+  take_retries_.Succeeded(told.name());
+  return true;
 }
 
 void BridgeService::WorkOnExports() {

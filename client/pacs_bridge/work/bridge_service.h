@@ -59,6 +59,8 @@ class BridgeService {
   void TakeIn();
   void WorkOnPlans();
   void TakeHeard() ABSL_LOCKS_EXCLUDED(mutex_);
+  // False: it is to be taken later.
+  bool TakeNow(const v1::Export& told);
   void WorkOnExports();
   void WorkOnPictures();
   void WatchServer();
@@ -70,6 +72,7 @@ class BridgeService {
   // Each of one thread.
   RetryTimes plan_retries_;
   RetryTimes export_retries_;
+  RetryTimes take_retries_;
   RetryTimes watch_retries_;
   std::chrono::steady_clock::time_point next_deletion_ = {};
   std::set<std::string> drawn_;  // keys of exports that wait and were drawn, or could not be

@@ -18,6 +18,7 @@
 #include "grpcpp/server_builder.h"
 #include "gtest/gtest.h"
 
+#include "client/cpp/backoff.h"
 #include "client/cpp/reattaching_stream.h"
 #include "client/cpp/reattaching_watch.h"
 #include "client/cpp/tissueform_client.h"
@@ -194,6 +195,22 @@ class ScriptedStreams final : public v1::DeformService::Service {
   std::vector<std::string> poses_ ABSL_GUARDED_BY(mutex_);
 };
 
+// Hears of exports until its turn to end has come.
+class ScriptedExports final : public v1::ExportService::Service {
+ public:
+  explicit ScriptedExports(Script* script) : script_(script) {}
+
+  grpc::Status WatchExports(grpc::ServerContext* context, const v1::WatchExportsRequest*,
+                            grpc::ServerWriter<v1::WatchExportsResponse>* stream) override {
+    const grpc::Status end = script_->Take(context);
+    stream->Write({});
+    return end;
+  }
+
+ private:
+  Script* const script_;
+};
+
 SessionRequest SomeRequest() {
   SessionRequest request;
   request.stiffness = 1e3;
@@ -208,6 +225,7 @@ class FailoverTest : public ::testing::Test {
     builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
     builder.RegisterService(&sessions_);
     builder.RegisterService(&streams_);
+    builder.RegisterService(&exports_);
     server_ = builder.BuildAndStart();
     ASSERT_NE(server_, nullptr);
     ASSERT_OK_AND_ASSIGN(client_, TissueformClient::Connect(absl::StrCat("127.0.0.1:", port), {}));
@@ -226,6 +244,7 @@ class FailoverTest : public ::testing::Test {
   Script script_;
   ScriptedSessions sessions_{&script_};
   ScriptedStreams streams_{&script_};
+  ScriptedExports exports_{&script_};
   std::unique_ptr<grpc::Server> server_;
   std::unique_ptr<TissueformClient> client_;
   int detached_ = 0;
@@ -389,6 +408,92 @@ TEST_F(FailoverTest, AFrameIsAcknowledgedWhereItCameFrom) {
   EXPECT_THAT(watch->Ack(*frame), IsOk());
   EXPECT_THAT(script_.meant(), ElementsAre("-", kOwnName));
 }
+
+// Through a proxy an error that ends a call early arrives under another code, with the server's
+// details or without any.
+class ProxiedFailoverTest : public FailoverTest,
+                            public ::testing::WithParamInterface<grpc::StatusCode> {
+ protected:
+  grpc::Status AsProxied(const grpc::Status& error) const {
+    return {GetParam(), "Received RST_STREAM with error code 8", error.error_details()};
+  }
+};
+
+const grpc::Status kCutOff(grpc::StatusCode::UNAVAILABLE, "");
+
+TEST_P(ProxiedFailoverTest, ADragGoesOnWhereTheReasonSays) {
+  streams_.PlanEnds({AsProxied(Moved("two:1")), AsProxied(kCutOff)});
+  const auto drag = OpenDrag();
+  ASSERT_NE(drag, nullptr);
+  drag->SendPoses(1, {});
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(drag->Receive().has_value()) << i;
+  EXPECT_THAT(script_.meant(), ElementsAre("-", "two:1", "-"));
+  drag->Cancel();
+  EXPECT_EQ(drag->Receive(), std::nullopt);
+  EXPECT_TRUE(absl::IsCancelled(drag->Finish())) << "it was";
+}
+
+TEST_P(ProxiedFailoverTest, AWatchDoesToo) {
+  streams_.PlanEnds({AsProxied(Moved("two:1")), AsProxied(kCutOff), kNotFound});
+  ASSERT_OK_AND_ASSIGN(const auto watch, ReattachingWatch::Open(client_.get(), kSession, {}));
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(watch->Receive().has_value()) << i;
+  EXPECT_EQ(watch->Receive(), std::nullopt);
+  EXPECT_THAT(script_.meant(), ElementsAre("-", "two:1", "-"));
+}
+
+TEST_P(ProxiedFailoverTest, AWatchOfExportsThatWasCutOffMayBeBegunAgain) {
+  script_.Plan({AsProxied(kCutOff)});
+  const auto watch = client_->exports().Watch();
+  EXPECT_TRUE(watch->Receive().has_value());
+  EXPECT_EQ(watch->Receive(), std::nullopt);
+  const absl::Status end = watch->Finish();
+  EXPECT_TRUE(IsTransient(end)) << end;
+}
+
+TEST_P(ProxiedFailoverTest, ACallThatMayBeRepeatedIs) {
+  EXPECT_TRUE(client_->GetSession(kSession).ok());
+  script_.Plan({AsProxied(kCutOff)});
+  EXPECT_TRUE(client_->GetSession(kSession).ok());
+  EXPECT_THAT(script_.meant(), ElementsAre("-", kOwnName, "-"));
+}
+
+TEST_P(ProxiedFailoverTest, WhatWasRefusedBeforeItBeganIsRepeatedWhateverItIs) {
+  EXPECT_TRUE(client_->GetSession(kSession).ok());
+  v1::UpdateSessionRequest request;
+  request.set_name(kSession);
+  request.set_etag("1");
+  for (const ErrorReason reason :
+       {ErrorReason::kSessionMoved, ErrorReason::kWrongNode, ErrorReason::kServerDraining}) {
+    script_.Plan({AsProxied(Refusal(grpc::StatusCode::UNAVAILABLE, reason, ""))});
+    EXPECT_TRUE(client_->UpdateSession(request).ok()) << ReasonName(reason);
+  }
+}
+
+TEST_P(ProxiedFailoverTest, WhatTheServerRefusesForGoodIsSaidAsTheServerSaidIt) {
+  script_.Plan(
+      {AsProxied(Refusal(grpc::StatusCode::NOT_FOUND, ErrorReason::kSessionNotFound, ""))});
+  const absl::Status refused = client_->GetSession(kSession).status();
+  EXPECT_TRUE(absl::IsNotFound(refused)) << refused;
+  EXPECT_TRUE(HasReason(refused, ErrorReason::kSessionNotFound)) << refused;
+}
+
+std::string NameOfCode(const ::testing::TestParamInfo<grpc::StatusCode>& code) {
+  switch (code.param) {
+    case grpc::StatusCode::CANCELLED:
+      return "Cancelled";
+    case grpc::StatusCode::UNKNOWN:
+      return "Unknown";
+    case grpc::StatusCode::INTERNAL:
+      return "Internal";
+    default:
+      return "Unavailable";
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Codes, ProxiedFailoverTest,
+                         ::testing::Values(grpc::StatusCode::CANCELLED, grpc::StatusCode::UNKNOWN,
+                                           grpc::StatusCode::INTERNAL,
+                                           grpc::StatusCode::UNAVAILABLE),
+                         NameOfCode);
 
 }  // namespace
 }  // namespace tissueform::testing

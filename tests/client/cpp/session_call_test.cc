@@ -63,6 +63,11 @@ TEST_F(SessionAttemptsTest, ASessionThatIsNowhereIsAskedForAtOnceAndThenAfterAWa
   EXPECT_TRUE(Waits(attempts.AfterError(Moved(""))));
 }
 
+TEST_F(SessionAttemptsTest, WhoHasNoPatienceAsksOnceForASessionThatIsNowhere) {
+  SessionAttempts attempts(&routes_, "sessions/a", CallRepeat::kAlways, kNoPatience);
+  EXPECT_FALSE(attempts.AfterError(Moved("")).has_value());
+}
+
 TEST_F(SessionAttemptsTest, WhatWasNotBegunIsRepeatedAndWhatMayHaveBeenDoneIsNot) {
   routes_.Remember("sessions/a", "one");
   for (const ErrorReason reason : {ErrorReason::kWrongNode, ErrorReason::kServerDraining}) {
@@ -70,8 +75,8 @@ TEST_F(SessionAttemptsTest, WhatWasNotBegunIsRepeatedAndWhatMayHaveBeenDoneIsNot
     EXPECT_TRUE(Waits(Attempts(CallRepeat::kIfNothingWasDone).AfterError(error))) << error;
     EXPECT_TRUE(Waits(Attempts(CallRepeat::kAlways).AfterError(error))) << error;
   }
-  for (const absl::Status& lost : {absl::UnavailableError(""), absl::UnknownError(""),
-                                   absl::InternalError(""), absl::CancelledError("")}) {
+  for (const absl::Status& lost :
+       {absl::UnavailableError(""), absl::UnknownError(""), absl::InternalError("")}) {
     EXPECT_FALSE(Attempts(CallRepeat::kIfNothingWasDone).AfterError(lost).has_value()) << lost;
     EXPECT_TRUE(Waits(Attempts(CallRepeat::kAlways).AfterError(lost))) << lost;
   }
@@ -79,9 +84,9 @@ TEST_F(SessionAttemptsTest, WhatWasNotBegunIsRepeatedAndWhatMayHaveBeenDoneIsNot
 
 TEST_F(SessionAttemptsTest, WhatIsRefusedIsNotRepeated) {
   routes_.Remember("sessions/a", "one");
-  for (const absl::Status& error :
-       {absl::NotFoundError(""), absl::InvalidArgumentError(""), absl::AbortedError(""),
-        absl::DeadlineExceededError(""), absl::DataLossError(""), Full("")}) {
+  for (const absl::Status& error : {absl::NotFoundError(""), absl::InvalidArgumentError(""),
+                                    absl::AbortedError(""), absl::DeadlineExceededError(""),
+                                    absl::DataLossError(""), absl::CancelledError(""), Full("")}) {
     EXPECT_FALSE(Attempts(CallRepeat::kAlways).AfterError(error).has_value()) << error;
   }
 }

@@ -45,7 +45,7 @@ class FakeCall final : public grpc::ServerGenericBidiReactor {
     } else if (!absl::EndsWith(method, "/ListMeshes") && !absl::EndsWith(method, "/Stuck")) {
       context->AddInitialMetadata("x-tissueform-node", server->name());
       context->AddTrailingMetadata("x-tissueform-node", server->name());
-      End(grpc::Status(grpc::StatusCode::NOT_FOUND, "not here: 5 %", "details"));
+      End(server->end());
     }
   }
 
@@ -98,6 +98,16 @@ std::string FakeServer::address() const { return absl::StrCat("127.0.0.1:", port
 
 void FakeServer::SetServing(bool serving) {
   server_->GetHealthCheckService()->SetServingStatus(serving);
+}
+
+void FakeServer::EndWith(const grpc::Status& end) {
+  MutexLock lock(mutex_);
+  end_ = end;
+}
+
+grpc::Status FakeServer::end() const {
+  MutexLock lock(mutex_);
+  return end_;
 }
 
 grpc::ServerGenericBidiReactor* FakeServer::CreateReactor(

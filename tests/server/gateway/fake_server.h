@@ -10,6 +10,8 @@
 #include "grpcpp/generic/async_generic_service.h"
 #include "grpcpp/server.h"
 
+#include "core/base/mutex.h"
+
 namespace tissueform::testing {
 
 // A gRPC server in this process that does by a method's name what a test wants:
@@ -22,8 +24,9 @@ namespace tissueform::testing {
 //                                                cancelled
 //   SessionService/GetSession                    the names of the client's metadata that it saw,
 //                                                with their values
-//   others                                       NOT_FOUND, "not here: 5 %", with details, headers
-//                                                and trailers
+//   others                                       what EndWith has said, at first NOT_FOUND, "not
+//                                                here: 5 %", with details; with headers and
+//                                                trailers
 class FakeServer : public grpc::CallbackGenericService {
  public:
   static constexpr size_t kEndlessBytes = size_t{64} << 10;
@@ -36,6 +39,9 @@ class FakeServer : public grpc::CallbackGenericService {
   std::string address() const;
   // By the health service.
   void SetServing(bool serving);
+  // How those calls end from now on of which nothing else is said above.
+  void EndWith(const grpc::Status& end) ABSL_LOCKS_EXCLUDED(mutex_);
+  grpc::Status end() const ABSL_LOCKS_EXCLUDED(mutex_);
 
   std::atomic<int> open = 0;
   std::atomic<int> cancelled = 0;
@@ -48,6 +54,9 @@ class FakeServer : public grpc::CallbackGenericService {
 
   const std::string name_;
   int port_ = 0;
+  mutable Mutex mutex_;
+  grpc::Status end_ ABSL_GUARDED_BY(mutex_){grpc::StatusCode::NOT_FOUND, "not here: 5 %",
+                                            "details"};
   std::unique_ptr<grpc::Server> server_;
 };
 

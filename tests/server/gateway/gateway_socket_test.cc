@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 #include "gmock/gmock.h"
+#include "google/rpc/status.pb.h"
 #include "gtest/gtest.h"
 
 #include "tests/server/gateway/gateway_test.h"
@@ -368,6 +369,58 @@ TEST_F(GatewaySocketTest, AnEndingGatewayTellsEverySocket) {
   EXPECT_TRUE(Becomes([&] { return server_.open == 0; }));
   Restart({});
 }
+
+// Before the servers a proxy may stand, which ends calls in words of its own.
+class ProxiedEndTest : public GatewaySocketTest,
+                       public ::testing::WithParamInterface<grpc::StatusCode> {
+ protected:
+  v1::GatewayCallEnd EndOf(const std::string& details) {
+    server_.EndWith({GetParam(), "Received RST_STREAM with error code 8", details});
+    RawSocket socket(port());
+    socket.Start("/tissueform.v1.SessionService/UpdateSession");
+    return socket.ReceiveEnd();
+  }
+};
+
+TEST_P(ProxiedEndTest, WhatTheServerHasSaidIsToldToThePage) {
+  for (const auto code : {grpc::StatusCode::UNAVAILABLE, grpc::StatusCode::NOT_FOUND}) {
+    google::rpc::Status details;
+    details.set_code(code);
+    details.set_message("said");
+    const v1::GatewayCallEnd end = EndOf(details.SerializeAsString());
+    EXPECT_EQ(end.code(), code);
+    EXPECT_EQ(end.status_details(), details.SerializeAsString());
+    EXPECT_EQ(end.message(), code == GetParam() ? "Received RST_STREAM with error code 8" : "said");
+  }
+}
+
+TEST_P(ProxiedEndTest, WhatNobodyHasCancelledIsNotToldAsCancelled) {
+  const auto told =
+      GetParam() == grpc::StatusCode::CANCELLED ? grpc::StatusCode::UNAVAILABLE : GetParam();
+  for (const char* details : {"", "\xff\xff"}) {
+    const v1::GatewayCallEnd end = EndOf(details);
+    EXPECT_EQ(end.code(), told);
+    EXPECT_EQ(end.message(), "Received RST_STREAM with error code 8");
+  }
+}
+
+std::string NameOfEnd(const ::testing::TestParamInfo<grpc::StatusCode>& code) {
+  switch (code.param) {
+    case grpc::StatusCode::CANCELLED:
+      return "Cancelled";
+    case grpc::StatusCode::UNKNOWN:
+      return "Unknown";
+    case grpc::StatusCode::INTERNAL:
+      return "Internal";
+    default:
+      return "Unavailable";
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Codes, ProxiedEndTest,
+                         ::testing::Values(grpc::StatusCode::CANCELLED, grpc::StatusCode::UNKNOWN,
+                                           grpc::StatusCode::INTERNAL,
+                                           grpc::StatusCode::UNAVAILABLE),
+                         NameOfEnd);
 
 }  // namespace
 }  // namespace tissueform::testing

@@ -16,22 +16,29 @@ const LONGEST_MS = 5000;
 /** While servers of a cluster say that the session is moving: it is free within seconds, and the hand waits. */
 const LONGEST_MOVING_MS = 800;
 const MOST_HOPS = 4;
+/** A stream that ends sooner has come to nothing: a server may let streams begin and end them at once. */
+const LASTING_MS = 2000;
 
 /**
  * How long to wait before each further try: twice as long each time, up to 5 s, a fifth at random so that pages spread. Not at
  * all where an error says which server to ask instead, up to four times on end, and once where it says that there is another.
+ * After a success that lasted it begins anew.
  */
 export class Backoff {
   private tries = 0;
   private hops = 0;
+  private hasMoved = false;
+  /** The first success since the last failure. */
+  private since: number | null = null;
 
-  constructor(private readonly random: () => number = Math.random) {}
+  constructor(
+    private readonly random: () => number = Math.random,
+    private readonly now: () => number = () => performance.now(),
+  ) {}
 
   next(error?: CallError): number {
-    if (error?.isMoved && this.hops < (error.node === "" ? 1 : MOST_HOPS)) {
-      this.hops += 1;
-      return 0;
-    }
+    this.judgeSuccess();
+    if (error !== undefined && this.isAtOnce(error)) return 0;
     this.hops = 0;
     const delay = Math.min(error?.isElsewhere ? LONGEST_MOVING_MS : LONGEST_MS, FIRST_MS * 2 ** this.tries);
     // What follows on a move does not wait long because the move took long.
@@ -39,8 +46,19 @@ export class Backoff {
     return delay * (1 - 0.2 * this.random());
   }
 
-  reset(): void {
-    this.tries = 0;
-    this.hops = 0;
+  succeeded(): void {
+    this.since ??= this.now();
+  }
+
+  private judgeSuccess(): void {
+    if (this.since !== null && this.now() - this.since >= LASTING_MS) [this.tries, this.hops, this.hasMoved] = [0, 0, false];
+    this.since = null;
+  }
+
+  private isAtOnce(error: CallError): boolean {
+    if (!error.isMoved || (error.node === "" ? this.hasMoved : this.hops === MOST_HOPS)) return false;
+    if (error.node === "") this.hasMoved = true;
+    else this.hops += 1;
+    return true;
   }
 }

@@ -5,10 +5,13 @@ import { fromBinary, type Message } from "@bufbuild/protobuf";
 import type { GenMessage } from "@bufbuild/protobuf/codegenv2";
 import { Code, ConnectError } from "@connectrpc/connect";
 import { type ErrorInfo, ErrorInfoSchema } from "../generated/google/rpc/error_details_pb";
-import { StatusSchema } from "../generated/google/rpc/status_pb";
+import { type Status, StatusSchema } from "../generated/google/rpc/status_pb";
 
 /** Codes of gRPC by which this page decides. */
 export { Code };
+
+/** A server refuses before anything is done, another one may not. */
+const ELSEWHERE = ["SESSION_MOVED", "WRONG_NODE", "SERVER_DRAINING"];
 
 /**
  * A call that failed: the code of gRPC, and the server's reason (docs/service-api.md), "" where it gave none. `message` is a
@@ -33,7 +36,7 @@ export class CallError extends Error {
 
   /** Whether it says nothing of the call itself, only that this server does not answer it now. */
   get isOfServer(): boolean {
-    return this.code === Code.Unavailable || this.isOfTransport;
+    return this.code === Code.Unavailable || ELSEWHERE.includes(this.reason) || this.isOfTransport;
   }
 
   /** Whether another server of the cluster is to be asked; this one has done nothing. */
@@ -51,10 +54,26 @@ export class CallError extends Error {
   }
 }
 
-/** Of an end frame: `details` are the bytes of a google.rpc.Status, or none. */
+/**
+ * Of an end frame of a call that this page has not cancelled: `details` are the bytes of a google.rpc.Status, or none. What the
+ * server says in them counts: a proxy may end a call in other words. CANCELLED says that something between here and there has
+ * gone, so it is UNAVAILABLE.
+ */
 export function callErrorOf(code: number, message: string, details: Uint8Array): CallError {
-  const info = infoOf(details);
-  return new CallError(code as Code, message === "" ? describe(code) : message, info?.reason ?? "", info?.metadata.node ?? "");
+  const status = parse(StatusSchema, details);
+  const isChanged = status !== undefined && status.code !== code && Code[status.code] !== undefined;
+  const [saidCode, said] = isChanged ? [status.code, status.message] : [code, message];
+  const info = infoOf(status);
+  const told = said === "" ? describe(saidCode) : said;
+  return new CallError(saidCode === Code.Canceled ? Code.Unavailable : (saidCode as Code), told, info?.reason ?? "", info?.metadata.node ?? "");
+}
+
+/** What a call that this page has not cancelled has failed with, where CANCELLED is UNAVAILABLE, too. */
+export function unlessCancelled(thrown: unknown): unknown {
+  if (!(thrown instanceof ConnectError) || thrown.code !== Code.Canceled) return thrown;
+  const error = new ConnectError(thrown.rawMessage, Code.Unavailable, thrown.metadata, undefined, thrown);
+  error.details = thrown.details;
+  return error;
 }
 
 /** Whatever was thrown, as a CallError. */
@@ -72,8 +91,7 @@ export function sentenceOf(thrown: unknown): string {
   return /[.!?]$/.test(sentence) ? sentence : `${sentence}.`;
 }
 
-function infoOf(details: Uint8Array): ErrorInfo | undefined {
-  const status = parse(StatusSchema, details);
+function infoOf(status: Status | undefined): ErrorInfo | undefined {
   const info = status?.details.find((detail) => detail.typeUrl.endsWith("/google.rpc.ErrorInfo"));
   return info === undefined ? undefined : parse(ErrorInfoSchema, info.value);
 }

@@ -3,7 +3,7 @@
 
 import type { Interceptor, StreamResponse } from "@connectrpc/connect";
 import { Backoff } from "./backoff";
-import { type CallError, toCallError } from "./call_error";
+import { type CallError, toCallError, unlessCancelled } from "./call_error";
 import { NODE_HEADER, SESSION_HEADER, type SessionRoutes } from "./session_routes";
 
 /** How long a call is tried again after it has failed first: longer than another server needs to take a session over. */
@@ -33,14 +33,17 @@ export function withRoutes(routes: SessionRoutes, clock: RepetitionClock = BROWS
       const node = routes.nodeOf(session);
       if (node === "") request.header.delete(NODE_HEADER);
       else request.header.set(NODE_HEADER, node);
-      const onError = (thrown: unknown) => routes.failed(session, node, toCallError(thrown));
+      const onError = (thrown: unknown) => {
+        const told = request.signal.aborted ? thrown : unlessCancelled(thrown);
+        routes.failed(session, node, toCallError(told));
+        return told;
+      };
       try {
         const response = await next(request);
         routes.learn(session, response.header.get(NODE_HEADER) ?? response.trailer.get(NODE_HEADER) ?? "");
         return response.stream ? { ...response, message: watched(response.message, onError) } : response;
       } catch (thrown) {
-        onError(thrown);
-        throw thrown;
+        throw onError(thrown);
       }
     };
     if (request.stream) return ask();
@@ -67,11 +70,10 @@ export async function repeated<T>(ask: () => Promise<T>, mayRepeat: (error: Call
 }
 
 // A stream of answers ends within what the caller reads.
-async function* watched(messages: StreamResponse["message"], onError: (thrown: unknown) => void) {
+async function* watched(messages: StreamResponse["message"], onError: (thrown: unknown) => unknown) {
   try {
     yield* messages;
   } catch (thrown) {
-    onError(thrown);
-    throw thrown;
+    throw onError(thrown);
   }
 }

@@ -54,7 +54,7 @@ export class DragSession {
   private readonly unwatch: () => void;
   private call: CallSocket<typeof DeformService.method.deform> | null = null;
   private stopTimer: (() => void) | null = null;
-  private readonly backoff = new Backoff();
+  private readonly backoff: Backoff;
   private isClosed = false;
   private isStarted = false;
   /** The token that the open call stands on. */
@@ -73,6 +73,7 @@ export class DragSession {
     private readonly timer: Timer = browserTimer,
     private readonly now: () => number = () => performance.now(),
   ) {
+    this.backoff = new Backoff(Math.random, now);
     this.unwatch = gateway.bearer.watch((token) => this.renew(token));
     this.connect();
   }
@@ -136,7 +137,7 @@ export class DragSession {
   private start(started: DeformStarted): void {
     this.isStarted = true;
     this.renew(this.gateway.bearer.token);
-    this.backoff.reset();
+    this.backoff.succeeded();
     this.listener.onStarted(started);
     this.sendNewest(this.uncommitted !== null);
   }

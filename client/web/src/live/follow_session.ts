@@ -82,7 +82,7 @@ export class FollowSession {
       this.watch = message.value.watch;
       this.used = null;
       this.form = message.value.form ?? null;
-      this.backoff.reset();
+      this.backoff.succeeded();
       this.listener.onStarted();
     } else if (message.case === "form") this.form = message.value;
     else if (message.case === "frame") this.show(message.value, raw);

@@ -68,7 +68,7 @@ export class PacsExports {
 
   // What was not done has come by then; what was done and what went meanwhile is asked for.
   private told(): void {
-    this.backoff.reset();
+    this.backoff.succeeded();
     this.list().then(
       (all) => {
         if (this.isClosed) return;

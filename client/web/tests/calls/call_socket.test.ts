@@ -54,6 +54,29 @@ test("an end with ErrorInfo tells code, message and reason", () => {
   expect(ends[0]).toMatchObject({ code: Code.NotFound, message: "no session of that name", reason: "SESSION_NOT_FOUND", isPassing: false });
 });
 
+const BY_PROXIES = [Code.Canceled, Code.Unknown, Code.Internal, Code.Unavailable];
+
+test.each(BY_PROXIES)("what the server says counts, whatever code a proxy makes of it (%i)", (code) => {
+  const end = (said: Code, reason: string) => {
+    const { socket, ends } = open();
+    const details = [anyPack(ErrorInfoSchema, create(ErrorInfoSchema, { reason, domain: "tissueform" }))];
+    socket.end(code, "Received RST_STREAM with error code 8", toBinary(StatusSchema, create(StatusSchema, { code: said, message: "said", details })));
+    return ends[0];
+  };
+  for (const reason of ["SESSION_MOVED", "WRONG_NODE", "SERVER_DRAINING"]) {
+    expect(end(Code.Unavailable, reason)).toMatchObject({ code: Code.Unavailable, reason, isPassing: true, isOfServer: true });
+    expect(end(0 as Code, reason)).toMatchObject({ reason, isPassing: true, isOfServer: true });
+  }
+  expect(end(Code.NotFound, "SESSION_NOT_FOUND")).toMatchObject({ code: Code.NotFound, message: "said", isPassing: false });
+});
+
+test.each(BY_PROXIES)("an end without a reason that nobody here asked for passes (%i)", (code) => {
+  const { socket, ends } = open();
+  socket.end(code, "Received RST_STREAM with error code 8");
+  expect(ends[0]).toMatchObject({ isPassing: true, isOfServer: true });
+  expect(ends[0]?.code).not.toBe(Code.Canceled);
+});
+
 test("details that cannot be read do not hide the error", () => {
   const { socket, ends } = open();
   socket.end(14, "draining", new Uint8Array([255, 255, 255]));

@@ -118,6 +118,22 @@ test("what only reads, or has an id, is tried again where the server dies", asyn
   expect(nodes()).toEqual([null, null, null, "b", null]);
 });
 
+test.each([Code.Canceled, Code.Unknown, Code.Internal, Code.Unavailable])("a read that ends with code %i, though this page has not ended it, is tried again", async (code) => {
+  const { calls, read, nodes } = gateway(failure(code), success("b"));
+  calls.routes.learn("s", "a");
+  await read();
+  expect(nodes()).toEqual(["a", null]);
+});
+
+test("what this page has ended itself is not tried again, and says nothing of the server", async () => {
+  const { calls, run, codeOf, asked } = gateway(failure(Code.Canceled));
+  calls.routes.learn("s", "a");
+  const call = calls.sessions.getSession({ name: "sessions/s" }, { headers: sessionMetadata("sessions/s"), signal: AbortSignal.abort() });
+  expect(await codeOf(run(call))).toBe(Code.Canceled);
+  expect(asked.length).toBeLessThanOrEqual(1);
+  expect(calls.routes.nodeOf("s")).toBe("a");
+});
+
 test("what might be done twice says the error", async () => {
   const { remove, asked, codeOf } = gateway(failure(14), success(""));
   expect(await codeOf(remove())).toBe(Code.Unavailable);

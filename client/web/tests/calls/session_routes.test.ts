@@ -98,7 +98,24 @@ test("where an error names the server there is no wait, up to four times on end"
 
 test("the first try after a move to nobody knows where does not wait, the next ones do", () => {
   const backoff = new Backoff(() => 0);
-  expect([backoff.next(moved()), backoff.next(moved()), backoff.next(moved())]).toEqual([0, 250, 0]);
+  expect([backoff.next(moved()), backoff.next(moved()), backoff.next(moved())]).toEqual([0, 250, 500]);
+});
+
+test("after a success that lasted, and only then, tries begin anew", () => {
+  let now = 0;
+  const backoff = new Backoff(() => 0, () => now);
+  const failure = (lastedMs: number) => {
+    backoff.succeeded();
+    backoff.succeeded();
+    now += lastedMs;
+    return backoff.next(moved());
+  };
+  expect([failure(0), failure(100), failure(1900), failure(2000), failure(0)]).toEqual([0, 250, 500, 0, 250]);
+});
+
+test("servers of which one names the other, and that knows nobody, are not asked without pause", () => {
+  const backoff = new Backoff(() => 0);
+  expect([1, 2, 3, 4].flatMap(() => [backoff.next(moved("b")), backoff.next(moved())])).toEqual([0, 0, 0, 250, 0, 500, 0, 800]);
 });
 
 test("a session that nobody may take yet is tried again within a second for as long as that lasts", () => {

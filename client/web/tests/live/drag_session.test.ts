@@ -128,8 +128,8 @@ describe("a drag", () => {
     expect(last().deformRequests()[1].message).toMatchObject({ case: "pose", value: { sequence: 2n } });
   });
 
-  test("waits longer from try to try, and starts over after a success", () => {
-    const { timers, last } = drag();
+  test("waits longer from try to try, and starts over after a success that lasted", () => {
+    const { timers, last, sleep } = drag();
     for (let i = 0; i < 8; ++i) {
       last().onclose?.({ code: 1006, reason: "" });
       timers[i].action();
@@ -140,8 +140,30 @@ describe("a drag", () => {
     expect(Math.max(...delays)).toBeLessThanOrEqual(5000);
     last().answer(STARTED);
     last().onclose?.({ code: 1006, reason: "" });
-    expect(timers[8].delayMs).toBeLessThanOrEqual(250);
+    expect(timers[8].delayMs).toBeGreaterThan(3900);
+    timers[8].action();
+    last().answer(STARTED);
+    sleep(2000);
+    last().onclose?.({ code: 1006, reason: "" });
+    expect(timers[9].delayMs).toBeLessThanOrEqual(250);
   });
+
+  test.each([Code.Unavailable, Code.Canceled, Code.Unknown, Code.Internal])(
+    "whose streams begin and end at once does not ask without pause, whatever code comes (%i)",
+    (code) => {
+      const { timers, last, errors, sleep } = drag();
+      let [now, tries] = [0, 0];
+      for (; now < 40_000 && tries < 10_000; ++tries) {
+        last().answer(STARTED);
+        last().end(code, "elsewhere", sessionMoved());
+        expect(errors).toEqual([]);
+        now += timers[tries].delayMs + 8;
+        sleep(timers[tries].delayMs + 8);
+        timers[tries].action();
+      }
+      expect(tries).toBeLessThan(5 * 40);
+    },
+  );
 
   test("whose session moves goes on at once, with the newest poses and what was not kept", () => {
     const { session, sockets, timers, last, told } = drag();

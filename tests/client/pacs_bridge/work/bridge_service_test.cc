@@ -4,8 +4,11 @@
 #include "client/pacs_bridge/work/bridge_service.h"
 
 #include <chrono>
+#include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/match.h"
@@ -127,6 +130,60 @@ TEST_F(BridgeServiceTest, WhatIsConfirmedWhileItIsDrawnIsDrawnOnce) {
   EXPECT_TRUE(log_.WaitFor("exports/1: sent -> told"));
   EXPECT_EQ(slow_.drawn(), 1);
 }
+
+// Tells of one export in a watch that lasts, and refuses the first word about it.
+class OnceRefusingServer final : public testing::FolderCaseServer {
+ public:
+  OnceRefusingServer(const std::filesystem::path& folder, v1::Export told, absl::Status refusal,
+                     HeardLog* log)
+      : FolderCaseServer(folder), told_(std::move(told)), refusal_(std::move(refusal)), log_(log) {}
+
+  absl::Status UpdateExport(const std::string& name, v1::ExportState state,
+                            const std::string& detail, int stored) override {
+    if (const absl::Status refusal = std::exchange(refusal_, absl::OkStatus()); !refusal.ok()) {
+      return refusal;
+    }
+    log_->Add("the server hears of " + name);
+    return FolderCaseServer::UpdateExport(name, state, detail, stored);
+  }
+  absl::Status WatchExports(const std::function<void(const v1::Export&)>& tell,
+                            const Cancellation& cancelled) override {
+    tell(told_);
+    MutexLock lock(mutex_);
+    while (!cancelled.requested()) {
+      changed_.WaitUntil(mutex_, std::chrono::steady_clock::now() + std::chrono::milliseconds(50));
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  const v1::Export told_;
+  absl::Status refusal_;  // of the thread that works on exports
+  HeardLog* const log_;
+  Mutex mutex_;
+  ConditionVariable changed_;
+};
+
+class RefusedWordTest : public BridgeServiceTest,
+                        public ::testing::WithParamInterface<absl::StatusCode> {};
+
+TEST_P(RefusedWordTest, IsSaidAgainThoughTheWatchGoesOn) {
+  v1::Export told;
+  told.set_name("exports/1");
+  told.set_case_(exports_.Get("exports/1")->case_name);
+  told.set_state(v1::EXPORT_STATE_WAITING);
+  OnceRefusingServer server(root_ / "server", told, absl::Status(GetParam(), "gone"), &log_);
+  ExportWork work(queue_.get(), &server, pacs_.get(), &writer_, ExportWorkOptions());
+  const BridgeService service({.queue = queue_.get(), .exports = &work, .server = &server});
+  EXPECT_TRUE(log_.WaitFor("the server hears of exports/1"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Codes, RefusedWordTest,
+                         ::testing::Values(absl::StatusCode::kUnavailable,
+                                           absl::StatusCode::kUnknown, absl::StatusCode::kInternal),
+                         [](const ::testing::TestParamInfo<absl::StatusCode>& code) {
+                           return absl::StatusCodeToString(code.param);
+                         });
 
 }  // namespace
 }  // namespace tissueform

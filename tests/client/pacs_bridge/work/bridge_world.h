@@ -34,7 +34,7 @@ inline std::vector<std::string> LinesOfFile(const std::filesystem::path& file) {
   return lines;
 }
 
-class FolderCaseServer final : public CaseServer {
+class FolderCaseServer : public CaseServer {
  public:
   explicit FolderCaseServer(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
