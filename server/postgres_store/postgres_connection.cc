@@ -163,10 +163,13 @@ absl::Status PostgresConnection::Transact(
   } catch (const pqxx::in_doubt_error&) {
     usable_ = false;
     *outcome = PostgresOutcome::kUnknown;
-    return absl::UnavailableError(absl::StrCat(
-        "database ", library_->name,
-        ": the connection was lost during a commit, which may have been kept; look before you try "
-        "again"));
+    return HidingDatabase(
+        absl::UnavailableError(absl::StrCat(
+            "database ", library_->name,
+            ": the connection was lost during a commit, which may have been kept; look before you "
+            "try again")),
+        "the server's database was lost while this was kept, and it may have been; look before you "
+        "try again");
   } catch (...) {
     return fail(FailureOfCaught(library_->name));
   }

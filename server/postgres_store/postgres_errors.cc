@@ -3,6 +3,7 @@
 
 #include "server/postgres_store/postgres_errors.h"
 
+#include <utility>
 #include <vector>
 
 #include "absl/strings/ascii.h"
@@ -11,6 +12,8 @@
 #include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
 #include <pqxx/pqxx>
+
+#include "server/store/store_errors.h"
 
 namespace tissueform {
 namespace {
@@ -22,50 +25,77 @@ std::string FirstLine(absl::string_view text) {
   return std::string(absl::StripAsciiWhitespace(line));
 }
 
+constexpr char kSameRows[] = "others change the same things at this moment; try again";
+
+const char* SentenceOf(absl::StatusCode code) {
+  switch (code) {
+    case absl::StatusCode::kUnavailable:
+      return "the server's database does not answer; try again in a minute";
+    case absl::StatusCode::kResourceExhausted:
+      return "the disk of the server's database is full; tell who operates the server";
+    case absl::StatusCode::kFailedPrecondition:
+      return "the server's database takes no changes now; tell who operates the server";
+    default:
+      return "the server's database has failed; tell who operates the server";
+  }
+}
+
+absl::Status SameRows(const std::string& name) {
+  return HidingDatabase(absl::UnavailableError(absl::StrCat(
+                            "database ", name, ": others write the same rows; try again")),
+                        kSameRows);
+}
+
+PostgresFailure LostConnection(const std::string& name, const std::exception& error) {
+  return {.status = HidingDatabase(absl::UnavailableError(
+              absl::StrCat("database ", name, ": ", FirstLine(error.what())))),
+          .transient = true,
+          .connected = false};
+}
+
 // By SQLSTATE; https://www.postgresql.org/docs/15/errcodes-appendix.html
 PostgresFailure FailureOf(const std::string& name, const pqxx::sql_error& error) {
   const std::string& state = error.sqlstate();
   const auto told = [&](const char* what) { return absl::StrCat("database ", name, ": ", what); };
   if (state == "53100") {
-    return {absl::ResourceExhaustedError(told("its disk is full; make room there"))};
+    return {
+        HidingDatabase(absl::ResourceExhaustedError(told("its disk is full; make room there")))};
   }
   if (state == "25006") {
     // Where a failover has made a replica of what was the primary another connection may find it.
-    return {.status = absl::FailedPreconditionError(
-                told("it is a read-only replica; name the primary (target_session_attrs)")),
+    return {.status = HidingDatabase(absl::FailedPreconditionError(
+                told("it is a read-only replica; name the primary (target_session_attrs)"))),
             .connected = false};
   }
   if (state == "22021") {
     return {absl::InvalidArgumentError("a name holds bytes that are no text in UTF-8")};
   }
   if (state == "40001" || state == "40P01") {
-    return {.status = absl::UnavailableError(told("others write the same rows; try again")),
-            .transient = true};
+    return {.status = SameRows(name), .transient = true};
   }
   if (state == "55P03") {
-    return {absl::UnavailableError(told("others hold the same rows for too long; try again"))};
+    return {HidingDatabase(
+        absl::UnavailableError(told("others hold the same rows for too long; try again")),
+        kSameRows)};
   }
   if (state == "57014") {
-    return {absl::UnavailableError(told("a statement took too long and was ended; try again"))};
+    return {HidingDatabase(
+        absl::UnavailableError(told("a statement took too long and was ended; try again")))};
   }
   if (absl::StartsWith(state, "08") || absl::StartsWith(state, "57P") || state == "53300" ||
       state == "25P03") {
-    return {.status = absl::UnavailableError(told(FirstLine(error.what()).c_str())),
-            .transient = true,
-            .connected = false};
+    return LostConnection(name, error);
   }
-  return {absl::InternalError(
-      absl::StrCat("database ", name, ": ", FirstLine(error.what()), " (SQLSTATE ", state, ")"))};
-}
-
-PostgresFailure LostConnection(const std::string& name, const std::exception& error) {
-  return {.status = absl::UnavailableError(
-              absl::StrCat("database ", name, ": ", FirstLine(error.what()))),
-          .transient = true,
-          .connected = false};
+  return {HidingDatabase(absl::InternalError(
+      absl::StrCat("database ", name, ": ", FirstLine(error.what()), " (SQLSTATE ", state, ")")))};
 }
 
 }  // namespace
+
+absl::Status HidingDatabase(absl::Status status, absl::string_view sentence) {
+  const absl::StatusCode code = status.code();
+  return TellingClients(std::move(status), sentence.empty() ? SentenceOf(code) : sentence);
+}
 
 PostgresFailure FailureOfCaught(const std::string& name) {
   try {
@@ -73,14 +103,12 @@ PostgresFailure FailureOfCaught(const std::string& name) {
   } catch (const pqxx::sql_error& error) {
     return FailureOf(name, error);
   } catch (const pqxx::transaction_rollback&) {
-    return {.status = absl::UnavailableError(
-                absl::StrCat("database ", name, ": others write the same rows; try again")),
-            .transient = true};
+    return {.status = SameRows(name), .transient = true};
   } catch (const pqxx::broken_connection& error) {
     return LostConnection(name, error);
   } catch (const std::exception& error) {
-    return {.status =
-                absl::InternalError(absl::StrCat("database ", name, ": ", FirstLine(error.what()))),
+    return {.status = HidingDatabase(absl::InternalError(
+                absl::StrCat("database ", name, ": ", FirstLine(error.what())))),
             .connected = false};
   }
 }
@@ -88,12 +116,13 @@ PostgresFailure FailureOfCaught(const std::string& name) {
 absl::Status ConnectError(const std::string& name, absl::string_view what) {
   if (absl::StrContains(what, "password authentication failed") ||
       absl::StrContains(what, "no password supplied")) {
-    return absl::FailedPreconditionError(absl::StrCat(
+    return HidingDatabase(absl::FailedPreconditionError(absl::StrCat(
         "database ", name,
-        ": it refuses the user or the password; mend its address or the password file"));
+        ": it refuses the user or the password; mend its address or the password file")));
   }
   // libpq tells of every address that it has tried; the last words of the first are the reason.
-  return absl::UnavailableError(absl::StrCat("database ", name, ": ", FirstLine(what)));
+  return HidingDatabase(
+      absl::UnavailableError(absl::StrCat("database ", name, ": ", FirstLine(what))));
 }
 
 }  // namespace tissueform

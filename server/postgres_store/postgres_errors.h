@@ -8,9 +8,13 @@
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 
-// What libpqxx throws, as a Status: one line, which names the database and no value. For
-// postgres_connection.cc, where errors are told.
+// What libpqxx throws, as a Status: one line, which names the database and no value, and is for the
+// log; clients are told a sentence of our own.
 namespace tissueform {
+
+// `status` of a database, with a plain sentence for clients (store_errors.h) in place of what names
+// it; by its code where no sentence is given.
+absl::Status HidingDatabase(absl::Status status, absl::string_view sentence = "");
 
 // What a statement or a connection has failed with.
 struct PostgresFailure {

@@ -20,6 +20,7 @@ namespace tissueform {
 namespace {
 
 constexpr absl::string_view kPathUrl = "type.tissueform/LocalPath";
+constexpr absl::string_view kSentenceUrl = "type.tissueform/ForClients";
 
 }  // namespace
 
@@ -142,7 +143,19 @@ absl::Status NamingPath(absl::Status status, absl::string_view path) {
   return status;
 }
 
+absl::Status TellingClients(absl::Status status, absl::string_view sentence) {
+  status.SetPayload(kSentenceUrl, absl::Cord(sentence));
+  return status;
+}
+
+bool TellsClientsOtherwise(const absl::Status& status) {
+  return status.GetPayload(kSentenceUrl).has_value();
+}
+
 std::string MessageForClients(const absl::Status& status) {
+  if (const auto sentence = status.GetPayload(kSentenceUrl); sentence.has_value()) {
+    return std::string(*sentence);
+  }
   const std::string message(status.message());
   const auto path = status.GetPayload(kPathUrl);
   if (!path.has_value() || path->empty()) return message;
