@@ -14,6 +14,7 @@
 #include <sys/socket.h>
 
 #include "server/postgres_store/postgres_errors.h"
+#include "server/store/store_errors.h"
 
 namespace tissueform {
 namespace {

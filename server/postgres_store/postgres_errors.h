@@ -12,10 +12,6 @@
 // log; clients are told a sentence of our own.
 namespace tissueform {
 
-// `status` of a database, with a plain sentence for clients (store_errors.h) in place of what names
-// it; by its code where no sentence is given.
-absl::Status HidingDatabase(absl::Status status, absl::string_view sentence = "");
-
 // What a statement or a connection has failed with.
 struct PostgresFailure {
   absl::Status status;

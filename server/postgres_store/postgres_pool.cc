@@ -10,7 +10,6 @@
 #include "spdlog/spdlog.h"
 
 #include "core/base/status_macros.h"
-#include "server/postgres_store/postgres_errors.h"
 #include "server/store/store_errors.h"
 
 namespace tissueform {
