@@ -13,6 +13,7 @@
 #include "core/base/status_macros.h"
 #include "server/postgres_store/postgres_access_store.h"
 #include "server/postgres_store/postgres_export_store.h"
+#include "server/session/worker_pool.h"
 #include "server/store/data_folder.h"
 #include "server/store/durable_store.h"
 #include "server/store/in_memory_stores.h"
@@ -36,7 +37,8 @@ absl::StatusOr<std::unique_ptr<Stores>> OpenFolder(const ServerOptions& options)
 
 // A database that is started together with its servers is there a little later.
 absl::StatusOr<std::unique_ptr<PostgresStores>> OpenPatiently(const ClusterOptions& cluster) {
-  TF_ASSIGN_OR_RETURN(const PostgresOptions database, StoreOptionsOf(cluster));
+  TF_ASSIGN_OR_RETURN(PostgresOptions database, StoreOptionsOf(cluster));
+  database.waited = &WorkerPool::Waited;
   const auto deadline = std::chrono::steady_clock::now() + cluster.start_patience;
   for (bool told = false;; told = true) {
     auto stores = PostgresStores::Open({.database = database});

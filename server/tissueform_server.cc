@@ -402,7 +402,8 @@ void TissueformServer::Drain() {
   const auto deadline = std::chrono::steady_clock::now() + options_.drain_deadline;
   spdlog::info("draining: {} open streams, at most {} s", streams_.size(),
                options_.drain_deadline.count());
-  if (cluster_ != nullptr) cluster_->BeginDraining();
+  // Whoever waits for a database that is away is told so while there is time to hear it.
+  if (cluster_ != nullptr) cluster_->BeginDraining(deadline - options_.drain_deadline / 10);
   server_->GetHealthCheckService()->SetServingStatus(false);
   if (cluster_ != nullptr) {
     std::this_thread::sleep_for(

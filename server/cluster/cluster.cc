@@ -60,6 +60,12 @@ void Cluster::Start(std::function<int64_t()> free_bytes) {
   follower_->Begin(rooms_);
 }
 
+void Cluster::BeginDraining(PostgresPool::Clock::time_point deadline) {
+  stores_->pool()->EndWaiting(deadline);
+  pool_->EndWaiting(deadline);
+  node_.nodes().SetDraining();
+}
+
 void Cluster::Stop() {
   follower_.reset();
   node_.Stop();

@@ -48,8 +48,9 @@ class Cluster {
   // No room is told of anything any more; leases are renewed no longer.
   void Stop();
 
-  // Others place nothing here any more. Blocks on the store.
-  void BeginDraining() { node_.nodes().SetDraining(); }
+  // Others place nothing here any more, and nobody waits for the database beyond `deadline`. Blocks
+  // on the store.
+  void BeginDraining(PostgresPool::Clock::time_point deadline);
 
   // Must outlive the page.
   void AddTo(MetricsPage* page);

@@ -81,6 +81,7 @@ PostgresOptions NodeOptionsOf(PostgresOptions store) {
   store.lock_timeout = std::chrono::milliseconds(1'000);
   store.unanswered_timeout = std::chrono::milliseconds(2'000);
   store.patience = std::chrono::milliseconds(1'000);
+  store.waited = nullptr;
   return store;
 }
 

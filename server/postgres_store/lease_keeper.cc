@@ -3,8 +3,11 @@
 
 #include "server/postgres_store/lease_keeper.h"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
+
+#include "core/base/status_macros.h"
 
 namespace tissueform {
 
@@ -29,8 +32,9 @@ absl::StatusOr<LeaseAnswer> LeaseKeeper::Acquire(const std::string& session) {
   absl::StatusOr<LeaseAnswer> answer;
   {
     MutexLock calls(calls_);
+    TF_RETURN_IF_ERROR(Silence());
     answer = leases_->Acquire(session);
-    if (!answer.ok()) return answer;
+    TF_RETURN_IF_ERROR(Asked(answer.status()));
     lost = held_.Acquired(session, *answer);
   }
   TellLost(lost);
@@ -40,7 +44,23 @@ absl::StatusOr<LeaseAnswer> LeaseKeeper::Acquire(const std::string& session) {
 absl::Status LeaseKeeper::Release(const std::string& session) {
   MutexLock calls(calls_);
   const std::optional<SessionLease> lease = held_.Take(session);
-  return lease.has_value() ? leases_->Release(session, lease->epoch) : absl::OkStatus();
+  if (!lease.has_value()) return absl::OkStatus();
+  TF_RETURN_IF_ERROR(Silence());
+  return Asked(leases_->Release(session, lease->epoch));
+}
+
+absl::Status LeaseKeeper::Silence() {
+  return options_.clock() < silent_until_ ? silence_ : absl::OkStatus();
+}
+
+absl::Status LeaseKeeper::Asked(absl::Status answer) {
+  if (absl::IsUnavailable(answer)) {
+    silence_ = answer;
+    silent_until_ = options_.clock() + options_.silence;
+  } else {
+    silent_until_ = {};
+  }
+  return answer;
 }
 
 absl::Status LeaseKeeper::ReleaseAll() {
@@ -59,7 +79,7 @@ absl::Status LeaseKeeper::Renew() {
   {
     MutexLock calls(calls_);
     const absl::StatusOr<std::vector<SessionLease>> renewed = leases_->Renew();
-    status = renewed.status();
+    status = Asked(renewed.status());
     std::vector<SessionLease> strays;
     lost = renewed.ok() ? held_.Renewed(*renewed, &strays) : held_.TakeEnded(options_.clock());
     for (const SessionLease& stray : strays) {
@@ -75,8 +95,9 @@ void LeaseKeeper::TellLost(const std::vector<SessionLease>& lost) {
 }
 
 void LeaseKeeper::Loop() {
+  std::chrono::milliseconds pause = options_.renew_every;
   for (;;) {
-    const auto next = std::chrono::steady_clock::now() + options_.renew_every;
+    const auto next = std::chrono::steady_clock::now() + pause;
     {
       MutexLock lock(mutex_);
       while (!ending_ && std::chrono::steady_clock::now() < next) {
@@ -85,7 +106,7 @@ void LeaseKeeper::Loop() {
       if (ending_) return;
     }
     // Why not, the next call of somebody says; what runs out is told in any case.
-    Renew().IgnoreError();
+    pause = Renew().ok() ? options_.renew_every : std::min(options_.renew_every, options_.silence);
   }
 }
 

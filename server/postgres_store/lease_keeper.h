@@ -27,6 +27,9 @@ class LeaseKeeper {
  public:
   struct Options {
     std::chrono::milliseconds renew_every{3'000};
+    // After a call that the store did not answer nobody waits for another one for so long, but for
+    // renewals: it is answered as that was. After so long renewing is tried again.
+    std::chrono::milliseconds silence{1'000};
     SteadyClock clock = std::chrono::steady_clock::now;
   };
   // A session is held no longer: its streams end (SESSION_MOVED), its memory is free. Called once
@@ -64,6 +67,10 @@ class LeaseKeeper {
 
  private:
   void Loop();
+  // Of a call that may not ask so soon after one that was not answered.
+  absl::Status Silence() ABSL_EXCLUSIVE_LOCKS_REQUIRED(calls_);
+  // `answer`, remembered for that.
+  absl::Status Asked(absl::Status answer) ABSL_EXCLUSIVE_LOCKS_REQUIRED(calls_);
   void TellLost(const std::vector<SessionLease>& lost);
 
   SessionLeases* const leases_;
@@ -72,6 +79,8 @@ class LeaseKeeper {
 
   // One call to the store at a time: what it says of all is newer than what is known of any.
   Mutex calls_;
+  absl::Status silence_ ABSL_GUARDED_BY(calls_);
+  std::chrono::steady_clock::time_point silent_until_ ABSL_GUARDED_BY(calls_);
   HeldLeases held_;
 
   Mutex mutex_;

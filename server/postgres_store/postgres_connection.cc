@@ -14,6 +14,7 @@
 #include <sys/socket.h>
 
 #include "server/postgres_store/postgres_errors.h"
+#include "server/store/store_errors.h"
 
 namespace tissueform {
 namespace {
@@ -163,10 +164,13 @@ absl::Status PostgresConnection::Transact(
   } catch (const pqxx::in_doubt_error&) {
     usable_ = false;
     *outcome = PostgresOutcome::kUnknown;
-    return absl::UnavailableError(absl::StrCat(
-        "database ", library_->name,
-        ": the connection was lost during a commit, which may have been kept; look before you try "
-        "again"));
+    return HidingDatabase(
+        absl::UnavailableError(absl::StrCat(
+            "database ", library_->name,
+            ": the connection was lost during a commit, which may have been kept; look before you "
+            "try again")),
+        "the server's database was lost while this was kept, and it may have been; look before you "
+        "try again");
   } catch (...) {
     return fail(FailureOfCaught(library_->name));
   }

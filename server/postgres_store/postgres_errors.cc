@@ -12,8 +12,12 @@
 #include "absl/strings/strip.h"
 #include <pqxx/pqxx>
 
+#include "server/store/store_errors.h"
+
 namespace tissueform {
 namespace {
+
+using absl::StatusCode;
 
 std::string FirstLine(absl::string_view text) {
   const std::vector<absl::string_view> lines = absl::StrSplit(text, absl::MaxSplits('\n', 1));
@@ -22,47 +26,54 @@ std::string FirstLine(absl::string_view text) {
   return std::string(absl::StripAsciiWhitespace(line));
 }
 
+constexpr char kSameRows[] = "others change the same things at this moment; try again";
+
+absl::Status Told(StatusCode code, const std::string& name, absl::string_view what,
+                  absl::string_view sentence = "") {
+  return HidingDatabase(absl::Status(code, absl::StrCat("database ", name, ": ", what)), sentence);
+}
+
+PostgresFailure SameRows(const std::string& name) {
+  constexpr char kWhat[] = "others write the same rows; try again";
+  return {.status = Told(StatusCode::kUnavailable, name, kWhat, kSameRows), .transient = true};
+}
+
+PostgresFailure LostConnection(const std::string& name, const std::exception& error) {
+  return {.status = Told(StatusCode::kUnavailable, name, FirstLine(error.what())),
+          .transient = true,
+          .connected = false};
+}
+
 // By SQLSTATE; https://www.postgresql.org/docs/15/errcodes-appendix.html
 PostgresFailure FailureOf(const std::string& name, const pqxx::sql_error& error) {
   const std::string& state = error.sqlstate();
-  const auto told = [&](const char* what) { return absl::StrCat("database ", name, ": ", what); };
   if (state == "53100") {
-    return {absl::ResourceExhaustedError(told("its disk is full; make room there"))};
+    return {Told(StatusCode::kResourceExhausted, name, "its disk is full; make room there")};
   }
   if (state == "25006") {
     // Where a failover has made a replica of what was the primary another connection may find it.
-    return {.status = absl::FailedPreconditionError(
-                told("it is a read-only replica; name the primary (target_session_attrs)")),
+    return {.status = Told(StatusCode::kFailedPrecondition, name,
+                           "it is a read-only replica; name the primary (target_session_attrs)"),
             .connected = false};
   }
   if (state == "22021") {
     return {absl::InvalidArgumentError("a name holds bytes that are no text in UTF-8")};
   }
-  if (state == "40001" || state == "40P01") {
-    return {.status = absl::UnavailableError(told("others write the same rows; try again")),
-            .transient = true};
-  }
+  if (state == "40001" || state == "40P01") return SameRows(name);
   if (state == "55P03") {
-    return {absl::UnavailableError(told("others hold the same rows for too long; try again"))};
+    return {Told(StatusCode::kUnavailable, name,
+                 "others hold the same rows for too long; try again", kSameRows)};
   }
   if (state == "57014") {
-    return {absl::UnavailableError(told("a statement took too long and was ended; try again"))};
+    return {
+        Told(StatusCode::kUnavailable, name, "a statement took too long and was ended; try again")};
   }
   if (absl::StartsWith(state, "08") || absl::StartsWith(state, "57P") || state == "53300" ||
       state == "25P03") {
-    return {.status = absl::UnavailableError(told(FirstLine(error.what()).c_str())),
-            .transient = true,
-            .connected = false};
+    return LostConnection(name, error);
   }
-  return {absl::InternalError(
-      absl::StrCat("database ", name, ": ", FirstLine(error.what()), " (SQLSTATE ", state, ")"))};
-}
-
-PostgresFailure LostConnection(const std::string& name, const std::exception& error) {
-  return {.status = absl::UnavailableError(
-              absl::StrCat("database ", name, ": ", FirstLine(error.what()))),
-          .transient = true,
-          .connected = false};
+  return {Told(StatusCode::kInternal, name,
+               absl::StrCat(FirstLine(error.what()), " (SQLSTATE ", state, ")"))};
 }
 
 }  // namespace
@@ -73,14 +84,11 @@ PostgresFailure FailureOfCaught(const std::string& name) {
   } catch (const pqxx::sql_error& error) {
     return FailureOf(name, error);
   } catch (const pqxx::transaction_rollback&) {
-    return {.status = absl::UnavailableError(
-                absl::StrCat("database ", name, ": others write the same rows; try again")),
-            .transient = true};
+    return SameRows(name);
   } catch (const pqxx::broken_connection& error) {
     return LostConnection(name, error);
   } catch (const std::exception& error) {
-    return {.status =
-                absl::InternalError(absl::StrCat("database ", name, ": ", FirstLine(error.what()))),
+    return {.status = Told(StatusCode::kInternal, name, FirstLine(error.what())),
             .connected = false};
   }
 }
@@ -88,12 +96,11 @@ PostgresFailure FailureOfCaught(const std::string& name) {
 absl::Status ConnectError(const std::string& name, absl::string_view what) {
   if (absl::StrContains(what, "password authentication failed") ||
       absl::StrContains(what, "no password supplied")) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        "database ", name,
-        ": it refuses the user or the password; mend its address or the password file"));
+    return Told(StatusCode::kFailedPrecondition, name,
+                "it refuses the user or the password; mend its address or the password file");
   }
   // libpq tells of every address that it has tried; the last words of the first are the reason.
-  return absl::UnavailableError(absl::StrCat("database ", name, ": ", FirstLine(what)));
+  return Told(StatusCode::kUnavailable, name, FirstLine(what));
 }
 
 }  // namespace tissueform

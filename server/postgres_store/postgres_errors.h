@@ -8,8 +8,8 @@
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 
-// What libpqxx throws, as a Status: one line, which names the database and no value. For
-// postgres_connection.cc, where errors are told.
+// What libpqxx throws, as a Status: one line, which names the database and no value, and is for the
+// log; clients are told a sentence of our own.
 namespace tissueform {
 
 // What a statement or a connection has failed with.

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -29,6 +30,8 @@ struct PostgresOptions {
   // What a call waits for a free connection, and for a database that is not there: then it is
   // answered UNAVAILABLE.
   std::chrono::milliseconds patience{30'000};
+  // Of that, what the call whose work this thread does has waited for a thread already.
+  std::function<std::chrono::steady_clock::duration()> waited = nullptr;
 };
 
 // What libpq connects with.

@@ -5,8 +5,8 @@
 
 #include <chrono>
 #include <functional>
+#include <map>
 #include <memory>
-#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -40,10 +40,20 @@ class PostgresPool {
   // Runs `work` in a transaction. A database that is not there is tried again until `deadline`; a
   // commit of which nobody knows whether it was kept is not.
   //
+  // A database that says nothing at all costs kMostLate more; one that falls silent within a
+  // statement at most kLeastAnswer.
+  //
   // Errors: what `work` says, those of PostgresConnection, and Unavailable (all connections are in
-  // use until then; the database is not there until then, for whatever reason).
-  absl::Status Run(const Work& work) { return Run(work, Clock::now() + options_.patience); }
+  // use until then; the database is not there until then, for whatever reason). Those of the
+  // database are logged, and have a sentence for clients (store_errors.h).
+  absl::Status Run(const Work& work) { return Run(work, Clock::now() + Patience()); }
   absl::Status Run(const Work& work, Clock::time_point deadline);
+
+  static constexpr std::chrono::milliseconds kMostLate{1'000};
+  static constexpr std::chrono::milliseconds kLeastAnswer{5'000};
+
+  // No call waits for the database any longer than until then: the server ends.
+  void EndWaiting(Clock::time_point by);
 
   const PostgresOptions& options() const { return options_; }
   const PostgresTarget& target() const { return target_; }
@@ -54,15 +64,20 @@ class PostgresPool {
   PostgresPool(PostgresOptions options, PostgresTarget target)
       : options_(std::move(options)), target_(std::move(target)), watch_([this] { Watch(); }) {}
 
+  // What is left of the options' for this thread's call: since the database answered last nothing
+  // of it is used up.
+  Clock::duration Patience();
   absl::Status TryUntil(const Work& work, Clock::time_point deadline);
   absl::Status Try(const Work& work, Clock::time_point deadline, PostgresOutcome* outcome);
   // A place, with a connection or none.
   absl::StatusOr<std::unique_ptr<PostgresConnection>> Take(Clock::time_point deadline);
-  void GiveBack(std::unique_ptr<PostgresConnection> connection);
+  void GiveBack(std::unique_ptr<PostgresConnection> connection, PostgresOutcome outcome);
+  absl::StatusOr<std::unique_ptr<PostgresConnection>> Connect(Clock::time_point deadline) const;
   // Gives up connections that are not answered.
   void Watch();
-  // False at the pool's end.
-  bool Pause(std::chrono::milliseconds pause);
+  // Before another try, after one that began then. False when there is no time for it.
+  bool Pause(std::chrono::milliseconds pause, Clock::time_point tried, Clock::time_point deadline);
+  void Tell(const absl::Status& failure);
 
   const PostgresOptions options_;
   const PostgresTarget target_;
@@ -71,9 +86,13 @@ class PostgresPool {
   Mutex mutex_;
   ConditionVariable changed_;
   std::vector<std::unique_ptr<PostgresConnection>> idle_ ABSL_GUARDED_BY(mutex_);
-  std::set<PostgresConnection*> busy_ ABSL_GUARDED_BY(mutex_);
+  // With the deadlines of those who use them.
+  std::map<PostgresConnection*, Clock::time_point> busy_ ABSL_GUARDED_BY(mutex_);
   int in_use_ ABSL_GUARDED_BY(mutex_) = 0;
   bool ending_ ABSL_GUARDED_BY(mutex_) = false;
+  Clock::time_point latest_ ABSL_GUARDED_BY(mutex_) = Clock::time_point::max();
+  Clock::time_point answered_ ABSL_GUARDED_BY(mutex_);
+  Clock::time_point told_ ABSL_GUARDED_BY(mutex_);
 
   std::thread watch_;  // last: it uses the others
 };

@@ -72,7 +72,10 @@ absl::StatusOr<CaseUploadStream::After> CaseUploadStream::TakeHeader(
   TF_RETURN_IF_ERROR(CheckCaseRecord(record));
   TF_RETURN_IF_ERROR(Access::MayPutInto(scope().principal(), header.project()));
   scope().SetResource(CaseName(record.sha256));
-  if (const auto known = store_->Find(record.key()); known.ok()) {
+  const auto known = store_->Find(record.key());
+  // A store that was waited for in vain is not waited for once more after the bytes.
+  if (absl::IsUnavailable(known.status())) return known.status();
+  if (known.ok()) {
     TF_RETURN_IF_ERROR(store_->Touch(record.key(), now_s));
     *response_->mutable_case_() = ToProto(*known);
     response_->set_already_existed(true);

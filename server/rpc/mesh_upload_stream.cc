@@ -51,7 +51,10 @@ absl::StatusOr<MeshUploadStream::After> MeshUploadStream::TakeHeader(
   const bool may_use = changes_->access().MayMesh(caller, announcement.sha256, Need::kLook).ok();
   scope().SetResource(MeshName(announcement.sha256));
   sha256_ = announcement.sha256;
-  if (const auto known = catalog_->Look(announcement.sha256); may_use && known.ok()) {
+  const auto known = catalog_->Look(announcement.sha256);
+  // A store that was waited for in vain is not waited for once more after the bytes.
+  if (absl::IsUnavailable(known.status())) return known.status();
+  if (may_use && known.ok()) {
     *response_->mutable_mesh() = ToProto(*known);
     response_->set_already_existed(true);
     response_->set_committed_bytes(announcement.total_bytes);

@@ -25,7 +25,11 @@ void BecomeNicer(int steps) {
   setpriority(PRIO_PROCESS, thread, now + steps);
 }
 
+thread_local std::chrono::steady_clock::duration job_has_waited{0};
+
 }  // namespace
+
+std::chrono::steady_clock::duration WorkerPool::Waited() { return job_has_waited; }
 
 WorkerPool::WorkerPool(int num_threads) {
   threads_.reserve(kNumLanes * num_threads);
@@ -77,7 +81,8 @@ void WorkerPool::Work(Lane lane) {
     queue.jobs.pop_front();
     mutex_.Unlock();
     const auto start = std::chrono::steady_clock::now();
-    measures.waited.Observe(start - job.since);
+    job_has_waited = start - job.since;
+    measures.waited.Observe(job_has_waited);
     job.job();
     measures.ran.Observe(std::chrono::steady_clock::now() - start);
     job.job = nullptr;  // what it holds goes before anybody sees it finished

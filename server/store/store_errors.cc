@@ -4,6 +4,7 @@
 #include "server/store/store_errors.h"
 
 #include <chrono>
+#include <utility>
 
 #include "absl/strings/cord.h"
 #include "absl/strings/str_cat.h"
@@ -20,6 +21,20 @@ namespace tissueform {
 namespace {
 
 constexpr absl::string_view kPathUrl = "type.tissueform/LocalPath";
+constexpr absl::string_view kSentenceUrl = "type.tissueform/ForClients";
+
+const char* SentenceOf(absl::StatusCode code) {
+  switch (code) {
+    case absl::StatusCode::kUnavailable:
+      return "the server's database does not answer; try again in a minute";
+    case absl::StatusCode::kResourceExhausted:
+      return "the disk of the server's database is full; tell who operates the server";
+    case absl::StatusCode::kFailedPrecondition:
+      return "the server's database takes no changes now; tell who operates the server";
+    default:
+      return "the server's database has failed; tell who operates the server";
+  }
+}
 
 }  // namespace
 
@@ -142,7 +157,24 @@ absl::Status NamingPath(absl::Status status, absl::string_view path) {
   return status;
 }
 
+absl::Status TellingClients(absl::Status status, absl::string_view sentence) {
+  status.SetPayload(kSentenceUrl, absl::Cord(sentence));
+  return status;
+}
+
+absl::Status HidingDatabase(absl::Status status, absl::string_view sentence) {
+  const absl::StatusCode code = status.code();
+  return TellingClients(std::move(status), sentence.empty() ? SentenceOf(code) : sentence);
+}
+
+bool TellsClientsOtherwise(const absl::Status& status) {
+  return status.GetPayload(kSentenceUrl).has_value();
+}
+
 std::string MessageForClients(const absl::Status& status) {
+  if (const auto sentence = status.GetPayload(kSentenceUrl); sentence.has_value()) {
+    return std::string(*sentence);
+  }
   const std::string message(status.message());
   const auto path = status.GetPayload(kPathUrl);
   if (!path.has_value() || path->empty()) return message;

@@ -36,7 +36,14 @@ absl::Status Damaged(absl::string_view what, absl::string_view why);  // DataLos
 // `status` whose message names that file or folder of this machine: good for the log and for who
 // starts the server, nothing for its clients. OK stays OK.
 absl::Status NamingPath(absl::Status status, absl::string_view path);
-// The message of `status` without such a path.
+// `status` with one plain sentence for clients; its message is for the log and for who starts the
+// server. OK stays OK.
+absl::Status TellingClients(absl::Status status, absl::string_view sentence);
+// The same of a database that several servers share, which the message names; by its code where no
+// sentence is given.
+absl::Status HidingDatabase(absl::Status status, absl::string_view sentence = "");
+bool TellsClientsOtherwise(const absl::Status& status);
+// That sentence, or the message of `status` without such a path.
 std::string MessageForClients(const absl::Status& status);
 
 }  // namespace tissueform

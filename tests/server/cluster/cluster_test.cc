@@ -71,6 +71,14 @@ bool RawDrag::WaitForCommit(uint64_t sequence) {
   return false;
 }
 
+std::string RawDrag::NextCommitsFailure() {
+  v1::DeformResponse response;
+  while (Read(&response)) {
+    if (response.notice().has_committed()) return response.notice().committed().failure();
+  }
+  return "the stream has ended";
+}
+
 absl::Status RawDrag::Finish() {
   v1::DeformResponse response;
   while (stream_->Read(&response)) {

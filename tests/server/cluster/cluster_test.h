@@ -46,6 +46,8 @@ class RawDrag {
   std::optional<v1::DeformFrame> ReceiveFrame(uint64_t sequence);
   // Until the poses of this sequence are kept. False when the stream has ended.
   bool WaitForCommit(uint64_t sequence);
+  // What the next commit that is told of failed with; empty where it did not.
+  std::string NextCommitsFailure();
   // How it has ended; reads what is left.
   absl::Status Finish();
 

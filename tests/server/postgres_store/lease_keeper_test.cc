@@ -98,6 +98,51 @@ TEST_F(LeaseKeeperTest, WhoStoodStillBeyondItsLeaseAnswersNothingThoughNobodyToo
   EXPECT_EQ(keeper_.EpochOf("s"), 4);
 }
 
+TEST_F(LeaseKeeperTest, WhileTheStoreIsSilentNobodyWaitsForItAgain) {
+  class Counted final : public SessionLeases {
+   public:
+    explicit Counted(SessionLeases* leases) : leases_(*leases) {}
+    absl::StatusOr<LeaseAnswer> Acquire(const std::string& session) override {
+      ++calls;
+      return leases_.Acquire(session);
+    }
+    absl::StatusOr<std::vector<SessionLease>> Renew() override {
+      ++calls;
+      return leases_.Renew();
+    }
+    absl::Status Release(const std::string& session, int64_t epoch) override {
+      ++calls;
+      return leases_.Release(session, epoch);
+    }
+
+    int calls = 0;
+
+   private:
+    SessionLeases& leases_;
+  } counted(&leases_);
+  LeaseKeeper keeper(&counted, {.clock = [this] { return store_.now; }},
+                     [](const SessionLease&) {});
+  ASSERT_THAT(keeper.Acquire("s"), IsOk());
+  store_.failure = absl::UnavailableError("gone");
+  counted.calls = 0;
+  const auto gone = StatusIs(absl::StatusCode::kUnavailable, HasSubstr("gone"));
+  EXPECT_THAT(keeper.Acquire("t"), gone);
+  EXPECT_THAT(keeper.Acquire("t"), gone);
+  EXPECT_THAT(keeper.Release("s"), gone);
+  EXPECT_EQ(counted.calls, 1);
+  EXPECT_THAT(keeper.Renew(), gone);
+  EXPECT_EQ(counted.calls, 2) << "a renewal is tried all the same";
+  store_.failure = absl::OkStatus();
+  EXPECT_THAT(keeper.Acquire("t"), gone) << "not yet";
+  store_.now += seconds(1);
+  EXPECT_THAT(keeper.Acquire("t"), IsOk());
+  store_.failure = absl::UnavailableError("gone");
+  EXPECT_THAT(keeper.Renew(), gone);
+  store_.failure = absl::OkStatus();
+  EXPECT_THAT(keeper.Renew(), IsOk());
+  EXPECT_THAT(keeper.Acquire("u"), StatusIs(absl::StatusCode::kNotFound)) << "it answers again";
+}
+
 TEST_F(LeaseKeeperTest, WhatIsReleasedIsAnothersAtOnce) {
   ASSERT_THAT(keeper_.Acquire("s"), IsOk());
   ASSERT_THAT(keeper_.Acquire("t"), IsOk());

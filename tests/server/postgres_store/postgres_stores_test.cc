@@ -4,6 +4,7 @@
 #include "server/postgres_store/postgres_stores.h"
 
 #include <chrono>
+#include <functional>
 #include <future>
 #include <memory>
 #include <string>
@@ -21,6 +22,7 @@
 #include "server/postgres_store/postgres_blobs.h"
 #include "server/postgres_store/postgres_export_store.h"
 #include "server/postgres_store/postgres_schema.h"
+#include "server/store/store_errors.h"
 #include "server/store/store_schema.h"
 #include "tests/server/postgres_store/frozen_proxy.h"
 #include "tests/server/postgres_store/test_database.h"
@@ -289,6 +291,85 @@ TEST_F(PostgresStoresTest, AConnectionThroughWhichNothingComesIsGivenUpAndTheCal
   EXPECT_EQ(SerializePoses(found.last_poses), SerializePoses(SamplePoses(7)));
 }
 
+TEST_F(PostgresStoresTest, OfConnectionsThatFrozeTogetherACallWaitsForOneOnly) {
+  FrozenProxy proxy(TestDatabasePort());
+  PostgresOptions options = TestDatabaseOptions();
+  options.url = absl::StrCat("postgresql://postgres@127.0.0.1:", proxy.port(), "/postgres");
+  options.unanswered_timeout = std::chrono::milliseconds(1'500);
+  options.patience = std::chrono::milliseconds(2'800);
+  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
+  const auto select = [](PostgresTransaction& transaction) {
+    return transaction.Run("SELECT 1", {});
+  };
+  // Three at once, so that there are as many connections.
+  ASSERT_THAT(pool->Run([&](PostgresTransaction&) {
+    return pool->Run([&](PostgresTransaction&) { return pool->Run(select); });
+  }),
+              IsOk());
+  const int before = proxy.accepted();
+  proxy.Freeze();
+  EXPECT_THAT(pool->Run(select), IsOk());
+  EXPECT_EQ(proxy.accepted(), before + 1);
+}
+
+TEST_F(PostgresStoresTest, NobodyWaitsBeyondTheEndOfWaiting) {
+  FrozenProxy proxy(TestDatabasePort());
+  PostgresOptions options = TestDatabaseOptions();
+  options.url = absl::StrCat("postgresql://postgres@127.0.0.1:", proxy.port(), "/postgres");
+  options.patience = std::chrono::minutes(10);
+  options.unanswered_timeout = std::chrono::minutes(10);
+  options.max_connections = 2;
+  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
+  // One that waits for an answer, one that tries again, one that finds no connection free.
+  std::promise<void> begun;
+  const auto run = [&pool](const std::function<void()>& first, const char* sql) {
+    return std::async(std::launch::async, [&pool, first, sql] {
+      return pool->Run([&](PostgresTransaction& transaction) {
+        first();
+        return transaction.Execute(sql);
+      });
+    });
+  };
+  auto silent = run(
+      [&] {
+        proxy.FreezeAll();
+        begun.set_value();
+      },
+      "SELECT 1");
+  begun.get_future().wait();
+  auto connecting = run([] {}, "SELECT 1");
+  auto waiting = run([] {}, "SELECT 1");
+  pool->EndWaiting(PostgresPool::Clock::now());
+  for (auto* call : {&silent, &connecting, &waiting}) {
+    ASSERT_EQ(call->wait_for(std::chrono::seconds(60)), std::future_status::ready);
+    EXPECT_THAT(call->get(), StatusIs(Code::kUnavailable));
+  }
+  EXPECT_THAT(pool->Run([](PostgresTransaction&) { return absl::OkStatus(); }),
+              StatusIs(Code::kUnavailable));
+  proxy.Thaw();
+}
+
+TEST_F(PostgresStoresTest, WhatACallHasWaitedForAThreadIsPartOfItsPatience) {
+  RunOutsideTransaction("DROP DATABASE IF EXISTS away WITH (FORCE)");
+  RunOutsideTransaction("CREATE DATABASE away");
+  PostgresOptions options = TestDatabaseOptions("away");
+  options.patience = std::chrono::minutes(10);
+  options.waited = [] { return std::chrono::hours(1); };
+  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
+  const auto select = [](PostgresTransaction& transaction) {
+    return transaction.Run("SELECT 1", {});
+  };
+  EXPECT_THAT(pool->Run(select, PostgresPool::Clock::now() + options.patience), IsOk());
+  EXPECT_THAT(pool->Run(select), IsOk()) << "that was the queue, since the database answers";
+  options.waited = [] { return std::chrono::minutes(9); };
+  ASSERT_OK_AND_ASSIGN(const auto fresh, PostgresPool::Open(options));
+  EXPECT_THAT(fresh->Run(select), IsOk()) << "some is left";
+  options.waited = [] { return std::chrono::hours(1); };
+  ASSERT_OK_AND_ASSIGN(const auto silent, PostgresPool::Open(options));
+  EXPECT_THAT(silent->Run(select), StatusIs(Code::kUnavailable, HasSubstr("in time")))
+      << "it has never answered";
+}
+
 TEST_F(PostgresStoresTest, OfACommitThatIsNotAnsweredNobodyClaimsToKnow) {
   FrozenProxy proxy(TestDatabasePort());
   PostgresOptions options = TestDatabaseOptions();
@@ -405,6 +486,11 @@ TEST_P(PostgresErrorTest, WhatTheDatabaseSaysIsOneLineWithItsCodeAndWithoutValue
   EXPECT_EQ(status.code(), error.code) << status;
   EXPECT_THAT(std::string(status.message()),
               AllOf(HasSubstr(error.told), Not(HasSubstr("hush")), Not(HasSubstr("\n"))));
+  if (!status.ok()) {
+    EXPECT_THAT(MessageForClients(status),
+                AllOf(Not(IsEmpty()), Not(HasSubstr("postgresql")), Not(HasSubstr("SQLSTATE")),
+                      Not(HasSubstr("host"))));
+  }
   EXPECT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1)), IsOk()) << "calls go on";
 }
 

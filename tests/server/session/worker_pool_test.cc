@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <future>
 #include <map>
 #include <memory>
@@ -162,6 +163,16 @@ TEST(StrandTest, AJobMayHoldTheLastReferenceToItsStrand) {
     posted_on.Post(Lane::kBatch, [&ran, owner = std::move(strand)] { ran = true; });
   }
   EXPECT_TRUE(ran);
+}
+
+TEST(WorkerPoolTest, AJobKnowsHowLongItHasWaited) {
+  WorkerPool pool(1);
+  std::promise<std::chrono::steady_clock::duration> waited;
+  pool.Post(
+      Lane::kStore, [&waited] { waited.set_value(WorkerPool::Waited()); },
+      std::chrono::steady_clock::now() - std::chrono::hours(1));
+  EXPECT_GE(waited.get_future().get(), std::chrono::hours(1));
+  EXPECT_EQ(WorkerPool::Waited().count(), 0) << "this thread runs none";
 }
 
 }  // namespace
