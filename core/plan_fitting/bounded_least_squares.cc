@@ -4,11 +4,9 @@
 #include "core/plan_fitting/bounded_least_squares.h"
 
 #include <algorithm>
-#include <cmath>
-
-#include <Eigen/Cholesky>
 
 #include "core/plan_fitting/box_program.h"
+#include "core/plan_fitting/residual_curvature.h"
 
 namespace tissueform {
 namespace {
@@ -36,10 +34,11 @@ enum class Step { kNone, kShort, kGood, kPoor };  // kPoor: lower, but not as th
 class Search {
  public:
   Search(const LeastSquaresProblem& problem, const VectorXd& start)
-      : problem_(problem), prior_(problem.A.transpose() * problem.A) {
+      : problem_(problem),
+        prior_(problem.A.transpose() * problem.A),
+        curvature_(problem.lower.size()) {
     at_.x = start.cwiseMax(problem.lower).cwiseMin(problem.upper);
     at_.residuals = problem.residuals(at_.x);
-    curvature_.setZero(at_.x.size(), at_.x.size());
     value_ = Value(at_.x, at_.residuals);
   }
 
@@ -79,29 +78,12 @@ class Search {
       x[i] = at_.x[i] - step;
       at_.jacobian.col(i) = (ahead - problem_.residuals(x)) / (2 * step);
     }
-    LearnCurvature();
+    const bool is_first = slopes_at_.size() == 0;
+    curvature_.Take(at_.x, at_.residuals, at_.jacobian,
+                    !is_first && IsTelling(at_.x - slopes_at_, kTellingOfCurvature));
     slopes_at_ = at_.x;
-    taken_jacobian_ = at_.jacobian;
-    taken_gradient_ = at_.jacobian.transpose() * at_.residuals;
+    slopes_are_taken_ = true;
     Linearise();
-  }
-
-  // What the residuals' own bending adds to the sum's: where targets cannot be met it is not small
-  // beside that of flat directions, and a search without it creeps. By the update of Dennis, Gay
-  // and Welsch (1981), from slopes that were taken at two places.
-  void LearnCurvature() {
-    if (slopes_at_.size() == 0) return;
-    const VectorXd step = at_.x - slopes_at_;
-    if (!IsTelling(step, kTellingOfCurvature)) return;
-    const VectorXd bent = (at_.jacobian - taken_jacobian_).transpose() * at_.residuals;
-    const VectorXd all = at_.jacobian.transpose() * at_.residuals - taken_gradient_;
-    const double along = all.dot(step);
-    if (along <= 1e-3 * all.norm() * step.norm()) return;
-    const double held = step.dot(curvature_ * step);
-    if (held != 0) curvature_ *= std::min(1.0, std::abs(step.dot(bent) / held));
-    const VectorXd miss = bent - curvature_ * step;
-    curvature_ += (miss * all.transpose() + all * miss.transpose()) / along -
-                  miss.dot(step) / (along * along) * all * all.transpose();
   }
 
   bool IsTelling(const VectorXd& step, double share) const {
@@ -113,6 +95,7 @@ class Search {
     if (IsTelling(last_step_, kTellingOfSlopes)) {
       at_.jacobian += (last_change_ - at_.jacobian * last_step_) * last_step_.transpose() /
                       last_step_.squaredNorm();
+      slopes_are_taken_ = false;
     }
     Linearise();
   }
@@ -123,22 +106,10 @@ class Search {
                 problem_.A.transpose() * (problem_.A * at_.x + problem_.c);
   }
 
-  // Of the sum's half: with what is known of the residuals' bending where that tells more.
-  MatrixXd Model() const {
-    if (!is_bent_) return normal_;
-    MatrixXd bent = normal_ + curvature_;
-    return bent.llt().info() == Eigen::Success ? bent : normal_;
-  }
-
-  void ChooseModel(const VectorXd& step, double gain) {
-    const double straight = -step.dot(2 * gradient_ + normal_ * step);
-    const double bent = straight - step.dot(curvature_ * step);
-    is_bent_ = std::abs(gain - bent) <= std::abs(gain - straight);
-  }
-
   // So near that where the search ends does not depend on which of the two they are taken at.
   bool SlopesAreOfHere() const {
-    return (at_.x - slopes_at_).cwiseAbs().maxCoeff() <= kSlopesHold * problem_.smallest_move;
+    return slopes_are_taken_ &&
+           (at_.x - slopes_at_).cwiseAbs().maxCoeff() <= kSlopesHold * problem_.smallest_move;
   }
 
   Step StepDown() {
@@ -146,7 +117,7 @@ class Search {
     const VectorXd upper = problem_.upper - at_.x;
     const bool slopes_are_of_here = SlopesAreOfHere();
     for (; damping_ < kMostDamping; damping_ *= 10) {
-      const MatrixXd model = Model();
+      const MatrixXd model = curvature_.AddedTo(normal_);
       MatrixXd H = model;
       // The unknowns have one scale, so the plain form: Marquardt's would not hold those that
       // nothing depends on.
@@ -158,7 +129,7 @@ class Search {
       const VectorXd x = (at_.x + step).cwiseMax(problem_.lower).cwiseMin(problem_.upper);
       const VectorXd residuals = problem_.residuals(x);
       const double value = Value(x, residuals);
-      ChooseModel(step, value_ - value);
+      curvature_.Compare(step, value_ - value, -step.dot(2 * gradient_ + normal_ * step));
       if (value < value_) {
         const bool is_poor = value_ - value < kLeastOfPromise * expected;
         last_step_ = x - at_.x;
@@ -190,11 +161,9 @@ class Search {
   double value_ = 0;
   MatrixXd normal_;
   VectorXd gradient_;  // half of the sum's
-  bool is_bent_ = true;
-  MatrixXd curvature_;  // the residuals', times what is left of them
-  VectorXd slopes_at_;  // where they were taken
-  MatrixXd taken_jacobian_;
-  VectorXd taken_gradient_;
+  ResidualCurvature curvature_;
+  VectorXd slopes_at_;             // where they were taken
+  bool slopes_are_taken_ = false;  // and have not learned since
   VectorXd last_step_;
   VectorXd last_change_;  // of the residuals
   double damping_ = kFirstDamping;

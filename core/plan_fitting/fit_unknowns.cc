@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "core/plan_fitting/handle_movement.h"
 
@@ -36,15 +35,12 @@ FitUnknowns::FitUnknowns(const FitProblem& problem, const TetMesh& mesh,
   movement_rest_.setZero(6 * handles);
   handle_weights_.setZero(handles);
   scales_.setOnes(n);
-  std::map<size_t, Eigen::Matrix<double, 6, 6>> roots;  // of handles: they look at all vertices
   for (Index i = 0; i < n; ++i) {
     const FitUnknown& unknown = problem.unknowns[static_cast<size_t>(i)];
     const auto h = static_cast<Index>(unknown.handle);
     const std::vector<int32_t>& vertices = constraints.handles()[unknown.handle].vertices;
-    if (!roots.contains(unknown.handle)) {
-      roots[unknown.handle] = MovementRoot(mesh, vertices, problem.poses[unknown.handle].pivot_mm);
-    }
-    const Eigen::Matrix<double, 6, 6>& root = roots[unknown.handle];
+    const Eigen::Matrix<double, 6, 6> root =
+        MovementRoot(mesh, vertices, problem.poses[unknown.handle].pivot_mm);
     const int component = unknown.axis + (unknown.is_rotation ? 0 : 3);
     movement_.block<6, 1>(6 * h, i) = unknown.sign * root.col(component);
     scales_[i] = std::max(movement_.col(i).norm(), unknown.is_rotation ? kLeastRadiusMm : 1.0);
