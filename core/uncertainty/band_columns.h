@@ -34,9 +34,11 @@ class BandColumns {
       const std::vector<int32_t>& vertices, const FactorAdmission& admission,
       const Cancellation& cancellation = {});
 
-  // Of each vertex the 95th percentile of the distance in mm, resized. REQUIRES: one legal pose per
-  // handle.
-  void Evaluate(absl::Span<const HandlePose> poses, Eigen::VectorXf* band_mm) const;
+  // Of each vertex the 95th percentile of the distance in mm, resized; empty where a handle turns
+  // too far for a band (HasBand of core/answer_evaluator), in answers that are prepared for turns
+  // up to `max_rotation_rad`. REQUIRES: one legal pose per handle.
+  void Evaluate(absl::Span<const HandlePose> poses, double max_rotation_rad,
+                Eigen::VectorXf* band_mm) const;
 
   // Adds the band to answers at the same vertices by an elastic model on the same preparation, in
   // columns as few as keep its fields within kBandTolerance of the mesh's diagonal for the widest

@@ -13,6 +13,7 @@
 
 #include "core/answer_evaluator/answer_bytes.h"
 #include "core/answer_evaluator/answer_evaluator.h"
+#include "core/answer_evaluator/pose_range.h"
 #include "core/prepared_answers/create_response.h"
 #include "core/prepared_answers/small_product.h"
 #include "core/uncertainty/band_columns.h"
@@ -120,7 +121,7 @@ TEST_F(HeadsBandTest, IsOffByAQuarterOfAStepAtMostOverRandomOperations) {
     const std::vector<HandlePose> poses =
         OperationPoses(*head->problem.mesh, head->problem.constraints, 1, &random);
     Eigen::VectorXf expected;
-    head->band->Evaluate(poses, &expected);
+    head->band->Evaluate(poses, kLargestBandRotationRad, &expected);
     std::vector<float> given;
     ASSERT_TRUE(evaluator.Band(ToAnswerPoses(poses), &given));
     const Eigen::Map<const Eigen::VectorXf> told(given.data(), expected.size());
