@@ -23,7 +23,8 @@ namespace tissueform {
 struct EvaluatedAnswer {
   std::vector<float> positions;  // x y z in mm of every vertex of the question, in its order
   double error_mm = 0;           // a bound; of neo_hookean an estimate
-  // Of each vertex; empty unless ranges of the material were asked for.
+  // Of each vertex; empty unless ranges of the material were asked for, and where a handle turns
+  // too far for a band (more than `max_rotation` of what was asked for, or than 30 degrees).
   std::vector<float> band_mm = {};
 };
 

@@ -44,7 +44,13 @@ bool AnswerEvaluator::Answer(std::span<const AnswerPose> poses, std::vector<floa
 }
 
 bool AnswerEvaluator::Band(std::span<const AnswerPose> poses, std::vector<float>* band_mm) const {
-  if (!has_band() || !AreLegal(answers_, poses)) return false;
+  const auto turns_too_far = [this](const AnswerPose& pose) {
+    return !HasBand(RowNorm(pose.rotation_vector.data(), 3), answers_.numbers.max_rotation_rad);
+  };
+  if (!has_band() || !AreLegal(answers_, poses) ||
+      std::any_of(poses.begin(), poses.end(), turns_too_far)) {
+    return false;
+  }
   const std::vector<float> of_free = BandOfFree(answers_, poses);
   band_mm->assign(answers_.regions.size(), 0.0F);
   ForEachVertex(answers_, [&](size_t place, int32_t region, size_t first) {

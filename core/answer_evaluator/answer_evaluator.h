@@ -41,8 +41,9 @@ class AnswerEvaluator {
   bool has_band() const { return sizes_.band_variables > 0; }
 
   // Writes of every vertex the distance in mm within which it stays in 95 of 100 cases if nothing
-  // but the material is in doubt; resized. False, with nothing written, without columns of the band
-  // and where there is no pose for every handle.
+  // but the material is in doubt; resized. False, with nothing written, without columns of the
+  // band, where there is no pose for every handle, and where one turns too far for a band
+  // (HasBand).
   bool Band(std::span<const AnswerPose> poses, std::vector<float>* band_mm) const;
 
  private:

@@ -51,4 +51,8 @@ bool AreCovered(const PortableAnswers& answers, std::span<const AnswerPose> pose
   return in_range && error_mm <= (is_neo ? numbers.max_estimate_mm : numbers.tolerance_mm);
 }
 
+bool HasBand(double rotation_rad, double max_rotation_rad) {
+  return rotation_rad <= std::min(max_rotation_rad, kLargestBandRotationRad) * (1 + kRangeSlack);
+}
+
 }  // namespace tissueform

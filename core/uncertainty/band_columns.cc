@@ -7,6 +7,7 @@
 
 #include "absl/memory/memory.h"
 
+#include "core/answer_evaluator/pose_range.h"
 #include "core/base/status_macros.h"
 #include "core/prepared_answers/column_compression.h"
 #include "core/prepared_answers/linear_elastic_response.h"
@@ -45,7 +46,12 @@ absl::StatusOr<std::unique_ptr<BandColumns>> BandColumns::Create(
   return band;
 }
 
-void BandColumns::Evaluate(absl::Span<const HandlePose> poses, Eigen::VectorXf* band_mm) const {
+void BandColumns::Evaluate(absl::Span<const HandlePose> poses, double max_rotation_rad,
+                           Eigen::VectorXf* band_mm) const {
+  band_mm->resize(0);
+  for (const HandlePose& pose : poses) {
+    if (!HasBand(pose.rotation_vector.norm(), max_rotation_rad)) return;
+  }
   const Eigen::VectorXf coefficients = elastic_.Coefficients(poses).cast<float>();
   Eigen::MatrixXf fields(columns_.front().rows(), static_cast<Eigen::Index>(columns_.size()));
   for (size_t i = 0; i < columns_.size(); ++i) {

@@ -34,7 +34,9 @@ UncertaintyBand SampleBand(const MaterialExpansion& expansion, const Positions& 
 // The sizes alone, quickly, from the terms of first order: the distance is then the length of a
 // normal vector with covariance C, whose square is taken for a multiple of a chi-squared variable
 // with tr(C)^2 / tr(C^2) degrees of freedom (Satterthwaite 1946), between 1 and 3. `fields` is
-// #terms matrices 3 #V by 1 one beside the other: 3 #V by #terms.
+// #terms matrices 3 #V by 1 one beside the other: 3 #V by #terms. What changes a vertex' fields by
+// e (Frobenius norm over all terms) changes its band by kNormal95 e at most: that is its gradient's
+// largest length, of fields along one line.
 Eigen::VectorXf FirstOrderBand(const Eigen::Ref<const Eigen::MatrixXf>& fields);
 
 }  // namespace tissueform

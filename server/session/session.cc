@@ -221,7 +221,9 @@ absl::StatusOr<std::optional<PreparedAnswer>> Session::Respond(const ResponseCla
   answer.summary.prepared = true;
   (shared->response->error_is_estimate() ? answer.summary.error_estimate_mm
                                          : answer.summary.error_bound_mm) = *bound_mm;
-  if (shared->band != nullptr) shared->band->Evaluate(poses, &answer.band_mm);
+  if (shared->band != nullptr) {
+    shared->band->Evaluate(poses, shared->request.max_rotation_rad, &answer.band_mm);
+  }
   answer.summary.solve_seconds = stopwatch.Seconds();
   return std::optional<PreparedAnswer>(std::move(answer));
 }

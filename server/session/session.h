@@ -37,7 +37,7 @@ namespace tissueform {
 struct PreparedAnswer {
   FloatPositions positions;
   SolveSummary summary;
-  Eigen::VectorXf band_mm;  // of each vertex; empty where no ranges of the material were given
+  Eigen::VectorXf band_mm;  // of each vertex; empty where it is not known
 };
 
 // A stream's claim on prepared answers; empty once its session is closed, so that no stream keeps

@@ -220,8 +220,8 @@ describe.skipIf(PGPORT === undefined || !hasHaproxy)("a drag in a cluster", () =
     await page.waitForFunction(() => (globalThis as any).heard.includes("moving"));
     const names = await page.evaluate(async () => {
       const { bench } = (globalThis as unknown as Hook).tissueform;
-      await bench.storePrediction("In the middle of it");
-      return bench.predictions.value.map(({ title }: { title: string }) => title);
+      await bench.stored.store("In the middle of it");
+      return bench.stored.all.value.map(({ title }: { title: string }) => title);
     });
     expect(names).toContain("In the middle of it");
     await answered(page);

@@ -152,7 +152,7 @@ describe("in Chromium", () => {
     await page.getByRole("checkbox").check();
     await page.getByRole("group", { name: "Legend of the map" }).waitFor();
     await page.getByText("Model: gradient field. Made by tissueform").waitFor();
-    await page.getByText("band of uncertainty of this model is not known").waitFor();
+    await page.getByText("band of uncertainty of this model or pose is not known").waitFor();
     expect(await seriousFindings(page)).toEqual([]);
   });
 

@@ -17,7 +17,9 @@
 namespace tissueform::testing {
 namespace {
 
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 constexpr double kTwice = 2;
 
@@ -98,10 +100,30 @@ TEST_F(MaterialBandTest, IsNotKnownOfModelsThatAreNoneOfElasticity) {
 
 TEST_F(MaterialBandTest, IsNotKnownOfACaseWithoutRanges) {
   contents_.material_ranges.reset();
-  ASSERT_OK_AND_ASSIGN(
-      const auto band,
-      AskMaterialBand(client_.get(), contents_, Predict(v1::DEFORMATION_MODEL_LINEAR_ELASTIC)));
+  const v1::Prediction prediction = Predict(v1::DEFORMATION_MODEL_LINEAR_ELASTIC);
+  ASSERT_OK_AND_ASSIGN(const auto band, AskMaterialBand(client_.get(), contents_, prediction));
   EXPECT_THAT(band, IsEmpty());
+  EXPECT_THAT(WhyNoMaterialBand(contents_, prediction), HasSubstr("no ranges"));
+}
+
+// Linear elasticity has answers there, which mean nothing.
+TEST_F(MaterialBandTest, IsNotKnownOfTurnsThatAreTakenForStrain) {
+  const auto turned = [this](double turn_rad) {
+    HandlePose pose;
+    pose.rotation_vector.y() = turn_rad;
+    return *client_->predictions().Create(session_, TopPose(pose),
+                                          v1::DEFORMATION_MODEL_LINEAR_ELASTIC);
+  };
+  for (const double far_rad : {0.53, 2.0}) {
+    const v1::Prediction prediction = turned(far_rad);
+    ASSERT_OK_AND_ASSIGN(const auto band, AskMaterialBand(client_.get(), contents_, prediction));
+    EXPECT_THAT(band, IsEmpty()) << far_rad;
+    EXPECT_THAT(WhyNoMaterialBand(contents_, prediction), HasSubstr("30 degrees"));
+  }
+  const v1::Prediction prediction = turned(0.52);
+  ASSERT_OK_AND_ASSIGN(const auto band, AskMaterialBand(client_.get(), contents_, prediction));
+  EXPECT_THAT(band, Not(IsEmpty()));
+  EXPECT_EQ(WhyNoMaterialBand(contents_, prediction), "");
 }
 
 TEST_F(MaterialBandTest, IsNotKnownOfAnotherStiffnessThanTheCases) {

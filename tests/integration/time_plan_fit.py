@@ -1,16 +1,19 @@
 #!/usr/bin/env python3
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""Times PlanService.Fit by python3-grpcio: 18 numbers of three segments, ten targets of three numbers each, wanting something else at every call.
+"""Times PlanService.Fit by python3-grpcio: 18 numbers of three segments, ten targets of three numbers each.
 
-  time_plan_fit.py HOST:PORT HEAD.vtu FOLDER_OF_GRPC_PROTOS FOLDER_OF_GOOGLE_RPC_PROTOS
+  time_plan_fit.py HOST:PORT HEAD.vtu FOLDER_OF_GRPC_PROTOS FOLDER_OF_GOOGLE_RPC_PROTOS [--json FILE --machine TEXT --compiler TEXT --commit HASH]
 
-HEAD.vtu: that of tests/data/plans/three_segments. By hand, for docs/plan-fitting.md.
+"jump": every call wants something else and begins at rest. "pull": every call wants a little more than the one before and begins with its answer, as
+the planner does; "pull of places": the same of means over three places of the skin. HEAD.vtu: that of tests/data/plans/three_segments. By hand, for docs/plan-fitting.md and docs/results/plan_fit.json.
 """
 
+import argparse
 import hashlib
+import json
+import pathlib
 import random
-import sys
 import time
 
 import grpc
@@ -22,11 +25,21 @@ from send_and_prepare import Messages, upload
 
 MODELS = {"gradient_field": 1, "linear_elastic": 3, "neo_hookean": 4}
 CALLS = 100
+GOALS = 30
+PULL_STEPS = 30  # from one goal to the next, up to 8 mm away
+PLACES = (1, 4, 6)  # of the head's skin, of 304, 388 and 1,029 vertices
 PATIENCE_S = 300
 
 
 def main():
-    address, head, grpc_protos, google_protos = sys.argv[1:]
+    parser = argparse.ArgumentParser()
+    for name in ("address", "head", "grpc_protos", "google_protos"):
+        parser.add_argument(name)
+    parser.add_argument("--json", type=pathlib.Path)
+    for name in ("machine", "compiler", "commit"):
+        parser.add_argument(f"--{name}", default="")
+    arguments = parser.parse_args()
+    address, head, grpc_protos, google_protos = arguments.address, arguments.head, arguments.grpc_protos, arguments.google_protos
     import_messages([(grpc_protos, ["grpc/reflection/v1alpha/reflection.proto"]),
                      (google_protos, ["google/rpc/status.proto", "google/rpc/error_details.proto"])])
     mesh = meshio.read(head)
@@ -42,7 +55,8 @@ def main():
     faces = np.sort(np.concatenate([np.delete(tets, k, axis=1) for k in range(4)]), axis=1)
     outer, counts = np.unique(faces, axis=0, return_counts=True)
     skin = [v for v in np.unique(outer[counts == 1]) if anatomy[v] == 0]
-    targets = [skin[(2 * k + 1) * len(skin) // 20] for k in range(10)]
+    single = [{"point_mm": dict(zip("xyz", points[skin[(2 * k + 1) * len(skin) // 20]]))} for k in range(10)]
+    places = [{"vertices": {"vertices": np.flatnonzero(mesh.point_data["skin_region"] == k).tolist()}} for k in PLACES]
 
     with grpc.insecure_channel(address) as channel:
         reflection = Reflection(channel)
@@ -63,26 +77,52 @@ def main():
         degrees, mm = {"lowest": -0.17, "highest": 0.17}, {"lowest": -10, "highest": 10}
         freedoms = [{"handle": handle["name"], "rotation_vector": dict(x=degrees, y=degrees, z=degrees),
                      "translation_mm": dict(x=mm, y=mm, z=mm)} for handle in handles]
-        wishes = random.Random(1)
+        def wanted(spots, moves):
+            return [{"name": f"spot {k}", "displacement_mm": dict(zip("xyz", move)), **spot} for k, (spot, move) in enumerate(zip(spots, moves))]
 
-        def fit(model):
-            wanted = [{"name": str(v), "point_mm": dict(zip("xyz", points[v])),
-                       "displacement_mm": {axis: wishes.uniform(-4, 4) for axis in "xyz"}} for v in targets]
-            start = time.perf_counter()
-            answer = call("/tissueform.v1.PlanService/Fit",
-                          messages("FitRequest")(session=session, targets=wanted, freedoms=freedoms, model=model),
-                          "FitResponse")
-            return time.perf_counter() - start, answer
+        def fit(model, spots, moves, start):
+            request = messages("FitRequest")(session=session, targets=wanted(spots, moves), freedoms=freedoms, poses=start, model=model)
+            begun = time.perf_counter()
+            answer = call("/tissueform.v1.PlanService/Fit", request, "FitResponse")
+            return time.perf_counter() - begun, answer
+
+        results = []
+
+        def report(kind, model, answers):
+            calls, searches = (np.array(values) * 1e3 for values in (
+                [seconds for seconds, _ in answers], [answer.search_seconds for _, answer in answers]))
+            figures = {"model": model, "kind": kind, "calls": len(answers), "converged": sum(answer.converged for _, answer in answers),
+                       "steps": float(np.mean([answer.iterations for _, answer in answers])),
+                       **{f"{what}_ms": {f"p{part}": round(float(np.percentile(of, part)), 3) for part in (50, 95, 99)}
+                          for what, of in (("call", calls), ("search", searches))}}
+            print("{model}, {kind}: p50 {call_ms[p50]:.1f} ms, p95 {call_ms[p95]:.1f} ms, p99 {call_ms[p99]:.1f} ms, of it the search "
+                  "{search_ms[p50]:.1f} / {search_ms[p95]:.1f} / {search_ms[p99]:.1f} ms, {steps:.1f} steps; "
+                  "{converged} of {calls} converged".format(**figures))
+            results.append(figures)
 
         for model, number in MODELS.items():
-            prepared_s = fit(number)[0]
-            answers = [fit(number) for _ in range(CALLS)]
-            total, search = (np.array(values) * 1e3 for values in (
-                [seconds for seconds, _ in answers], [answer.search_seconds for _, answer in answers]))
-            converged = sum(answer.converged for _, answer in answers)
-            print(f"{model}: first call {prepared_s:.2f} s; then p50 {np.median(total):.1f} ms, "
-                  f"p99 {np.percentile(total, 99):.1f} ms, of it the search {np.median(search):.1f} ms; "
-                  f"{converged} of {CALLS} converged")
+            numbers = random.Random(1)
+
+            def anywhere(spots):
+                return np.array([[numbers.uniform(-4, 4) for _ in "xyz"] for _ in spots])
+
+            prepared_s = fit(number, single, 0 * anywhere(single), [])[0]
+            print(f"{model}: first call {prepared_s:.2f} s")
+            report("jump", model, [fit(number, single, anywhere(single), []) for _ in range(CALLS)])
+            for kind, spots in (("pull", single), ("pull of places", places)):
+                start, moves, pulls = [], 0 * anywhere(spots), []
+                fit(number, spots, moves, start)
+                for _ in range(GOALS):
+                    begin, goal = moves, anywhere(spots)
+                    for step in range(PULL_STEPS):
+                        moves = begin + (goal - begin) * (step + 1) / PULL_STEPS
+                        pulls.append(fit(number, spots, moves, start))
+                        start = pulls[-1][1].poses
+                report(kind, model, pulls)
+        if arguments.json:
+            document = {"machine": arguments.machine, "compiler": arguments.compiler, "commit": arguments.commit,
+                        "notice": "research software, not a medical device", "fits": results}
+            arguments.json.write_text(json.dumps(document, indent=2) + "\n")
 
 
 if __name__ == "__main__":

@@ -344,6 +344,7 @@ def run(programs):
         check("what goes back goes into its own study", by_patient[of_study] == {patient["patient_id"]}, str(by_patient))
         names = {name for _, _, item in objects.values() if item.Modality == "SR" for name, _ in terms(item)}
         check("where no band is known the report tells movements without one", "MOVEMENT" in names and "BAND" not in names, str(sorted(names)))
+        check("and says why", "NO_BAND" in names, str(sorted(names)))
     export_files(programs)
     check_secrets(programs)
     print(f"     {time.monotonic() - began:.0f} s")

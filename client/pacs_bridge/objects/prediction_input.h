@@ -44,8 +44,9 @@ struct PredictionObjectsInput {
   v1::Prediction prediction = {};
   Positions deformed = {};  // of the case's mesh, #V by 3
   // Of each vertex of the mesh the distance within which it stays in 95 of 100 cases if nothing
-  // but the material is in doubt, mm; empty: not known.
+  // but the material is in doubt, mm; empty: not known, and why in words.
   std::vector<double> band_mm = {};
+  std::string why_no_band = {};
   std::vector<v1::Measure> measures = {};
   std::vector<std::string> pictures = {};  // PNG files of one size, frame by frame
 

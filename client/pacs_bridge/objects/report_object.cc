@@ -101,6 +101,9 @@ void AddPlaces(const PredictionObjectsInput& input, const PredictedCase& predict
   if (places.empty()) return;
   const CodedTerm movement = OwnTerm("MOVEMENT", "Movement");
   tree->Open(OwnTerm("SKIN", "Predicted movement of the skin"));
+  if (input.band_mm.empty()) {
+    AddPlain(OwnTerm("NO_BAND", "Why no band of uncertainty is known"), input.why_no_band, tree);
+  }
   for (const PlaceMovement& place : places) {
     tree->Open(OwnTerm("PLACE", "Place of the face"));
     AddPlain(NameTerm(), place.name, tree);

@@ -3,12 +3,14 @@
 
 #include "client/pacs_bridge/work/material_band.h"
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 
 #include "absl/cleanup/cleanup.h"
 
 #include "client/cpp/prepared_evaluator.h"
+#include "core/answer_evaluator/pose_range.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "tissueform/v1/session_service.pb.h"
@@ -31,16 +33,13 @@ bool IsOfTheCase(const v1::Prediction& prediction, const v1::CreateSessionReques
 absl::StatusOr<std::vector<double>> AskMaterialBand(TissueformClient* client,
                                                     const CaseFile& contents,
                                                     const v1::Prediction& prediction) {
-  if (!contents.material_ranges || !TellsOfMaterial(prediction.model())) {
-    return std::vector<double>();
-  }
+  if (!WhyNoMaterialBand(contents, prediction).empty()) return std::vector<double>();
   v1::PrepareSessionRequest request;
   v1::PreparedAnswers prepared;
   if (!request.mutable_create()->ParseFromString(contents.session_request) ||
       !prepared.mutable_ranges()->ParseFromString(*contents.material_ranges)) {
     return absl::DataLossError("the case's session request or ranges of the material are damaged");
   }
-  if (!IsOfTheCase(prediction, request.create())) return std::vector<double>();
   // Linear elasticity tells the band of either model, and its columns are the cheaper ones.
   request.mutable_create()->set_model(v1::DEFORMATION_MODEL_LINEAR_ELASTIC);
   TF_ASSIGN_OR_RETURN(const v1::Session session, client->PrepareSession(request, {}));
@@ -56,6 +55,26 @@ absl::StatusOr<std::vector<double>> AskMaterialBand(TissueformClient* client,
   TF_ASSIGN_OR_RETURN(const std::optional<EvaluatedAnswer> answer, evaluator->Evaluate(poses));
   if (!answer) return std::vector<double>();
   return std::vector<double>(answer->band_mm.begin(), answer->band_mm.end());
+}
+
+std::string WhyNoMaterialBand(const CaseFile& contents, const v1::Prediction& prediction) {
+  if (!contents.material_ranges) return "the case gives no ranges of the material";
+  if (!TellsOfMaterial(prediction.model())) {
+    return "the model is none of elasticity, and stiffness in it no mechanics";
+  }
+  v1::CreateSessionRequest request;
+  if (!request.ParseFromString(contents.session_request)) return "";
+  if (!IsOfTheCase(prediction, request)) {
+    return "it was predicted with another mesh or stiffness than the case's";
+  }
+  const auto turns_too_far = [](const v1::HandlePose& pose) {
+    const double turn_rad = ToNamedPose(pose).pose.rotation_vector.norm();
+    return !HasBand(turn_rad, kLargestBandRotationRad);
+  };
+  if (std::any_of(prediction.poses().begin(), prediction.poses().end(), turns_too_far)) {
+    return "a segment turns by more than 30 degrees, which linear elasticity takes for strain";
+  }
+  return "";
 }
 
 }  // namespace tissueform

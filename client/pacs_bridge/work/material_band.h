@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -15,13 +16,19 @@ namespace tissueform {
 
 // Of each vertex of the mesh the distance in mm within which the prediction stays in 95 of 100
 // cases if nothing but the material is in doubt, by linear elasticity in first order. Empty where
-// nothing is known of it: the case gives no ranges, the model is none of elasticity, the poses are
-// beyond what is prepared, or it was predicted with another stiffness than the case's.
+// nothing is known of it: WhyNoMaterialBand says why, or the poses move so far that prepared
+// answers do not cover them.
 //
 // Makes a session of the case for it, a second or two of the server's time, and deletes it again.
 // Errors: the server's; DataLoss (the case's request or ranges are no messages).
 absl::StatusOr<std::vector<double>> AskMaterialBand(TissueformClient* client,
                                                     const CaseFile& contents,
                                                     const v1::Prediction& prediction);
+
+// Why a prediction has no band, in words for a report, without asking anybody: the case gives no
+// ranges, the model is none of elasticity, it was predicted with another stiffness than the case's,
+// or a segment turns so far that linear elasticity takes it for strain. Empty where there may be
+// one, and where the case is damaged.
+std::string WhyNoMaterialBand(const CaseFile& contents, const v1::Prediction& prediction);
 
 }  // namespace tissueform

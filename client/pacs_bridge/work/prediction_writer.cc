@@ -13,6 +13,7 @@
 #include "absl/time/time.h"
 
 #include "client/pacs_bridge/objects/prediction_objects.h"
+#include "client/pacs_bridge/work/material_band.h"
 #include "client/pacs_bridge/work/tissueform_command.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
@@ -46,6 +47,10 @@ PredictionObjectsInput InputOf(const ExportMaterial& material) {
   input.prediction = material.prediction.description;
   input.deformed = material.prediction.positions;
   input.band_mm = material.band_mm;
+  if (input.band_mm.empty()) {
+    input.why_no_band = WhyNoMaterialBand(input.contents, input.prediction);
+    if (input.why_no_band.empty()) input.why_no_band = "the server could not tell it";
+  }
   input.measures.assign(material.asked.measures().begin(), material.asked.measures().end());
   input.uids = material.uids;
   // Of the wish, not of this moment: the same again writes the same bytes.

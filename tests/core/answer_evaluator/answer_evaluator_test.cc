@@ -18,7 +18,6 @@
 #include "core/answer_evaluator/answer_checks.h"
 #include "core/mesh/tet_topology.h"
 #include "core/planning/plan_io.h"
-#include "core/uncertainty/band_columns.h"
 #include "tests/core/answer_evaluator/evaluated_problem.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
@@ -124,50 +123,6 @@ TEST(AnswerSizeTest, AHeadWithThreeSegmentsTravelsInAFewMegabytes) {
     // Little beside what is held: how the vertices are divided, and some numbers.
     EXPECT_LT(bytes, response->bytes_held() + 6 * static_cast<int64_t>(problem.vertices.size()));
   }
-}
-
-// With all that may be unknown of a material, at a third of the skin's vertices: about as many as
-// what is drawn follows. Bone moves by up to 10 mm and 8 degrees.
-TEST(AnswerSizeTest, AHeadsBandTravelsInAFewMegabytesAndIsOffByLessThanIsShown) {
-  constexpr double kShownMm = 0.1;
-  Plan plan = *ReadPlan(TestDataPath("plans/three_segments/plan.json"));
-  plan.uncertainty.emplace().youngs_modulus_factor_95 = 2.0;
-  plan.uncertainty->poisson_ratio_95 = {0.4, 0.48};
-  const PlanProblem problem = *ResolvePlan(plan);
-  const auto preparation =
-      *MeshPreparation::Create(*problem.mesh, problem.stiffness, problem.constraints, {});
-  const std::vector<int32_t> skin = BoundaryVertices(*problem.mesh);
-  std::vector<int32_t> vertices;
-  for (size_t v = 0; v < skin.size(); v += 3) vertices.push_back(skin[v]);
-  ASSERT_OK_AND_ASSIGN(
-      const auto response,
-      CreateResponse(preparation, vertices, {.model = DeformationModel::kLinearElastic}));
-  ASSERT_OK_AND_ASSIGN(const auto band,
-                       BandColumns::Create(preparation, *problem.uncertainty, vertices, {}));
-  PortableAnswers answers = response->Describe();
-  band->Describe(&answers);
-  EXPECT_LT(WriteAnswers(answers).size(), 2500000U);
-  const AnswerEvaluator evaluator(std::move(answers));
-
-  RandomNumbers random(5);
-  double largest_mm = 0;
-  for (int sample = 0; sample < 200; ++sample) {
-    std::vector<HandlePose> poses;
-    for (const HandleRegion& handle : problem.constraints.handles()) {
-      HandlePose& pose = poses.emplace_back();
-      pose.pivot_mm = problem.mesh->positions()(handle.vertices, Eigen::all).colwise().mean();
-      pose.rotation_vector = 0.14 * random.Next() * random.Vector().normalized();
-      pose.translation_mm = 10 * random.Next() * random.Vector().normalized();
-    }
-    Eigen::VectorXf expected;
-    band->Evaluate(poses, &expected);
-    std::vector<float> given;
-    ASSERT_TRUE(evaluator.Band(ToAnswerPoses(poses), &given));
-    const Eigen::Map<const Eigen::VectorXf> told(given.data(), expected.size());
-    ASSERT_LT((told - expected).cwiseAbs().maxCoeff(), 0.25 * kShownMm) << sample;
-    largest_mm = std::max<double>(largest_mm, expected.maxCoeff());
-  }
-  EXPECT_GT(largest_mm, 2) << "of bands that are worth a test";
 }
 
 class EvaluatedModelTest : public ::testing::TestWithParam<Evaluated> {

@@ -55,8 +55,12 @@ struct Case {
   const ConstraintSet& constraints() const { return preparation->constraints(); }
 
   absl::StatusOr<PlanFit> Fit(const FitRequest& request, bool verify = true) {
-    const std::vector<HandlePose> rest(constraints().handles().size());
-    problem = *ResolveFit(request, mesh, constraints(), rest);
+    return FitFrom(std::vector<HandlePose>(constraints().handles().size()), request, verify);
+  }
+
+  absl::StatusOr<PlanFit> FitFrom(const std::vector<HandlePose>& start, const FitRequest& request,
+                                  bool verify) {
+    problem = *ResolveFit(request, mesh, constraints(), start);
     const auto response = CreateResponse(preparation, FitVertices(problem),
                                          {.model = options.model,
                                           .tolerance_mm = 1e-3,
@@ -107,6 +111,19 @@ void ExpectSamePoses(const std::vector<HandlePose>& found, const std::vector<Han
   }
 }
 
+// Between where two answers bring a vertex of bone, at most.
+double BoneDistanceMm(const Case& of, const std::vector<HandlePose>& one,
+                      const std::vector<HandlePose>& other) {
+  double most = 0;
+  for (size_t h = 0; h < one.size(); ++h) {
+    for (const int32_t v : of.constraints().handles()[h].vertices) {
+      const Vector3d rest = of.mesh.positions().row(v).transpose();
+      most = std::max(most, (ApplyPose(one[h], rest) - ApplyPose(other[h], rest)).norm());
+    }
+  }
+  return most;
+}
+
 class KnownPoseTest : public ::testing::TestWithParam<std::pair<std::string, DeformationModel>> {};
 
 TEST_P(KnownPoseTest, IsFoundAgainOnAJitteredBarWithTwoHandles) {
@@ -132,6 +149,34 @@ INSTANTIATE_TEST_SUITE_P(
                       std::pair("LinearElastic", DeformationModel::kLinearElastic),
                       std::pair("NeoHookean", DeformationModel::kNeoHookean)),
     [](const auto& test) { return test.param.first; });
+
+// As somebody pulls: every wish a little further than the one before, which cannot be met.
+TEST_P(KnownPoseTest, APullEndsWhereASearchFromRestDoes) {
+  Case bar(testing::Bar({4, 4, 8}, 2.0, 0.2), 2, GetParam().second);
+  FitRequest request = bar.TargetsOf(std::vector<HandlePose>(2), 6);
+  request.moving = AllMay(bar.constraints(), 15, 5);
+  RandomNumbers random(4);
+  std::vector<Vector3d> goals;
+  for (const FitTargetRequest& target : request.targets) {
+    goals.push_back(*target.position_mm + 1.5 * random.Vector());
+  }
+  std::vector<HandlePose> last(2);
+  for (int step = 0; step < 8; ++step) {
+    for (size_t t = 0; t < goals.size(); ++t) {
+      Vector3d& wanted = *request.targets[t].position_mm;
+      wanted += (goals[t] - wanted) / (8 - step);
+    }
+    ASSERT_OK_AND_ASSIGN(const PlanFit cold, bar.Fit(request, /*verify=*/false));
+    ASSERT_OK_AND_ASSIGN(const PlanFit warm, bar.FitFrom(last, request, /*verify=*/false));
+    EXPECT_TRUE(cold.converged && warm.converged);
+    EXPECT_LT(BoneDistanceMm(bar, warm.poses, cold.poses), 0.02) << step;
+    for (size_t t = 0; t < goals.size(); ++t) {
+      EXPECT_LT((warm.targets[t].position_mm - cold.targets[t].position_mm).norm(), 0.005);
+    }
+    last = warm.poses;
+  }
+  EXPECT_GT(last[0].translation_mm.norm(), 0.05) << "something was pulled";
+}
 
 TEST(PlanFitTest, KnownPoseOfTheTongueIsFoundAgain) {
   Case tongue(testing::LoadTestMesh("plans/tongue/volumetricTongue.vtu"), 1,

@@ -6,6 +6,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/answer_evaluator/pose_range.h"
 #include "core/uncertainty/uncertainty_band.h"
 #include "tests/core/uncertainty/uncertain_bar.h"
 #include "tests/testing/status_matchers.h"
@@ -22,7 +23,7 @@ Eigen::VectorXf Evaluate(const UncertainBar& bar, const std::vector<int32_t>& ve
   const auto columns = BandColumns::Create(bar.Prepare(), bar.uncertainty, vertices, {});
   EXPECT_THAT(columns, testing::IsOk());
   Eigen::VectorXf band;
-  (*columns)->Evaluate(bar.poses, &band);
+  (*columns)->Evaluate(bar.poses, kLargestBandRotationRad, &band);
   return band;
 }
 
@@ -61,6 +62,26 @@ TEST(BandColumnsTest, AreNearThoseOfTheNonlinearModel) {
       SampleBand(expansion, SurfaceNormals(bar.mesh, answer), /*threads=*/1).size_mm;
   const Eigen::VectorXd quick = Evaluate(bar, AllVertices(bar.mesh)).cast<double>();
   EXPECT_LT((quick - sampled).norm(), 0.2 * sampled.norm());
+}
+
+// Where linear elasticity takes a turn for strain, and where columns were not kept for it.
+TEST(BandColumnsTest, TurnsBeyondTheRangeHaveNone) {
+  UncertainBar bar(DeformationModel::kLinearElastic);
+  const std::vector<int32_t> vertices = AllVertices(bar.mesh);
+  ASSERT_OK_AND_ASSIGN(const auto columns,
+                       BandColumns::Create(bar.Prepare(), bar.uncertainty, vertices, {}));
+  const auto size_of = [&](double turn_rad, double max_rotation_rad) {
+    bar.poses[0].rotation_vector = {0, turn_rad, 0};
+    Eigen::VectorXf band = Eigen::VectorXf::Ones(3);
+    columns->Evaluate(bar.poses, max_rotation_rad, &band);
+    return band.size();
+  };
+  const auto all = static_cast<Eigen::Index>(vertices.size());
+  EXPECT_EQ(size_of(0.3, 0.3), all) << "the edge belongs to the range";
+  EXPECT_EQ(size_of(0.31, 0.3), 0);
+  EXPECT_EQ(size_of(0.52, 2.5), all);
+  EXPECT_EQ(size_of(0.53, 2.5), 0) << "whatever was asked for";
+  EXPECT_EQ(size_of(2, 2.5), 0);
 }
 
 TEST(BandColumnsTest, WhatTheAdmissionRefusesIsNotMade) {

@@ -160,5 +160,31 @@ TEST(FirstOrderBandTest, IsThe95thPercentileOfNormalVectors) {
   EXPECT_EQ(FirstOrderBand(Eigen::MatrixXf::Zero(3, 2))[0], 0);
 }
 
+// By its gradient that is at most kNormal95 of the fields' Frobenius norm; nothing is nearer to it
+// than fields all along one line.
+TEST(FirstOrderBandTest, ChangesByNoMoreThanTheNormalPercentileOfTheFieldsChange) {
+  std::mt19937 generator(11);
+  std::normal_distribution<float> normal;
+  double steepest = 0;
+  for (int variables = 1; variables <= 5; ++variables) {
+    for (int sample = 0; sample < 2000; ++sample) {
+      Eigen::MatrixXf fields(3, variables);
+      Eigen::MatrixXf change(3, variables);
+      // From all directions alike to one line.
+      const float across = static_cast<float>(sample % 10) / 9;
+      for (float& value : fields.reshaped()) value = normal(generator);
+      for (float& value : change.reshaped()) value = normal(generator);
+      fields.bottomRows(2) *= across;
+      if (sample % 3 == 0) change.bottomRows(2).setZero();
+      change *= 0.3F;
+      const double changed =
+          std::abs(FirstOrderBand(fields + change)[0] - FirstOrderBand(fields)[0]);
+      steepest = std::max(steepest, changed / change.norm());
+    }
+  }
+  EXPECT_LT(steepest, kNormal95 * (1 + 1e-4));
+  EXPECT_GT(steepest, 0.99 * kNormal95);
+}
+
 }  // namespace
 }  // namespace tissueform

@@ -11,6 +11,7 @@
 #include "gtest/gtest.h"
 #include "spdlog/spdlog.h"
 
+#include "core/answer_evaluator/pose_range.h"
 #include "core/uncertainty/band_columns.h"
 #include "proto/conversion/material_conversion.h"
 #include "server/rpc/resource_conversion.h"
@@ -117,7 +118,7 @@ TEST_F(FrameBandTest, FramesTellTheBandOfTheirPose) {
     HandlePose pose;
     pose.translation_mm.z() = static_cast<double>(sequence) / 64;
     Eigen::VectorXf expected;
-    columns->Evaluate({pose}, &expected);
+    columns->Evaluate({pose}, kLargestBandRotationRad, &expected);
     EXPECT_GT(expected.maxCoeff(), 1e-3F);
     EXPECT_LT((band - expected).cwiseAbs().maxCoeff(), 1e-5F);
     stream.Send(Ack(sequence));

@@ -43,6 +43,18 @@ export function areCovered({ numbers }: PreparedColumns, poses: readonly Pose[],
   return errorMm <= (isNeo ? numbers.maxEstimateMm : numbers.toleranceMm);
 }
 
+/** Beyond this turn, 30 degrees, there is no band, whatever was prepared: linear elasticity takes the turn for strain. */
+export const LARGEST_BAND_ROTATION = 0.524;
+
+/** Whether no handle turns too far for a band. */
+export function haveBand({ numbers }: PreparedColumns, poses: readonly Pose[]): boolean {
+  const most = Math.min(numbers.maxRotation, LARGEST_BAND_ROTATION) * (1 + RANGE_SLACK);
+  for (const { rotationVector: w } of poses) {
+    if (!(Math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) <= most)) return false;
+  }
+  return true;
+}
+
 /** How far a free vertex of gradient_field or linear_elastic can be put off by compression and single precision. */
 export class CompressionError {
   private readonly sums = new Float64Array(3);

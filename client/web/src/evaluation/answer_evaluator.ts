@@ -4,7 +4,7 @@
 import type { Pose } from "../geometry/pose";
 import { AnswerBand } from "./answer_band";
 import { AnswerModel, FIXED, FREE, type PreparedColumns } from "./answer_bytes";
-import { CompressionError, HeldError, areCovered, areLegal } from "./answer_errors";
+import { CompressionError, HeldError, areCovered, areLegal, haveBand } from "./answer_errors";
 import { type AnswerSizes, sizesOf } from "./answer_sizes";
 import { type ColumnKernel, javascriptKernel } from "./column_kernel";
 import { ColumnMatrix, partsOf, unpack, wholeOf } from "./column_matrix";
@@ -94,13 +94,13 @@ export class AnswerEvaluator {
     if (this.isClustered) this.placeClusters();
     else this.placeFree();
     this.placeHandles(poses);
-    result.uncertainty = withBand && this.band !== null ? this.band.evaluate(poses) : null;
+    result.uncertainty = withBand && this.band !== null && haveBand(this.answers, poses) ? this.band.evaluate(poses) : null;
     return result;
   }
 
-  /** The band alone, of poses of any size, in an array of the caller's; null without columns of it and for poses that are none. */
+  /** The band alone, of poses that need not be covered, in an array of the caller's; null without columns of it, for poses that are none, and where one turns too far. */
   bandAt(poses: readonly Pose[]): Float32Array | null {
-    return this.band === null || !areLegal(this.answers, poses) ? null : this.band.evaluate(poses).slice();
+    return this.band === null || !areLegal(this.answers, poses) || !haveBand(this.answers, poses) ? null : this.band.evaluate(poses).slice();
   }
 
   private get isClustered(): boolean {

@@ -76,7 +76,7 @@ export function planDocument(bench: Workbench): string {
       return [{ name: definition.name, title: definition.title, unit: definition.unit, before, after, ...(band === null ? {} : { lowest_after: band.lowest, highest_after: band.highest }) }];
     }),
     answer: summary == null ? null : { prepared: summary.prepared, converged: summary.converged, error_bound_mm: summary.errorBoundMm, error_estimate_mm: summary.errorEstimateMm },
-    predictions: bench.predictions.value.map(({ name, title }) => ({ name, title })),
+    predictions: bench.stored.all.value.map(({ name, title }) => ({ name, title })),
   };
   return JSON.stringify(document, null, 2);
 }

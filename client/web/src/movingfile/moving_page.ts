@@ -123,7 +123,7 @@ function numbersPanel(data: MovingData, head: MovingHead): { element: HTMLElemen
 
 function withBand({ largestMm, bandMm }: Shown): string {
   const number = `${formatNumber(largestMm)} mm`;
-  if (bandMm === null) return `${number}. The band of uncertainty of this model is not known.`;
+  if (bandMm === null) return `${number}. The band of uncertainty of this model or pose is not known.`;
   const low = formatNumber(Math.max(0, largestMm - bandMm));
   return `${number}, ${low} to ${formatNumber(largestMm + bandMm)} in 95 of 100 cases if only the tissue's stiffness is in doubt.`;
 }

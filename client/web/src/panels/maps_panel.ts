@@ -101,7 +101,7 @@ export function mapPanel(bench: Workbench): HTMLElement {
   };
   bench.map.choice.watch(show);
   bench.model.watch(show);
-  bench.predictions.watch(show);
+  bench.stored.all.watch(show);
   return section("Map", [field.element]);
 }
 
@@ -115,7 +115,7 @@ function mapChoices(bench: Workbench): Choice<MapChoice>[] {
     const { label } = modelText(name);
     if (model !== bench.model.value) choices.push({ value: { kind: "model", model, label }, label: `Difference to ${label}` });
   }
-  for (const prediction of bench.predictions.value) {
+  for (const prediction of bench.stored.all.value) {
     choices.push({ value: { kind: "prediction", prediction }, label: `Difference to “${prediction.title}”` });
   }
   return choices;

@@ -37,6 +37,7 @@ function captionOf(bench: Workbench, results: readonly MeasureResult[]): string 
   return [
     `In the ${hasHeadFrame(bench.file) ? "head frame" : "axes of the scanner, for no head frame was found"}; forward, up and the patient’s left are positive.`,
     hasBand ? "Below “after”: where it stays in 95 of 100 cases if nothing but the material is in doubt." : "",
+    bench.hasBand && bench.whyNoBand !== "" ? `No band is known: ${bench.whyNoBand}.` : "",
     bench.showsPlan ? "" : `The face that is shown is not the plan’s${hasBand ? "" : "; no band of it is known"}.`,
   ].filter((text) => text !== "").join(" ");
 }

@@ -25,7 +25,7 @@ function storeForm(bench: Workbench): HTMLElement {
     event.preventDefault();
     const run = async () => {
       bench.notice.value = "The server solves in full and keeps the answer.";
-      const prediction = await bench.storePrediction(title.value.trim() === "" ? defaultTitle(bench) : title.value.trim());
+      const prediction = await bench.stored.store(title.value.trim() === "" ? defaultTitle(bench) : title.value.trim());
       title.value = "";
       bench.notice.value = `Stored “${prediction.title}”.`;
     };
@@ -35,18 +35,18 @@ function storeForm(bench: Workbench): HTMLElement {
 }
 
 function defaultTitle(bench: Workbench): string {
-  return `Prediction ${bench.predictions.value.length + 1}`;
+  return `Prediction ${bench.stored.all.value.length + 1}`;
 }
 
 function predictionList(bench: Workbench): HTMLElement {
   const list = el("ul", { class: "predictions" });
   const show = () => {
     const compared = bench.comparison.value?.to.name;
-    const items = bench.predictions.value.map((prediction) => predictionItem(bench, prediction, prediction.name === compared));
+    const items = bench.stored.all.value.map((prediction) => predictionItem(bench, prediction, prediction.name === compared));
     list.replaceChildren(...items);
     if (items.length === 0) list.append(el("li", { class: "quiet", text: "None is stored yet." }));
   };
-  bench.predictions.watch(show);
+  bench.stored.all.watch(show);
   bench.pacs.byPrediction.watch(show);
   bench.comparison.watch((next) => {
     // While the slider moves the list stays as it is: what has the focus keeps it.
@@ -66,7 +66,7 @@ function predictionItem(bench: Workbench, prediction: Prediction, isCompared: bo
   const compare = button("Compare", () => void whileBusy(compare, toggle, onError), {
     attributes: { "aria-pressed": String(isCompared), "data-name": prediction.name, "aria-label": `Compare ${prediction.title}` },
   });
-  const remove = button("Delete", () => void whileBusy(remove, () => bench.removePrediction(prediction), onError), {
+  const remove = button("Delete", () => void whileBusy(remove, () => bench.stored.remove(prediction), onError), {
     attributes: { "aria-label": `Delete ${prediction.title}` },
   });
   return el("li", {}, [text, compare, remove, pacsLine(bench, prediction)]);
@@ -78,7 +78,7 @@ function pacsLine(bench: Workbench, prediction: Prediction): HTMLElement | null 
   if (all === null) return null;
   const entry = all.get(prediction.name);
   const onError = (thrown: unknown) => (bench.notice.value = sentenceOf(thrown));
-  const send = button("Send to PACS", () => void whileBusy(send, () => bench.sendToPacs(prediction), onError), {
+  const send = button("Send to PACS", () => void whileBusy(send, () => bench.stored.send(prediction), onError), {
     attributes: { "aria-label": `Send ${prediction.title} to the PACS` },
   });
   const withdraw = async () => (mayTakeBack(entry) ? bench.pacs.takeBack(entry) : undefined);
@@ -119,7 +119,7 @@ function comparisonBox(bench: Workbench): HTMLElement {
 }
 
 function fromChoices(bench: Workbench, to: Prediction): Choice<Comparison["from"]>[] {
-  const others = bench.predictions.value.filter((prediction) => prediction.name !== to.name);
+  const others = bench.stored.all.value.filter((prediction) => prediction.name !== to.name);
   return [
     { value: "plan", label: "The plan now" },
     { value: "rest", label: "The face at rest" },

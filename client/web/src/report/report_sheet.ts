@@ -63,7 +63,7 @@ function facts(bench: Workbench, model: string): HTMLElement {
   const lines = [
     `made ${new Date().toISOString()}`,
     `model ${model}, answer ${answer}`,
-    bench.hasBand ? "95 of 100: where it stays if nothing but the material is in doubt; excludes errors of model and surgery" : "the band of uncertainty is not known for this model or case",
+    bench.whyNoBand === "" ? "95 of 100: where it stays if nothing but the material is in doubt; excludes errors of model and surgery" : `no band of uncertainty is known: ${bench.whyNoBand}`,
     bench.showsPlan ? "" : "the face that is shown is not the plan's: a comparison, or an open jaw",
     "mm and degrees in the head frame: forward, up and the patient's left are positive",
     ...provenanceLines(bench).filter((line) => !line.startsWith("model")),

@@ -5,6 +5,7 @@ import { sentenceOf } from "../calls/call_error";
 import type { Gateway } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
 import type { SurfaceKind } from "../case/manifest";
+import { LARGEST_BAND_ROTATION } from "../evaluation/answer_errors";
 import type { Evaluation } from "../evaluation/answer_evaluator";
 import type { SolveSummary } from "../generated/tissueform/v1/deform_service_pb";
 import type { Measure } from "../generated/tissueform/v1/export_service_pb";
@@ -31,6 +32,7 @@ import { FaceMap, type MapChoice } from "./face_map";
 import { NewestAnswer } from "./newest_answer";
 import { PacsExports } from "./pacs_exports";
 import { Signal } from "./signal";
+import { StoredPredictions } from "./stored_predictions";
 import { WishFit } from "./wish_fit";
 import { recallLandmarks, rememberLandmarks } from "./work";
 
@@ -64,6 +66,7 @@ export class Workbench implements ShownFace {
   readonly jaw: JawOpening;
   readonly wishes: WishFit;
   readonly pacs: PacsExports;
+  readonly stored: StoredPredictions;
   readonly local: LocalAnswers;
   readonly map: FaceMap;
 
@@ -74,7 +77,6 @@ export class Workbench implements ShownFace {
   readonly picture = new Signal<PictureFacts | null>(null);
   readonly localState = new Signal<LocalState>({ kind: "none" });
   readonly model = new Signal<DeformationModel>(0);
-  readonly predictions = new Signal<Prediction[]>([]);
   readonly comparison = new Signal<Comparison | null>(null);
   readonly penetrations = new Signal<Penetration[]>([]);
   /** What the next click upon the picture is for; null: for nothing but looking and taking a segment. */
@@ -105,6 +107,13 @@ export class Workbench implements ShownFace {
     this.newest = new NewestAnswer(rest);
     this.answers = new Answers(gateway, file, caseName, rest);
     this.pacs = new PacsExports(gateway, caseName);
+    this.stored = new StoredPredictions(this.answers, this.pacs, {
+      question: () => ({ session: this.live.session, model: this.model.value, poses: this.plan.poses() }),
+      measuresOf: (prediction) => this.measuresOf(prediction),
+      onRemoved: async ({ name }) => {
+        if (this.comparison.value?.to.name === name) await this.compare(null);
+      },
+    });
     this.comparer = new Comparer(this.plan, this.answers, (prediction, poses) => (this.knowsBand(prediction.model) ? this.local.bandAt(poses) : Promise.resolve(null)));
     this.map = new FaceMap(view.head, {
       ofModel: (model) => this.answers.ofModel(this.live.session, model, this.plan.poses()),
@@ -141,7 +150,8 @@ export class Workbench implements ShownFace {
     this.landmarks.onChange(() => rememberLandmarks(this.caseName, this.landmarks.save()));
     this.view.setPoses(this.posesByHandle(this.plan.poses()));
     this.pacs.start();
-    await Promise.all([this.live.start(this.plan.poses()), this.loadPredictions()]);
+    const noList = (thrown: unknown) => (this.notice.value = `The stored predictions cannot be listed: ${sentenceOf(thrown)}`);
+    await Promise.all([this.live.start(this.plan.poses()), this.stored.load().catch(noList)]);
   }
 
   /** For how long a pose has been waiting for its picture, in ms; 0: none is. */
@@ -174,6 +184,13 @@ export class Workbench implements ShownFace {
     return this.knowsBand(this.model.value);
   }
 
+  /** Of what is shown, in words; empty where there is one, or none yet. */
+  get whyNoBand(): string {
+    if (!this.hasBand) return "this model or case tells none";
+    const turnsTooFar = Array.from(this.shownPoses.values()).some(({ rotationVector }) => Math.hypot(...rotationVector) > LARGEST_BAND_ROTATION);
+    return this.shownBand === null && turnsTooFar ? "a segment turns by more than 30 degrees, which linear elasticity takes for strain" : "";
+  }
+
   async compare(comparison: Comparison | null): Promise<void> {
     if (comparison !== null) {
       await this.answers.ofPrediction(comparison.to);
@@ -182,18 +199,6 @@ export class Workbench implements ShownFace {
     this.comparison.value = comparison;
     this.gizmo.setVisible(comparison === null);
     await this.redraw();
-  }
-
-  /** Solves in full and keeps it. */
-  async storePrediction(title: string): Promise<Prediction> {
-    const prediction = await this.answers.store(this.live.session, this.model.value, this.plan.poses(), title);
-    this.predictions.value = [prediction, ...this.predictions.value];
-    return prediction;
-  }
-
-  /** Asks for a stored prediction to be stored in the patient's study, with the numbers of its face. */
-  async sendToPacs(prediction: Prediction): Promise<void> {
-    await this.pacs.send(prediction, await this.measuresOf(prediction));
   }
 
   /** They are read from the stage: it shows that face for a moment. */
@@ -206,12 +211,6 @@ export class Workbench implements ShownFace {
     } finally {
       await this.compare(before);
     }
-  }
-
-  async removePrediction(prediction: Prediction): Promise<void> {
-    await this.answers.remove(prediction);
-    this.predictions.value = this.predictions.value.filter((other) => other.name !== prediction.name);
-    if (this.comparison.value?.to.name === prediction.name) await this.compare(null);
   }
 
   /** Where a vertex of the first skin is now, LPS. */
@@ -258,14 +257,6 @@ export class Workbench implements ShownFace {
     const info = this.modelInfo(this.model.value);
     const isPrepared = info?.hasPreparedAnswers ?? false;
     return { model: this.model.value, isPrepared, ranges: this.hasBand ? this.file.materialRanges : null };
-  }
-
-  private async loadPredictions(): Promise<void> {
-    try {
-      this.predictions.value = await this.answers.list();
-    } catch (thrown) {
-      this.notice.value = `The stored predictions cannot be listed: ${sentenceOf(thrown)}`;
-    }
   }
 
   private pull(pose: Pose, isFinal: boolean): void {

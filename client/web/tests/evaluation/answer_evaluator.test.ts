@@ -39,6 +39,15 @@ test.each(ALL)("$name gives the positions, errors and bands that are written the
   }
 });
 
+test.each(KERNELS)("a handle that turns beyond the range has positions and no band, by %s", async (kernel) => {
+  const evaluator = await evaluatorOf("linear_elastic_band", kernel);
+  const cases = goldenCases("linear_elastic_band");
+  expect(Math.hypot(...cases[7].poses[0].rotationVector)).toBeCloseTo(0.42);
+  expect(evaluator.evaluate(cases[7].poses)).toMatchObject({ coverage: "covered", uncertainty: null });
+  expect(evaluator.bandAt(cases[7].poses)).toBeNull();
+  expect(evaluator.bandAt(cases[1].poses)?.length).toBe(cases[1].bandMm?.length);
+});
+
 test.each(GOLDEN)("%s: a thousand poses give the same by JavaScript and by WebAssembly", async (name) => {
   const [one, other] = await Promise.all(KERNELS.map((kernel) => evaluatorOf(name, kernel)));
   const [from, to] = goldenCases(name).filter(({ isCovered }) => isCovered).slice(1, 3);

@@ -168,6 +168,18 @@ TEST_F(OtherReadersTest, DcmtkReadsTheReport) {
   EXPECT_THAT(Said(), HasSubstr("<value>6.3246</value>"));
 }
 
+TEST_F(OtherReadersTest, AReportWithoutABandSaysWhy) {
+  if (!Has("dsrdump")) GTEST_SKIP() << "dcmtk is not installed";
+  PredictionObjectsInput input = MakeInput();
+  input.why_no_band = "a segment turns by more than 30 degrees";
+  ASSERT_EQ(Run("dsrdump +Pl " + Write(input).at("report").path), 0) << Said();
+  EXPECT_THAT(Said(), Not(HasSubstr(input.why_no_band))) << "a band is known";
+  input.band_mm.clear();
+  ASSERT_EQ(Run("dsrdump +Pl " + Write(input).at("report").path), 0) << Said();
+  EXPECT_THAT(Said(), HasSubstr(input.why_no_band));
+  EXPECT_THAT(Said(), Not(HasSubstr("95 of 100")));
+}
+
 TEST_F(OtherReadersTest, ASourceInJpeg2000IsAsGood) {
   if (!Has("gdcmconv")) GTEST_SKIP() << "libgdcm-tools is not installed";
   PredictionObjectsInput input = MakeInput();
