@@ -30,7 +30,7 @@ struct PostgresOptions {
   // What a call waits for a free connection, and for a database that is not there: then it is
   // answered UNAVAILABLE.
   std::chrono::milliseconds patience{30'000};
-  // Of that, what the call whose work this thread does has waited for a thread already.
+  // Of that, what the call whose work this thread does has waited already, for a thread above all.
   std::function<std::chrono::steady_clock::duration()> waited = nullptr;
 };
 

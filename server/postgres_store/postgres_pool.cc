@@ -74,9 +74,11 @@ PostgresPool::~PostgresPool() {
 
 PostgresPool::Clock::duration PostgresPool::Patience() {
   if (!options_.waited) return options_.patience;
+  const Clock::duration left = options_.patience - options_.waited();
   MutexLock lock(mutex_);
-  // A queue that is slow is no database that is away.
-  return options_.patience - std::min(options_.waited(), Clock::now() - answered_);
+  if (failed_ <= answered_) return options_.patience;
+  // Nobody may have asked since: then one try.
+  return Clock::now() - failed_ < kLeastAnswer ? left : std::max<Clock::duration>(left, kMostLate);
 }
 
 absl::Status PostgresPool::Run(const Work& work, Clock::time_point deadline) {
@@ -177,6 +179,7 @@ void PostgresPool::GiveBack(std::unique_ptr<PostgresConnection> connection,
   --in_use_;
   busy_.erase(connection.get());
   if (outcome == PostgresOutcome::kCommitted) answered_ = Clock::now();
+  if (outcome == PostgresOutcome::kTransient) failed_ = Clock::now();
   if (connection != nullptr && connection->usable()) {
     idle_.push_back(std::move(connection));
   } else if (connection != nullptr) {

@@ -64,8 +64,8 @@ class PostgresPool {
   PostgresPool(PostgresOptions options, PostgresTarget target)
       : options_(std::move(options)), target_(std::move(target)), watch_([this] { Watch(); }) {}
 
-  // What is left of the options' for this thread's call: since the database answered last nothing
-  // of it is used up.
+  // What is left of the options' for this thread's call while the database is away: a queue or a
+  // job that was slow uses nothing up.
   Clock::duration Patience();
   absl::Status TryUntil(const Work& work, Clock::time_point deadline);
   absl::Status Try(const Work& work, Clock::time_point deadline, PostgresOutcome* outcome);
@@ -91,7 +91,9 @@ class PostgresPool {
   int in_use_ ABSL_GUARDED_BY(mutex_) = 0;
   bool ending_ ABSL_GUARDED_BY(mutex_) = false;
   Clock::time_point latest_ ABSL_GUARDED_BY(mutex_) = Clock::time_point::max();
+  // When a transaction was last committed, and when one failed that another try may help.
   Clock::time_point answered_ ABSL_GUARDED_BY(mutex_);
+  Clock::time_point failed_ ABSL_GUARDED_BY(mutex_);
   Clock::time_point told_ ABSL_GUARDED_BY(mutex_);
 
   std::thread watch_;  // last: it uses the others

@@ -47,13 +47,13 @@ absl::StatusOr<MeshUploadStream::After> MeshUploadStream::TakeHeader(
   UploadAnnouncement announcement = ToAnnouncement(request.header());
   const Principal& caller = scope().principal();
   announcement.owner = caller.name;
-  // Whoever may not use the mesh does not hear that it is here: the bytes say who has it.
-  const bool may_use = changes_->access().MayMesh(caller, announcement.sha256, Need::kLook).ok();
-  scope().SetResource(MeshName(announcement.sha256));
   sha256_ = announcement.sha256;
-  const auto known = catalog_->Look(announcement.sha256);
-  // A store that was waited for in vain is not waited for once more after the bytes.
+  scope().SetResource(MeshName(sha256_));
+  const auto known = catalog_->Look(sha256_);
+  // A store that was waited for in vain is not waited for once more, nor after the bytes.
   if (absl::IsUnavailable(known.status())) return known.status();
+  // Whoever may not use the mesh does not hear that it is here: the bytes say who has it.
+  const bool may_use = changes_->access().MayMesh(caller, sha256_, Need::kLook).ok();
   if (may_use && known.ok()) {
     *response_->mutable_mesh() = ToProto(*known);
     response_->set_already_existed(true);

@@ -3,6 +3,7 @@
 
 #include "server/session/worker_pool.h"
 
+#include <optional>
 #include <unistd.h>
 #include <utility>
 
@@ -25,11 +26,14 @@ void BecomeNicer(int steps) {
   setpriority(PRIO_PROCESS, thread, now + steps);
 }
 
-thread_local std::chrono::steady_clock::duration job_has_waited{0};
+thread_local std::optional<std::chrono::steady_clock::time_point> job_posted;
 
 }  // namespace
 
-std::chrono::steady_clock::duration WorkerPool::Waited() { return job_has_waited; }
+std::chrono::steady_clock::duration WorkerPool::Waited() {
+  if (!job_posted.has_value()) return std::chrono::steady_clock::duration::zero();
+  return std::chrono::steady_clock::now() - *job_posted;
+}
 
 WorkerPool::WorkerPool(int num_threads) {
   threads_.reserve(kNumLanes * num_threads);
@@ -81,8 +85,8 @@ void WorkerPool::Work(Lane lane) {
     queue.jobs.pop_front();
     mutex_.Unlock();
     const auto start = std::chrono::steady_clock::now();
-    job_has_waited = start - job.since;
-    measures.waited.Observe(job_has_waited);
+    job_posted = job.since;
+    measures.waited.Observe(start - job.since);
     job.job();
     measures.ran.Observe(std::chrono::steady_clock::now() - start);
     job.job = nullptr;  // what it holds goes before anybody sees it finished

@@ -54,8 +54,8 @@ class WorkerPool {
   void Post(Lane lane, Job job, std::chrono::steady_clock::time_point since);
 
   const LaneMeasures& measures(Lane lane) const { return measures_[static_cast<size_t>(lane)]; }
-  // How long the job that this thread runs has waited for it, since it was posted; nothing where it
-  // runs none.
+  // How long ago the job that this thread runs was posted: what its caller waits since then;
+  // nothing where it runs none.
   static std::chrono::steady_clock::duration Waited();
 
   // Jobs that no thread has taken yet; what waits in strands is not in a lane.
