@@ -135,6 +135,8 @@ TEST_F(QuotasTest, PosesOfADragAreNoCalls) {
   v1::DeformRequest request;
   request.mutable_configuration()->set_session(session.name());
   ASSERT_TRUE(drag->Write(request));
+  v1::DeformResponse response;
+  ASSERT_TRUE(drag->Read(&response)) << "the stream that counts has begun";
   constexpr uint64_t kPoses = 500;
   for (uint64_t sequence = 1; sequence <= kPoses; ++sequence) {
     request.mutable_pose()->set_sequence(sequence);
@@ -145,7 +147,6 @@ TEST_F(QuotasTest, PosesOfADragAreNoCalls) {
   const auto second_context = ContextOf(ann_);
   const auto second = stubs_->deform->Deform(second_context.get());
   ExpectRefused(second->Finish(), "streams");
-  v1::DeformResponse response;
   uint64_t newest = 0;
   uint64_t answered = 0;
   int64_t coalesced = 0;
