@@ -36,8 +36,8 @@ def git(root, *arguments, text_in=None):
 
 
 def of_interest(path):
-    """The examples in docs are projects of their own, which this build's commands do not know."""
-    return not path.startswith("docs/") and bool(SOURCE.search(path) or CONCERNS_ALL.search(path))
+    """The examples in docs and what browsers run are projects of their own, which this build's commands do not know."""
+    return not path.startswith(("docs/", "client/web/")) and bool(SOURCE.search(path) or CONCERNS_ALL.search(path))
 
 
 def contents_of_tree(root):

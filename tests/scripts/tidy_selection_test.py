@@ -71,6 +71,8 @@ class State(unittest.TestCase):
         self.git("init", "-q")
         (self.root / "a.cc").write_text("int a;\n", encoding="utf-8")
         (self.root / "notes.md").write_text("notes\n", encoding="utf-8")
+        (self.root / "client/web").mkdir(parents=True)
+        (self.root / "client/web/page.cc").write_text("int page;\n", encoding="utf-8")
         self.git("add", ".")
         self.git("-c", "user.name=n", "-c", "user.email=e@example.org", "commit", "-qm", "one")
 
