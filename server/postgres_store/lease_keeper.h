@@ -30,7 +30,7 @@ class LeaseKeeper {
     // After a call that the store did not answer nobody waits for another one for so long, but for
     // renewals: it is answered as that was. After so long renewing is tried again.
     std::chrono::milliseconds silence{1'000};
-    SteadyClock clock = std::chrono::steady_clock::now;
+    SteadyNow clock = std::chrono::steady_clock::now;
   };
   // A session is held no longer: its streams end (SESSION_MOVED), its memory is free. Called once
   // for each lease that is lost, without a lock held.

@@ -12,7 +12,7 @@
 namespace tissueform {
 
 PostgresSessionLeases::PostgresSessionLeases(PostgresPool* pool, std::string node,
-                                             LeaseOptions options, SteadyClock clock)
+                                             LeaseOptions options, SteadyNow clock)
     : pool_(pool),
       node_(std::move(node)),
       holder_(RandomId()),

@@ -18,7 +18,7 @@ class PostgresSessionLeases final : public SessionLeases {
   // `node`: where clients find this server. Two servers of one name are two holders all the same:
   // each makes a random one. `pool` must outlive it.
   PostgresSessionLeases(PostgresPool* pool, std::string node, LeaseOptions options = {},
-                        SteadyClock clock = std::chrono::steady_clock::now);
+                        SteadyNow clock = std::chrono::steady_clock::now);
 
   absl::StatusOr<LeaseAnswer> Acquire(const std::string& session) override;
   absl::StatusOr<std::vector<SessionLease>> Renew() override;
@@ -35,7 +35,7 @@ class PostgresSessionLeases final : public SessionLeases {
   const std::string node_;
   const std::string holder_;
   const LeaseOptions options_;
-  const SteadyClock clock_;
+  const SteadyNow clock_;
 };
 
 }  // namespace tissueform

@@ -15,7 +15,7 @@
 namespace tissueform {
 
 // Where a server takes the time from that its leases run by. Any thread may call it.
-using SteadyClock = std::function<std::chrono::steady_clock::time_point()>;
+using SteadyNow = std::function<std::chrono::steady_clock::time_point()>;
 
 struct LeaseOptions {
   std::chrono::milliseconds duration{10'000};

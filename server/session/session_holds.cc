@@ -104,7 +104,7 @@ void SessionHolds::EraseIfIdle(const std::string& id) {
   if (state.holds == 0 && !state.is_taken && !state.releasing) states_.erase(found);
 }
 
-void SessionHolds::GiveBack(SessionHoldPtr hold, std::function<void()> then) {
+void SessionHolds::GiveBack(SessionHoldPtr hold, const std::function<void()>& then) {
   if (hold == nullptr) {
     then();
     return;

@@ -94,7 +94,7 @@ class SessionHolds : public std::enable_shared_from_this<SessionHolds> {
 
   // Ends a hold; `then`, in Lane::kStore or at once, when others may take the session if it was the
   // last one.
-  void GiveBack(SessionHoldPtr hold, std::function<void()> then);
+  void GiveBack(SessionHoldPtr hold, const std::function<void()>& then);
 
   // Nothing is taken from now on.
   void StopTaking() { stops_taking_ = true; }

@@ -200,8 +200,6 @@ bool SessionMakings::Full() const {
 
 void SessionMakings::StartCreation(const MakingPtr& making, const SessionRecord& record,
                                    const std::shared_ptr<const StoredMesh>& mesh) {
-  // NOLINTNEXTLINE(clang-analyzer-cplusplus.NewDeleteLeaks): the caller's functions own what they
-  // hold
   maker_->Create(record, mesh, CallerOf(making),
                  [this, making, record, mesh](absl::StatusOr<std::shared_ptr<Session>> made) {
                    if (!FinishCreation(making, std::move(made))) {
@@ -211,7 +209,6 @@ void SessionMakings::StartCreation(const MakingPtr& making, const SessionRecord&
 }
 
 void SessionMakings::StartRestore(const MakingPtr& making) {
-  // NOLINTNEXTLINE(clang-analyzer-cplusplus.NewDeleteLeaks): as above
   maker_->Restore(making->id, CallerOf(making),
                   [this, making](absl::StatusOr<std::shared_ptr<Session>> session) {
                     FinishRestore(making, std::move(session));
