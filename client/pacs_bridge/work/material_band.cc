@@ -60,7 +60,8 @@ absl::StatusOr<std::vector<double>> AskMaterialBand(TissueformClient* client,
 std::string WhyNoMaterialBand(const CaseFile& contents, const v1::Prediction& prediction) {
   if (!contents.material_ranges) return "the case gives no ranges of the material";
   if (!TellsOfMaterial(prediction.model())) {
-    return "the model is none of elasticity, and stiffness in it no mechanics";
+    return "the model computes no elasticity: the band is of stiffness that only elastic models "
+           "know";
   }
   v1::CreateSessionRequest request;
   if (!request.ParseFromString(contents.session_request)) return "";
