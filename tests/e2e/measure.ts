@@ -37,6 +37,24 @@ test.each(["gradient_field", "linear_elastic", "neo_hookean"])("pose to position
   console.log(JSON.stringify({ model: name, ...told, ...result }, null, 1));
 }, 1000 * SECONDS + 120_000);
 
+test("from a wish to the bone that gives it, while one pulls", async () => {
+  const { page } = await openCase(await planner.browse(), planner);
+  await page.evaluate(() => (globalThis as unknown as { tissueform: any }).tissueform.view.stage.setDrawing(false));
+  await page.locator("summary").getByText("Wished-for face", { exact: true }).click();
+  await page.getByLabel("or a place").selectOption({ label: "Chin" });
+  const forward = page.getByRole("textbox", { name: "forward", exact: true });
+  const times: number[] = [];
+  for (let i = 0; i < 5 * SECONDS; ++i) {
+    await forward.fill((3 + (i % 40) / 10).toFixed(1));
+    await forward.press("Enter");
+    await page.waitForTimeout(i === 0 ? 5000 : 150);
+    times.push(await page.evaluate(() => (globalThis as unknown as { tissueform: any }).tissueform.bench.wishes.fitted.value.milliseconds));
+  }
+  const rising = times.slice(1).sort((a, b) => a - b);
+  const at = (part: number) => rising[Math.floor(part * (rising.length - 1))];
+  console.log(JSON.stringify({ firstMs: times[0], count: rising.length, p50Ms: at(0.5), p95Ms: at(0.95), p99Ms: at(0.99) }, null, 1));
+}, 1000 * SECONDS + 120_000);
+
 test.each([["loopback", null], ["20 Mbit/s", SLOW]] as const)("first picture over %s", async (name, network) => {
   const { page } = await openCase(await planner.browse(), planner);
   const session = await page.context().newCDPSession(page);
