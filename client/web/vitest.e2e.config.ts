@@ -18,6 +18,12 @@ export default defineConfig(({ mode }) => ({
     include: mode === "test" ? ["**/*.test.ts"] : [`${mode}.ts`],
     testTimeout: 120_000,
     hookTimeout: 90_000,
+    // Tests go on where the one before them left the page: after the first that fails nothing more is learnt, and CTest would
+    // kill what waits on without a word of which it was.
+    bail: 1,
+    // By default a second, which a browser on a busy machine does not keep.
+    expect: { poll: { timeout: 30_000 } },
+    reporters: "verbose",
     // Browsers without a graphics card take all processors that they get.
     fileParallelism: false,
   },
