@@ -13,6 +13,8 @@ import signal
 import subprocess
 import sys
 import threading
+import time
+import urllib.error
 import urllib.request
 
 PATIENCE_S = 120
@@ -21,6 +23,17 @@ PATIENCE_S = 120
 def fetch(url):
     with urllib.request.urlopen(url, timeout=30) as answer:
         return answer.status, answer.headers, answer.read().decode()
+
+
+def await_ready(address):
+    """The gateway takes calls at once and is ready when it has heard from the server, a moment later."""
+    for _ in range(300):
+        try:
+            fetch(address + "/readyz")
+            return
+        except urllib.error.HTTPError:
+            time.sleep(0.1)
+    sys.exit("no server behind the gateway")
 
 
 def check_planner(url):
@@ -32,8 +45,7 @@ def check_planner(url):
         sys.exit(f"the page is not the planner's: {status}, {policy}, {page[:200]}")
     if fetch(f"{address}/{script.group(1)}")[0] != 200:
         sys.exit("the page's script is not there")
-    if fetch(address + "/readyz")[0] != 200:
-        sys.exit("no server behind the gateway")
+    await_ready(address)
     # GetCase as gRPC-Web: what a browser sends for it.
     name = b"cases/" + case.encode()
     message = b"\x0a" + bytes([len(name)]) + name
