@@ -98,6 +98,8 @@ test("a drag outlives its tokens: it is told every new one, and the server takes
 
 test("without a token the server answers nobody", async () => {
   const { page } = await open(await planner.browse());
+  // Before that the page goes to the provider and back by itself.
+  await page.getByRole("button", { name: "Sign in", exact: true }).waitFor();
   const status = await page.evaluate(async () => {
     const headers = { "content-type": "application/grpc-web+proto" };
     const response = await fetch("/tissueform.v1.CaseService/ListCases", { method: "POST", headers, body: new Uint8Array(5) });
