@@ -140,7 +140,7 @@ export class Login {
 
   private async renewOnce(isReplacement: boolean): Promise<boolean> {
     const refreshToken = this.tokens?.refreshToken ?? null;
-    if (refreshToken === null) return this.runOut("Your login ends soon, and the identity provider does not renew it here.", false);
+    if (refreshToken === null) return this.runOut("The identity provider does not renew it here.", false);
     try {
       const tokens = await this.provider.renew(refreshToken);
       if (this.tokens === null) return false;
@@ -157,10 +157,10 @@ export class Login {
     const leftMs = this.endsAt - this.now();
     if (this.tokens === null) return false;
     if (leftMs <= 0) {
-      this.end(text);
+      this.end(`Your login has ended. ${text}`);
       return false;
     }
-    this.become({ kind: "ending", name: this.name, text });
+    this.become({ kind: "ending", name: this.name, text: `Your login ends soon. ${text}` });
     if (again) this.wait(Math.min(RETRY_MS, leftMs), () => void this.renew(false));
     else this.wait(leftMs, () => this.end("Your login has ended."));
     return false;
