@@ -8,7 +8,6 @@ A process is known by its id and by when it began, so that one that came later u
 import contextlib
 import os
 import pathlib
-import random
 import signal
 import socket
 import subprocess
@@ -16,23 +15,6 @@ import time
 
 HOST = "127.0.0.1"
 PATIENCE_S = 60
-# Below the ports that outgoing connections take (net.ipv4.ip_local_port_range): a program that is started again finds
-# its port free.
-PORTS = range(20000, 32000)
-
-
-def free_ports(count):
-    """Ports that nobody listens on now."""
-    ports = []
-    for port in random.sample(PORTS, len(PORTS)):
-        try:
-            socket.create_server((HOST, port)).close()
-        except OSError:
-            continue
-        ports.append(port)
-        if len(ports) == count:
-            return ports
-    raise SystemExit(f"no {count} free ports between {PORTS.start} and {PORTS.stop}; end what listens there")
 
 
 def birth(pid):

@@ -10,9 +10,13 @@ import os
 import pathlib
 import shutil
 import signal
+import sys
 
 import database
 import processes
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))
+from free_ports import free_ports
 
 DATABASE, HAPROXY = "postgresql", "haproxy"
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -92,7 +96,7 @@ class Cluster:
         self.folder.chmod(0o700)
         self.state = {"settings": SETTINGS | settings, "processes": {}, "ports": {}}
         places = [*self.names, "workstations", "browsers"]
-        self.state["ports"] = dict(zip(places, processes.free_ports(len(places))))
+        self.state["ports"] = dict(zip(places, free_ports(len(places))))
         self.state["database"] = database.make(self.folder)
         self.save()
 

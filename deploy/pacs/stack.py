@@ -16,9 +16,13 @@ import signal
 import socket
 import ssl
 import subprocess
+import sys
 import time
 import urllib.parse
 import urllib.request
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))
+from free_ports import free_ports
 
 PATIENCE_S = 60
 HOST = "127.0.0.1"
@@ -47,14 +51,6 @@ def missing_programs():
     if dicomweb_plugin() is None:
         missing.append("orthanc-dicomweb")
     return missing
-
-
-def free_ports(count):
-    sockets = [socket.create_server((HOST, 0)) for _ in range(count)]
-    ports = [each.getsockname()[1] for each in sockets]
-    for each in sockets:
-        each.close()
-    return ports
 
 
 def children_of(process):

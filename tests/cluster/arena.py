@@ -12,6 +12,7 @@ import time
 import balancer
 import processes
 import stack
+from free_ports import free_ports
 
 LEASE_S = 10
 AFTER_S = 1
@@ -45,7 +46,7 @@ class Arena:
         if self.cluster.exists:
             self.cluster.down()
         names = [f"node{number}" for number in range(1, nodes + 1)]
-        ports = dict(zip([*names, TWIN], processes.free_ports(nodes + 1)))
+        ports = dict(zip([*names, TWIN], free_ports(nodes + 1)))
         self.cluster.make(nodes=nodes, database_ports={name: ports[name] for name in names}, server_environment={SHIFTED: fake_clock()})
         self.links, self.twin = {}, None
         self.twin_port = ports[TWIN]

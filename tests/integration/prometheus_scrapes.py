@@ -13,7 +13,6 @@ import pathlib
 import re
 import secrets
 import shutil
-import socket
 import subprocess
 import sys
 import tempfile
@@ -21,6 +20,9 @@ import threading
 import time
 import urllib.error
 import urllib.request
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "deploy"))
+from free_ports import free_ports
 
 PATIENCE_S = 60
 
@@ -108,8 +110,7 @@ def scrape(folder, source, ports):
         text = text.replace(kept, str(ours))
     (folder / "prometheus.yml").write_text(text)
     shutil.copy(source / "deploy/prometheus/tissueform.rules.yml", folder)
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
+    (port,) = free_ports(1)
     process = subprocess.Popen(["prometheus", f"--config.file={folder}/prometheus.yml", f"--storage.tsdb.path={folder}/data",
                                 f"--web.listen-address=127.0.0.1:{port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
@@ -124,7 +125,11 @@ def scrape(folder, source, ports):
         jobs = sorted(target["labels"]["job"] for target in up)
         expect(jobs == ["tissueform", "tissueform-gateway"], "prometheus scrapes both programs", jobs)
         expect(len(ask(port, "rules")["groups"][0]["rules"]) > 15, "prometheus has the rules")
-        found = ask(port, "query?query=tissueform_build_info")["result"]
+        found = []
+        # A target is up a moment before what it has told is kept.
+        while not found and process.poll() is None and time.monotonic() < end:
+            found = ask(port, "query?query=tissueform_build_info")["result"]
+            time.sleep(0.1)
         expect([sample["value"][1] for sample in found] == ["1"], "a metric is found again", found)
     finally:
         process.terminate()

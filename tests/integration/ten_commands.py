@@ -14,13 +14,15 @@ import os
 import pathlib
 import re
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
 import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "deploy"))
+from free_ports import free_ports
+
 HEADING = "## From nothing to a monitored server in ten commands"
 COMMANDS = 10
 PATIENCE_S = 100
@@ -33,14 +35,6 @@ def block():
     text = found.group(1)
     assert re.findall(r"^# (\d+)\. ", text, flags=re.MULTILINE) == [str(n + 1) for n in range(COMMANDS)], "not ten commands"
     return text
-
-
-def free_ports(count):
-    sockets = [socket.create_server(("127.0.0.1", 0)) for _ in range(count)]
-    ports = [str(one.getsockname()[1]) for one in sockets]
-    for one in sockets:
-        one.close()
-    return ports
 
 
 def check(condition, what):
@@ -76,7 +70,7 @@ def main(programs):
     commands = block()
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        port, metrics_port = free_ports(2)
+        port, metrics_port = map(str, free_ports(2))
         environment = {"PATH": f"{programs}:/usr/sbin:/usr/bin:/sbin:/bin", "HOME": name, "PORT": port, "METRICS": metrics_port, "LANG": "C.UTF-8"}
         # A group of its own, so that the server that they leave running can be ended with it.
         shell = subprocess.Popen(["bash", "-euo", "pipefail", "-c", commands], cwd=folder, env=environment, start_new_session=True)

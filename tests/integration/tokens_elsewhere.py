@@ -9,7 +9,6 @@ refuses; it reads those of `tissueform token`. grpcio brings them. Nothing of a 
 import json
 import pathlib
 import shutil
-import socket
 import subprocess
 import sys
 import time
@@ -20,6 +19,9 @@ try:
     import jwt
 except ImportError:
     sys.exit(77)
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "deploy"))
+from free_ports import free_ports
 
 ISSUER, AUDIENCE, NAME = "https://login.example", "tissueform", "planted.patient.name"
 METHOD = "/tissueform.v1.ServerInfoService/GetServerInfo"
@@ -101,16 +103,11 @@ def check_our_tokens(channel):
         assert ask(channel, bearer(token)) == ("OK", "")
 
 
-def free_port():
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        return listener.getsockname()[1]
-
-
 def main():
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     keys = make_keys()
-    metrics_port = free_port()
+    (metrics_port,) = free_ports(1)
     server = subprocess.Popen(
         [programs / "tissueform-server", "--in-memory", "--port", "0", "--log-level", "trace", "--token-issuer", ISSUER,
          "--token-audience", AUDIENCE, "--token-keys", folder / "jwks.json", "--metrics-port", str(metrics_port)],

@@ -22,6 +22,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent.parent / "
 sys.dont_write_bytecode = True
 
 import stack
+from free_ports import free_ports
 
 try:
     import head_series
@@ -166,7 +167,7 @@ AETable END
 
 def check_stranger(programs, study, case_of):
     """The same with DCMTK's archive in the PACS's place; plain, on loopback."""
-    port, bridge_port = stack.free_ports(2)
+    port, bridge_port = free_ports(2)
     area = start_stranger(programs, port, bridge_port)
     subprocess.run(["storescu", "--call", STRANGER, "--scan-directories", stack.HOST, str(port), programs.folder / "ct"], check=True,
                    capture_output=True, timeout=stack.PATIENCE_S, env=stack.QUICK)

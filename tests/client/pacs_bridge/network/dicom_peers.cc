@@ -9,6 +9,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <random>
 #include <thread>
 #include <unistd.h>
 
@@ -27,6 +28,9 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr std::chrono::seconds kPatience{20};
+// Below those that outgoing connections and port 0 take (net.ipv4.ip_local_port_range).
+constexpr int kFirstPort = 20'000;
+constexpr int kLastPort = 31'999;
 
 fs::path Find(const std::string& program) {
   if (fs::path(program).is_absolute()) return fs::exists(program) ? fs::path(program) : fs::path();
@@ -72,8 +76,13 @@ ProgramEnd RunPeer(const std::string& program, const std::vector<std::string>& a
 }
 
 int FreePort() {
-  const auto listening = ListeningSocket::Listen("127.0.0.1", 0);
-  return listening.ok() ? listening->port() : 0;
+  std::random_device random;
+  std::uniform_int_distribution<int> ports(kFirstPort, kLastPort);
+  for (int tries = 0; tries < 1000; ++tries) {
+    const int port = ports(random);
+    if (ListeningSocket::Listen("127.0.0.1", port).ok()) return port;
+  }
+  return 0;
 }
 
 bool WaitForPort(int port) {
