@@ -202,8 +202,9 @@ function(_tissueform_whole_test name whole)
     set(command "${TISSUEFORM_${program}}" ${whole} "${command}")
   endif()
   add_test(NAME ${name} COMMAND ${command})
-  # Where every test that needs the program was skipped.
-  set_tests_properties(${name} PROPERTIES ${ARGN} SKIP_REGULAR_EXPRESSION "this program with ${program}")
+  # Where every test that needs the program was skipped. One at a time: two of pg_virtualenv that start together take the
+  # same port.
+  set_tests_properties(${name} PROPERTIES ${ARGN} RESOURCE_LOCK ${program} SKIP_REGULAR_EXPRESSION "this program with ${program}")
 endfunction()
 
 function(_tissueform_resolve out)

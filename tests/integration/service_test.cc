@@ -104,7 +104,7 @@ std::string ServiceTest::address() { return absl::StrCat("127.0.0.1:", server().
 
 std::unique_ptr<TissueformClient> ServiceTest::Connect() {
   TissueformClient::Options options;
-  options.call_deadline = std::chrono::seconds(60);
+  options.call_deadline = std::chrono::seconds(300);
   return ValueOrDie(TissueformClient::Connect(address(), options));
 }
 
