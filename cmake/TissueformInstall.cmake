@@ -23,14 +23,16 @@ set(TISSUEFORM_INSTALL_CMAKE "${CMAKE_INSTALL_LIBDIR}/cmake/tissueform")
 set(TISSUEFORM_INSTALL_LIBEXEC "${CMAKE_INSTALL_LIBEXECDIR}/tissueform")
 set(TISSUEFORM_INSTALL_DATA "${CMAKE_INSTALL_DATADIR}/tissueform")
 
-# tissueform_install_program(TARGET bin|libexec): a program, or a module that programs there load. The server and the
-# gateway are components of their own (`cmake --install BUILD --component server`): the Dockerfile wants nothing else.
+# tissueform_install_program(TARGET bin|libexec): a program, or a module that programs there load. What runs as a
+# service is a component of its own (`cmake --install BUILD --component server`): a machine that serves wants nothing else.
 function(tissueform_install_program target where)
   set(component tissueform)
   if(target STREQUAL "tissueform-server")
     set(component server)
   elseif(target STREQUAL "tissueform-gateway")
     set(component gateway)
+  elseif(target STREQUAL "tissueform-pacs")
+    set(component pacs)
   endif()
   if(where STREQUAL "bin")
     set(folder "${CMAKE_INSTALL_BINDIR}")

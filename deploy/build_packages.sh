@@ -7,6 +7,7 @@
 #   tissueform-server   the server, its unit, its user, /etc/tissueform/server.ini
 #   tissueform-gateway  the gateway and the planner for browsers, likewise
 #   tissueform-tools    the commands, with plans, schemas and manual pages
+#   tissueform-pacs     the bridge to a PACS, its unit, its user, /etc/tissueform/pacs.ini; needs tissueform-tools
 #
 #   deploy/build_packages.sh [OUT_FOLDER [PACKAGE...]]     build/packages, and all of them
 #
@@ -18,7 +19,7 @@ build=$(realpath "${TISSUEFORM_BUILD_DIR:-build/release}")
 out=${1:-build/packages}
 shift || true
 packages=("${@:-tissueform-server}")
-if [[ $# -eq 0 ]]; then packages=(tissueform-server tissueform-gateway tissueform-tools); fi
+if [[ $# -eq 0 ]]; then packages=(tissueform-server tissueform-gateway tissueform-tools tissueform-pacs); fi
 mkdir -p "$out"
 out=$(realpath "$out")
 
@@ -64,14 +65,14 @@ add_man_page() {
   fi
 }
 
-# A unit, its configuration, and scripts that make its user and start it.
+# A unit, its configuration, and scripts that make its user and, where $6 is yes, start it.
 add_service() {
-  local package=$1 tree=$2 user=$3 state=$4 config=$5 file
+  local package=$1 tree=$2 user=$3 state=$4 config=$5 starts=$6 file
   install -Dm 644 "deploy/systemd/$package.service" "$tree/lib/systemd/system/$package.service"
   install -Dm 644 "deploy/config/$config" "$tree/etc/tissueform/$config"
   printf '/etc/tissueform/%s\n' "$config" >"$tree/DEBIAN/conffiles"
   for file in deploy/debian/{postinst,prerm,postrm}; do
-    sed -e "s/@PACKAGE@/$package/g" -e "s/@USER@/$user/g" -e "s|@STATE@|$state|g" "$file" >"$tree/DEBIAN/$(basename "$file")"
+    sed -e "s/@PACKAGE@/$package/g" -e "s/@USER@/$user/g" -e "s|@STATE@|$state|g" -e "s/@STARTS@/$starts/g" "$file" >"$tree/DEBIAN/$(basename "$file")"
     chmod 755 "$tree/DEBIAN/$(basename "$file")"
   done
 }
@@ -98,7 +99,7 @@ make_package() {
   mkdir -p "$tree/DEBIAN"
   case $package in
     tissueform-server)
-      add_service "$package" "$tree" tissueform /var/lib/tissueform server.ini
+      add_service "$package" "$tree" tissueform /var/lib/tissueform server.ini yes
       install -Dm 644 deploy/logrotate/tissueform "$tree/etc/logrotate.d/tissueform"
       echo /etc/logrotate.d/tissueform >>"$tree/DEBIAN/conffiles"
       add_man_page "$package" "$tree"
@@ -106,9 +107,20 @@ make_package() {
       more=$'Suggests: tissueform-gateway, tissueform-tools\n'
       ;;
     tissueform-gateway)
-      add_service "$package" "$tree" tissueform-gateway /nonexistent gateway.ini
+      add_service "$package" "$tree" tissueform-gateway /nonexistent gateway.ini yes
       add_man_page "$package" "$tree"
       also=", adduser"
+      more=$'Suggests: haproxy, tissueform-server\n'
+      ;;
+    tissueform-pacs)
+      # Which PACS there is, somebody must say first.
+      add_service "$package" "$tree" "$package" /var/lib/tissueform-pacs pacs.ini no
+      install -Dm 644 -t "$tree/etc/tissueform" deploy/config/series-rules.json
+      install -Dm 644 deploy/pacs/recipe.json "$tree/etc/tissueform/series-recipe.json"
+      printf '/etc/tissueform/%s\n' series-rules.json series-recipe.json >>"$tree/DEBIAN/conffiles"
+      add_man_page "$package" "$tree"
+      # Pictures of predictions are drawn by the commands, on a display in memory.
+      also=", adduser, tissueform-tools (= $version), xvfb, libgl1-mesa-dri"
       more=$'Suggests: haproxy, tissueform-server\n'
       ;;
     tissueform-tools)
@@ -127,7 +139,7 @@ make_package() {
   fi
   if [[ $package == tissueform-tools ]]; then
     # The client library is for who builds: cmake --install. The other packages have their own pages.
-    rm -rf "$tree/usr/lib" "$tree/usr/include" "$tree"/usr/share/man/man1/tissueform-{server,gateway}.1 "$tree/usr/share/doc/tissueform/LICENSE"
+    rm -rf "$tree/usr/lib" "$tree/usr/include" "$tree"/usr/share/man/man1/tissueform-{server,gateway,pacs}.1 "$tree/usr/share/doc/tissueform/LICENSE"
     gzip -9n "$tree"/usr/share/man/man1/*.1
   fi
   add_documents "$package" "$tree"

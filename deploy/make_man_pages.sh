@@ -31,7 +31,7 @@ for command in "${commands[@]}"; do
   name=$(head -n 1 <<<"$help")
   # Defaults that are those of this machine stay out.
   help2man --no-info --version-string="$version" --name="${name%.}" "$programs/$command" |
-    sed -e "s/^\.TH [^ ]* /.TH ${page^^} /" -e "s/^$command \\\\- /$page \\\\- /" \
+    sed -e "s/^\.TH [^\"]*/.TH ${page^^} /" -e "s/^$command \\\\- /$page \\\\- /" \
         -e 's/^\(.*\\-\(threads\|workers\|budget\\-mib\)\(\\fR\)* .*\]\)=[0-9]*/\1/' >"$out/$page.1.new"
   mv "$out/$page.1.new" "$out/$page.1"
 done

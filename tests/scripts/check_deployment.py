@@ -5,7 +5,7 @@
 
     tests/scripts/check_deployment.py FOLDER_OF_PROGRAMS
 
-systemd finds the units right and little exposed; logrotate rotates what a program goes on writing; server, gateway and
+systemd finds the units right and little exposed, and each program starts as its unit starts it; logrotate rotates what a program goes on writing; server, gateway and
 bridge read the example configurations, those lines too that are commented out, and print them back. Exit code 0 when all is so,
 77 when systemd or logrotate is not installed.
 """
@@ -49,6 +49,35 @@ def check_units(programs, scratch):
         check(unit.name not in complaints, f"{unit.name} is right for systemd {complaints.strip()}")
 
 
+# What a unit's command says besides, here: ports that are free, folders that are ours.
+ELSEWHERE = {
+    "tissueform-server": ["--data-dir", "@/server", "--port", "0"],
+    "tissueform-gateway": ["--web", "@/web", "--listen", "127.0.0.1:0"],
+    "tissueform-pacs": ["--state-dir", "@/pacs", "--listen", "127.0.0.1:0", "--worklist-listen", "127.0.0.1:0"],
+}
+
+
+def check_starts(programs, scratch):
+    folder = scratch / "etc"
+    shutil.copytree(ROOT / "deploy/config", folder)
+    shutil.copy(ROOT / "deploy/pacs/recipe.json", folder / "series-recipe.json")
+    (folder / "pacs.ini").write_text((folder / "pacs.ini").read_text().replace("/etc/tissueform", str(folder)))
+    (scratch / "web").mkdir()
+    (scratch / "web/index.html").write_text("<!doctype html>")
+    for name, elsewhere in ELSEWHERE.items():
+        unit = (ROOT / f"deploy/systemd/{name}.service").read_text()
+        command = re.search(r"^ExecStart=(.*)$", unit, flags=re.MULTILINE).group(1)
+        command = command.replace("/usr/bin/", f"{programs}/").replace("/etc/tissueform", str(folder))
+        words = [*command.split(), *(word.replace("@", str(scratch)) for word in elsewhere)]
+        with open(scratch / "log", "w+", encoding="utf-8") as log:
+            program = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=log, text=True)
+            said = program.stdout.readline()
+            program.terminate()
+            program.communicate(timeout=60)
+            log.seek(0)
+            check(re.match("(listening|receiving) on ", said) and program.returncode == 0, f"{name} starts by its unit's command {said}{log.read() if not said else ''}".strip())
+
+
 def check_rotation(logrotate, scratch):
     log, audit = scratch / "server.log", scratch / "audit.log"
     audit.write_text("a line\n")
@@ -88,6 +117,7 @@ def main(programs):
     with tempfile.TemporaryDirectory() as folder:
         scratch = pathlib.Path(folder)
         check_units(programs, scratch)
+        check_starts(programs, scratch)
         check_configuration(programs, scratch)
         check_rotation(logrotate, scratch)
     return 0
