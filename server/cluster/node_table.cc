@@ -72,7 +72,7 @@ int NodeTable::CountOthers() {
 bool NodeTable::IsNameTaken() {
   MutexLock lock(mutex_);
   return std::any_of(others_.begin(), others_.end(),
-                     [&](const Other& other) { return other.name == name_; });
+                     [&](const Other& other) { return other.beside_us && other.name == name_; });
 }
 
 absl::Status NodeTable::Exchange() {
@@ -82,6 +82,8 @@ absl::Status NodeTable::Exchange() {
     MutexLock lock(mutex_);
     draining = draining_;
   }
+  const int64_t age_s =
+      std::chrono::floor<std::chrono::seconds>(std::chrono::steady_clock::now() - began_).count();
   std::vector<Other> others;
   const absl::Status status = pool_->Run(
       [&](PostgresTransaction& transaction) -> absl::Status {
@@ -98,13 +100,15 @@ absl::Status NodeTable::Exchange() {
             {kForgottenAfterS}));
         TF_ASSIGN_OR_RETURN(
             const PostgresRows rows,
-            transaction.Query("SELECT name, free_bytes, draining::int FROM nodes WHERE holder <> "
+            transaction.Query("SELECT name, free_bytes, draining::int, (seen > tissueform_now() - "
+                              "$3::bigint * interval '1 second')::int FROM nodes WHERE holder <> "
                               "$1 AND seen > tissueform_now() - $2::bigint * interval '1 second'",
-                              {holder_, int64_t{kGoneAfter.count()}}));
+                              {holder_, int64_t{kGoneAfter.count()}, age_s}));
         for (size_t row = 0; row < rows.size(); ++row) {
           others.push_back({.name = std::string(rows.Text(row, 0)),
                             .free_bytes = rows.Integer(row, 1),
-                            .draining = rows.Integer(row, 2) != 0});
+                            .draining = rows.Integer(row, 2) != 0,
+                            .beside_us = rows.Integer(row, 3) != 0});
         }
         return absl::OkStatus();
       },

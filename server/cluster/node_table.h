@@ -53,7 +53,8 @@ class NodeTable {
   std::string WithRoom(int64_t bytes);
   // Others that are there.
   int CountOthers();
-  // Another one has this one's name: routing by name leads to either.
+  // Another one has this one's name, and has written since this one began, as none that was killed
+  // before: routing by name leads to either.
   bool IsNameTaken();
 
   // What the thread does every second. Errors: those of the pool.
@@ -64,6 +65,7 @@ class NodeTable {
     std::string name = {};
     int64_t free_bytes = 0;
     bool draining = false;
+    bool beside_us = false;  // has written since this one began
   };
 
   void Loop();
@@ -72,6 +74,7 @@ class NodeTable {
   PostgresPool* const pool_;
   const std::string name_;
   const std::string holder_;  // random: names may be given twice
+  const std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
   std::function<int64_t()> free_bytes_ = [] { return int64_t{0}; };  // constant once it runs
 
   Mutex mutex_;

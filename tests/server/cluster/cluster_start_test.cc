@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <future>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/match.h"
@@ -18,6 +19,7 @@
 #include "client/cpp/client_call.h"
 #include "core/process/child_process.h"
 #include "server/cluster/cluster_options.h"
+#include "server/cluster/node_table.h"
 #include "tests/server/cluster/cluster_test.h"
 #include "tests/server/postgres_store/test_database.h"
 #include "tests/testing/http_get.h"
@@ -153,6 +155,21 @@ TEST_F(ClusterStartTest, NodesOfOneNameAreToldAndHoldSessionsApartAllTheSame) {
   EXPECT_THAT(AskOnce(other, session, 1), StatusIs(Code::kUnavailable));
   ASSERT_TRUE(drag.Send(2));
   EXPECT_TRUE(drag.ReceiveFrame(2).has_value());
+}
+
+TEST_F(ClusterStartTest, ANodeThatWasKilledDoesNotKeepItsName) {
+  RunSql(
+      "INSERT INTO nodes (holder, name, free_bytes, draining, seen) VALUES ('killed', 'c', 0, "
+      "false, tissueform_now())");
+  const TestNode node = StartNode(NodeOptions("c"));
+  NodeTable& nodes = node.server->cluster()->node().nodes();
+  ASSERT_TRUE(Eventually([&] { return nodes.CountOthers() == 3; })) << "the killed one, too";
+  // Longer than a twin goes unseen.
+  for (const auto end = std::chrono::steady_clock::now() + 3 * NodeTable::kEvery;
+       std::chrono::steady_clock::now() < end;) {
+    ASSERT_FALSE(nodes.IsNameTaken());
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
 }
 
 TEST_F(ClusterStartTest, ANodeSaysItsNameAndRefusesWhatIsMeantForAnother) {
