@@ -137,7 +137,7 @@ export class Planner {
   async startServer(): Promise<void> {
     const port = this.serverAddress.split(":")[1];
     const data = join(this.folder, "data");
-    const options = ["--port", port, "--data-dir", data, "--workers", "2", "--drain-seconds", "3", ...this.serverOptions];
+    const options = ["--port", port, "--data-dir", data, "--workers", "2", "--drain-seconds", "6", ...this.serverOptions];
     this.server = await Program.start("tissueform-server", options);
     this.serverAddress = this.server.address;
   }

@@ -148,8 +148,13 @@ describe("on a line with delay", () => {
 
   test("a line that broke off takes nothing from the hand", async () => {
     const { page } = opened;
+    // Written down: a page that is slow to ask finds it live again.
+    await page.evaluate(() => {
+      const { bench } = (globalThis as unknown as Hook).tissueform;
+      (globalThis as any).broken = new Promise<void>((done) => bench.connection.watch(({ kind }: { kind: string }) => kind !== "live" && done()));
+    });
     line.breakOff();
-    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.connection.value.kind !== "live");
+    await page.evaluate(() => (globalThis as any).broken);
     await page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.plan.change(1, { forwardMm: 0, pitchDeg: 0 }, true));
     await dragForward(page, 5);
     await followedByPage(page);
