@@ -36,7 +36,13 @@ export interface FollowListener {
   onEnd(error: CallError): void;
 }
 
-/** Follows a session that somebody else drags; opens the watch again where the connection breaks off. */
+/** For so long after a break a drag that was seen is waited for, before what was last committed is shown. */
+const DRAG_RETURNS_MS = 5000;
+
+/**
+ * Follows a session that somebody else drags; opens the watch again where the connection breaks off. A server that has just
+ * taken the session begins with what was committed: the face stays as it was until the drag is back.
+ */
 export class FollowSession {
   private readonly unwatch: () => void;
   private call: CallSocket<typeof DeformService.method.watch> | null = null;
@@ -47,6 +53,11 @@ export class FollowSession {
   private form: WatchForm | null = null;
   /** The newest picture that was shown; null: none yet. */
   private used: bigint | null = null;
+  /** Whether the newest picture is of a drag, and a drag has not come back since the watch broke off. */
+  private isOfDrag = false;
+  private awaitsDrag = false;
+  /** Forgets the picture that waits for that. */
+  private stopWaiting: (() => void) | null = null;
 
   constructor(
     private readonly gateway: Pick<Gateway, "open" | "bearer"> & { deform: Pick<Gateway["deform"], "acknowledgeWatch"> },
@@ -63,6 +74,7 @@ export class FollowSession {
     this.isClosed = true;
     this.unwatch();
     this.stopTimer?.();
+    this.stopWaiting?.();
     this.call?.cancel();
   }
 
@@ -81,6 +93,7 @@ export class FollowSession {
     if (message.case === "started") {
       this.watch = message.value.watch;
       this.used = null;
+      this.awaitsDrag = this.isOfDrag;
       this.form = message.value.form ?? null;
       this.backoff.succeeded();
       this.listener.onStarted();
@@ -96,10 +109,19 @@ export class FollowSession {
     }
     const positions = asFloats(raw, frame.frame.positions);
     const watch = this.watch;
-    this.listener.onPicture({ frame, origin: frame.origin, vertices: this.form.vertices, positions }, () => {
+    const picture = { frame, origin: frame.origin, vertices: this.form.vertices, positions };
+    const used = () => {
       if (watch === this.watch) this.used = frame.number;
       this.acknowledge(watch, frame.number);
-    });
+    };
+    const tell = () => {
+      this.isOfDrag = frame.origin === WatchOrigin.DRAG;
+      this.awaitsDrag = false;
+      this.listener.onPicture(picture, used);
+    };
+    this.stopWaiting?.();
+    if (this.awaitsDrag && frame.origin !== WatchOrigin.DRAG) this.stopWaiting = this.timer(tell, DRAG_RETURNS_MS);
+    else tell();
   }
 
   // A watch that has ended meanwhile needs no acknowledgement; its end is told by itself.
@@ -114,6 +136,7 @@ export class FollowSession {
 
   private broken(error: CallError | null): void {
     if (this.isClosed) return;
+    this.stopWaiting?.();
     const cause = error ?? new CallError(Code.Unavailable, "the server has ended the watch");
     if (!cause.isPassing) {
       this.isClosed = true;

@@ -17,6 +17,7 @@ function follow() {
   const told: string[] = [];
   const pictures: { picture: FollowedPicture; used: () => void }[] = [];
   const timers: (() => void)[] = [];
+  const stopped: (() => void)[] = [];
   const acknowledgeWatch = vi.fn(() => Promise.resolve({}));
   const bearer = new Bearer();
   const gateway = {
@@ -40,22 +41,22 @@ function follow() {
       onBroken: () => told.push("broken"),
       onEnd: (error) => told.push(error.message),
     },
-    (action) => (timers.push(action), () => {}),
+    (action) => (timers.push(action), () => stopped.push(action)),
   );
   const answer = (message: MessageInitShape<typeof WatchResponseSchema>["message"]) => {
     const payload = toBinary(WatchResponseSchema, create(WatchResponseSchema, { message }));
     sockets[sockets.length - 1].onmessage?.({ data: encodeFrame(FrameKind.Message, payload).buffer });
   };
-  return { sockets, told, pictures, timers, acknowledgeWatch, bearer, answer };
+  return { sockets, told, pictures, timers, stopped, acknowledgeWatch, bearer, answer };
 }
 
 const started = (vertices: number[], encoding = PositionEncoding.FLOAT32) => ({
   case: "started" as const,
   value: { watch: "watches/1", form: { vertexCount: BigInt(vertices.length), vertices, encoding } },
 });
-const frame = (number: bigint, floats: number[]) => ({
+const frame = (number: bigint, floats: number[], origin = WatchOrigin.DRAG) => ({
   case: "frame" as const,
-  value: { number, origin: WatchOrigin.DRAG, frame: { positions: new Uint8Array(Float32Array.from(floats).buffer) } },
+  value: { number, origin, frame: { positions: new Uint8Array(Float32Array.from(floats).buffer) } },
 });
 
 test("a watch asks once, and acknowledges what was used", () => {
@@ -106,4 +107,41 @@ test("a watch that breaks off begins again, one whose session is gone ends", () 
   sockets[1].end(5, "no such session");
   expect(told).toEqual(["started", "broken", "no such session"]);
   expect(timers).toHaveLength(1);
+});
+
+test("after a break the face stays as it was dragged until the drag is back", () => {
+  const { sockets, timers, stopped, answer, pictures } = follow();
+  answer(started([4]));
+  answer(frame(1n, [0, 0, 0], WatchOrigin.REST));
+  expect(pictures).toHaveLength(1);
+  answer(frame(2n, [1, 1, 1]));
+  sockets[0].onclose?.({ code: 1006, reason: "" });
+  timers[0]();
+  answer(started([4]));
+  answer(frame(1n, [0, 0, 0], WatchOrigin.COMMITTED));
+  expect(pictures).toHaveLength(2);
+  answer(frame(2n, [2, 2, 2]));
+  expect(pictures).toHaveLength(3);
+  expect(stopped).toContain(timers[1]);
+  answer(frame(3n, [0, 0, 0], WatchOrigin.COMMITTED));
+  expect(pictures).toHaveLength(4);
+});
+
+test("where the drag does not come back what was committed is shown", () => {
+  const { sockets, timers, stopped, answer, pictures, acknowledgeWatch } = follow();
+  answer(started([4]));
+  answer(frame(1n, [1, 1, 1]));
+  for (const turn of [0, 2]) {
+    sockets[sockets.length - 1].onclose?.({ code: 1006, reason: "" });
+    timers[turn]();
+    answer(started([4]));
+    answer(frame(5n, [0, 0, 0], WatchOrigin.COMMITTED));
+  }
+  expect(stopped).toContain(timers[1]);
+  expect(pictures).toHaveLength(1);
+  timers[3]();
+  expect(pictures).toHaveLength(2);
+  expect(Array.from(pictures[1].picture.positions)).toEqual([0, 0, 0]);
+  pictures[1].used();
+  expect(acknowledgeWatch.mock.calls[0]).toMatchObject([{ number: 5n }, {}]);
 });
