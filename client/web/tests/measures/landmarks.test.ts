@@ -146,3 +146,27 @@ test("the profile suggests forehead, fold, lip and chin between what the case kn
   });
   expect(suggestFromProfile(profile, new Map()).size).toBe(0);
 });
+
+const NOSE = new Map([["pronasale", { left: 0, forward: 20, up: 0 }]]);
+const glabellaOf = (points: readonly (readonly [number, number])[]) => suggestFromProfile(points.map(([forward, up]) => ({ forward, up })), NOSE).get("soft_glabella");
+
+test("the forehead is the foremost above the root of the nose, also where the back of the nose stands in front of it", () => {
+  expect(glabellaOf([[5, 80], [11, 70], [13, 62], [14, 56], [12, 50], [10, 44], [12, 40], [16, 35], [18, 20], [20, 0]])).toEqual({ forward: 14, up: 56 });
+});
+
+test.each([
+  // As the bundled head's: a hump of a quarter of a millimetre on a nose behind which the forehead falls back.
+  ["the forehead falls back behind a humped nose", [[10.5, 72], [11.3, 64], [12, 55], [15.5, 40], [17.8, 29], [17.6, 26], [18.2, 20], [20, 0]]],
+  ["the CT ends below the brows", [[13, 50], [11, 45], [10, 40], [16, 30], [20, 0]]],
+  ["what is deepest lies too near the tip to be the root of the nose", [[5, 70], [14, 60], [12, 40], [10, 26], [8, 20], [20, 0]]],
+  ["nothing is seen above the nose", [[18, 20], [20, 0]]],
+] as const)("no forehead is suggested where %s", (_, points) => {
+  expect(glabellaOf(points)).toBeUndefined();
+});
+
+test("no fold is suggested where there is next to none between lip and chin", () => {
+  const known = new Map([["labrale_inferius", { left: 0, forward: 10, up: -30 }], ["soft_pogonion", { left: 0, forward: 4, up: -50 }]]);
+  const fold = (forward: number) => suggestFromProfile([{ forward: 10, up: -30 }, { forward, up: -40 }, { forward: 4, up: -50 }], known).get("sublabiale");
+  expect(fold(6.5)).toBeUndefined();
+  expect(fold(4)).toEqual({ forward: 4, up: -40 });
+});
