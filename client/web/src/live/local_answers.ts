@@ -13,7 +13,7 @@ import { type FetchedColumns, fetchColumns } from "./column_fetch";
 export type LocalState =
   | { kind: "none" }
   | { kind: "fetching"; share: number }
-  | { kind: "ready"; place: "page" | "worker"; kernel: string; coverage: Evaluation["coverage"]; errorBoundMm: number; isEstimate: boolean }
+  | { kind: "ready"; place: "page" | "worker"; kernel: string; coverage: Evaluation["coverage"] }
   | { kind: "stopped" }
   | { kind: "failed"; text: string };
 
@@ -59,7 +59,7 @@ export class LocalAnswers {
       const error = toCallError(thrown);
       if (error.code === Code.Canceled) return;
       // What it has stays good while the server is away: the next start of the drag asks again.
-      if (error.isPassing && this.host !== null) return this.tell("covered", 0, false);
+      if (error.isPassing && this.host !== null) return this.tell("covered");
       this.drop();
       this.listener.onState({ kind: "failed", text: sentenceOf(thrown) });
     }
@@ -130,22 +130,22 @@ export class LocalAnswers {
     this.host?.close();
     this.host = host;
     this.columns = columns;
-    this.tell("covered", 0, false);
+    this.tell("covered");
     if (this.poses !== null) host.ask(this.poses, this.asked);
   }
 
   private take(evaluation: Evaluation, number: number): void {
-    const { coverage, errorBoundMm, isEstimate } = evaluation;
-    this.tell(coverage, errorBoundMm, isEstimate);
+    const { coverage } = evaluation;
+    this.tell(coverage);
     if (coverage === "beyond" || number <= this.told) return;
     this.told = number;
     this.listener.onEvaluation(evaluation);
   }
 
-  private tell(coverage: Evaluation["coverage"], errorBoundMm: number, isEstimate: boolean): void {
+  private tell(coverage: Evaluation["coverage"]): void {
     if (this.host === null) return;
     const { place, kernel } = this.host;
-    this.listener.onState({ kind: "ready", place, kernel, coverage, errorBoundMm, isEstimate });
+    this.listener.onState({ kind: "ready", place, kernel, coverage });
   }
 }
 

@@ -8,6 +8,7 @@ import { formatNumber } from "../planning/numbers";
 import type { LocalState } from "../live/local_answers";
 import type { MapLegend } from "../workbench/face_colors";
 import type { MapChoice } from "../workbench/face_map";
+import { describeFace } from "../workbench/shown_answer";
 import type { Workbench } from "../workbench/workbench";
 import { type Choice, button, el, newId, onceAPicture, section, select } from "./dom";
 
@@ -38,10 +39,11 @@ export function modelPanel(bench: Workbench): HTMLElement {
   });
   const answer = el("p", { class: "quiet" });
   const show = () => {
-    const text = bench.picture.value === null ? "" : describeAnswer(bench.picture.value);
+    const text = describeFace(bench.answer.value, bench.comparison.value);
     if (answer.textContent !== text) answer.textContent = text;
   };
-  bench.picture.watch(onceAPicture(show));
+  bench.answer.watch(onceAPicture(show));
+  bench.comparison.watch(onceAPicture(show));
   return section("Model", [el("div", { attributes: { role: "radiogroup", "aria-label": "Model" } }, items), answer, localAnswers(bench)]);
 }
 
@@ -79,14 +81,6 @@ function describeLocal(state: LocalState): string {
       return `This page answers at once${slow}; the server confirms.`;
     }
   }
-}
-
-function describeAnswer({ summary, isRefining }: NonNullable<Workbench["picture"]["value"]>): string {
-  if (summary === null) return "";
-  if (isRefining) return `Estimate, within about ${formatNumber(Math.max(summary.errorEstimateMm, 0.01), 2)} mm; the full answer follows.`;
-  if (summary.prepared) return `Prepared answer, within ${formatNumber(Math.max(summary.errorBoundMm, 0.01), 2)} mm of the full one.`;
-  if (!summary.converged) return `The full answer was not reached (${formatNumber(100 * summary.load, 0)} % of the move)${summary.obstacle === "" ? "." : `: ${summary.obstacle}.`}`;
-  return "Full answer.";
 }
 
 /** Which map lies on the skin, and what its colours mean. */

@@ -8,6 +8,7 @@ import { labelOf, measureFace } from "../measures/face_measures";
 import { bandText, normText, unitText, valueTexts, whyNot } from "../measures/texts";
 import { formatNumber } from "../planning/numbers";
 import { MOVE_KEYS } from "../planning/plan";
+import { type ShownAnswer, describeFace, storedFace } from "../workbench/shown_answer";
 import type { Workbench } from "../workbench/workbench";
 import { reportPictures } from "./report_pictures";
 
@@ -31,14 +32,13 @@ function table(heads: readonly string[], rows: readonly (readonly (Node | string
 /** The sheet of what is shown now. Its pictures are `data:` addresses, so that it is whole wherever it is kept. */
 export async function reportSheet(bench: Workbench): Promise<HTMLElement> {
   const pictures = await reportPictures(bench);
-  const model = bench.modelInfo(bench.model.value)?.name ?? "unknown";
   return node("article", [
     node("header", [node("h1", ["Surgical plan and predicted face"]), node("p", [`${NOTICE[0].toUpperCase()}${NOTICE.slice(1)}: a prediction by a model, not for diagnosis or treatment.`], "report-notice")]),
     node("section", [node("h2", ["Plan"]), planTable(bench)]),
     node("section", [node("h2", ["Measures"]), measureTable(bench)], "wide"),
     node("section", [node("h2", ["Profile"]), new ProfileDrawing(bench).draw()]),
     node("section", [node("h2", ["Pictures"]), node("div", pictures, "pictures")]),
-    node("section", [node("h2", ["How it came about"]), facts(bench, model)], "wide"),
+    node("section", [node("h2", ["How it came about"]), facts(bench)], "wide"),
   ], "report");
 }
 
@@ -57,12 +57,18 @@ function measureTable(bench: Workbench): HTMLElement {
   return table(["Measure", "Before", "After", "95 of 100", "Change", "Norm"], rows);
 }
 
-function facts(bench: Workbench, model: string): HTMLElement {
-  const summary = bench.picture.value?.summary;
-  const answer = summary == null ? "no answer yet" : summary.prepared ? `prepared, within ${formatNumber(Math.max(summary.errorBoundMm, 0.01), 2)} mm of the full one` : "full";
+/** Which model's answer the face is that is shown, how near it is to that model's full one, and who gave it. */
+export function answerLine(bench: Pick<Workbench, "comparison" | "model" | "modelInfo"> & { answer: { value: ShownAnswer | null } }): string {
+  const [answer, comparison] = [bench.answer.value, bench.comparison.value];
+  const model = bench.modelInfo((comparison === null ? null : storedFace(comparison))?.model ?? bench.model.value)?.name ?? "unknown";
+  const isOwn = answer?.by === "page" && (comparison === null || (comparison.share === 0 && comparison.from === "plan"));
+  return `model ${model}. ${describeFace(answer, comparison) || "No answer yet."}${isOwn ? " Given by the page itself; the server has not confirmed it yet." : ""}`;
+}
+
+function facts(bench: Workbench): HTMLElement {
   const lines = [
     `made ${new Date().toISOString()}`,
-    `model ${model}, answer ${answer}`,
+    answerLine(bench),
     bench.whyNoBand === "" ? "95 of 100: where it stays if nothing but the material is in doubt; excludes errors of model and surgery" : `no band of uncertainty is known: ${bench.whyNoBand}`,
     bench.showsPlan ? "" : "the face that is shown is not the plan's: a comparison, or an open jaw",
     "mm and degrees in the head frame: forward, up and the patient's left are positive",

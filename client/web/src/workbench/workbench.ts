@@ -31,16 +31,16 @@ import { followedRest } from "./face_colors";
 import { FaceMap, type MapChoice } from "./face_map";
 import { NewestAnswer } from "./newest_answer";
 import { PacsExports } from "./pacs_exports";
+import type { ShownAnswer } from "./shown_answer";
 import { Signal } from "./signal";
 import { StoredPredictions } from "./stored_predictions";
 import { WishFit } from "./wish_fit";
 import { recallLandmarks, rememberLandmarks } from "./work";
 
-/** What a picture was answered with. */
+/** What the server's last picture was answered with, be it shown or not. */
 export interface PictureFacts {
   roundTripMs: number;
   summary: SolveSummary | null;
-  isRefining: boolean;
 }
 
 /** A point of a surface that somebody is asked to click. */
@@ -75,6 +75,8 @@ export class Workbench implements ShownFace {
   readonly followers = new Signal(0);
   readonly notice = new Signal("");
   readonly picture = new Signal<PictureFacts | null>(null);
+  /** Whose answer the plan's face is, which a comparison hides. */
+  readonly answer = new Signal<ShownAnswer | null>(null);
   readonly localState = new Signal<LocalState>({ kind: "none" });
   readonly model = new Signal<DeformationModel>(0);
   readonly comparison = new Signal<Comparison | null>(null);
@@ -165,6 +167,7 @@ export class Workbench implements ShownFace {
 
   async chooseModel(model: DeformationModel): Promise<void> {
     this.model.value = model;
+    this.answer.value = null;
     this.local.drop();
     if (this.map.choice.value.kind === "band" && !this.hasBand) this.map.choice.value = { kind: "none" };
     await this.live.choose(this.dragChoice());
@@ -296,7 +299,8 @@ export class Workbench implements ShownFace {
   private show(picture: Picture, used: () => void): void {
     const isTaken = this.newest.takePicture(picture, this.local.posesSinceTold);
     this.waitingFrom = null;
-    this.picture.value = { roundTripMs: picture.roundTripMs, summary: picture.frame.summary ?? null, isRefining: picture.frame.refining };
+    this.picture.value = { roundTripMs: picture.roundTripMs, summary: picture.frame.summary ?? null };
+    this.answer.value = this.newest.answer;
     if (isTaken && this.comparison.value === null) this.lay(this.newest, used);
     else used();
   }
@@ -304,6 +308,7 @@ export class Workbench implements ShownFace {
   /** The page's own answer, in the picture that shows the bone there. */
   private showLocal(evaluation: Evaluation): void {
     if (!this.newest.takeOwn(evaluation)) return this.local.drop();
+    this.answer.value = this.newest.answer;
     if (this.comparison.value === null) this.lay(this.newest);
   }
 

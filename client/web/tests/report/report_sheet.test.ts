@@ -1,0 +1,39 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { create } from "@bufbuild/protobuf";
+import { expect, test } from "vitest";
+import { SolveSummarySchema } from "../../src/generated/tissueform/v1/deform_service_pb";
+import { PredictionSchema } from "../../src/generated/tissueform/v1/prediction_pb";
+import { type ModelInfo, ModelInfoSchema } from "../../src/generated/tissueform/v1/server_info_pb";
+import { DeformationModel } from "../../src/generated/tissueform/v1/session_pb";
+import { answerLine } from "../../src/report/report_sheet";
+import type { Comparison } from "../../src/workbench/comparison";
+import type { ShownAnswer } from "../../src/workbench/shown_answer";
+import { Signal } from "../../src/workbench/signal";
+
+const NAMES: Partial<Record<DeformationModel, string>> = { [DeformationModel.NEO_HOOKEAN]: "neo_hookean", [DeformationModel.LINEAR_ELASTIC]: "linear_elastic" };
+
+function line(answer: ShownAnswer | null, comparison: Comparison | null = null): string {
+  return answerLine({
+    answer: new Signal(answer),
+    comparison: new Signal(comparison),
+    model: new Signal<DeformationModel>(DeformationModel.NEO_HOOKEAN),
+    modelInfo: (model): ModelInfo => create(ModelInfoSchema, { model, name: NAMES[model] }),
+  });
+}
+
+const OWN: ShownAnswer = { by: "page", errorBoundMm: 0.3, isEstimate: true };
+
+test("an estimate is told as one, and that the page gave it itself", () => {
+  const summary = create(SolveSummarySchema, { prepared: true, errorEstimateMm: 0.4 });
+  expect(line({ by: "server", summary, isRefining: true })).toBe("model neo_hookean. Estimate, within about 0.40 mm; the full answer follows.");
+  expect(line(OWN)).toBe("model neo_hookean. Estimate, within about 0.30 mm; the full answer follows. Given by the page itself; the server has not confirmed it yet.");
+  expect(line(null)).toBe("model neo_hookean. No answer yet.");
+});
+
+test("a stored face is told by its own model and answer, whatever the plan's is", () => {
+  const to = create(PredictionSchema, { model: DeformationModel.LINEAR_ELASTIC, summary: { converged: true, load: 1 } });
+  expect(line(OWN, { from: "plan", to, share: 1 })).toBe("model linear_elastic. A stored prediction. Full answer.");
+  expect(line(OWN, { from: "plan", to, share: 0 })).toMatch(/^model neo_hookean\. Estimate.* Given by the page itself/);
+});
