@@ -69,8 +69,8 @@ export class Gateway {
     const session = options?.metadata?.[SESSION_HEADER] ?? "";
     const route = this.routes.metadata(session);
     const onBegin = (headers: Record<string, string>) => this.routes.learn(session, headers[NODE_HEADER] ?? "");
-    const onEnd = (error: CallError | null) => {
-      if (error !== null) this.routes.failed(session, route[NODE_HEADER] ?? "", error);
+    const onEnd = (ended: CallError | null) => {
+      const error = ended === null ? null : this.routes.failed(session, route[NODE_HEADER] ?? "", ended);
       if (error?.code === Code.Unauthenticated) void this.refused(error, token, (told) => handlers.onEnd(told));
       else handlers.onEnd(error);
     };

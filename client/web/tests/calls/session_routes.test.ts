@@ -50,6 +50,29 @@ test.each([
   expect(routes.metadata("s")).toEqual({});
 });
 
+test("servers that name a holder which the gateway never reaches end in one error, and do not while it may have died", () => {
+  let now = 0;
+  const routes = new SessionRoutes(() => now);
+  const backoff = new Backoff(() => 0, () => now);
+  const turn = (session = "s") => {
+    now += backoff.next(routes.failed(session, "", moved("b")));
+    const told = routes.failed(session, "b", WRONG_NODE);
+    now += backoff.next(told);
+    return told;
+  };
+  const first = Array.from({ length: 40 }, () => turn());
+  expect(first.every((error) => error.isPassing)).toBe(true);
+  expect(now).toBeGreaterThan(20_000);
+  const last = turn();
+  expect(last.isPassing).toBe(false);
+  expect(last.message).toMatch("gateway");
+  expect(turn().isPassing).toBe(true);
+  for (let i = 0; i < 100; ++i) {
+    now += 6000;
+    expect(turn("found in between").isPassing).toBe(true);
+  }
+});
+
 test("an error that is the call's own says nothing of the server", () => {
   const routes = new SessionRoutes();
   routes.learn("s", "a");
