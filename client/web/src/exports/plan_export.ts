@@ -3,9 +3,11 @@
 
 import * as three from "three";
 import { headAxes, toMove } from "../geometry/pose";
-import { measureFace } from "../measures/face_measures";
+import { type ShownFace, measureFace } from "../measures/face_measures";
 import { landmarkMovement } from "../planning/landmarks";
 import type { DrawnSurface } from "../scene/head";
+import { type ShownAnswer, modelShown } from "../workbench/shown_answer";
+import type { StoredPredictions } from "../workbench/stored_predictions";
 import type { Workbench } from "../workbench/workbench";
 import { type ExportedSurface, NOTICE } from "./files";
 
@@ -22,24 +24,28 @@ function exportSurface({ source, shape, mesh }: DrawnSurface): ExportedSurface {
   return { name: source.entry.name, positions, triangles: source.triangles };
 }
 
-/** How it came about, for every file. */
+/** The face that is shown is another one than that of the plan's numbers. */
+export const NOT_THE_PLAN = "the face that is shown is not the plan's: a comparison, or an open jaw";
+
+/** How what is shown came about, for every file. */
 export function provenanceLines(bench: Workbench): string[] {
   const { provenance, mesh } = bench.file.manifest;
   return [
     `case ${bench.caseName}`,
     `mesh ${mesh.name}`,
-    `model ${bench.modelInfo(bench.model.value)?.name ?? ""}`,
+    `model ${bench.modelInfo(modelShown(bench.comparison.value, bench.model.value))?.name ?? ""}`,
+    ...(bench.showsPlan ? [] : [NOT_THE_PLAN]),
     ...Object.entries(provenance).map(([key, value]) => `${key} ${value}`),
   ];
 }
 
-/** Plan, movements and provenance as JSON. */
-export function planDocument(bench: Workbench): string {
+/** What is told of a plan. */
+export type ToldPlan = ShownFace & Pick<Workbench, "answer" | "caseName" | "model" | "modelInfo" | "plan" | "skinPoint"> & { stored: Pick<StoredPredictions, "all"> };
+
+/** Plan, movements and provenance as JSON. Movements and measures are of the plan's face, and left out while another one is shown. */
+export function planDocument(bench: ToldPlan): string {
   const { manifest } = bench.file;
   const poses = bench.plan.poses();
-  const summary = bench.picture.value?.summary;
-  const skin = bench.file.surfaces.findIndex(({ entry }) => entry.kind === "skin");
-  const band = skin < 0 ? null : bench.bandOf(skin);
   const document = {
     format: "tissueform-planner-export",
     version: 1,
@@ -64,19 +70,48 @@ export function planDocument(bench: Workbench): string {
         scale: poses[index].scale,
       },
     })),
-    landmarks: manifest.landmarks.map((landmark) => ({
-      name: landmark.name,
-      ...landmarkMovement(landmark, bench.shownPoses, bench.skinPoint, manifest.headFrame),
-      ...(landmark.skinVertex === null || band === null ? {} : { band_95_mm: band[landmark.skinVertex] }),
-    })),
     measurement_landmarks: bench.landmarks.save(),
-    measures: measureFace(bench).flatMap((result) => {
-      if (result.kind !== "value") return [];
-      const { definition, before, after, band } = result;
-      return [{ name: definition.name, title: definition.title, unit: definition.unit, before, after, ...(band === null ? {} : { lowest_after: band.lowest, highest_after: band.highest }) }];
-    }),
-    answer: summary == null ? null : { prepared: summary.prepared, converged: summary.converged, error_bound_mm: summary.errorBoundMm, error_estimate_mm: summary.errorEstimateMm },
+    ...(bench.showsPlan ? { landmarks: movements(bench), measures: measures(bench), answer: answerFacts(bench.answer.value) } : { left_out: `landmarks, measures and answer: ${NOT_THE_PLAN}` }),
     predictions: bench.stored.all.value.map(({ name, title }) => ({ name, title })),
   };
   return JSON.stringify(document, null, 2);
+}
+
+function movements(bench: ToldPlan): object[] {
+  const { landmarks, headFrame } = bench.file.manifest;
+  const skin = bench.file.surfaces.findIndex(({ entry }) => entry.kind === "skin");
+  const band = skin < 0 ? null : bench.bandOf(skin);
+  return landmarks.map((landmark) => ({
+    name: landmark.name,
+    ...landmarkMovement(landmark, bench.shownPoses, bench.skinPoint, headFrame),
+    ...(landmark.skinVertex === null || band === null ? {} : { band_95_mm: band[landmark.skinVertex] }),
+  }));
+}
+
+function measures(bench: ToldPlan): object[] {
+  return measureFace(bench).flatMap((result) => {
+    if (result.kind !== "value") return [];
+    const { definition, before, after, band } = result;
+    return [{ name: definition.name, title: definition.title, unit: definition.unit, before, after, ...(band === null ? {} : { lowest_after: band.lowest, highest_after: band.highest }) }];
+  });
+}
+
+/** An estimate has no bound: whichever does not hold is null. */
+function answerFacts(answer: ShownAnswer | null): object | null {
+  if (answer === null) return null;
+  if (answer.by === "page") {
+    const { errorBoundMm, isEstimate } = answer;
+    return { given_by: "page", prepared: true, refining: false, converged: null, error_bound_mm: isEstimate ? null : errorBoundMm, error_estimate_mm: isEstimate ? errorBoundMm : null };
+  }
+  const { summary, isRefining } = answer;
+  const isEstimate = isRefining || summary.errorEstimateMm > 0;
+  return {
+    given_by: "server",
+    prepared: summary.prepared,
+    refining: isRefining,
+    converged: summary.converged,
+    load: summary.load,
+    error_bound_mm: summary.prepared && !isEstimate ? summary.errorBoundMm : null,
+    error_estimate_mm: summary.prepared && isEstimate ? summary.errorEstimateMm : null,
+  };
 }

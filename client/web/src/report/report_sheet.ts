@@ -8,7 +8,7 @@ import { labelOf, measureFace } from "../measures/face_measures";
 import { bandText, normText, unitText, valueTexts, whyNot } from "../measures/texts";
 import { formatNumber } from "../planning/numbers";
 import { MOVE_KEYS } from "../planning/plan";
-import { type ShownAnswer, describeFace, storedFace } from "../workbench/shown_answer";
+import { type ShownAnswer, describeFace, modelShown } from "../workbench/shown_answer";
 import type { Workbench } from "../workbench/workbench";
 import { reportPictures } from "./report_pictures";
 
@@ -60,7 +60,7 @@ function measureTable(bench: Workbench): HTMLElement {
 /** Which model's answer the face is that is shown, how near it is to that model's full one, and who gave it. */
 export function answerLine(bench: Pick<Workbench, "comparison" | "model" | "modelInfo"> & { answer: { value: ShownAnswer | null } }): string {
   const [answer, comparison] = [bench.answer.value, bench.comparison.value];
-  const model = bench.modelInfo((comparison === null ? null : storedFace(comparison))?.model ?? bench.model.value)?.name ?? "unknown";
+  const model = bench.modelInfo(modelShown(comparison, bench.model.value))?.name ?? "unknown";
   const isOwn = answer?.by === "page" && (comparison === null || (comparison.share === 0 && comparison.from === "plan"));
   return `model ${model}. ${describeFace(answer, comparison) || "No answer yet."}${isOwn ? " Given by the page itself; the server has not confirmed it yet." : ""}`;
 }
@@ -70,7 +70,6 @@ function facts(bench: Workbench): HTMLElement {
     `made ${new Date().toISOString()}`,
     answerLine(bench),
     bench.whyNoBand === "" ? "95 of 100: where it stays if nothing but the material is in doubt; excludes errors of model and surgery" : `no band of uncertainty is known: ${bench.whyNoBand}`,
-    bench.showsPlan ? "" : "the face that is shown is not the plan's: a comparison, or an open jaw",
     "mm and degrees in the head frame: forward, up and the patient's left are positive",
     ...provenanceLines(bench).filter((line) => !line.startsWith("model")),
   ];

@@ -4,6 +4,7 @@
 import type { Evaluation } from "../evaluation/answer_evaluator";
 import type { SolveSummary } from "../generated/tissueform/v1/deform_service_pb";
 import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
+import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
 import { formatNumber } from "../planning/numbers";
 import type { Comparison } from "./comparison";
 
@@ -34,9 +35,14 @@ export function describeFace(answer: ShownAnswer | null, comparison: Comparison 
 }
 
 /** The prediction that a comparison shows; null where it shows another face, or what lies between two. */
-export function storedFace({ from, to, share }: Comparison): Prediction | null {
+function storedFace({ from, to, share }: Comparison): Prediction | null {
   if (share === 1) return to;
   return share === 0 && typeof from === "object" ? from : null;
+}
+
+/** The model whose answer is shown. `planned`: that of the plan. */
+export function modelShown(comparison: Comparison | null, planned: DeformationModel): DeformationModel {
+  return (comparison === null ? null : storedFace(comparison))?.model ?? planned;
 }
 
 function prepared(errorMm: number): string {
