@@ -33,13 +33,30 @@ async function openSlowly(context: BrowserContext): Promise<{ page: Page; faults
   return opened;
 }
 
+interface Ready {
+  place: string;
+  kernel: string;
+}
+
 /** Until the page answers by itself. */
-async function ready(page: Page, model?: number): Promise<{ place: string; kernel: string }> {
+async function ready(page: Page, model?: number): Promise<Ready> {
   await page.waitForFunction((wanted) => {
     const { bench } = (globalThis as unknown as Hook).tissueform;
     return bench.localState.value.kind === "ready" && (wanted === undefined || bench.local.configuration.model === wanted);
   }, model);
   return page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.localState.value);
+}
+
+const MOST_TRIES = 5;
+
+/** The same, and not beside the page: where the machine was too busy when it was measured a worker has the work, and it is measured anew. */
+async function readyInPage(page: Page, model?: number): Promise<Ready> {
+  for (let tries = 1; ; ++tries) {
+    const state = await ready(page, model);
+    if (state.place === "page" || tries === MOST_TRIES) return state;
+    await page.getByRole("button", { name: "Stop", exact: true }).click();
+    await page.getByRole("button", { name: "Answer here" }).click();
+  }
 }
 
 function modelOf(page: Page, name: string): Promise<number> {
@@ -97,13 +114,12 @@ describe("on a line with delay", () => {
     await takeSegment(page, "Lower jaw");
     await page.getByRole("radio", { name: new RegExp(`^${label}`) }).check();
     await typeMove(page, "Forward", "0");
-    const { place } = await ready(page, await modelOf(page, name));
+    expect(await readyInPage(page, await modelOf(page, name))).toMatchObject({ place: "page", kernel: "webassembly" });
     const { frames, roundTripMs } = await dragForward(page, FRAMES);
     expect(roundTripMs).toBeGreaterThan(2 * DELAY_MS);
     let before = 0;
     for (const { largestMm, laterMm } of frames) {
-      // On a machine that is too busy a worker answers, a picture later.
-      if (place === "page") expect(largestMm).toBeGreaterThan(before + 0.03);
+      expect(largestMm).toBeGreaterThan(before + 0.03);
       expect(laterMm).toBeGreaterThan(largestMm - 0.05);
       before = largestMm;
     }
@@ -143,7 +159,7 @@ describe("on a line with delay", () => {
     await page.getByText("Beyond what was prepared: the server answers.").waitFor();
     await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.picture.value.summary?.prepared === false);
     await typeMove(page, "Forward", "1");
-    await page.getByText("This page answers at once").waitFor();
+    await page.getByText("This page answers at once; the server confirms.").waitFor();
   });
 
   test("a line that broke off takes nothing from the hand", async () => {
@@ -173,15 +189,15 @@ describe("on a line with delay", () => {
 });
 
 test.each([
-  ["WebAssembly", "without WebAssembly"],
-  ["Worker", "This page answers at once"],
-])("a browser without %s answers, too", async (missing, words) => {
+  ["WebAssembly", "javascript", "This page answers at once (without WebAssembly: slower); the server confirms."],
+  ["Worker", "webassembly", "This page answers at once; the server confirms."],
+])("a browser without %s answers, too", async (missing, kernel, words) => {
   const context = await planner.browse();
   await context.addInitScript((name) => {
     delete (globalThis as unknown as Record<string, unknown>)[name];
   }, missing);
   const { page, faults } = await openCase(context, planner);
-  await ready(page);
+  expect(await readyInPage(page)).toMatchObject({ place: "page", kernel });
   await page.getByText(words).waitFor();
   await dragForward(page, 10);
   await followedByPage(page);
