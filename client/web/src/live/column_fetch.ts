@@ -81,7 +81,7 @@ class Download {
   }
 
   private begin(totalBytes: number, sha256: string): void {
-    if (totalBytes > MOST_BYTES) throw new CallError(Code.ResourceExhausted, `the columns have ${totalBytes} bytes; this page takes ${MOST_BYTES}`);
+    if (!(totalBytes >= 0 && totalBytes <= MOST_BYTES)) throw new CallError(Code.ResourceExhausted, `the columns have ${totalBytes} bytes; this page takes ${MOST_BYTES}`);
     if (sha256 === this.sha256) return;
     const isOther = this.sha256 !== "";
     this.sha256 = sha256;
