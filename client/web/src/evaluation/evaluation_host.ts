@@ -13,8 +13,12 @@ import { makeEvaluator } from "./evaluator";
  */
 const PAGE_BUDGET_MS = 8;
 
-/** `number`: that of the question. */
-export type OnEvaluation = (evaluation: Evaluation, number: number) => void;
+export interface HostListener {
+  /** `number`: that of the question. */
+  onEvaluation(evaluation: Evaluation, number: number): void;
+  /** The worker has ended by itself, or cannot answer: nothing more comes of this host. */
+  onEnded(): void;
+}
 
 /** Where answers are evaluated. A question replaces one that waits. */
 export interface EvaluationHost {
@@ -40,13 +44,13 @@ export function evaluationWorker(): WorkerLike | null {
 }
 
 /** Checks and unpacks the bytes beside the page where it can. Rejects with an AnswersError for bytes that are not good. */
-export async function makeHost(bytes: Uint8Array, sha256: string, onEvaluation: OnEvaluation, makeWorker: () => WorkerLike | null = evaluationWorker): Promise<EvaluationHost> {
+export async function makeHost(bytes: Uint8Array, sha256: string, listener: HostListener, makeWorker: () => WorkerLike | null = evaluationWorker): Promise<EvaluationHost> {
   const worker = makeWorker();
   const ready = worker === null ? null : await load(worker, bytes, sha256);
-  if (worker === null || ready === null) return new PageHost(await makeEvaluator(bytes, { sha256 }), onEvaluation);
-  if (ready.medianMs > PAGE_BUDGET_MS) return new WorkerHost(worker, ready.kernel, onEvaluation);
+  if (worker === null || ready === null) return new PageHost(await makeEvaluator(bytes, { sha256 }), listener);
+  if (ready.medianMs > PAGE_BUDGET_MS) return new WorkerHost(worker, ready.kernel, listener);
   worker.terminate();
-  return new PageHost(await makeEvaluator(bytes), onEvaluation);
+  return new PageHost(await makeEvaluator(bytes), listener);
 }
 
 /** Null where the worker does not run at all. */
@@ -71,7 +75,7 @@ class PageHost implements EvaluationHost {
 
   constructor(
     private readonly evaluator: AnswerEvaluator,
-    private readonly onEvaluation: OnEvaluation,
+    private readonly listener: HostListener,
   ) {}
 
   get kernel(): string {
@@ -79,7 +83,7 @@ class PageHost implements EvaluationHost {
   }
 
   ask(poses: readonly Pose[], number: number): void {
-    this.onEvaluation(this.evaluator.evaluate(poses), number);
+    this.listener.onEvaluation(this.evaluator.evaluate(poses), number);
   }
 
   async bandAt(poses: readonly Pose[]): Promise<Float32Array | null> {
@@ -96,13 +100,15 @@ class WorkerHost implements EvaluationHost {
   private waiting: { poses: readonly Pose[]; number: number } | null = null;
   /** Those that wait for a band, the first first. */
   private readonly bands: ((bandMm: Float32Array | null) => void)[] = [];
+  private isClosed = false;
 
   constructor(
     private readonly worker: WorkerLike,
     readonly kernel: string,
-    private readonly onEvaluation: OnEvaluation,
+    private readonly listener: HostListener,
   ) {
     worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.take(data);
+    worker.onerror = () => this.end();
   }
 
   ask(poses: readonly Pose[], number: number): void {
@@ -112,30 +118,39 @@ class WorkerHost implements EvaluationHost {
 
   bandAt(poses: readonly Pose[]): Promise<Float32Array | null> {
     return new Promise((done) => {
+      if (this.isClosed) return done(null);
       this.bands.push(done);
       this.worker.postMessage({ kind: "band", poses: [...poses] });
     });
   }
 
   close(): void {
+    this.isClosed = true;
     this.worker.onmessage = null;
+    this.worker.onerror = null;
     this.worker.terminate();
     this.bands.splice(0).forEach((done) => done(null));
   }
 
+  private end(): void {
+    this.close();
+    this.listener.onEnded();
+  }
+
   private send(): void {
-    if (this.asked !== null || this.waiting === null) return;
+    if (this.isClosed || this.asked !== null || this.waiting === null) return;
     this.asked = this.waiting.number;
     this.worker.postMessage({ kind: "evaluate", poses: [...this.waiting.poses] });
     this.waiting = null;
   }
 
   private take(message: FromWorker): void {
+    if (message.kind === "failed") return this.end();
     if (message.kind === "band") this.bands.shift()?.(message.bandMm);
     if (message.kind !== "evaluated" || this.asked === null) return;
     const number = this.asked;
     this.asked = null;
     this.send();
-    this.onEvaluation(message, number);
+    this.listener.onEvaluation(message, number);
   }
 }

@@ -22,19 +22,19 @@ export class EvaluationService {
   constructor(private readonly post: (message: FromWorker, transfer: Transferable[]) => void) {}
 
   async take(message: ToWorker): Promise<void> {
-    if (message.kind === "load") await this.load(message.bytes, message.sha256);
-    else if (message.kind === "band") this.post({ kind: "band", bandMm: this.evaluator?.bandAt(message.poses) ?? null }, []);
-    else this.evaluate(message.poses);
-  }
-
-  private async load(bytes: Uint8Array, sha256: string): Promise<void> {
     try {
-      this.evaluator = await makeEvaluator(bytes, { sha256 });
-      const medianMs = this.evaluator.measure(() => performance.now());
-      this.post({ kind: "ready", medianMs, kernel: this.evaluator.kernel.name }, []);
+      if (message.kind === "load") await this.load(message.bytes, message.sha256);
+      else if (message.kind === "band") this.post({ kind: "band", bandMm: this.evaluator?.bandAt(message.poses) ?? null }, []);
+      else this.evaluate(message.poses);
     } catch (thrown) {
       this.post({ kind: "failed", message: thrown instanceof Error ? thrown.message : String(thrown) }, []);
     }
+  }
+
+  private async load(bytes: Uint8Array, sha256: string): Promise<void> {
+    this.evaluator = await makeEvaluator(bytes, { sha256 });
+    const medianMs = this.evaluator.measure(() => performance.now());
+    this.post({ kind: "ready", medianMs, kernel: this.evaluator.kernel.name }, []);
   }
 
   private evaluate(poses: Pose[]): void {

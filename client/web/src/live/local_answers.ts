@@ -122,7 +122,7 @@ export class LocalAnswers {
     };
     const columns = await fetchColumns(this.gateway, configuration, { known: this.columns?.sha256 ?? "", onProgress, signal });
     if (signal.aborted || columns === null) return;
-    const host = await this.makeEvaluationHost(columns.bytes, columns.sha256, (evaluation, number) => this.take(evaluation, number));
+    const host = await this.makeEvaluationHost(columns.bytes, columns.sha256, { onEvaluation: (evaluation, number) => this.take(evaluation, number), onEnded: () => this.end() });
     if (signal.aborted) {
       host.close();
       return;
@@ -132,6 +132,11 @@ export class LocalAnswers {
     this.columns = columns;
     this.tell("covered");
     if (this.poses !== null) host.ask(this.poses, this.asked);
+  }
+
+  private end(): void {
+    this.drop();
+    this.listener.onState({ kind: "failed", text: "what computed beside it has ended." });
   }
 
   private take(evaluation: Evaluation, number: number): void {

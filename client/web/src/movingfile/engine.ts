@@ -8,6 +8,7 @@ import type { Reply, Request } from "./answers_worker";
 
 /** Answers poses, one after the other. */
 export interface Engine {
+  /** Rejects where the worker cannot answer, or has ended. */
   ask(poses: Pose[]): Promise<Answer | null>;
   /** Beside the page, so that it never waits. */
   isInWorker: boolean;
@@ -15,27 +16,40 @@ export interface Engine {
   isFast: boolean;
 }
 
+/** What of a worker is used; tests have their own. */
+export type WorkerLike = Pick<Worker, "onmessage" | "onerror" | "terminate"> & { postMessage(request: Request): void };
+
 /** `bytes` stay the caller's. In the page itself where the browser has no workers. */
-export async function startEngine(bytes: Uint8Array<ArrayBuffer>): Promise<Engine> {
+export async function startEngine(bytes: Uint8Array<ArrayBuffer>, makeWorker: () => WorkerLike = answersWorker): Promise<Engine> {
   try {
-    return await startWorker(bytes);
+    return await startWorker(bytes, makeWorker());
   } catch {
     const { evaluate, isFast } = await openAnswers(bytes);
     return { ask: async (poses) => evaluate(poses), isInWorker: false, isFast };
   }
 }
 
-async function startWorker(bytes: Uint8Array<ArrayBuffer>): Promise<Engine> {
+function answersWorker(): WorkerLike {
   if (typeof Worker === "undefined") throw new Error("no workers");
-  const worker = new AnswersWorker();
+  return new AnswersWorker();
+}
+
+async function startWorker(bytes: Uint8Array<ArrayBuffer>, worker: WorkerLike): Promise<Engine> {
   const waiting: { accept: (reply: Reply) => void; reject: (error: Error) => void }[] = [];
-  worker.onerror = () => waiting.splice(0).forEach(({ reject }) => reject(new Error("the worker has ended")));
+  let hasEnded = false;
+  const ended = () => new Error("the worker has ended");
+  worker.onerror = () => {
+    hasEnded = true;
+    worker.terminate();
+    waiting.splice(0).forEach(({ reject }) => reject(ended()));
+  };
   worker.onmessage = ({ data }: MessageEvent<Reply>) => {
     if ("problem" in data) waiting.shift()?.reject(new Error(data.problem));
     else waiting.shift()?.accept(data);
   };
   const send = (request: Request) =>
     new Promise<Reply>((accept, reject) => {
+      if (hasEnded) return reject(ended());
       waiting.push({ accept, reject });
       worker.postMessage(request);
     });

@@ -11,18 +11,18 @@ import type { StageListener } from "../scene/stage";
 import { FaceColors, type MapLegend, subtractInto } from "../workbench/face_colors";
 import type { Answer } from "./answer_engine";
 import type { Engine } from "./engine";
+import { type LargestMovement, largestMovement, largestOf } from "./largest_movement";
+import { NewestPoses } from "./newest_poses";
 
 /** What is seen, in numbers. */
-export interface Shown {
-  /** The poses reach further than the answers: the picture is the last one that did not. */
-  isBeyond: boolean;
-  largestMm: number;
-  /** How far that may be off in 95 of 100 cases; null where it is not known. */
-  bandMm: number | null;
+export interface Shown extends LargestMovement {
   errorBoundMm: number;
   isEstimate: boolean;
   legend: MapLegend | null;
 }
+
+/** Why the picture is still the one before: the poses reach further than the answers, or there is no answer. */
+export type NotShown = "beyond" | "failed";
 
 /** The head that moves: a plan, what answers it, and the picture. */
 export class MovingHead {
@@ -30,16 +30,15 @@ export class MovingHead {
   readonly view: HeadView;
   /** Pictures shown so far. */
   answered = 0;
-  onShown: (shown: Shown) => void = () => {};
+  onShown: (shown: Shown | NotShown) => void = () => {};
 
   private readonly colors: FaceColors;
   private readonly planned: ReadonlyMap<string, Pose>;
   private readonly displacements: Float32Array;
   private readonly lengths: Float32Array[];
   private readonly bands: Float32Array[];
+  private readonly newest: NewestPoses;
   private isColored = false;
-  private isAsking = false;
-  private isWaiting = false;
 
   private constructor(
     container: HTMLElement,
@@ -57,7 +56,8 @@ export class MovingHead {
     const { skins } = this.view.head;
     this.lengths = skins.map(({ source }) => new Float32Array(source.positions.length / 3));
     this.bands = skins.map(({ source }) => new Float32Array(source.positions.length / 3));
-    this.plan.onChange(() => void this.follow());
+    this.newest = new NewestPoses(engine, { onAnswer: (poses, answer) => this.show(poses, answer), onFailed: (thrown) => this.fail(thrown) });
+    this.plan.onChange(() => this.follow());
   }
 
   /** Throws an Error where the answers are of other vertices than the surfaces follow. */
@@ -81,7 +81,7 @@ export class MovingHead {
 
   /** The picture is that of the newest poses. */
   get isIdle(): boolean {
-    return !this.isAsking && !this.isWaiting;
+    return this.newest.isIdle;
   }
 
   /** 0: before, all at rest; 1: as the plan has it. Segments without sliders stay as the plan has them. */
@@ -96,28 +96,21 @@ export class MovingHead {
 
   setColored(isColored: boolean): void {
     this.isColored = isColored;
-    void this.follow();
+    this.follow();
   }
 
-  /** Asks for the newest poses, one question at a time. */
-  private async follow(): Promise<void> {
-    this.isWaiting = true;
-    if (this.isAsking) return;
-    this.isAsking = true;
-    while (this.isWaiting) {
-      this.isWaiting = false;
-      const poses = this.plan.poses();
-      this.show(poses, await this.engine.ask(poses));
-    }
-    this.isAsking = false;
+  private follow(): void {
+    void this.newest.ask(this.plan.poses());
+  }
+
+  private fail(thrown: unknown): void {
+    console.error(thrown);
+    this.onShown("failed");
   }
 
   private show(poses: Pose[], answer: Answer | null): void {
     this.answered += 1;
-    if (answer === null) {
-      this.onShown({ isBeyond: true, largestMm: 0, bandMm: null, errorBoundMm: 0, isEstimate: false, legend: null });
-      return;
-    }
+    if (answer === null) return this.onShown("beyond");
     const { head } = this.view;
     subtractInto(answer.positions, this.rest, this.displacements);
     head.setDisplacements(this.displacements);
@@ -125,22 +118,16 @@ export class MovingHead {
     let legend: MapLegend | null = null;
     if (this.isColored) legend = this.colors.showLengths("Movement of the skin", this.displacements);
     else this.colors.clear();
-    this.onShown({ isBeyond: false, ...this.largest(answer), errorBoundMm: answer.errorBoundMm, isEstimate: answer.isEstimate, legend });
+    this.onShown({ ...this.largest(answer), errorBoundMm: answer.errorBoundMm, isEstimate: answer.isEstimate, legend });
   }
 
-  private largest({ uncertainty }: Answer): Pick<Shown, "largestMm" | "bandMm"> {
-    let largestMm = 0;
-    let bandMm: number | null = null;
-    this.view.head.skins.forEach(({ shape }, s) => {
+  private largest({ uncertainty }: Answer): LargestMovement {
+    const ofSkins = this.view.head.skins.map(({ shape }, s) => {
       shape.spreadLengths(this.displacements, this.lengths[s]);
       if (uncertainty !== null) shape.spread(uncertainty, this.bands[s]);
-      this.lengths[s].forEach((length, i) => {
-        if (length <= largestMm) return;
-        largestMm = length;
-        if (uncertainty !== null) bandMm = this.bands[s][i];
-      });
+      return largestMovement(this.lengths[s], uncertainty === null ? null : this.bands[s]);
     });
-    return { largestMm, bandMm };
+    return largestOf(ofSkins);
   }
 }
 

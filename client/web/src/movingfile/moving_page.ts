@@ -10,7 +10,7 @@ import { MOVE_KEYS } from "../planning/plan";
 import { cssColor, segmentColor } from "../scene/materials";
 import type { MovingData } from "../movingdata/moving_data";
 import type { Engine } from "./engine";
-import { MovingHead, type Shown } from "./moving_head";
+import { MovingHead, type NotShown, type Shown } from "./moving_head";
 
 const LABELS: Record<MoveKey, string> = {
   forwardMm: "Forward",
@@ -25,6 +25,11 @@ const MODELS: Record<string, string> = {
   gradient_field: "gradient field",
   linear_elastic: "linear elastic",
   neo_hookean: "neo-Hookean",
+};
+
+const NOT_SHOWN: Record<NotShown, string> = {
+  beyond: "Beyond what this file can answer: the picture shows the last movement that it can.",
+  failed: "This movement could not be computed: the picture shows an older one. If that stays so, close the page and open the file again.",
 };
 
 const STEP = 0.1;
@@ -45,7 +50,7 @@ export async function movingPage(data: MovingData, engine: Engine): Promise<{ el
   const numbers = numbersPanel(data, head);
   head.onShown = (shown) => {
     numbers.show(shown);
-    legend.show(shown.legend);
+    legend.show(typeof shown === "string" ? null : shown.legend);
   };
   const segments = data.handles.flatMap((handle, index) => (handle.isFree ? [segmentSection(head, index)] : []));
   const panel = el("aside", { attributes: { "aria-label": "Movements" } }, [beforeAfter(head), numbers.element, ...segments]);
@@ -98,34 +103,35 @@ function moveRow({ plan }: MovingHead, index: number, key: MoveKey): HTMLElement
   return el("div", { class: "move" }, [el("label", { text: LABELS[key], attributes: { for: id } }), control, number]);
 }
 
-function numbersPanel(data: MovingData, head: MovingHead): { element: HTMLElement; show(shown: Shown): void } {
-  const beyond = el("p", { class: "warning", attributes: { role: "status" } });
+function numbersPanel(data: MovingData, head: MovingHead): { element: HTMLElement; show(shown: Shown | NotShown): void } {
+  const problem = el("p", { class: "warning", attributes: { role: "status" } });
   const largest = el("p");
   const exactness = el("p", { class: "quiet" });
   const lacks = [head.isInWorker ? "" : "no thread of its own", head.isFast ? "" : "no WebAssembly"].filter((lack) => lack !== "");
   const slow = lacks.length === 0 ? null : el("p", { class: "quiet", text: `This browser gives the file ${lacks.join(" and ")}: it moves more slowly.` });
   const element = section("Prediction", [
-    beyond,
+    problem,
     largest,
     exactness,
     el("p", { class: "quiet", text: `Model: ${MODELS[data.model] ?? data.model}. Made by ${data.software}.` }),
     slow,
   ]);
-  const show = onceAPictureWith((shown: Shown) => {
-    beyond.hidden = !shown.isBeyond;
-    beyond.textContent = "Beyond what this file can answer: the picture shows the last movement that it can.";
-    if (shown.isBeyond) return;
+  const show = onceAPictureWith((shown: Shown | NotShown) => {
+    problem.hidden = typeof shown !== "string";
+    if (typeof shown === "string") {
+      problem.textContent = NOT_SHOWN[shown];
+      return;
+    }
     largest.textContent = `Largest movement of the skin: ${withBand(shown)}`;
     exactness.textContent = describeError(shown);
   });
   return { element, show };
 }
 
-function withBand({ largestMm, bandMm }: Shown): string {
+function withBand({ largestMm, band }: Shown): string {
   const number = `${formatNumber(largestMm)} mm`;
-  if (bandMm === null) return `${number}. The band of uncertainty of this model or pose is not known.`;
-  const low = formatNumber(Math.max(0, largestMm - bandMm));
-  return `${number}, ${low} to ${formatNumber(largestMm + bandMm)} in 95 of 100 cases if only the tissue's stiffness is in doubt.`;
+  if (band === null) return `${number}. The band of uncertainty of this model or pose is not known.`;
+  return `${number}, ${formatNumber(band.lowestMm)} to ${formatNumber(band.highestMm)} in 95 of 100 cases if only the tissue's stiffness is in doubt.`;
 }
 
 function describeError({ errorBoundMm, isEstimate }: Shown): string {

@@ -3,8 +3,7 @@
 
 import { createHash } from "node:crypto";
 import { expect, test } from "vitest";
-import { type Evaluation } from "../../src/evaluation/answer_evaluator";
-import { type WorkerLike, makeHost } from "../../src/evaluation/evaluation_host";
+import { type HostListener, type WorkerLike, makeHost } from "../../src/evaluation/evaluation_host";
 import { EvaluationService, type FromWorker, type ToWorker } from "../../src/evaluation/evaluation_service";
 import { goldenBytes, goldenCases } from "./golden_answers";
 
@@ -32,6 +31,10 @@ class FakeWorker implements WorkerLike {
     this.isTerminated = true;
   }
 
+  fail(): void {
+    this.onerror?.call(this as never, {} as ErrorEvent);
+  }
+
   letOut(): void {
     this.waiting.splice(0).forEach((message) => this.tell(message));
   }
@@ -48,14 +51,18 @@ class FakeWorker implements WorkerLike {
 
 function listener() {
   const told: { number: number; coverage: string; first: number }[] = [];
-  const onEvaluation = ({ coverage, positions }: Evaluation, number: number) => told.push({ number, coverage, first: positions[0] });
-  return { told, onEvaluation };
+  const ends: string[] = [];
+  const listening: HostListener = {
+    onEvaluation: ({ coverage, positions }, number) => told.push({ number, coverage, first: positions[0] }),
+    onEnded: () => ends.push("ended"),
+  };
+  return { told, ends, listening };
 }
 
 test("what is fast is evaluated in the page, before the question returns", async () => {
   const worker = new FakeWorker(0.5);
-  const { told, onEvaluation } = listener();
-  const host = await makeHost(BYTES, SHA256, onEvaluation, () => worker);
+  const { told, listening } = listener();
+  const host = await makeHost(BYTES, SHA256, listening, () => worker);
   expect(host.place).toBe("page");
   expect(worker.isTerminated).toBe(true);
   host.ask(CASES[1].poses, 7);
@@ -66,8 +73,8 @@ test("what is fast is evaluated in the page, before the question returns", async
 
 test("what is slow is evaluated by the worker, the newest question only", async () => {
   const worker = new FakeWorker(20);
-  const { told, onEvaluation } = listener();
-  const host = await makeHost(BYTES, SHA256, onEvaluation, () => worker);
+  const { told, listening } = listener();
+  const host = await makeHost(BYTES, SHA256, listening, () => worker);
   expect(host.place).toBe("worker");
   [1, 2, 3].forEach((number) => host.ask(CASES[number].poses, number));
   expect(told).toEqual([]);
@@ -84,9 +91,9 @@ test("what is slow is evaluated by the worker, the newest question only", async 
 test.each([["the page", 0.5], ["a worker", 20]])("the band of other poses comes from %s, and tells nobody who listens for answers", async (_, medianMs) => {
   const bytes = goldenBytes("linear_elastic_band");
   const cases = goldenCases("linear_elastic_band");
-  const { told, onEvaluation } = listener();
+  const { told, listening } = listener();
   const worker = new FakeWorker(medianMs);
-  const host = await makeHost(bytes, createHash("sha256").update(bytes).digest("hex"), onEvaluation, () => worker);
+  const host = await makeHost(bytes, createHash("sha256").update(bytes).digest("hex"), listening, () => worker);
   const [one, other] = await Promise.all([host.bandAt(cases[1].poses), host.bandAt(cases[2].poses)]);
   for (const [band, { bandMm }] of [[one, cases[1]], [other, cases[2]]] as const) {
     expect(band?.length).toBe(bandMm?.length);
@@ -96,19 +103,42 @@ test.each([["the page", 0.5], ["a worker", 20]])("the band of other poses comes 
 });
 
 test("columns without a band know none, and who waits for one is told so when the columns go", async () => {
-  const host = await makeHost(BYTES, SHA256, () => {}, () => null);
+  const host = await makeHost(BYTES, SHA256, listener().listening, () => null);
   expect(await host.bandAt(CASES[1].poses)).toBeNull();
   const worker = new FakeWorker(20);
-  const beside = await makeHost(BYTES, SHA256, () => {}, () => worker);
+  const beside = await makeHost(BYTES, SHA256, listener().listening, () => worker);
   worker.postMessage = () => {};
   const waiting = beside.bandAt(CASES[1].poses);
   beside.close();
   expect(await waiting).toBeNull();
 });
 
+test("a worker that ends by itself is told of, and leaves nobody waiting", async () => {
+  const worker = new FakeWorker(20);
+  const { told, ends, listening } = listener();
+  const host = await makeHost(BYTES, SHA256, listening, () => worker);
+  host.ask(CASES[1].poses, 1);
+  worker.postMessage = () => {};
+  const waiting = host.bandAt(CASES[1].poses);
+  worker.fail();
+  expect([await waiting, await host.bandAt(CASES[1].poses)]).toEqual([null, null]);
+  expect(ends).toEqual(["ended"]);
+  expect(worker.isTerminated).toBe(true);
+  worker.letOut();
+  expect(told).toEqual([]);
+});
+
+test("a worker that cannot answer says so, and counts as ended", async () => {
+  const worker = new FakeWorker(20);
+  const { ends, listening } = listener();
+  const host = await makeHost(BYTES, SHA256, listening, () => worker);
+  host.ask([null, null] as never, 1);
+  await expect.poll(() => ends).toEqual(["ended"]);
+});
+
 test("a browser without workers evaluates in the page", async () => {
-  const { told, onEvaluation } = listener();
-  const host = await makeHost(BYTES, SHA256, onEvaluation, () => null);
+  const { told, listening } = listener();
+  const host = await makeHost(BYTES, SHA256, listening, () => null);
   host.ask(CASES[7].poses, 1);
   expect(host.place).toBe("page");
   expect(told[0].coverage).toBe("beyond");
@@ -116,8 +146,8 @@ test("a browser without workers evaluates in the page", async () => {
 
 test("a worker that does not start is done without", async () => {
   const worker = new FakeWorker(0);
-  worker.postMessage = () => worker.onerror?.call(worker as never, {} as ErrorEvent);
-  const host = await makeHost(BYTES, SHA256, listener().onEvaluation, () => worker);
+  worker.postMessage = () => worker.fail();
+  const host = await makeHost(BYTES, SHA256, listener().listening, () => worker);
   expect(host.place).toBe("page");
 });
 
@@ -126,7 +156,7 @@ test.each([
   ["of another hash", BYTES, SHA256.replace(/^../, "zz"), "another SHA-256"],
 ])("bytes that are %s are refused, by a worker and without", async (_what, bytes, sha256, words) => {
   const worker = new FakeWorker(0);
-  await expect(makeHost(bytes, sha256, listener().onEvaluation, () => worker)).rejects.toThrow(words);
+  await expect(makeHost(bytes, sha256, listener().listening, () => worker)).rejects.toThrow(words);
   expect(worker.isTerminated).toBe(true);
-  await expect(makeHost(bytes, sha256, listener().onEvaluation, () => null)).rejects.toThrow(words);
+  await expect(makeHost(bytes, sha256, listener().listening, () => null)).rejects.toThrow(words);
 });

@@ -80,6 +80,20 @@ test("a line that brings nothing is given up, what is refused at once", async ()
   expect(refused.offsets).toHaveLength(1);
 });
 
+test.each([
+  ["more than a page takes", 2n ** 26n + 1n, "67108865 bytes; this page takes 67108864"],
+  ["less than none", -1n, "-1 bytes; this page takes 67108864"],
+])("columns that say that they are %s are refused in a sentence, at once", async (_, totalBytes, words) => {
+  let calls = 0;
+  async function* getPreparedAnswers() {
+    calls += 1;
+    yield { message: { case: "header" as const, value: { totalBytes, sha256: "a" } } };
+  }
+  const gateway = { deform: { getPreparedAnswers } } as unknown as Pick<Gateway, "deform">;
+  await expect(fetchColumns(gateway, configuration(), options())).rejects.toThrow(words);
+  expect(calls).toBe(1);
+});
+
 function local(bytes: () => Uint8Array = () => goldenBytes("linear_elastic")) {
   const states: LocalState[] = [];
   const firsts: number[] = [];
@@ -87,7 +101,7 @@ function local(bytes: () => Uint8Array = () => goldenBytes("linear_elastic")) {
   const answers = new LocalAnswers(
     gateway,
     { onState: (state) => states.push(state), onEvaluation: ({ positions }) => firsts.push(positions[0]) },
-    (data, sha256, onEvaluation) => makeHost(data, sha256, onEvaluation, () => null),
+    (data, sha256, listener) => makeHost(data, sha256, listener, () => null),
   );
   return { answers, states, firsts, offsets, last: () => states[states.length - 1] };
 }
@@ -173,6 +187,24 @@ test("who stops it is answered by the server until it is resumed", async () => {
   expect(last()).toEqual({ kind: "stopped" });
   answers.resume();
   await expect.poll(() => firsts.length).toBe(1);
+});
+
+test("a worker that ends by itself leaves the server to answer until it is asked for anew", async () => {
+  const states: LocalState[] = [];
+  const endings: (() => void)[] = [];
+  const { gateway, offsets } = server(() => goldenBytes("linear_elastic"));
+  const answers = new LocalAnswers(gateway, { onState: (state) => states.push(state), onEvaluation: () => {} }, async (_bytes, _sha256, listener) => {
+    endings.push(() => listener.onEnded());
+    return { place: "worker", kernel: "webassembly", ask: () => {}, bandAt: async () => null, close: () => {} };
+  });
+  await answers.follow(configuration());
+  expect(states[states.length - 1]).toMatchObject({ kind: "ready", place: "worker" });
+  endings[0]();
+  expect(states[states.length - 1]).toMatchObject({ kind: "failed", text: expect.stringContaining("has ended") });
+  expect([answers.heldColumns, await answers.bandAt(CASES[1].poses)]).toEqual([null, null]);
+  answers.resume();
+  await expect.poll(() => states[states.length - 1]).toMatchObject({ kind: "ready" });
+  expect(offsets).toEqual([0, 0]);
 });
 
 test("damaged columns are told in a sentence, and the server answers", async () => {
