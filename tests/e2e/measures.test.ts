@@ -184,6 +184,16 @@ describe("the bundled head", () => {
     await moved(page, 2.5, 7);
     await page.keyboard.press("Control+z");
     await moved(page, 0, 0.05);
+    // A wish on a planned face leaves it: it begins where the skin is, and asks nothing.
+    await takeSegment(page, "Lower jaw");
+    await typeMove(page, "Forward", "6");
+    await moved(page, 4, 8);
+    const planned = (await state(page)).moves;
+    await page.getByLabel("or a place").selectOption({ label: "Chin" });
+    await expect.poll(() => forwardOf(page, "Chin").inputValue()).toMatch(/^[3-7]\.\d$/);
+    await page.getByText("This is the face as planned").waitFor();
+    expect((await state(page)).moves).toEqual(planned);
+    await page.getByRole("button", { name: "Remove the wish for Chin" }).click();
     // This case has the scanner's axes alone.
     await open(page, "Measures");
     await page.getByText("In the axes of the scanner").waitFor();

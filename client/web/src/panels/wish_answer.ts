@@ -25,6 +25,7 @@ export function wishAnswer(bench: Workbench): HTMLElement {
     details.hidden = response === null;
     const lines = response === null ? [] : wishSentences(response, fit.wishes.value, bench.plan.handles);
     if (fit.problem.value !== null) lines.unshift(`This cannot be asked: ${sentenceOf(fit.problem.value)}`);
+    else if (!fit.isAsked) lines.unshift("This is the face as planned: pull at a wish, or type where it is to be.");
     else if (response === null) lines.unshift("The server prepares answers for these points …");
     else lines.push(`Searched for ${Math.max(1, Math.round(1000 * response.searchSeconds))} ms, answered after ${Math.max(1, Math.round(milliseconds))}; bone moves ${formatNumber(response.movementMm)} mm from rest.`);
     told.replaceChildren(...lines.map((text) => el("p", { text })));

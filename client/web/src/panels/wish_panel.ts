@@ -5,14 +5,13 @@ import { add } from "../geometry/rotation";
 import { fromLps, toLps } from "../geometry/pose";
 import { formatNumber, parseNumber } from "../planning/numbers";
 import { Gizmo } from "../scene/gizmo";
-import type { Wish } from "../workbench/wish_fit";
+import { type Wish, isSameMove } from "../workbench/wish_fit";
 import { type WishPlace, placeOfAnchor, placeOfRegion } from "../workbench/wish_place";
 import type { Workbench } from "../workbench/workbench";
-import { button, collapsible, el, newId, select } from "./dom";
+import { button, collapsible, el, newId, onceAPicture, select } from "./dom";
 import { wishAnswer } from "./wish_answer";
 
 const MOST_WISHES = 16;
-const NO_MOVE = { forwardMm: 0, leftMm: 0, upMm: 0 };
 const FIELDS: readonly [keyof Wish["move"], string][] = [["forwardMm", "forward"], ["leftMm", "left"], ["upMm", "up"]];
 
 /** The face that is wished for: points and regions of the skin that are pulled or told how far to go, and what bone does for it. */
@@ -20,9 +19,10 @@ export function wishPanel(bench: Workbench): HTMLElement {
   const fit = bench.wishes;
   const puller = new Puller(bench);
   const addWish = (label: string, place: WishPlace | null) => {
-    if (place === null) bench.notice.value = `${label}: this skin does not move with the bone; choose a point of the face.`;
+    if (!bench.showsPlan) bench.notice.value = "Wishes are for the plan's face: go back to the plan, and close the jaw, first.";
+    else if (place === null) bench.notice.value = `${label}: this skin does not move with the bone; choose a point of the face.`;
     else if (fit.wishes.value.length >= MOST_WISHES) bench.notice.value = `There are ${MOST_WISHES} wishes; remove one first.`;
-    else puller.take(fit.wishes.value.length, [...fit.wishes.value, { label, place, move: NO_MOVE, isAlong: false }]);
+    else puller.take(fit.wishes.value.length, [...fit.wishes.value, { label, place, move: bench.moveAt(place), isAlong: false, isChanged: false }]);
   };
   const point = button("Choose a point", () => {
     const take = (anchor: Parameters<NonNullable<Workbench["picking"]["value"]>["take"]>[0]) => {
@@ -44,7 +44,7 @@ export function wishPanel(bench: Workbench): HTMLElement {
     list.replaceChildren(...wishes.map((_, index) => wishItem(bench, puller, index)));
   });
   return collapsible("Wished-for face", [
-    el("p", { class: "quiet", text: "Choose a point or a place of the skin; pull it by its arrows, or type how far it is to go. Bone moves so that the face comes there." }),
+    el("p", { class: "quiet", text: "Choose a point or a place of the skin; pull it by its arrows, or type how far from rest it is to be. Bone moves so that the face comes there." }),
     el("div", { class: "buttons" }, [point]),
     regions.length === 0 ? null : region.element,
     list,
@@ -64,6 +64,7 @@ class Puller {
       this.change(this.index, { move: fromLps(translationMm, bench.file.manifest.headFrame) });
     });
     bench.wishes.wishes.watch(() => this.place());
+    bench.shown.watch(onceAPicture(() => bench.showsPlan && bench.wishes.follow(bench.moveAt)));
   }
 
   show(isOpen: boolean): void {
@@ -81,7 +82,9 @@ class Puller {
   change(index: number, part: Partial<Wish>): void {
     const wishes = this.bench.wishes.wishes.value;
     this.index = index;
-    this.bench.wishes.set(wishes.map((wish, k) => (k === index ? { ...wish, ...part } : wish)));
+    // Arrows that are let go of where they were taken have moved nothing.
+    if (part.move !== undefined && isSameMove(part.move, wishes[index].move)) return;
+    this.bench.wishes.set(wishes.map((wish, k) => (k === index ? { ...wish, ...part, isChanged: true } : wish)));
   }
 
   private place(): void {

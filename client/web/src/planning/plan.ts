@@ -27,11 +27,13 @@ interface State {
 /**
  * What the planner wants of the bone: a move for each segment about a pivot, within the case's limits, with all that was
  * before. A change that is not final is a step of a movement of the hand: the final one that ends it is what undo takes back.
+ * A preview is no step: whatever changes the plan next takes it away first.
  */
 export class Plan {
   readonly handles: readonly HandleEntry[];
   private readonly history: History<State>;
   private state: State;
+  private isPreview = false;
   private readonly listeners: PlanListener[] = [];
 
   constructor(private readonly file: PlannedCase) {
@@ -45,7 +47,7 @@ export class Plan {
   }
 
   get canUndo(): boolean {
-    return this.history.canUndo;
+    return this.isPreview || this.history.canUndo;
   }
 
   get canRedo(): boolean {
@@ -88,7 +90,8 @@ export class Plan {
 
   /** What lies beyond a limit is brought to it. True where nothing was. */
   change(handle: number, part: Partial<SegmentMove>, isFinal: boolean): boolean {
-    const move = { ...this.moves[handle], ...part };
+    const { moves } = this.base;
+    const move = { ...moves[handle], ...part };
     let isWithin = true;
     for (const key of MOVE_KEYS) {
       if (part[key] === undefined) continue;
@@ -97,16 +100,17 @@ export class Plan {
       if (Math.abs(move[key]) > limit + 1e-9) isWithin = false;
       move[key] = Math.min(limit, Math.max(-limit, move[key]));
     }
-    this.set({ ...this.state, moves: this.moves.map((old, index) => (index === handle ? move : old)) }, isFinal);
+    this.set({ ...this.base, moves: moves.map((old, index) => (index === handle ? move : old)) }, isFinal);
     return isWithin;
   }
 
   /** The segment stays where it is; its numbers are told about another point from now on. */
   setPivot(handle: number, pivotMm: Vector): void {
-    const move = toMove(this.poses()[handle], pivotMm, this.file.manifest.headFrame);
+    const { moves } = this.base;
+    const move = toMove(this.poses(moves)[handle], pivotMm, this.file.manifest.headFrame);
     this.set(
       {
-        moves: this.moves.map((old, index) => (index === handle ? move : old)),
+        moves: moves.map((old, index) => (index === handle ? move : old)),
         pivots: this.state.pivots.map((old, index) => (index === handle ? pivotMm : old)),
       },
       true,
@@ -115,16 +119,21 @@ export class Plan {
 
   /** Poses of some handles by name, as a server or the case has them; the others are at rest. */
   setPoses(poses: ReadonlyMap<string, Pose>): void {
-    this.set({ ...this.state, moves: this.movesOf(poses) }, true);
+    this.set({ ...this.base, moves: this.movesOf(poses) }, true);
   }
 
   /** Shown and not yet kept: `setPoses` keeps them as one step, `revert` goes back to the newest step. */
   preview(poses: ReadonlyMap<string, Pose>): void {
-    this.set({ ...this.state, moves: this.movesOf(poses) }, false);
+    this.show({ ...this.history.now, moves: this.movesOf(poses) }, false, true);
   }
 
   revert(): void {
     this.show(this.history.now, true);
+  }
+
+  /** What changes go on from. */
+  private get base(): State {
+    return this.isPreview ? this.history.now : this.state;
   }
 
   private movesOf(poses: ReadonlyMap<string, Pose>): Moves {
@@ -136,12 +145,13 @@ export class Plan {
 
   /** Of one segment, or of all. */
   reset(handle?: number): void {
-    const moves = this.moves.map((move, index) => (handle === undefined || handle === index ? { ...NO_MOVE } : move));
-    this.set({ ...this.state, moves }, true);
+    const moves = this.base.moves.map((move, index) => (handle === undefined || handle === index ? { ...NO_MOVE } : move));
+    this.set({ ...this.base, moves }, true);
   }
 
+  /** Of a preview takes back that alone. */
   undo(): void {
-    this.show(this.history.undo(), true);
+    this.show(this.isPreview ? this.history.now : this.history.undo(), true);
   }
 
   redo(): void {
@@ -153,8 +163,9 @@ export class Plan {
     this.show(state, isFinal);
   }
 
-  private show(state: State, isFinal: boolean): void {
+  private show(state: State, isFinal: boolean, isPreview = false): void {
     this.state = state;
+    this.isPreview = isPreview;
     this.listeners.forEach((listener) => listener(this, { isFinal }));
   }
 }

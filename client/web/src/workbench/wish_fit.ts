@@ -18,6 +18,8 @@ export interface Wish {
   move: { forwardMm: number; leftMm: number; upMm: number };
   /** Only along `move`; across it the skin goes as it will. */
   isAlong: boolean;
+  /** By who wishes; else `move` is where the skin was when it was chosen. */
+  isChanged: boolean;
 }
 
 export type FitAsk = Omit<MessageInitShape<typeof FitRequestSchema>, "$typeName" | "session" | "model">;
@@ -30,9 +32,15 @@ export interface Fitted {
 
 const LEAST_WISH_MM = 1e-3;
 
+/** But for rounding. */
+export function isSameMove(a: Wish["move"], b: Wish["move"]): boolean {
+  return Math.hypot(a.forwardMm - b.forwardMm, a.leftMm - b.leftMm, a.upMm - b.upMm) < 1e-6;
+}
+
 /**
  * The face that is wished for, and the poses that give it: asked of the server while somebody pulls, one call at a time, and of
  * wishes that come meanwhile the newest only. What is found is shown by the plan and becomes a step of it when it is accepted.
+ * Before any of the wishes is changed nothing is asked: the face is what it is. Wishes end with any other change of the plan.
  */
 export class WishFit {
   readonly wishes = new Signal<readonly Wish[]>([]);
@@ -47,35 +55,59 @@ export class WishFit {
   private start: ReadonlyMap<string, Pose> = new Map();
   private isStale = false;
   private found: ReadonlyMap<string, Pose> | null = null;
+  /** The change of the plan that is heard of is this object's own. */
+  private isShowing = false;
+  /** How often wishes have ended: an answer to those that did is none to those that came after them. */
+  private ends = 0;
 
   constructor(
     private readonly file: CaseFile,
     private readonly plan: Plan,
     private readonly ask: (request: FitAsk) => Promise<FitResponse>,
+    private readonly onOvertaken: () => void = () => {},
     private readonly now: () => number = () => performance.now(),
   ) {
     this.free = new Set(plan.handles.map(({ name }) => name));
+    plan.onChange(() => this.planChanged());
   }
 
   get isActive(): boolean {
     return this.wishes.value.length > 0;
   }
 
-  /** Asks again. The poses of the plan when the first wish came are where the search begins. */
+  /** Something else than what is shown is wished for. */
+  get isAsked(): boolean {
+    return this.wishes.value.some(({ isChanged }) => isChanged);
+  }
+
+  /**
+   * Asks again, unless others were added that are not changed yet. The poses of the plan when the first wish was changed are where
+   * the search begins.
+   */
   set(wishes: readonly Wish[]): void {
-    if (!this.isActive) this.start = this.planPoses();
+    const before = this.wishes.value;
+    if (!this.isAsked) this.start = this.planPoses();
     this.wishes.value = wishes;
-    if (wishes.length === 0) this.leave();
-    else void this.update();
+    const areThere = before.every((wish, index) => wish === wishes[index]);
+    if (areThere && wishes.slice(before.length).every(({ isChanged }) => !isChanged)) return;
+    if (this.isAsked) void this.update();
+    else this.leave();
+  }
+
+  /** While nothing is asked wishes go with the face. `moveOf`: of the skin at a place, from rest, as it is shown. */
+  follow(moveOf: (place: WishPlace) => Wish["move"]): void {
+    if (!this.isActive || this.isAsked) return;
+    const wishes = this.wishes.value.map((wish) => ({ ...wish, move: moveOf(wish.place) }));
+    if (wishes.some(({ move }, index) => !isSameMove(move, this.wishes.value[index].move))) this.wishes.value = wishes;
   }
 
   /** The bounds have changed. */
   async update(): Promise<void> {
-    if (!this.isActive) return;
+    if (!this.isAsked) return;
     this.isStale = true;
     if (this.isAsking.value) return;
     this.isAsking.value = true;
-    while (this.isStale && this.isActive) {
+    while (this.isStale && this.isAsked) {
       this.isStale = false;
       await this.once();
     }
@@ -89,7 +121,8 @@ export class WishFit {
 
   /** What was found is a step of the plan. */
   accept(): void {
-    if (this.found !== null) this.plan.setPoses(this.found);
+    const { found } = this;
+    if (found !== null) this.show(() => this.plan.setPoses(found));
     this.end();
   }
 
@@ -99,31 +132,51 @@ export class WishFit {
   }
 
   private leave(): void {
-    if (this.found !== null) this.plan.revert();
-    this.found = null;
-    this.fitted.value = null;
-    this.problem.value = null;
+    if (this.found !== null) this.show(() => this.plan.revert());
+    this.forget();
   }
 
   private end(): void {
     this.wishes.value = [];
+    this.forget();
+  }
+
+  private forget(): void {
+    this.ends += 1;
     this.found = null;
     this.fitted.value = null;
     this.problem.value = null;
   }
 
   private async once(): Promise<void> {
-    const begun = this.now();
+    const [begun, ends] = [this.now(), this.ends];
     try {
       const response = await this.ask(this.request());
-      if (!this.isActive) return;
-      this.found = fromMessages(response.poses);
+      if (ends !== this.ends) return;
+      const found = fromMessages(response.poses);
+      this.found = found;
       this.problem.value = null;
       this.fitted.value = { response, milliseconds: this.now() - begun };
-      this.plan.preview(this.found);
+      this.show(() => this.plan.preview(found));
     } catch (thrown) {
-      if (this.isActive) this.problem.value = thrown;
+      if (ends === this.ends) this.problem.value = thrown;
     }
+  }
+
+  private show(change: () => void): void {
+    this.isShowing = true;
+    try {
+      change();
+    } finally {
+      this.isShowing = false;
+    }
+  }
+
+  /** By somebody else: what was found is of a plan that is there no more. The plan has taken it away already. */
+  private planChanged(): void {
+    if (this.isShowing || !this.isAsked) return;
+    this.end();
+    this.onOvertaken();
   }
 
   private planPoses(): Map<string, Pose> {

@@ -16,6 +16,8 @@ export interface WishPlace {
   share: number;
   /** Of the drawn skin, at rest. */
   drawnMm: Vector;
+  /** It goes by the sum of what these places of CaseFile.followed do, each times its weight. */
+  follows: readonly (readonly [place: number, weight: number])[];
 }
 
 /** Skin that follows less than this is beyond what is modelled. */
@@ -35,7 +37,9 @@ export function placeOfAnchor(file: CaseFile, { surface, triangle, weights }: An
     const followed = file.followed[skin.follows.places[3 * vertex + k]];
     pointMm = add(pointMm, scaled(pointAt(file.restPositions, followed), skin.follows.weights[3 * vertex + k] / share));
   }
-  return { pointMm, vertices: null, share, drawnMm: pointAt(skin.positions, vertex) };
+  const { places, weights: shares } = skin.follows;
+  const follows = [0, 1, 2].map((k) => [places[3 * vertex + k], shares[3 * vertex + k]] as const);
+  return { pointMm, vertices: null, share, drawnMm: pointAt(skin.positions, vertex), follows };
 }
 
 /** A named region of the skin; null where nothing of it moves. */
@@ -49,16 +53,22 @@ export function placeOfRegion(file: CaseFile, region: number): WishPlace | null 
     const own = shareOf(skin, vertex);
     if (skin.regions[vertex] !== region || own < LEAST_SHARE) continue;
     const row = [0, 1, 2].map((k) => (skin.follows as NonNullable<typeof skin.follows>).weights[3 * vertex + k]);
-    found.add(file.followed[skin.follows.places[3 * vertex + row.indexOf(Math.max(...row))]]);
+    found.add(skin.follows.places[3 * vertex + row.indexOf(Math.max(...row))]);
     drawnMm = add(drawnMm, pointAt(skin.positions, vertex));
     share += own;
     count += 1;
   }
   if (count === 0) return null;
   const all = Array.from(found);
-  const vertices = all.filter((_, index) => index % Math.ceil(all.length / MOST_VERTICES) === 0);
+  const places = all.filter((_, index) => index % Math.ceil(all.length / MOST_VERTICES) === 0);
   const middle = scaled(drawnMm, 1 / count);
-  return { pointMm: middle, vertices, share: share / count, drawnMm: middle };
+  const follows = places.map((place) => [place, share / count / places.length] as const);
+  return { pointMm: middle, vertices: places.map((place) => file.followed[place]), share: share / count, drawnMm: middle, follows };
+}
+
+/** How far the drawn skin is from rest there, LPS. `displacements`: three of each of CaseFile.followed, mm. */
+export function shownMove({ follows }: WishPlace, displacements: Float32Array): Vector {
+  return follows.reduce<Vector>((sum, [place, weight]) => add(sum, scaled(pointAt(displacements, place), weight)), [0, 0, 0]);
 }
 
 function shareOf({ follows }: CaseSurface, vertex: number): number {

@@ -13,7 +13,7 @@ import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
 import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
 import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
 import { BoneSolid, type Penetration, PenetrationTest } from "../geometry/penetration";
-import { type Pose, toMove } from "../geometry/pose";
+import { type Pose, fromLps, toMove } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
 import type { Picture } from "../live/drag_session";
 import { type Connection, LiveSession } from "../live/live_session";
@@ -34,7 +34,8 @@ import { PacsExports } from "./pacs_exports";
 import type { ShownAnswer } from "./shown_answer";
 import { Signal } from "./signal";
 import { StoredPredictions } from "./stored_predictions";
-import { WishFit } from "./wish_fit";
+import { type Wish, WishFit } from "./wish_fit";
+import { type WishPlace, shownMove } from "./wish_place";
 import { recallLandmarks, rememberLandmarks } from "./work";
 
 /** What the server's last picture was answered with, be it shown or not. */
@@ -121,7 +122,12 @@ export class Workbench implements ShownFace {
       ofModel: (model) => this.answers.ofModel(this.live.session, model, this.plan.poses()),
       ofPrediction: (prediction) => this.answers.ofPrediction(prediction),
     });
-    this.wishes = new WishFit(file, this.plan, (request) => this.answers.fit({ ...request, session: this.live.session, model: this.model.value }));
+    this.wishes = new WishFit(
+      file,
+      this.plan,
+      (request) => this.answers.fit({ ...request, session: this.live.session, model: this.model.value }),
+      () => (this.notice.value = "The plan was changed otherwise: what was wished for has ended."),
+    );
     const solids = file.surfaces.filter(({ entry }) => entry.kind === "bone" || entry.kind === "segment");
     const label = (handle: string) => file.manifest.handles.find(({ name }) => name === handle)?.label;
     this.penetrationTest = new PenetrationTest(
@@ -215,6 +221,9 @@ export class Workbench implements ShownFace {
       await this.compare(before);
     }
   }
+
+  /** How far the skin at a place is from rest by the plan's newest answer, in the head frame. */
+  readonly moveAt = (place: WishPlace): Wish["move"] => fromLps(shownMove(place, this.newest.displacements), this.file.manifest.headFrame);
 
   /** Where a vertex of the first skin is now, LPS. */
   skinPoint = (vertex: number): Vector | null => {

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { create } from "@bufbuild/protobuf";
-import { expect, test } from "vitest";
+import { expect, test, vi } from "vitest";
 import { openCase } from "../../src/case/case_file";
-import { FitResponseSchema } from "../../src/generated/tissueform/v1/plan_service_pb";
+import { type FitResponse, FitResponseSchema } from "../../src/generated/tissueform/v1/plan_service_pb";
 import { Plan } from "../../src/planning/plan";
 import { type FitAsk, type Wish, WishFit } from "../../src/workbench/wish_fit";
-import { placeOfAnchor, placeOfRegion } from "../../src/workbench/wish_place";
+import { placeOfAnchor, placeOfRegion, shownMove } from "../../src/workbench/wish_place";
 import { smallCase, sourceOf } from "../testing/small_case";
 
 /** Answers wait until the test gives them. */
@@ -16,7 +16,8 @@ async function bench() {
   const plan = new Plan(file);
   const asked: FitAsk[] = [];
   const answers: ((forwardMm: number | Error) => Promise<void>)[] = [];
-  const fit = new WishFit(file, plan, (request) => {
+  const overtaken = vi.fn();
+  const ask = (request: FitAsk): Promise<FitResponse> => {
     asked.push(request);
     return new Promise((resolve, reject) => {
       answers.push(async (forwardMm) => {
@@ -25,10 +26,13 @@ async function bench() {
         await new Promise((done) => setTimeout(done, 0));
       });
     });
-  });
+  };
+  const fit = new WishFit(file, plan, ask, overtaken);
   const place = placeOfAnchor(file, { surface: 0, triangle: 0, weights: [1, 0, 0] }) ?? expect.fail("no place");
-  const wish = (forwardMm: number): Wish => ({ label: "Chin", place, move: { forwardMm, leftMm: 0, upMm: 0 }, isAlong: false });
-  return { file, plan, fit, asked, answers, wish };
+  const wish = (forwardMm: number): Wish => ({ label: "Chin", place, move: { forwardMm, leftMm: 0, upMm: 0 }, isAlong: false, isChanged: true });
+  /** One that was just chosen on a face that lies so far forward. */
+  const chosen = (forwardMm: number): Wish => ({ ...wish(forwardMm), isChanged: false });
+  return { file, plan, fit, asked, answers, wish, chosen, overtaken };
 }
 
 test("one call is on its way at a time, and the newest wish alone is asked next", async () => {
@@ -49,7 +53,6 @@ test("what is found is shown at once, and accepting makes one step of it all", a
   fit.set([wish(2)]);
   await answers[1](2);
   expect(plan.moves[0].forwardMm).toBeCloseTo(2);
-  expect(plan.canUndo).toBe(false);
   fit.accept();
   expect(fit.isActive).toBe(false);
   expect(plan.moves[0].forwardMm).toBeCloseTo(2);
@@ -86,6 +89,77 @@ test("rejecting brings the plan back, and an answer that comes later changes not
   expect(fit.fitted.value).toBeNull();
 });
 
+test("a wish that was just chosen asks nothing, goes with the face, and leaves the plan as it is", async () => {
+  const { plan, fit, asked, answers, wish, chosen } = await bench();
+  plan.change(0, { forwardMm: 6 }, true);
+  const before = plan.moves;
+  fit.set([chosen(5)]);
+  await fit.update();
+  expect([asked.length, plan.moves, fit.isAsked, fit.isSettled]).toEqual([0, before, false, false]);
+  plan.change(0, { forwardMm: 7 }, true);
+  fit.follow(() => ({ forwardMm: 5.5, leftMm: 0, upMm: 0.5 }));
+  expect(fit.wishes.value[0].move).toEqual({ forwardMm: 5.5, leftMm: 0, upMm: 0.5 });
+  fit.set([wish(8)]);
+  fit.follow(() => expect.fail("what was asked for goes with nothing"));
+  // The search begins with the plan as it was when something was asked, not when the place was chosen.
+  expect(asked[0].poses?.[0].translationMm?.y).toBeCloseTo(-7);
+  await answers[0](7);
+  const asks = asked.length;
+  fit.set([...fit.wishes.value, chosen(2)]);
+  expect([asked.length, fit.isSettled]).toEqual([asks, true]);
+});
+
+test("without the wish that was changed the plan is as it was", async () => {
+  const { plan, fit, answers, wish, chosen } = await bench();
+  fit.set([chosen(1), wish(4)]);
+  await answers[0](4);
+  expect(plan.moves[0].forwardMm).toBeCloseTo(4);
+  fit.set(fit.wishes.value.slice(0, 1));
+  expect([plan.moves[0].forwardMm, fit.isActive, fit.isSettled]).toEqual([0, true, false]);
+});
+
+test("what is changed by hand meanwhile is a step of the plan without the preview, and ends the wishes", async () => {
+  const { plan, fit, asked, answers, wish, overtaken } = await bench();
+  plan.change(0, { upMm: 1 }, true);
+  fit.set([wish(3)]);
+  await answers[0](3);
+  fit.set([wish(4)]);
+  plan.change(0, { leftMm: 2 }, true);
+  expect([fit.isActive, overtaken.mock.calls.length]).toEqual([false, 1]);
+  await answers[1](4);
+  fit.reject();
+  fit.accept();
+  expect(plan.moves[0]).toMatchObject({ forwardMm: 0, leftMm: 2, upMm: 1 });
+  plan.undo();
+  expect(plan.moves[0]).toMatchObject({ forwardMm: 0, leftMm: 0, upMm: 1 });
+  expect(asked.length).toBe(2);
+});
+
+test("undo during a wish takes back the preview alone, and nothing accepts it afterwards", async () => {
+  const { plan, fit, answers, wish, overtaken } = await bench();
+  plan.change(0, { upMm: 1 }, true);
+  fit.set([wish(3)]);
+  await answers[0](3);
+  expect(plan.canUndo).toBe(true);
+  plan.undo();
+  expect([plan.moves[0].forwardMm, plan.moves[0].upMm, fit.isActive, overtaken.mock.calls.length]).toEqual([0, 1, false, 1]);
+  fit.accept();
+  expect(plan.moves[0].forwardMm).toBe(0);
+  plan.undo();
+  expect([plan.moves[0].upMm, plan.canUndo]).toEqual([0, false]);
+});
+
+test("an answer to wishes that have ended is none to those that came after them", async () => {
+  const { plan, fit, answers, wish } = await bench();
+  fit.set([wish(3)]);
+  plan.change(0, { upMm: 1 }, true);
+  fit.set([wish(5)]);
+  await answers[0](3);
+  expect([plan.moves[0].forwardMm, fit.isSettled]).toEqual([0, false]);
+  await answers[1](5);
+  expect([plan.moves[0].forwardMm, plan.moves[0].upMm, fit.isSettled]).toEqual([expect.closeTo(5), 0, true]);
+});
+
 test("the search goes on from what was found, within the limits, by those that may move", async () => {
   const { fit, asked, answers, wish } = await bench();
   fit.set([wish(1)]);
@@ -118,5 +192,12 @@ test("a place is where the drawn skin follows the mesh, and none where it does n
   expect(placeOfAnchor(file, { surface: 1, triangle: 0, weights: [1, 0, 0] })).toBeNull();
   expect(placeOfRegion(file, 1)).toBeNull();
   const regions = { ...file, surfaces: file.surfaces.map((surface) => ({ ...surface, regions: Uint8Array.from([1, 1, 0, 0]) })) };
-  expect(placeOfRegion(regions, 1)?.vertices?.length).toBe(2);
+  const region = placeOfRegion(regions, 1) ?? expect.fail("no place");
+  expect(region.vertices?.length).toBe(2);
+  // Vertex 0 follows the first of the list, vertex 1 the half of the second and the third.
+  const displacements = new Float32Array(3 * file.followed.length);
+  displacements.set([0, -4, 0, 0, -2, 0]);
+  expect(shownMove(region, displacements)).toEqual([0, -3, 0]);
+  const point = placeOfAnchor(file, { surface: 0, triangle: 0, weights: [0.2, 0.6, 0.2] }) ?? expect.fail("no place");
+  expect(shownMove(point, displacements)).toEqual([0, -1, 0]);
 });
