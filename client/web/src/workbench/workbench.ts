@@ -8,8 +8,6 @@ import type { SurfaceKind } from "../case/manifest";
 import { LARGEST_BAND_ROTATION } from "../evaluation/answer_errors";
 import type { Evaluation } from "../evaluation/answer_evaluator";
 import type { SolveSummary } from "../generated/tissueform/v1/deform_service_pb";
-import type { Measure } from "../generated/tissueform/v1/export_service_pb";
-import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
 import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
 import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
 import { BoneSolid, type Penetration, PenetrationTest } from "../geometry/penetration";
@@ -19,20 +17,21 @@ import type { Picture } from "../live/drag_session";
 import { type Connection, LiveSession } from "../live/live_session";
 import { LocalAnswers, type LocalState } from "../live/local_answers";
 import type { Anchor } from "../measures/anchor";
-import { type ShownFace, collectMeasures, suggestLandmarks } from "../measures/face_measures";
+import { type ShownFace, suggestLandmarks } from "../measures/face_measures";
 import { LandmarkBook } from "../measures/landmark_book";
 import { JawOpening } from "../planning/jaw_opening";
 import { Plan } from "../planning/plan";
 import { Gizmo } from "../scene/gizmo";
 import type { HeadView } from "../scene/head_view";
 import { Answers } from "./answers";
-import { Comparer, type Comparison } from "./comparison";
+import { Comparer, type Comparison, type Shape } from "./comparison";
 import { followedRest } from "./face_colors";
 import { FaceMap, type MapChoice } from "./face_map";
 import { NewestAnswer } from "./newest_answer";
 import { PacsExports } from "./pacs_exports";
 import type { ShownAnswer } from "./shown_answer";
 import { Signal } from "./signal";
+import { storedMeasures } from "./stored_measures";
 import { StoredPredictions } from "./stored_predictions";
 import { type Wish, WishFit } from "./wish_fit";
 import { type WishPlace, shownMove } from "./wish_place";
@@ -112,7 +111,7 @@ export class Workbench implements ShownFace {
     this.pacs = new PacsExports(gateway, caseName);
     this.stored = new StoredPredictions(this.answers, this.pacs, {
       question: () => ({ session: this.live.session, model: this.model.value, poses: this.plan.poses() }),
-      measuresOf: (prediction) => this.measuresOf(prediction),
+      measuresOf: (prediction) => storedMeasures(file, this.landmarks, this.comparer, prediction, this.planned),
       onRemoved: async ({ name }) => {
         if (this.comparison.value?.to.name === name) await this.compare(null);
       },
@@ -208,18 +207,6 @@ export class Workbench implements ShownFace {
     this.comparison.value = comparison;
     this.gizmo.setVisible(comparison === null);
     await this.redraw();
-  }
-
-  /** They are read from the stage: it shows that face for a moment. */
-  private async measuresOf(prediction: Prediction): Promise<Measure[]> {
-    const before = this.comparison.value;
-    await this.compare({ from: "rest", to: prediction, share: 1 });
-    try {
-      const { file, landmarks, shownPoses } = this;
-      return collectMeasures({ file, landmarks, shownPoses, showsPlan: true, bandOf: (surface) => this.bandOf(surface), positionsOf: (surface) => this.positionsOf(surface) });
-    } finally {
-      await this.compare(before);
-    }
   }
 
   /** How far the skin at a place is from rest by the plan's newest answer, in the head frame. */
@@ -335,11 +322,15 @@ export class Workbench implements ShownFace {
     this.shown.value += 1;
   }
 
+  /** The plan's face, the jaw open or not. */
+  private get planned(): Shape {
+    const { displacements, uncertainty } = this.newest;
+    return { displacements, uncertainty, poses: this.jaw.apply(this.plan.poses()) };
+  }
+
   private async redraw(): Promise<void> {
     const comparison = this.comparison.value;
-    const { displacements, uncertainty } = this.newest;
-    const planned = { displacements, uncertainty, poses: this.jaw.apply(this.plan.poses()) };
-    const shape = comparison === null ? planned : await this.comparer.between(comparison, planned);
+    const shape = comparison === null ? this.planned : await this.comparer.between(comparison, this.planned);
     // Another comparison may have been chosen meanwhile.
     if (comparison !== this.comparison.value) return;
     this.lay(shape);

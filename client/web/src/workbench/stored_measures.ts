@@ -1,0 +1,55 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import type { CaseFile } from "../case/case_file";
+import type { Measure } from "../generated/tissueform/v1/export_service_pb";
+import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
+import { FollowingSurface } from "../geometry/following_surface";
+import type { Pose } from "../geometry/pose";
+import { type ShownFace, collectMeasures } from "../measures/face_measures";
+import type { LandmarkBook } from "../measures/landmark_book";
+import type { Comparer, Shape } from "./comparison";
+
+/** The numbers of a stored prediction's face, whatever is on the stage meanwhile. `planned`: what the plan shows. Rejects with a CallError. */
+export async function storedMeasures(file: CaseFile, landmarks: LandmarkBook, comparer: Pick<Comparer, "between">, prediction: Prediction, planned: Shape): Promise<Measure[]> {
+  return collectMeasures(new FaceOfShape(file, landmarks, await comparer.between({ from: "rest", to: prediction, share: 1 }, planned)));
+}
+
+/** A face that nobody looks at. */
+class FaceOfShape implements ShownFace {
+  readonly shownPoses: ReadonlyMap<string, Pose>;
+  /** There is no other plan beside its poses. */
+  readonly showsPlan = true;
+  /** Those that somebody asked for. */
+  private readonly surfaces = new Map<number, FollowingSurface>();
+
+  constructor(
+    readonly file: CaseFile,
+    readonly landmarks: LandmarkBook,
+    private readonly shape: Shape,
+  ) {
+    this.shownPoses = new Map(file.manifest.handles.map(({ name }, index) => [name, shape.poses[index]]));
+  }
+
+  positionsOf(surface: number): Float32Array {
+    return this.surface(surface).positions;
+  }
+
+  bandOf(surface: number): Float32Array | null {
+    const { uncertainty } = this.shape;
+    if (uncertainty === null) return null;
+    const band = new Float32Array(this.file.surfaces[surface].positions.length / 3);
+    this.surface(surface).spread(uncertainty, band);
+    return band;
+  }
+
+  private surface(index: number): FollowingSurface {
+    const known = this.surfaces.get(index);
+    if (known !== undefined) return known;
+    const { positions, triangles, follows } = this.file.surfaces[index];
+    const made = new FollowingSurface(positions, triangles, follows);
+    if (follows !== null) made.move(this.shape.displacements);
+    this.surfaces.set(index, made);
+    return made;
+  }
+}
