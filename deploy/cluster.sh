@@ -6,6 +6,7 @@
 # gateways; and the run that kills them under load. `deploy/cluster.sh --help` tells more.
 #
 #   deploy/cluster.sh up [--nodes N] [--cpus LIST]
+#   deploy/cluster.sh add
 #   deploy/cluster.sh status
 #   deploy/cluster.sh chaos [--kills N] [--seconds S] [--seed X]
 #   deploy/cluster.sh down

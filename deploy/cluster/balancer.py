@@ -26,7 +26,7 @@ def socket_path(cluster):
 def environment(cluster):
     """What deploy/haproxy/cluster.cfg reads."""
     words = {"LISTEN": cluster.address("workstations"), "LISTEN_WEB": cluster.address("browsers"), "SOCKET": str(socket_path(cluster))}
-    for number, node in enumerate(cluster.nodes, 1):
+    for number, node in enumerate(cluster.places, 1):
         words |= {f"NODE_{number}": node, f"SERVER_{number}": cluster.address(node)}
     for number, gateway in enumerate(cluster.gateways, 1):
         words[f"GATEWAY_{number}"] = cluster.address(gateway)

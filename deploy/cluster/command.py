@@ -20,6 +20,7 @@ find it; servers (node1, node2, ...), each of which may end at any time; and two
 
   deploy/cluster.sh up                        makes and starts it, or starts again what has ended
   deploy/cluster.sh up --nodes 2 --cpus 0 --cpus 1    two servers, each on a core of its own
+  deploy/cluster.sh add                       one server more, which takes its part of the sessions
   deploy/cluster.sh status                    who runs, who holds which sessions, and what HAProxy thinks
   deploy/cluster.sh chaos --kills 20          a cluster of its own, killed at random under load; --help tells more
   deploy/cluster.sh down                      ends it; what it kept is gone
@@ -32,14 +33,15 @@ def parse(words):
     parser = argparse.ArgumentParser(prog="deploy/cluster.sh", description=__doc__, epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--programs", help=argparse.SUPPRESS, required=True)
     parser.add_argument("--web", help=argparse.SUPPRESS)
-    commands = parser.add_subparsers(dest="command", metavar="up|status|down|chaos", required=True)
+    commands = parser.add_subparsers(dest="command", metavar="up|add|status|down|chaos", required=True)
     up = commands.add_parser("up", help="make and start it; start again what has ended")
-    up.add_argument("--nodes", type=int, choices=range(1, 6), default=3, help="servers (default: 3)")
+    up.add_argument("--nodes", type=int, choices=range(1, stack.MOST_NODES + 1), default=3, help="servers (default: 3)")
     up.add_argument("--gateways", type=int, choices=range(1, 4), default=2, help="gateways (default: 2)")
     up.add_argument("--cpus", action="append", default=[], metavar="LIST",
                     help="pin a server to these cores, as taskset counts them; given several times: the first server to the first list, and so on")
     up.add_argument("--server-option", action="append", default=[], metavar="WORD",
                     help="a word more on each server's command line: --server-option=--workers --server-option=1")
+    commands.add_parser("add", help="start one server more; nothing else is told or started again")
     commands.add_parser("status", help="who runs, who holds what, and what HAProxy thinks")
     commands.add_parser("down", help="end it, and remove what it kept")
     commands.add_parser("chaos", help="kill parts of a cluster of its own at random, under load")
@@ -77,6 +79,15 @@ Try: {cluster.programs}/tissueform load --server {cluster.address("workstations"
      kill -9 {cluster.process(cluster.nodes[0])["pid"]}                     {cluster.nodes[0]}: its drags go on elsewhere
      deploy/cluster.sh up                starts it again
      deploy/cluster.sh down              ends all of it""")
+
+
+def add(cluster):
+    if len(cluster.nodes) == stack.MOST_NODES:
+        raise SystemExit(f"there are {stack.MOST_NODES} servers, as many as the database has connections for")
+    if not all(cluster.is_running(name) for name in (stack.DATABASE, stack.HAPROXY)):
+        raise SystemExit("the cluster does not run; `deploy/cluster.sh up` starts it")
+    name = cluster.add()
+    print(f"{name} {cluster.address(name)} serves; sessions that begin fall to it, too, its share grows over 10 s")
 
 
 def health(cluster, name):
@@ -127,6 +138,9 @@ def main():
     if not cluster.exists:
         print("there is no cluster; `deploy/cluster.sh up` makes one")
         return 0 if options.command == "down" else 1
+    if options.command == "add":
+        add(cluster)
+        return 0
     if options.command == "status":
         return status(cluster)
     cluster.down()

@@ -21,6 +21,9 @@ from free_ports import free_ports
 DATABASE, HAPROXY = "postgresql", "haproxy"
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SYSTEM_PATH = "/usr/sbin:/usr/bin:/sbin:/bin:/usr/local/bin"
+# Servers that there may be. HAProxy and the gateways know them all from the start, so that one is added by being started. As many
+# as a database of PostgreSQL's default of 100 connections takes.
+MOST_NODES = 5
 SETTINGS = {"nodes": 3, "gateways": 2, "cpus": [], "server_options": [], "server_environment": {}, "database_ports": {}}
 
 
@@ -66,7 +69,12 @@ class Cluster:
 
     @property
     def nodes(self):
-        return [f"node{number}" for number in range(1, self.state["settings"]["nodes"] + 1)]
+        return self.places[:self.state["settings"]["nodes"]]
+
+    @property
+    def places(self):
+        """Names of the servers that there are, and of those that may be added."""
+        return [f"node{number}" for number in range(1, MOST_NODES + 1)]
 
     @property
     def gateways(self):
@@ -95,8 +103,8 @@ class Cluster:
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self.folder.chmod(0o700)
         self.state = {"settings": SETTINGS | settings, "processes": {}, "ports": {}}
-        places = [*self.names, "workstations", "browsers"]
-        self.state["ports"] = dict(zip(places, free_ports(len(places))))
+        listening = [*self.names, *self.places[len(self.nodes):], "workstations", "browsers"]
+        self.state["ports"] = dict(zip(listening, free_ports(len(listening))))
         self.state["database"] = database.make(self.folder)
         self.save()
 
@@ -128,7 +136,7 @@ class Cluster:
         return max(256, machine_mib // 2 // self.state["settings"]["nodes"])
 
     def gateway_command(self, gateway):
-        servers = [word for node in self.nodes for word in ("--server", f"{node}={self.address(node)}")]
+        servers = [word for node in self.places for word in ("--server", f"{node}={self.address(node)}")]
         web = ["--web", self.web] if self.web else []
         return [self.programs / "tissueform-gateway", "--listen", self.address(gateway), *servers, *web,
                 "--max-connections-per-address", "4096", "--trust-forwarded-from", processes.HOST]
@@ -175,6 +183,16 @@ class Cluster:
             self.wait_until_ready(name)
         import balancer
         balancer.wait_until_routing(self)
+
+    def add(self):
+        """Starts the next server, and tells nobody; its name."""
+        self.state["settings"]["nodes"] += 1
+        name = self.nodes[-1]
+        self.start(name)
+        self.wait_until_ready(name)
+        import balancer
+        balancer.wait_until_routing(self)
+        return name
 
     def kill(self, name, how=signal.SIGKILL):
         processes.send(self.process(name), how)

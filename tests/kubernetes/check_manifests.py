@@ -71,10 +71,15 @@ def of_name(objects, kind, name):
     return next(each for each in objects if each["kind"] == kind and each["metadata"]["name"] == name)
 
 
+def gateway_of(objects):
+    return of_name(objects, "Deployment", "tissueform-gateway")["spec"]["template"]["spec"]["containers"][0]
+
+
 def change(words, old, new):
     words[words.index(old)] = new
 
 
+LAST_NODE = "tissueform-server-7"
 # What is made wrong, and a part of the complaint.
 BROKEN = {
     "an option that is none": (lambda o: first(o)["args"].append("--drain-second=1"), "no option --drain-second"),
@@ -84,7 +89,11 @@ BROKEN = {
     "a probe of a port that is none": (lambda o: first(o)["readinessProbe"]["grpc"].update(port=50054), "asks port 50054"),
     "a service of a port that is none": (lambda o: of_name(o, "Service", "tissueform")["spec"]["ports"][0].update(targetPort="web"), "no container has a port web"),
     "a policy for a port that is none": (lambda o: of_name(o, "NetworkPolicy", "server")["spec"]["ingress"][0]["ports"][0].update(port="http"), "has no port http"),
-    "a node more": (lambda o: server_of(o)["spec"].update(replicas=4), "--server names other nodes"),
+    "a node more than they know": (lambda o: server_of(o)["spec"].update(replicas=9), "9 replicas, of which gateways and HAProxy know 8"),
+    "a node that gateways do not know": (lambda o: gateway_of(o)["args"].remove(f"--server={LAST_NODE}={LAST_NODE}.tissueform.svc.cluster.local:50051"),
+                                         "--server names other nodes"),
+    "a node that HAProxy does not know": (lambda o: of_name(o, "Deployment", "tissueform-haproxy")["spec"]["template"]["spec"]["containers"][0]["env"].remove(
+        {"name": "TISSUEFORM_NODE_8", "value": LAST_NODE}), "it knows other nodes"),
     "a variable that HAProxy does not read": (lambda o: of_name(o, "Deployment", "tissueform-haproxy")["spec"]["template"]["spec"]["containers"][0]["env"].append(
         {"name": "TISSUEFORM_SERVERS", "value": "x"}), "cluster.cfg does not read TISSUEFORM_SERVERS"),
     "a node without an address": (lambda o: o.remove(of_name(o, "Service", "tissueform-server-1")), "tissueform-server-1: it has no Service"),

@@ -11,6 +11,7 @@ import yaml
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "deploy/kubernetes"
 PROGRAMS = ("tissueform-server", "tissueform-gateway")
+MOST_NODES = 8  # as many as deploy/haproxy/cluster.cfg has places for
 # Beside the budget: gRPC's own buffers (docs/operations.md), the program, and a tenth for the allocator's slack.
 GRPC_MIB, PROGRAM_MIB, SLACK = 512, 128, 1.1
 # Files of the image that arguments may name, and what puts them there.
@@ -149,15 +150,18 @@ def wrong_ports(objects):
 
 
 def unknown_servers(objects):
-    """Nodes that a gateway or HAProxy calls and that the StatefulSet does not make, and those that they leave out."""
+    """Nodes that gateways, HAProxy or Services leave out of those that there are and may be: a node is added by `replicas` alone."""
     server = next(each for each in workloads(objects) if each["kind"] == "StatefulSet")
     name, port = server["metadata"]["name"], arguments(pod(server)["containers"][0])["port"][0]
-    wanted = {node: f"{node}.tissueform.svc.cluster.local:{port}" for node in (f"{name}-{i}" for i in range(server["spec"]["replicas"]))}
+    wanted = {node: f"{node}.tissueform.svc.cluster.local:{port}" for node in (f"{name}-{i}" for i in range(MOST_NODES))}
+    replicas = server["spec"]["replicas"]
+    if isinstance(replicas, int) and replicas > MOST_NODES:
+        yield f"{name}: {replicas} replicas, of which gateways and HAProxy know {MOST_NODES}"
     by_program = {container["command"][0]: container for _, container in containers(objects) if container["name"] != "health"}
     if dict(value.split("=", 1) for value in arguments(by_program["tissueform-gateway"])["server"]) != wanted:
         yield f"tissueform-gateway: --server names other nodes than {list(wanted)}"
     given = {each["name"]: each["value"] for each in by_program["haproxy"]["env"]}
-    if {given[f"TISSUEFORM_NODE_{i}"]: given.get(f"TISSUEFORM_SERVER_{i}") for i in range(1, 9) if f"TISSUEFORM_NODE_{i}" in given} != wanted:
+    if {given[f"TISSUEFORM_NODE_{i}"]: given.get(f"TISSUEFORM_SERVER_{i}") for i in range(1, MOST_NODES + 1) if f"TISSUEFORM_NODE_{i}" in given} != wanted:
         yield f"tissueform-haproxy: it knows other nodes than {list(wanted)}"
     services = {each["metadata"]["name"]: each["spec"] for each in of_kind(objects, "Service")}
     for node in wanted:
@@ -264,7 +268,7 @@ def loose_ends(objects):
     labels = [workload["spec"]["template"]["metadata"]["labels"] for workload in workloads(objects)]
     # Kubernetes labels the pods of a StatefulSet with their names.
     labels += [each["spec"]["template"]["metadata"]["labels"] | {"statefulset.kubernetes.io/pod-name": f"{each['metadata']['name']}-{i}"}
-               for each in of_kind(objects, "StatefulSet") for i in range(each["spec"]["replicas"] if isinstance(each["spec"]["replicas"], int) else 0)]
+               for each in of_kind(objects, "StatefulSet") for i in range(MOST_NODES)]
     for each in of_kind(objects, "Service", "PodDisruptionBudget", "NetworkPolicy", "StatefulSet", "Deployment"):
         spec = each["spec"]
         selector = spec.get("podSelector", spec.get("selector", {}))
