@@ -32,9 +32,17 @@ class Event:
 
 
 def fake_clock():
-    """The environment of a program whose wall clock is an hour off; empty where faketime is not installed."""
-    found = glob.glob("/usr/lib/*/faketime/libfaketime.so.1")
-    return {"LD_PRELOAD": found[0], "FAKETIME": CLOCK_OFF, "FAKETIME_DONT_FAKE_MONOTONIC": "1"} if found else {}
+    """The environment of a program whose wall clock is an hour off."""
+    return {"LD_PRELOAD": _faketime()[0], "FAKETIME": CLOCK_OFF, "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
+
+
+def _faketime():
+    return glob.glob("/usr/lib/*/faketime/libfaketime.so.1")
+
+
+def missing_programs():
+    """As stack.missing_programs, of what the run needs besides."""
+    return stack.missing_programs() + ([] if _faketime() else ["faketime is missing; install it: apt-get install faketime"])
 
 
 class Arena:

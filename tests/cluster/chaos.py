@@ -166,8 +166,6 @@ def chaos(options, seed):
     load = None
     try:
         arena.up()
-        if not arena_module.fake_clock():
-            print("no server's clock is off: apt-get install faketime")
         load = Load(arena, ledger, options.drags, chance)
         load.start()
         run = run_scenarios(options, arena, load, ledger, chance.random())
@@ -201,7 +199,7 @@ def report(ledger, load, run):
 
 def main():
     options = parse()
-    missing = stack.missing_programs()
+    missing = arena_module.missing_programs()
     if shutil.which("protoc") is None:
         missing.append("protoc is missing; install it: apt-get install protobuf-compiler")
     if missing:
