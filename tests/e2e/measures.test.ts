@@ -111,6 +111,7 @@ describe("the hand-made face", () => {
     await open(page, "Report");
     await page.getByRole("button", { name: "Open the report" }).click();
     await page.locator(".report").waitFor();
+    await page.locator(".report").getByRole("cell", { name: "The case’s pivot (0.0, 40.0, 10.0)" }).waitFor();
     expect(await seriousFindings(page)).toEqual([]);
     const pdf = await page.pdf();
     expect(pdf.subarray(0, 5).toString()).toBe("%PDF-");

@@ -3,6 +3,7 @@
 
 import { type MoveKey } from "../geometry/pose";
 import { type Unit, formatNumber, parseNumber } from "../planning/numbers";
+import { pivotChoices } from "../planning/pivots";
 import { MOVE_KEYS } from "../planning/plan";
 import { cssColor, segmentColor } from "../scene/materials";
 import type { Workbench } from "../workbench/workbench";
@@ -112,13 +113,7 @@ function moveRow(bench: Workbench, key: MoveKey): HTMLElement {
 function pivotField(bench: Workbench): HTMLElement {
   const choices = () => {
     const handle = bench.plan.handles[bench.selected.value];
-    const landmarks = bench.file.manifest.landmarks.filter((landmark) => landmark.handle === handle.name);
-    const middle = bench.view.head.segmentMiddle(handle.name);
-    return [
-      { value: handle.pivotMm, label: "The case’s pivot" },
-      ...(middle === null ? [] : [{ value: middle, label: "Middle of the segment" }]),
-      ...landmarks.map((l) => ({ value: l.positionMm, label: l.label })),
-    ];
+    return pivotChoices(handle, bench.file.manifest.landmarks, bench.view.head.segmentMiddle(handle.name));
   };
   const field = select("Turns about", choices(), (point) => bench.plan.setPivot(bench.selected.value, point));
   const show = () => {

@@ -7,6 +7,7 @@ import { ProfileDrawing } from "../exports/profile_svg";
 import { labelOf, measureFace } from "../measures/face_measures";
 import { bandText, normText, unitText, valueTexts, whyNot } from "../measures/texts";
 import { formatNumber } from "../planning/numbers";
+import { pivotChoices, pivotText } from "../planning/pivots";
 import { MOVE_KEYS } from "../planning/plan";
 import { type ShownAnswer, describeFace, modelShown } from "../workbench/shown_answer";
 import type { Workbench } from "../workbench/workbench";
@@ -43,8 +44,12 @@ export async function reportSheet(bench: Workbench): Promise<HTMLElement> {
 }
 
 function planTable(bench: Workbench): HTMLElement {
-  const rows = bench.plan.handles.map(({ label }, index) => [label, ...MOVE_KEYS.map((key) => formatNumber(bench.plan.moves[index][key]))]);
-  return table(["Segment", ...MOVE_KEYS.map((key) => HEADS[key])], rows);
+  const { landmarks } = bench.file.manifest;
+  const rows = bench.plan.handles.map((handle, index) => {
+    const pivots = pivotChoices(handle, landmarks, bench.view.head.segmentMiddle(handle.name));
+    return [handle.label, ...MOVE_KEYS.map((key) => formatNumber(bench.plan.moves[index][key])), pivotText(pivots, bench.plan.pivot(index))];
+  });
+  return table(["Segment", ...MOVE_KEYS.map((key) => HEADS[key]), "Of and about (at rest, LPS, mm)"], rows);
 }
 
 function measureTable(bench: Workbench): HTMLElement {

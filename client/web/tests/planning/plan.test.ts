@@ -6,6 +6,7 @@ import { openCase } from "../../src/case/case_file";
 import { NO_MOVE, movedPoint } from "../../src/geometry/pose";
 import { formatNumber, formatWithUnit, parseNumber } from "../../src/planning/numbers";
 import { describeMovement, landmarkMovement } from "../../src/planning/landmarks";
+import { pivotChoices, pivotText } from "../../src/planning/pivots";
 import { Plan, posesOfCase } from "../../src/planning/plan";
 import { smallCase, sourceOf } from "../testing/small_case";
 
@@ -64,6 +65,15 @@ test("another pivot leaves the segment where it is", async () => {
   movedPoint(plan.poses()[0], [2, 3, 4]).forEach((part, k) => expect(part).toBeCloseTo(before[k], 9));
   plan.undo();
   expect(plan.pivot(0)).toEqual([5, 5, 0]);
+});
+
+test("a pivot is told by its name and place, one that nobody knows by its place", async () => {
+  const { file, plan } = await makePlan();
+  const choices = pivotChoices(plan.handles[0], file.manifest.landmarks, [1, 2.25, -3]);
+  expect(choices.map(({ label }) => label)).toEqual(["The case’s pivot", "Middle of the segment", "Pogonion"]);
+  plan.setPivot(0, choices[1].value);
+  expect(pivotText(choices, plan.pivot(0))).toBe("Middle of the segment (1.0, 2.3, −3.0)");
+  expect(pivotText(choices, [1, 2.25, -3.5])).toBe("(1.0, 2.3, −3.5)");
 });
 
 test("the case's own pose is 8 mm forward", async () => {
