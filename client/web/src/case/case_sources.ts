@@ -5,6 +5,7 @@ import { Code, toCallError } from "../calls/call_error";
 import type { Gateway } from "../calls/gateway";
 import type { Case } from "../generated/tissueform/v1/case_pb";
 import type { CaseSource } from "./case_file";
+import { subtleCrypto } from "./secure_page";
 
 const PAGE_SIZE = 200;
 
@@ -64,11 +65,8 @@ export async function listCases(gateway: Gateway): Promise<Case[]> {
   return cases;
 }
 
-/** In hexadecimal digits. Browsers do this on pages of https and of this computer only. */
+/** In hexadecimal digits. Rejects with an Error on pages where browsers check no files. */
 export async function sha256Of(file: Blob): Promise<string> {
-  if (crypto.subtle === undefined) {
-    throw new Error("this browser checks files on https pages only: open the planner by https, or publish the case by tissueform case publish");
-  }
-  const digest = await crypto.subtle.digest("SHA-256", await file.arrayBuffer());
+  const digest = await subtleCrypto("checks files", "or publish the case by tissueform case publish").digest("SHA-256", await file.arrayBuffer());
   return Array.from(new Uint8Array(digest), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }

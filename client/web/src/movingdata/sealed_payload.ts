@@ -1,6 +1,8 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+import { subtleCrypto } from "../case/secure_page";
+
 // The bytes of a file that moves: compressed, and under a password encrypted. docs/moving-file.md; tissueform export does the same.
 
 /** What stands before the payload, for all to read. */
@@ -29,15 +31,16 @@ const NONCE_BYTES = 12;
 /** Before they are compressed: a few bytes could become more than a browser has. */
 const MOST_DATA_BYTES = 256 << 20;
 
-/** Without a password: only compressed. Rejects with an Error where there is more than a page takes. */
+/** Without a password: only compressed. Rejects with an Error where there is more than a page takes, and where the browser has no hash. */
 export async function seal(data: Uint8Array<ArrayBuffer>, password: string): Promise<Sealed> {
   if (data.length > MOST_DATA_BYTES) throw new Error(`the file that moves would hold ${data.length} bytes, and may hold ${MOST_DATA_BYTES}`);
+  const subtle = subtleCrypto("writes files that move");
   const packed = await collect(new Blob([data]).stream().pipeThrough(new CompressionStream("gzip")));
   if (password === "") return { envelope: await envelopeOf(packed), payload: packed };
   const salt = crypto.getRandomValues(new Uint8Array(SALT_BYTES));
   const nonce = crypto.getRandomValues(new Uint8Array(NONCE_BYTES));
   const key = await keyOf(password, salt, KEY_ROUNDS);
-  const payload = new Uint8Array(await crypto.subtle.encrypt({ name: "AES-GCM", iv: nonce }, key, packed));
+  const payload = new Uint8Array(await subtle.encrypt({ name: "AES-GCM", iv: nonce }, key, packed));
   const encryption = { cipher: "AES-256-GCM", derivation: "PBKDF2-SHA-256", rounds: KEY_ROUNDS, salt: toBase64(salt), nonce: toBase64(nonce) } as const;
   return { envelope: { ...(await envelopeOf(payload)), encryption }, payload };
 }

@@ -25,9 +25,12 @@ function showReport(sheet: HTMLElement): void {
     page.remove();
     others.forEach((element) => (element.hidden = false));
   };
-  const save = () => void reportFile(sheet).then((html) => download("tissueform-report.html", new Blob([html], { type: "text/html" })));
-  const buttons = [button("Print or save as PDF", () => print()), button("Report HTML", save), button("Back to the plan", close)];
-  const page = el("main", { class: "report-page", attributes: { "aria-label": "Report" } }, [el("div", { class: "buttons" }, buttons), sheet]);
+  // The planner's own line of words lies below the report.
+  const told = el("p", { attributes: { role: "alert" } });
+  const save = async () => download("tissueform-report.html", new Blob([await reportFile(sheet)], { type: "text/html" }));
+  const html = button("Report HTML", () => void whileBusy(html, save, (thrown) => (told.textContent = sentenceOf(thrown))));
+  const buttons = [button("Print or save as PDF", () => print()), html, button("Back to the plan", close)];
+  const page = el("main", { class: "report-page", attributes: { "aria-label": "Report" } }, [el("div", { class: "buttons" }, [...buttons, told]), sheet]);
   page.addEventListener("keydown", (event) => event.key === "Escape" && close());
   others.forEach((element) => (element.hidden = true));
   document.body.append(page);
