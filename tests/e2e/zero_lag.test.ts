@@ -190,7 +190,7 @@ describe("on a line with delay", () => {
 
 test.each([
   ["WebAssembly", "javascript", "This page answers at once (without WebAssembly: slower); the server confirms."],
-  ["Worker", "webassembly", "This page answers at once; the server confirms."],
+  ["Worker", "webassembly", "This page answers at once (without a thread of its own: slower); the server confirms."],
 ])("a browser without %s answers, too", async (missing, kernel, words) => {
   const context = await planner.browse();
   await context.addInitScript((name) => {

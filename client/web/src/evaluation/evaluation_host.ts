@@ -23,6 +23,8 @@ export interface HostListener {
 /** Where answers are evaluated. A question replaces one that waits. */
 export interface EvaluationHost {
   readonly place: "page" | "worker";
+  /** False: the browser runs none, and the page does what is slow, too. */
+  readonly hasWorkers: boolean;
   readonly kernel: string;
   /** In the page it is answered before this returns. */
   ask(poses: readonly Pose[], number: number): void;
@@ -47,10 +49,10 @@ export function evaluationWorker(): WorkerLike | null {
 export async function makeHost(bytes: Uint8Array, sha256: string, listener: HostListener, makeWorker: () => WorkerLike | null = evaluationWorker): Promise<EvaluationHost> {
   const worker = makeWorker();
   const ready = worker === null ? null : await load(worker, bytes, sha256);
-  if (worker === null || ready === null) return new PageHost(await makeEvaluator(bytes, { sha256 }), listener);
+  if (worker === null || ready === null) return new PageHost(await makeEvaluator(bytes, { sha256 }), listener, false);
   if (ready.medianMs > PAGE_BUDGET_MS) return new WorkerHost(worker, ready.kernel, listener);
   worker.terminate();
-  return new PageHost(await makeEvaluator(bytes), listener);
+  return new PageHost(await makeEvaluator(bytes), listener, true);
 }
 
 /** Null where the worker does not run at all. */
@@ -76,6 +78,7 @@ class PageHost implements EvaluationHost {
   constructor(
     private readonly evaluator: AnswerEvaluator,
     private readonly listener: HostListener,
+    readonly hasWorkers: boolean,
   ) {}
 
   get kernel(): string {
@@ -95,6 +98,7 @@ class PageHost implements EvaluationHost {
 
 class WorkerHost implements EvaluationHost {
   readonly place = "worker";
+  readonly hasWorkers = true;
   /** Of the question that the worker has; null: none. */
   private asked: number | null = null;
   private waiting: { poses: readonly Pose[]; number: number } | null = null;

@@ -65,7 +65,7 @@ function localAnswers(bench: Workbench): HTMLElement {
   return el("p", { class: "quiet local" }, [text, " ", stop, start]);
 }
 
-function describeLocal(state: LocalState): string {
+export function describeLocal(state: LocalState): string {
   switch (state.kind) {
     case "none":
       return "The server answers.";
@@ -77,7 +77,8 @@ function describeLocal(state: LocalState): string {
       return `The server answers. This page cannot: ${state.text}`;
     case "ready": {
       if (state.coverage === "beyond") return "Beyond what was prepared: the server answers.";
-      const slow = state.kernel === "webassembly" ? "" : " (without WebAssembly: slower)";
+      const lacks = [state.kernel === "webassembly" ? "" : "without WebAssembly", state.hasWorkers ? "" : "without a thread of its own"].filter((text) => text !== "");
+      const slow = lacks.length === 0 ? "" : ` (${lacks.join(", ")}: slower)`;
       return `This page answers at once${slow}; the server confirms.`;
     }
   }

@@ -63,7 +63,7 @@ test("what is fast is evaluated in the page, before the question returns", async
   const worker = new FakeWorker(0.5);
   const { told, listening } = listener();
   const host = await makeHost(BYTES, SHA256, listening, () => worker);
-  expect(host.place).toBe("page");
+  expect([host.place, host.hasWorkers]).toEqual(["page", true]);
   expect(worker.isTerminated).toBe(true);
   host.ask(CASES[1].poses, 7);
   expect(told).toHaveLength(1);
@@ -140,7 +140,7 @@ test("a browser without workers evaluates in the page", async () => {
   const { told, listening } = listener();
   const host = await makeHost(BYTES, SHA256, listening, () => null);
   host.ask(CASES[7].poses, 1);
-  expect(host.place).toBe("page");
+  expect([host.place, host.hasWorkers]).toEqual(["page", false]);
   expect(told[0].coverage).toBe("beyond");
 });
 

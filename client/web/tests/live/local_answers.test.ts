@@ -116,7 +116,7 @@ test("a pose is answered before the question returns, once the columns are there
   expect(firsts).toHaveLength(2);
   expect(firsts[1]).toBeCloseTo(CASES[2].positionsMm[0], 4);
   expect(answers.posesSinceTold).toBe(0);
-  expect(last()).toMatchObject({ kind: "ready", coverage: "covered" });
+  expect(last()).toMatchObject({ kind: "ready", coverage: "covered", place: "page", hasWorkers: false });
 });
 
 test("beyond the range nothing is told, and how old the last answer is", async () => {
@@ -195,7 +195,7 @@ test("a worker that ends by itself leaves the server to answer until it is asked
   const { gateway, offsets } = server(() => goldenBytes("linear_elastic"));
   const answers = new LocalAnswers(gateway, { onState: (state) => states.push(state), onEvaluation: () => {} }, async (_bytes, _sha256, listener) => {
     endings.push(() => listener.onEnded());
-    return { place: "worker", kernel: "webassembly", ask: () => {}, bandAt: async () => null, close: () => {} };
+    return { place: "worker", hasWorkers: true, kernel: "webassembly", ask: () => {}, bandAt: async () => null, close: () => {} };
   });
   await answers.follow(configuration());
   expect(states[states.length - 1]).toMatchObject({ kind: "ready", place: "worker" });

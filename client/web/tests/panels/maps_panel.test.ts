@@ -1,0 +1,19 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { expect, test } from "vitest";
+import type { LocalState } from "../../src/live/local_answers";
+import { describeLocal } from "../../src/panels/maps_panel";
+
+type Ready = Extract<LocalState, { kind: "ready" }>;
+const READY: Ready = { kind: "ready", place: "page", hasWorkers: true, kernel: "webassembly", coverage: "covered" };
+
+test.each<[string, Partial<Ready>, string]>([
+  ["nothing lacks", {}, "This page answers at once; the server confirms."],
+  ["no WebAssembly", { kernel: "javascript" }, "This page answers at once (without WebAssembly: slower); the server confirms."],
+  ["no workers", { hasWorkers: false }, "This page answers at once (without a thread of its own: slower); the server confirms."],
+  ["neither", { hasWorkers: false, kernel: "javascript" }, "This page answers at once (without WebAssembly, without a thread of its own: slower); the server confirms."],
+  ["beyond the columns", { coverage: "beyond" }, "Beyond what was prepared: the server answers."],
+])("who answers the hand: %s", (_, change, text) => {
+  expect(describeLocal({ ...READY, ...change })).toBe(text);
+});
