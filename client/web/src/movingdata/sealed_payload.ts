@@ -39,7 +39,7 @@ export async function seal(data: Uint8Array<ArrayBuffer>, password: string): Pro
   if (password === "") return { envelope: await envelopeOf(packed), payload: packed };
   const salt = crypto.getRandomValues(new Uint8Array(SALT_BYTES));
   const nonce = crypto.getRandomValues(new Uint8Array(NONCE_BYTES));
-  const key = await keyOf(password, salt, KEY_ROUNDS);
+  const key = await keyOf(password.normalize("NFC"), salt, KEY_ROUNDS);
   const payload = new Uint8Array(await subtle.encrypt({ name: "AES-GCM", iv: nonce }, key, packed));
   const encryption = { cipher: "AES-256-GCM", derivation: "PBKDF2-SHA-256", rounds: KEY_ROUNDS, salt: toBase64(salt), nonce: toBase64(nonce) } as const;
   return { envelope: { ...(await envelopeOf(payload)), encryption }, payload };
@@ -66,12 +66,20 @@ export async function unseal({ envelope, payload }: Sealed, password: string): P
 
 async function decrypt({ rounds, salt, nonce }: NonNullable<Envelope["encryption"]>, payload: Uint8Array<ArrayBuffer>, password: string): Promise<Uint8Array<ArrayBuffer>> {
   if (!Number.isSafeInteger(rounds) || rounds < 1 || rounds > MOST_ROUNDS) throw new DamagedError();
-  const key = await keyOf(password, fromBase64(salt), rounds);
-  try {
-    return new Uint8Array(await crypto.subtle.decrypt({ name: "AES-GCM", iv: fromBase64(nonce) }, key, payload));
-  } catch {
-    throw new WrongPasswordError();
+  for (const way of waysToWrite(password)) {
+    const key = await keyOf(way, fromBase64(salt), rounds);
+    try {
+      return new Uint8Array(await crypto.subtle.decrypt({ name: "AES-GCM", iv: fromBase64(nonce) }, key, payload));
+    } catch {
+      // Written in another way, or wrong.
+    }
   }
+  throw new WrongPasswordError();
+}
+
+/** An "ä" may be one character, or an "a" and a diaeresis: it depends on the keyboard. The planner seals by the former, the command by what its file has. */
+function waysToWrite(password: string): Set<string> {
+  return new Set([password.normalize("NFC"), password.normalize("NFD"), password]);
 }
 
 async function keyOf(password: string, salt: Uint8Array<ArrayBuffer>, rounds: number): Promise<CryptoKey> {

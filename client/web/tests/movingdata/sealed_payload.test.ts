@@ -27,6 +27,26 @@ describe("a payload", () => {
     await expect(unseal(sealed, "correct horse battery")).rejects.toBeInstanceOf(WrongPasswordError);
   });
 
+  test("opens by its password however that is written", async () => {
+    const [composed, decomposed] = [PASSWORD.normalize("NFC"), PASSWORD.normalize("NFD")];
+    expect(decomposed).not.toBe(composed);
+    const sealed = await seal(DATA, decomposed);
+    expect(await unseal(sealed, composed)).toEqual(DATA);
+    expect(await unseal(sealed, decomposed)).toEqual(DATA);
+  });
+
+  test("that the command has sealed by a decomposed password opens by either", async () => {
+    const [salt, iv] = [new Uint8Array(16), new Uint8Array(12)];
+    const rounds = 1000;
+    const secret = await crypto.subtle.importKey("raw", new TextEncoder().encode(PASSWORD.normalize("NFD")), "PBKDF2", false, ["deriveKey"]);
+    const key = await crypto.subtle.deriveKey({ name: "PBKDF2", hash: "SHA-256", salt, iterations: rounds }, secret, { name: "AES-GCM", length: 256 }, false, ["encrypt"]);
+    const { envelope, payload } = await seal(DATA, "");
+    const encryption = { cipher: "AES-256-GCM", derivation: "PBKDF2-SHA-256", rounds, salt: toBase64(salt), nonce: toBase64(iv) } as const;
+    const sealed = { envelope: { ...envelope, encryption }, payload: new Uint8Array(await crypto.subtle.encrypt({ name: "AES-GCM", iv }, key, payload)) };
+    for (const form of ["NFC", "NFD"]) expect(await unseal(sealed, PASSWORD.normalize(form))).toEqual(DATA);
+    await expect(unseal(sealed, "correct horse battery")).rejects.toBeInstanceOf(WrongPasswordError);
+  });
+
   test("that was changed, or is cut off, is damaged", async () => {
     const sealed = await seal(DATA, "");
     const changed = sealed.payload.slice();
