@@ -88,9 +88,15 @@ describe("the hand-made face", () => {
     expect((await state(page)).moves).toEqual(before);
     await page.getByRole("button", { name: "Show the bite" }).click();
     await page.getByText("The teeth lie more than 6 mm from each other.").waitFor();
+    await page.locator(".legend").getByText("Distance of upper and lower teeth, mm").waitFor();
+    expect(await page.locator(".legend .ticks span").allInnerTexts()).toEqual(["6.0", "3.0", "0.0"]);
+    const canTake = () => page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.gizmo.controls.enabled as boolean);
+    expect(await canTake()).toBe(false);
     await page.getByRole("button", { name: "Close", exact: true }).click();
     await page.getByText("Closed as planned").waitFor();
     await open(page, "Jaw and bite");
+    await page.locator(".legend").waitFor({ state: "hidden" });
+    expect(await canTake()).toBe(true);
   });
 
   test("is exported as plan, profile and report, which name nobody and load nothing", async () => {
@@ -215,7 +221,9 @@ describe("the bundled head", () => {
     await page.locator("[data-measure=e_line_lower_lip] .band").waitFor();
     await expect.poll(() => page.locator("[data-measure=e_line_lower_lip] .band").innerText()).toMatch(/^−?\d+\.\d to −?\d+\.\d$/);
     const row = page.getByRole("row", { name: "Soft pogonion" }).first();
-    await expect.poll(() => row.locator(".band").innerText()).toMatch(/^\d+\.\d to \d+\.\d$/);
+    const band = (cell: number) => row.locator("td").nth(cell).locator(".band").innerText();
+    await expect.poll(() => band(3)).toMatch(/^\d+\.\d to \d+\.\d$/);
+    for (const component of [0, 1, 2]) expect(await band(component)).toMatch(/^± \d+\.\d$/);
     const widths = await page.evaluate(() => {
       const { bench } = (globalThis as unknown as Hook).tissueform;
       const skin = bench.file.surfaces.findIndex(({ entry }: any) => entry.kind === "skin");

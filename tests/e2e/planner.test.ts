@@ -101,6 +101,7 @@ describe("a planner", () => {
     await page.locator(".legend").waitFor({ state: "visible" });
     const { legend } = await state(page);
     expect(legend?.largestMm).toBeGreaterThan(6);
+    await page.locator(".legend").getByText(/^largest \d+\.\d\d mm, in 95 of 100 cases \d+\.\d\d to \d+\.\d\d$/).waitFor();
     expect(legend?.mostMm).toBeGreaterThanOrEqual(legend?.largestMm ?? Infinity);
     await page.getByLabel("Colours show").selectOption({ label: "Difference to Gradient field" });
     await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.map.legend.value?.title === "Difference to Gradient field");
@@ -204,6 +205,14 @@ describe("a whole head", () => {
     await typeMove(page, "Forward", "0");
     await typeMove(page, "Up", "-3");
     await page.getByText(/Lower jaw lies up to [1-5]\.\d mm in Chin\./).waitFor();
+    // Its points are those of the closed jaw.
+    const seesPoints = () => page.evaluate(() => (globalThis as unknown as Hook).tissueform.view.points.get("penetration").visible as boolean);
+    expect(await seesPoints()).toBe(true);
+    await page.locator("summary").getByText("Jaw and bite", { exact: true }).click();
+    await page.getByLabel("Opening of the jaw").fill("5");
+    expect(await seesPoints()).toBe(false);
+    await page.locator("summary").getByText("Jaw and bite", { exact: true }).click();
+    await expect.poll(seesPoints).toBe(true);
     await typeMove(page, "Up", "0");
     await page.locator(".warning").waitFor({ state: "hidden" });
     expect(faults).toEqual([]);

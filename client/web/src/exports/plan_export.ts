@@ -13,15 +13,16 @@ import { type ExportedSurface, NOTICE } from "./files";
 
 /** What is shown, as files have it: bone where it was moved to. `what`: the skin, or all. */
 export function exportedSurfaces(bench: Workbench, what: "skin" | "all"): ExportedSurface[] {
-  const surfaces = what === "skin" ? bench.view.head.skins : bench.view.head.surfaces;
-  return surfaces.map(exportSurface);
+  const { head } = bench.view;
+  const surfaces = what === "skin" ? head.skins : head.surfaces;
+  return surfaces.map((surface) => exportSurface(surface, what === "skin" ? bench.bandOf(head.surfaces.indexOf(surface)) : null));
 }
 
-function exportSurface({ source, shape, mesh }: DrawnSurface): ExportedSurface {
+function exportSurface({ source, shape, mesh }: DrawnSurface, bandMm: Float32Array | null): ExportedSurface {
   const positions = new Float32Array(shape.positions);
   const point = new three.Vector3();
   for (let i = 0; i < positions.length; i += 3) point.fromArray(positions, i).applyMatrix4(mesh.matrix).toArray(positions, i);
-  return { name: source.entry.name, positions, triangles: source.triangles };
+  return { name: source.entry.name, positions, triangles: source.triangles, bandMm };
 }
 
 /** The face that is shown is another one than that of the plan's numbers. */

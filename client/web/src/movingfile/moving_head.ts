@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { CaseSurface } from "../case/case_file";
+import { type LargestMovement, largestMovement, largestOf } from "../geometry/largest_movement";
 import type { Pose } from "../geometry/pose";
 import type { MovingData } from "../movingdata/moving_data";
 import { Plan, type PlannedCase, posesOfCase } from "../planning/plan";
@@ -11,7 +12,6 @@ import type { StageListener } from "../scene/stage";
 import { FaceColors, type MapLegend, subtractInto } from "../workbench/face_colors";
 import type { Answer } from "./answer_engine";
 import type { Engine } from "./engine";
-import { type LargestMovement, largestMovement, largestOf } from "./largest_movement";
 import { NewestPoses } from "./newest_poses";
 
 /** What is seen, in numbers. */

@@ -7,6 +7,7 @@ import { type Contact, MOST_GAP_MM, type Teeth, ToothContact } from "../geometry
 import { MOST_OPENING_DEG, incisorDistanceMm, lowerJawHandles } from "../planning/jaw_opening";
 import { formatNumber } from "../planning/numbers";
 import type { DrawnSurface } from "../scene/head";
+import type { ShownLegend } from "../workbench/face_colors";
 import type { Workbench } from "../workbench/workbench";
 import { button, collapsible, el, onceAPicture, slider } from "./dom";
 
@@ -54,6 +55,8 @@ function openingPart(bench: Workbench): HTMLElement {
 }
 
 const SETTLE_MS = 150;
+/** Dark to bright: far to near. */
+const LEGEND: ShownLegend = { title: "Distance of upper and lower teeth", ticksMm: [MOST_GAP_MM, MOST_GAP_MM / 2, 0], note: `yellow: they touch; dark: ${MOST_GAP_MM} mm apart or more` };
 
 /** Teeth alone, with the distance between upper and lower as colours. */
 function bitePart(bench: Workbench): { element: HTMLElement; off(): void } {
@@ -79,7 +82,7 @@ function bitePart(bench: Workbench): { element: HTMLElement; off(): void } {
   };
   const set = (isShown: boolean) => {
     toggle.setAttribute("aria-pressed", String(isShown));
-    bench.view.head.setTeethOnly(isShown);
+    bench.showBite(isShown ? LEGEND : null);
     if (!isShown) bench.view.head.colorSurfaces([...above, ...below], null);
     told.textContent = "";
     bench.view.stage.invalidate();
@@ -90,8 +93,7 @@ function bitePart(bench: Workbench): { element: HTMLElement; off(): void } {
     clearTimeout(timer);
     timer = setTimeout(find, SETTLE_MS);
   });
-  const legend = `Yellow: the teeth touch; dark: ${MOST_GAP_MM} mm apart or more.`;
-  return { element: el("div", { class: "landmark-part" }, [el("div", { class: "buttons" }, [toggle]), told, el("p", { class: "quiet", text: legend })]), off: () => isOn() && set(false) };
+  return { element: el("div", { class: "landmark-part" }, [el("div", { class: "buttons" }, [toggle]), told]), off: () => isOn() && set(false) };
 }
 
 function toTeeth({ source }: DrawnSurface): Teeth {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { cell, describeMovement, landmarkMovement } from "../planning/landmarks";
+import { formatNumber } from "../planning/numbers";
 import { lengthBand } from "../measures/texts";
 import type { Workbench } from "../workbench/workbench";
 import { el, onceAPicture, section } from "./dom";
@@ -9,6 +10,11 @@ import { el, onceAPicture, section } from "./dom";
 function captionOf(source: string): string {
   const frame = source === "scanner" ? " Directions are the scanner’s: no head frame was found." : "";
   return `In mm of the head frame; a dot is less than 0.05.${frame}`;
+}
+
+/** A number with its band below it; "" where none is known. */
+function fill(cell: HTMLElement, number: string, band: string): void {
+  if (cell.textContent !== number + band) cell.replaceChildren(number, ...(band === "" ? [] : [el("small", { class: "band", text: band })]));
 }
 
 /** Where landmarks go, in mm of the head frame. */
@@ -23,17 +29,14 @@ export function movementsPanel(bench: Workbench): HTMLElement {
   const skin = bench.file.surfaces.findIndex(({ entry }) => entry.kind === "skin");
   const show = () => {
     const band = skin < 0 ? null : bench.bandOf(skin);
-    caption.textContent = `${captionOf(headFrame.source)}${band === null ? "" : " Below “in all”: where it stays in 95 of 100 cases if nothing but the material is in doubt."}`;
+    caption.textContent = `${captionOf(headFrame.source)}${band === null ? "" : " Below a number of the skin: by how much more or less it is in 95 of 100 cases if nothing but the material is in doubt; below “in all” from where to where."}`;
     for (const { landmark, row, cells } of rows) {
       const movement = landmarkMovement(landmark, bench.shownPoses, bench.skinPoint, headFrame);
-      const values = [movement.forwardMm, movement.leftMm, movement.upMm, movement.totalMm];
-      values.forEach((value, index) => {
-        const text = cell(value);
-        if (cells[index].textContent !== text) cells[index].textContent = text;
-      });
-      row.title = describeMovement(movement);
       const bandMm = landmark.skinVertex === null ? null : (band?.[landmark.skinVertex] ?? null);
-      if (bandMm !== null) cells[3].replaceChildren(cell(movement.totalMm), el("small", { class: "band", text: lengthBand(movement.totalMm, bandMm) }));
+      const plusMinus = bandMm === null ? "" : `± ${formatNumber(bandMm)}`;
+      [movement.forwardMm, movement.leftMm, movement.upMm].forEach((value, index) => fill(cells[index], cell(value), plusMinus));
+      fill(cells[3], cell(movement.totalMm), bandMm === null ? "" : lengthBand(movement.totalMm, bandMm));
+      row.title = `${describeMovement(movement)}${bandMm === null ? "" : `, ${plusMinus} mm in 95 of 100 cases`}`;
     }
   };
   bench.shown.watch(onceAPicture(show));

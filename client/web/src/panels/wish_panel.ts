@@ -64,6 +64,8 @@ class Puller {
       this.change(this.index, { move: fromLps(translationMm, bench.file.manifest.headFrame) });
     });
     bench.wishes.wishes.watch(() => this.place());
+    bench.comparison.watch(() => this.place());
+    bench.bite.watch(() => this.place());
     bench.shown.watch(onceAPicture(() => bench.showsPlan && bench.wishes.follow(bench.moveAt)));
   }
 
@@ -90,9 +92,9 @@ class Puller {
   private place(): void {
     const { wishes } = this.bench.wishes;
     const wish = wishes.value[Math.min(this.index, wishes.value.length - 1)];
-    const isShown = this.isOpen && wish !== undefined && this.bench.comparison.value === null;
-    this.gizmo.setVisible(isShown);
-    this.bench.gizmo.setVisible(!isShown && this.bench.comparison.value === null);
+    const isShown = this.isOpen && wish !== undefined && this.bench.comparison.value === null && this.bench.bite.value === null;
+    this.gizmo.hide("wish", !isShown);
+    this.bench.gizmo.hide("wish", isShown);
     const { headFrame } = this.bench.file.manifest;
     this.bench.view.setPoints("wish", isShown ? wishes.value.map(({ place, move }) => add(place.drawnMm, toLps(move, headFrame))) : []);
     if (isShown && !this.gizmo.isDragging) {

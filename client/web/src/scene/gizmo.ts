@@ -16,6 +16,7 @@ export class Gizmo {
   private readonly proxy = new three.Object3D();
   private pivot: Vector = [0, 0, 0];
   private scale = 1;
+  private readonly hiddenBy = new Set<string>();
 
   /** `onPose`: the segment is pulled there; `isFinal` when the hand lets go. */
   constructor(
@@ -50,7 +51,11 @@ export class Gizmo {
     this.stage.invalidate();
   }
 
-  setVisible(isVisible: boolean): void {
+  /** It is seen, and can be taken, while nobody hides it. */
+  hide(by: string, isHidden: boolean): void {
+    if (isHidden) this.hiddenBy.add(by);
+    else this.hiddenBy.delete(by);
+    const isVisible = this.hiddenBy.size === 0;
     this.controls.getHelper().visible = isVisible;
     this.controls.enabled = isVisible;
     this.stage.invalidate();

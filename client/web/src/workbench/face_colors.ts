@@ -3,6 +3,7 @@
 
 import type { CaseFile } from "../case/case_file";
 import { VIRIDIS, colorTable, colorize, roundUp } from "../geometry/color_map";
+import { type LargestMovement, largestMovement, largestOf } from "../geometry/largest_movement";
 import type { Head } from "../scene/head";
 
 /** What the colours of a map say. */
@@ -12,6 +13,15 @@ export interface MapLegend {
   mostMm: number;
   /** The largest value on the face, in mm. */
   largestMm: number;
+  /** Where that stays in 95 of 100 cases, mm; null where it is not known. */
+  band: LargestMovement["band"];
+}
+
+/** A bar of colours as it is drawn: what stands over it, numbers at its ends and in its middle, and below it. */
+export interface ShownLegend {
+  title: string;
+  ticksMm: readonly [number, number, number];
+  note: string;
 }
 
 const TABLE = colorTable(VIRIDIS);
@@ -19,11 +29,13 @@ const TABLE = colorTable(VIRIDIS);
 /** Lays numbers of mm upon the skin as colours. */
 export class FaceColors {
   private readonly values: Float32Array[];
+  private readonly bands: Float32Array[];
   private readonly colors: Uint8Array[];
   private isColored = false;
 
   constructor(private readonly head: Head) {
     this.values = head.skins.map((skin) => new Float32Array(skin.source.positions.length / 3));
+    this.bands = this.values.map((values) => new Float32Array(values.length));
     this.colors = head.skins.map((skin) => new Uint8Array(skin.source.positions.length));
   }
 
@@ -33,28 +45,28 @@ export class FaceColors {
     this.isColored = false;
   }
 
-  /** Lengths of `vectors`, three of each of CaseFile.followed. */
-  showLengths(title: string, vectors: Float32Array): MapLegend {
-    this.head.skins.forEach((skin, index) => skin.shape.spreadLengths(vectors, this.values[index]));
-    return this.show(title);
+  /** Lengths of `vectors`, three of each of CaseFile.followed. `uncertainty`: their band, one of each; null where none is known. */
+  showLengths(title: string, vectors: Float32Array, uncertainty: Float32Array | null = null): MapLegend {
+    this.head.skins.forEach((skin, index) => {
+      skin.shape.spreadLengths(vectors, this.values[index]);
+      if (uncertainty !== null) skin.shape.spread(uncertainty, this.bands[index]);
+    });
+    return this.show(title, uncertainty !== null);
   }
 
   /** One of each of CaseFile.followed. */
   showNumbers(title: string, numbers: Float32Array): MapLegend {
     this.head.skins.forEach((skin, index) => skin.shape.spread(numbers, this.values[index]));
-    return this.show(title);
+    return this.show(title, false);
   }
 
-  private show(title: string): MapLegend {
-    let largestMm = 0;
-    for (const values of this.values) {
-      for (const value of values) if (value > largestMm) largestMm = value;
-    }
+  private show(title: string, hasBand: boolean): MapLegend {
+    const { largestMm, band } = largestOf(this.values.map((values, index) => largestMovement(values, hasBand ? this.bands[index] : null)));
     const mostMm = roundUp(largestMm);
     this.values.forEach((values, index) => colorize(values, mostMm, TABLE, this.colors[index]));
     this.head.colorSkin(this.colors);
     this.isColored = true;
-    return { title, mostMm, largestMm };
+    return { title, mostMm, largestMm, band };
   }
 }
 

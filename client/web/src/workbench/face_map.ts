@@ -67,7 +67,7 @@ export class FaceMap {
   private color(displacements: Float32Array, uncertainty: Float32Array | null): MapLegend | null {
     const { colors, other } = this;
     const map = this.choice.value;
-    if (map.kind === "movement") return colors.showLengths("Movement of the skin", displacements);
+    if (map.kind === "movement") return colors.showLengths("Movement of the skin", displacements, uncertainty);
     if (map.kind === "band" && uncertainty !== null) return colors.showNumbers("Band of 95 in 100 (stiffness only; excludes model and surgical error)", uncertainty);
     if ((map.kind === "model" || map.kind === "prediction") && other !== null) {
       const title = map.kind === "model" ? `Difference to ${map.label}` : `Difference to “${map.prediction.title}”`;

@@ -25,7 +25,7 @@ import { Gizmo } from "../scene/gizmo";
 import type { HeadView } from "../scene/head_view";
 import { Answers } from "./answers";
 import { Comparer, type Comparison, type Shape } from "./comparison";
-import { followedRest } from "./face_colors";
+import { type ShownLegend, followedRest } from "./face_colors";
 import { FaceMap, type MapChoice } from "./face_map";
 import { NewestAnswer } from "./newest_answer";
 import { PacsExports } from "./pacs_exports";
@@ -81,6 +81,8 @@ export class Workbench implements ShownFace {
   readonly model = new Signal<DeformationModel>(0);
   readonly comparison = new Signal<Comparison | null>(null);
   readonly penetrations = new Signal<Penetration[]>([]);
+  /** Teeth alone are shown, coloured by this legend; null: the whole head. */
+  readonly bite = new Signal<ShownLegend | null>(null);
   /** What the next click upon the picture is for; null: for nothing but looking and taking a segment. */
   readonly picking = new Signal<Picking | null>(null);
   /** The face or the bone on the stage changed. */
@@ -205,7 +207,8 @@ export class Workbench implements ShownFace {
       if (typeof comparison.from === "object") await this.answers.ofPrediction(comparison.from);
     }
     this.comparison.value = comparison;
-    this.gizmo.setVisible(comparison === null);
+    this.gizmo.hide("comparison", comparison !== null);
+    this.showPenetrations();
     await this.redraw();
   }
 
@@ -237,7 +240,17 @@ export class Workbench implements ShownFace {
 
   open(degrees: number): void {
     this.jaw.degrees = degrees;
+    this.showPenetrations();
     this.planChanged(degrees === 0);
+  }
+
+  /** Teeth alone, with this legend of their colours; null: all. */
+  showBite(legend: ShownLegend | null): void {
+    this.bite.value = legend;
+    this.view.head.setTeethOnly(legend !== null);
+    this.gizmo.hide("bite", legend !== null);
+    this.showPenetrations();
+    this.view.stage.invalidate();
   }
 
   posesByHandle(poses: readonly Pose[]): Map<string, Pose> {
@@ -278,13 +291,19 @@ export class Workbench implements ShownFace {
   /** The hand rests: what takes longer than a picture is done now. */
   private settled(): void {
     this.penetrations.value = this.penetrationTest.find(this.posesByHandle(this.plan.poses()));
-    this.view.setPoints("penetration", this.penetrations.value.flatMap((penetration) => penetration.points));
+    this.showPenetrations();
     if (this.map.choice.value.kind === "model") {
       this.map.refresh().then(
         () => this.redraw(),
         (thrown) => (this.notice.value = sentenceOf(thrown)),
       );
     }
+  }
+
+  /** The points are those of the plan's bone: not beside other bone, nor where none is drawn. */
+  private showPenetrations(): void {
+    const isShown = this.showsPlan && this.bite.value === null;
+    this.view.setPoints("penetration", isShown ? this.penetrations.value.flatMap((penetration) => penetration.points) : []);
   }
 
   private placeGizmo(): void {

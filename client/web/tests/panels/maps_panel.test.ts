@@ -3,7 +3,7 @@
 
 import { expect, test } from "vitest";
 import type { LocalState } from "../../src/live/local_answers";
-import { describeLocal } from "../../src/panels/maps_panel";
+import { describeLocal, largestText } from "../../src/panels/maps_panel";
 
 type Ready = Extract<LocalState, { kind: "ready" }>;
 const READY: Ready = { kind: "ready", place: "page", hasWorkers: true, kernel: "webassembly", coverage: "covered" };
@@ -16,4 +16,9 @@ test.each<[string, Partial<Ready>, string]>([
   ["beyond the columns", { coverage: "beyond" }, "Beyond what was prepared: the server answers."],
 ])("who answers the hand: %s", (_, change, text) => {
   expect(describeLocal({ ...READY, ...change })).toBe(text);
+});
+
+test("the largest movement is told with its band where that is known", () => {
+  expect(largestText({ largestMm: 8.123, band: { lowestMm: 7.5, highestMm: 8.8 } })).toBe("largest 8.12 mm, in 95 of 100 cases 7.50 to 8.80");
+  expect(largestText({ largestMm: 8.123, band: null })).toBe("largest 8.12 mm");
 });

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { expect, test } from "vitest";
-import { largestMovement, largestOf } from "../../src/movingfile/largest_movement";
+import { largestMovement, largestOf } from "../../src/geometry/largest_movement";
 
 const numbers = (...values: number[]) => Float32Array.from(values);
 
