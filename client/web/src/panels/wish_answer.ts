@@ -23,7 +23,7 @@ export function wishAnswer(bench: Workbench): HTMLElement {
     box.hidden = !fit.isActive;
     accept.disabled = !fit.isSettled;
     details.hidden = response === null;
-    const lines = response === null ? [] : wishSentences(response, fit.wishes.value, bench.plan.handles);
+    const lines = response === null ? [] : wishSentences(response, fit.wishes.value, bench.plan.handles, fit.limitShare);
     if (fit.problem.value !== null) lines.unshift(`This cannot be asked: ${sentenceOf(fit.problem.value)}`);
     else if (!fit.isAsked) lines.unshift("This is the face as planned: pull at a wish, or type where it is to be.");
     else if (response === null) lines.unshift("The server prepares answers for these points …");

@@ -207,13 +207,19 @@ export class WishFit {
     return { name: `wish ${index + 1}`, at, wanted };
   }
 
-  /** Within the case's limits, which hold along the axes of the head: a box of LPS that lies within theirs. */
+  /**
+   * The part of the case's limits that is searched. They hold along the axes of the head, bounds of the search along those of the
+   * scanner: within a head that lies aslant there is room for a smaller box only.
+   */
+  get limitShare(): number {
+    const axes = headAxes(this.file.manifest.headFrame);
+    return 1 / Math.max(...[0, 3, 6].map((row) => Math.abs(axes[row]) + Math.abs(axes[row + 1]) + Math.abs(axes[row + 2])));
+  }
+
   private freedom(handle: number): NonNullable<FitAsk["freedoms"]>[number] {
     const { name, limits } = this.plan.handles[handle];
-    const axes = headAxes(this.file.manifest.headFrame);
-    const widest = Math.max(...[0, 3, 6].map((row) => Math.abs(axes[row]) + Math.abs(axes[row + 1]) + Math.abs(axes[row + 2])));
-    const mm = limits.translationMm / widest;
-    const radians = (Math.min(90, limits.rotationDeg / widest) * Math.PI) / 180;
+    const mm = limits.translationMm * this.limitShare;
+    const radians = (Math.min(90, limits.rotationDeg * this.limitShare) * Math.PI) / 180;
     const ranges = (most: number) => ({ x: { lowest: -most, highest: most }, y: { lowest: -most, highest: most }, z: { lowest: -most, highest: most } });
     return { handle: name, translationMm: ranges(mm), rotationVector: ranges(radians), pivotMm: vector(this.plan.pivot(handle)) };
   }

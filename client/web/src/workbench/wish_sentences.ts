@@ -7,8 +7,8 @@ import type { Wish } from "./wish_fit";
 
 type Named = readonly { name: string; label: string }[];
 
-/** What becomes of wishes, one thing a sentence: each reached or missed, those that contradict each other, what holds back. */
-export function wishSentences(response: FitResponse, wishes: readonly Pick<Wish, "label">[], handles: Named): string[] {
+/** What becomes of wishes, one thing a sentence: each reached or missed, those that contradict each other, what holds back. `limitShare`: of WishFit. */
+export function wishSentences(response: FitResponse, wishes: readonly Pick<Wish, "label">[], handles: Named, limitShare: number): string[] {
   const label = (name: string) => wishes[Number(name.replace("wish ", "")) - 1]?.label ?? name;
   const held = response.numbers.filter(({ bound }) => bound !== FitBound.UNSPECIFIED);
   return [
@@ -17,9 +17,14 @@ export function wishSentences(response: FitResponse, wishes: readonly Pick<Wish,
       return `${label(name)}: cannot be reached; ${formatNumber(missedMm)} mm are missing.`;
     }),
     ...response.contradictions.map(({ first, second }) => `${label(first)} and ${label(second)} ask different things of the same bone.`),
-    ...(held.length === 0 ? [] : [`Held by its limit: ${held.map((number) => numberName(number, handles)).join(", ")}.`]),
+    ...(held.length === 0 ? [] : [`Held by its limit${aslant(limitShare)}: ${held.map((number) => numberName(number, handles)).join(", ")}.`]),
     ...(response.converged ? [] : ["The search has not come to its end; wish for less."]),
   ];
+}
+
+/** What is asked for goes no further than this part of a limit; what is moved by hand does. */
+function aslant(limitShare: number): string {
+  return limitShare > 0.995 ? "" : ` (the head lies aslant in the scan: the search goes to ${formatNumber(100 * limitShare, 0)} % of the case’s limits)`;
 }
 
 const SHIFTS = ["to the left", "to the back", "up"];

@@ -175,6 +175,21 @@ test("the search goes on from what was found, within the limits, by those that m
   expect(asked[2].targets?.[0].wanted).toEqual({ case: "movement", value: { direction: { x: 0, y: -2, z: 0 }, byMm: 2 } });
 });
 
+test("in a head that lies aslant the search stays within its limits, and how far it goes is known", async () => {
+  const { file, plan, wish } = await bench();
+  const half = Math.SQRT1_2;
+  const turned = { ...file, manifest: { ...file.manifest, headFrame: { ...file.manifest.headFrame, left: [half, half, 0] as const, posterior: [-half, half, 0] as const } } } as unknown as typeof file;
+  const asked: FitAsk[] = [];
+  const fit = new WishFit(turned, plan, async (request) => {
+    asked.push(request);
+    return create(FitResponseSchema, {});
+  });
+  expect(fit.limitShare).toBeCloseTo(half);
+  fit.set([wish(1)]);
+  expect(asked[0].freedoms?.[0].translationMm?.x?.highest).toBeCloseTo(15 * half);
+  expect(asked[0].freedoms?.[0].rotationVector?.z?.highest).toBeCloseTo((20 * half * Math.PI) / 180);
+});
+
 test("a refusal is kept for who reads it, and the next wish is asked all the same", async () => {
   const { fit, asked, answers, wish } = await bench();
   fit.set([wish(1)]);

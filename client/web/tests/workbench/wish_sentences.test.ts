@@ -19,7 +19,7 @@ test("wishes that contradict each other are told by their names, as is what each
     ],
     contradictions: [{ first: "wish 1", second: "wish 2" }],
   });
-  expect(wishSentences(response, WISHES, HANDLES)).toEqual([
+  expect(wishSentences(response, WISHES, HANDLES, 1)).toEqual([
     "Chin: cannot be reached; 2.3 mm are missing.",
     "Lower lip: cannot be reached; 1.5 mm are missing.",
     "Upper lip: reached, within 0.01 mm.",
@@ -35,5 +35,6 @@ test("what is held by its limit, and a search that did not end, are told last", 
       { handle: "mandible", isRotation: true, axis: 0, bound: FitBound.UNSPECIFIED },
     ],
   });
-  expect(wishSentences(response, WISHES, HANDLES)).toEqual(["Held by its limit: Lower jaw to the back.", "The search has not come to its end; wish for less."]);
+  expect(wishSentences(response, WISHES, HANDLES, 1)).toEqual(["Held by its limit: Lower jaw to the back.", "The search has not come to its end; wish for less."]);
+  expect(wishSentences(response, WISHES, HANDLES, 0.8)[0]).toBe("Held by its limit (the head lies aslant in the scan: the search goes to 80 % of the case’s limits): Lower jaw to the back.");
 });
