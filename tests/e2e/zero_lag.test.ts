@@ -205,7 +205,7 @@ test.each([
 });
 
 const POSES = 1000;
-/** Of each answer every so manieth vertex is compared, others of each pose. */
+/** Of each answer the page itself compares every vertex; out of it come every so manieth, others of each pose. */
 const STRIDE = 20;
 
 /** An answer of the server to a pose of the hand. */
@@ -213,14 +213,16 @@ interface ServerAnswer {
   poses: Pose[];
   isPrepared: boolean;
   errorMm: number;
+  /** How far the page's own answer is off at most: null where it has none. */
+  pageOffMm: number | null;
   first: number;
   /** As base64 of floats, of the vertices first, first + STRIDE, ... */
   positions: string;
   bandMm: string;
 }
 
-/** Runs in the page: random poses of all segments, up to 5 mm and 4.6 degrees times `size` along each axis, each asked of the server once the one before was answered. */
-async function askServer([count, stride, size]: readonly [number, number, number]): Promise<{ columns: string; answers: ServerAnswer[] }> {
+/** Runs in the page: random poses of all segments, up to 5 mm and 4.6 degrees times `size` along each axis, each asked of the server once the one before was answered, and of the page. */
+async function askBoth([count, stride, size]: readonly [number, number, number]): Promise<{ columns: string; answers: ServerAnswer[] }> {
   const { bench } = (globalThis as unknown as Hook).tissueform;
   const base64 = (bytes: Uint8Array) => {
     const parts = [];
@@ -236,6 +238,12 @@ async function askServer([count, stride, size]: readonly [number, number, number
   const random = (most: number) => most * (2 * (seed = (seed * 48271) % 2147483647) / 2147483647 - 1);
   const vector = (most: number) => [random(most), random(most), random(most)];
   const show = bench.live.listener.onPicture;
+  const { evaluator } = bench.local.host;
+  const pageOffMm = (poses: Pose[], positions: Float32Array) => {
+    const own = evaluator.evaluate(poses);
+    if (own.coverage !== "covered") return null;
+    return positions.reduce((most, value, i) => Math.max(most, Math.abs(value - own.positions[i])), 0);
+  };
   const answers = [];
   for (let i = 0; i < count; ++i) {
     const poses = bench.plan.handles.map((_: unknown, handle: number) => {
@@ -251,7 +259,7 @@ async function askServer([count, stride, size]: readonly [number, number, number
     });
     const { prepared, errorBoundMm } = picture.frame.summary;
     const bandMm = picture.uncertainty === null ? "" : picked(picture.uncertainty, 1, i % stride);
-    answers.push({ poses, isPrepared: prepared, errorMm: errorBoundMm, first: i % stride, positions: picked(picture.positions, 3, i % stride), bandMm });
+    answers.push({ poses, isPrepared: prepared, errorMm: errorBoundMm, pageOffMm: pageOffMm(poses, picture.positions), first: i % stride, positions: picked(picture.positions, 3, i % stride), bandMm });
   }
   bench.live.listener.onPicture = show;
   return { columns: base64(bench.local.heldColumns), answers };
@@ -265,13 +273,16 @@ describe("a thousand random poses", () => {
 
   test.each(MODELS)("%s: JavaScript and WebAssembly give what the server gives, the band as well", async (name, label) => {
     await page.getByRole("radio", { name: new RegExp(`^${label}`) }).check();
-    await ready(page, await modelOf(page, name));
-    const { columns, answers } = await page.evaluate(askServer, [POSES, STRIDE, name === "neo_hookean" ? 0.25 : 1] as const);
+    expect(await readyInPage(page, await modelOf(page, name))).toMatchObject({ place: "page", kernel: "webassembly" });
+    const { columns, answers } = await page.evaluate(askBoth, [POSES, STRIDE, name === "neo_hookean" ? 0.25 : 1] as const);
     const bytes = fromBase64(columns);
     const evaluators = [await makeEvaluator(bytes), await makeEvaluator(bytes, { kernel: javascriptKernel })];
     expect(evaluators.map(({ kernel }) => kernel.name)).toEqual(["webassembly", "javascript"]);
     let [compared, mostMm, mostBandMm] = [0, 0, 0];
-    for (const { poses, isPrepared, errorMm, first, positions, bandMm } of answers) {
+    for (const { poses, isPrepared, errorMm, pageOffMm, first, positions, bandMm } of answers) {
+      expect(pageOffMm !== null).toBe(isPrepared);
+      expect(pageOffMm ?? 0).toBeLessThan(1e-4 + errorMm);
+      mostMm = Math.max(mostMm, pageOffMm ?? 0);
       for (const evaluator of evaluators) {
         const own = evaluator.evaluate(poses);
         expect(own.coverage === "covered").toBe(isPrepared);
