@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "client/cpp/client_call.h"
+#include "client/cpp/session_call.h"
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "core/mesh_payload/sha256.h"
@@ -44,11 +45,11 @@ bool MaySendAgain(const absl::Status& status) {
 }  // namespace
 
 CaseCalls::CaseCalls(const std::shared_ptr<grpc::Channel>& channel,
-                     std::chrono::milliseconds call_deadline)
-    : call_deadline_(call_deadline), stub_(v1::CaseService::NewStub(channel)) {}
+                     std::chrono::milliseconds call_deadline, SessionRoutes* routes)
+    : call_deadline_(call_deadline), routes_(routes), stub_(v1::CaseService::NewStub(channel)) {}
 
-void CaseCalls::SetDeadline(grpc::ClientContext* context) const {
-  context->set_deadline(std::chrono::system_clock::now() + call_deadline_);
+std::chrono::system_clock::time_point CaseCalls::Deadline() const {
+  return std::chrono::system_clock::now() + call_deadline_;
 }
 
 absl::StatusOr<v1::Case> CaseCalls::Upload(absl::string_view bytes, const std::string& title,
@@ -71,22 +72,23 @@ absl::StatusOr<v1::Case> CaseCalls::Upload(absl::string_view bytes, const std::s
 
 absl::StatusOr<v1::Case> CaseCalls::TryUpload(absl::string_view bytes, const v1::CaseHeader& header,
                                               const UploadOptions& options) {
-  absl::StatusOr<v1::Case> known = Get(CaseName(header.sha256()));
+  absl::StatusOr<v1::Case> known = Find(CaseName(header.sha256()));
   if (!absl::IsNotFound(known.status())) return known;
   grpc::ClientContext context;
-  SetDeadline(&context);
+  context.set_deadline(Deadline());
   v1::UploadCaseResponse response;
   const auto writer = stub_->UploadCase(&context, &response);
   v1::UploadCaseRequest request;
   *request.mutable_header() = header;
   if (writer->Write(request) && WriteChunks(bytes, options, writer.get())) writer->WritesDone();
   TF_RETURN_IF_ERROR(EndOfCall(writer->Finish()));
+  if (!response.has_case_()) return AnswerWasLost();
   return std::move(*response.mutable_case_());
 }
 
-absl::StatusOr<v1::Case> CaseCalls::Get(const std::string& name) {
+absl::StatusOr<v1::Case> CaseCalls::Find(const std::string& name) {
   grpc::ClientContext context;
-  SetDeadline(&context);
+  context.set_deadline(Deadline());
   v1::GetCaseRequest request;
   request.set_name(name);
   v1::Case found;
@@ -94,14 +96,25 @@ absl::StatusOr<v1::Case> CaseCalls::Get(const std::string& name) {
   return found;
 }
 
+absl::StatusOr<v1::Case> CaseCalls::Get(const std::string& name) {
+  v1::GetCaseRequest request;
+  request.set_name(name);
+  v1::Case found;
+  TF_RETURN_IF_ERROR(RunSessionCall(
+      routes_, "", CallRepeat::kAlways, Deadline(),
+      [&](grpc::ClientContext* context) { return stub_->GetCase(context, request, &found); }));
+  return found;
+}
+
 absl::StatusOr<std::vector<v1::Case>> CaseCalls::List() {
   std::vector<v1::Case> cases;
   v1::ListCasesRequest request;
   do {
-    grpc::ClientContext context;
-    SetDeadline(&context);
     v1::ListCasesResponse response;
-    TF_RETURN_IF_ERROR(EndOfCall(stub_->ListCases(&context, request, &response)));
+    TF_RETURN_IF_ERROR(RunSessionCall(routes_, "", CallRepeat::kAlways, Deadline(),
+                                      [&](grpc::ClientContext* context) {
+                                        return stub_->ListCases(context, request, &response);
+                                      }));
     cases.insert(cases.end(), response.cases().begin(), response.cases().end());
     request.set_page_token(response.next_page_token());
   } while (!request.page_token().empty());
@@ -109,40 +122,43 @@ absl::StatusOr<std::vector<v1::Case>> CaseCalls::List() {
 }
 
 absl::Status CaseCalls::Delete(const std::string& name) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
   v1::DeleteCaseRequest request;
   request.set_name(name);
   google::protobuf::Empty response;
-  return EndOfCall(stub_->DeleteCase(&context, request, &response));
+  return RunDeletion(routes_, "", Deadline(), [&](grpc::ClientContext* context) {
+    return stub_->DeleteCase(context, request, &response);
+  });
 }
 
-absl::Status CaseCalls::ReadOn(const std::string& name, std::string* bytes) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
+grpc::Status CaseCalls::ReadOn(const std::string& name, std::string* bytes, bool* follows,
+                               grpc::ClientContext* context) {
   v1::ReadCaseRequest request;
   request.set_name(name);
   request.set_read_offset(static_cast<int64_t>(bytes->size()));
-  const auto reader = stub_->ReadCase(&context, request);
+  const auto reader = stub_->ReadCase(context, request);
   v1::ReadCaseResponse response;
-  bool follows = true;
-  while (follows && reader->Read(&response)) {
-    follows = response.offset() == static_cast<int64_t>(bytes->size());
-    if (follows) *bytes += response.data();
+  while (*follows && reader->Read(&response)) {
+    *follows = response.offset() == static_cast<int64_t>(bytes->size());
+    if (*follows) *bytes += response.data();
   }
-  if (!follows) context.TryCancel();
-  const absl::Status ended = EndOfCall(reader->Finish());
-  if (follows) return ended;
-  return absl::DataLossError("the server's chunks do not follow each other; read the case again");
+  if (!*follows) context->TryCancel();
+  const grpc::Status ended = reader->Finish();
+  return *follows ? ended : grpc::Status::OK;
 }
 
 absl::StatusOr<std::string> CaseCalls::Read(const std::string& name) {
   TF_ASSIGN_OR_RETURN(const std::string sha256, ParseCaseName(name));
   std::string bytes;
+  bool follows = true;
   for (size_t before = 0;; before = bytes.size()) {
-    const absl::Status ended = ReadOn(name, &bytes);
+    const absl::Status ended = RunSessionCall(
+        routes_, "", CallRepeat::kAlways, Deadline(),
+        [&](grpc::ClientContext* context) { return ReadOn(name, &bytes, &follows, context); });
     if (ended.ok()) break;
     if (!IsTransient(ended) || bytes.size() == before) return ended;
+  }
+  if (!follows) {
+    return absl::DataLossError("the server's chunks do not follow each other; read the case again");
   }
   if (Sha256Hex({bytes}) == sha256) return bytes;
   return absl::DataLossError(

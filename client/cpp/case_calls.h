@@ -12,8 +12,10 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "grpcpp/channel.h"
+#include "grpcpp/client_context.h"
 
 #include "client/cpp/mesh_upload.h"
+#include "client/cpp/session_routes.h"
 #include "tissueform/v1/case_service.grpc.pb.h"
 
 namespace tissueform {
@@ -25,7 +27,8 @@ namespace tissueform {
 // Thread-safe.
 class CaseCalls {
  public:
-  CaseCalls(const std::shared_ptr<grpc::Channel>& channel, std::chrono::milliseconds call_deadline);
+  CaseCalls(const std::shared_ptr<grpc::Channel>& channel, std::chrono::milliseconds call_deadline,
+            SessionRoutes* routes);
 
   // Sends the case unless the server has it. What breaks off begins anew (on_resumed is not
   // called), also when the server is started again, until options.give_up_after has passed.
@@ -36,18 +39,24 @@ class CaseCalls {
   absl::StatusOr<std::vector<v1::Case>> List();
   absl::Status Delete(const std::string& name);
 
-  // The whole file. Goes on where the connection broke off as long as something comes. Errors:
-  // DataLoss also when the bytes are not those that the name says.
+  // The whole file. Goes on where the connection broke off as long as something comes, in a cluster
+  // also before the first byte. Errors: DataLoss also when the bytes are not those that the name
+  // says.
   absl::StatusOr<std::string> Read(const std::string& name);
 
  private:
   absl::StatusOr<v1::Case> TryUpload(absl::string_view bytes, const v1::CaseHeader& header,
                                      const UploadOptions& options);
-  // Adds what comes from the end of `bytes` on.
-  absl::Status ReadOn(const std::string& name, std::string* bytes);
-  void SetDeadline(grpc::ClientContext* context) const;
+  // One attempt.
+  absl::StatusOr<v1::Case> Find(const std::string& name);
+  // Adds what comes from the end of `bytes` on. `follows`: nothing is missing in between; without
+  // that the call is given up, and ends well.
+  grpc::Status ReadOn(const std::string& name, std::string* bytes, bool* follows,
+                      grpc::ClientContext* context);
+  std::chrono::system_clock::time_point Deadline() const;
 
   const std::chrono::milliseconds call_deadline_;
+  SessionRoutes* const routes_;
   const std::unique_ptr<v1::CaseService::Stub> stub_;
 };
 

@@ -47,6 +47,10 @@ absl::Status EndOfCall(const grpc::Status& status, bool was_cancelled) {
   return info.reason == ReasonName(ErrorReason::kCancelled) ? lost : WithErrorInfo(lost, info);
 }
 
+absl::Status AnswerWasLost() {
+  return absl::UnavailableError("the server's answer was lost on the way");
+}
+
 void AddSessionHeader(const std::string& session, grpc::ClientContext* context) {
   // Not of a name that is none: the server refuses it, and a header takes only some letters.
   if (const absl::StatusOr<std::string> id = ParseSessionName(session); id.ok()) {

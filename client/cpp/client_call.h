@@ -20,6 +20,10 @@ absl::Status FromGrpcStatus(const grpc::Status& status);
 // something between here and there has gone, and it is Unavailable.
 absl::Status EndOfCall(const grpc::Status& status, bool was_cancelled = false);
 
+// Of an upload that has ended well without its answer: a proxy may reset the stream of a call that
+// was answered early, and gRPC then drops the answer, but not the OK that followed. Unavailable.
+absl::Status AnswerWasLost();
+
 // Lets a proxy send the call to the server of `session` ("sessions/{id}"); see kSessionHeader.
 void AddSessionHeader(const std::string& session, grpc::ClientContext* context);
 

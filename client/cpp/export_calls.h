@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +17,7 @@
 #include "grpcpp/client_context.h"
 #include "grpcpp/support/sync_stream.h"
 
+#include "client/cpp/session_call.h"
 #include "tissueform/v1/export_service.grpc.pb.h"
 
 namespace tissueform {
@@ -61,7 +63,7 @@ class ExportWatchStream {
 class ExportCalls {
  public:
   ExportCalls(const std::shared_ptr<grpc::Channel>& channel,
-              std::chrono::milliseconds call_deadline);
+              std::chrono::milliseconds call_deadline, SessionRoutes* routes);
 
   // With a `request_id` the call may be repeated: it gives the same export again, done or not.
   absl::StatusOr<v1::Export> Create(const std::string& prediction,
@@ -79,9 +81,12 @@ class ExportCalls {
   std::unique_ptr<ExportWatchStream> Watch();
 
  private:
-  void SetDeadline(grpc::ClientContext* context) const;
+  absl::Status Call(CallRepeat repeat,
+                    const std::function<grpc::Status(grpc::ClientContext*)>& attempt);
+  std::chrono::system_clock::time_point Deadline() const;
 
   const std::chrono::milliseconds call_deadline_;
+  SessionRoutes* const routes_;
   const std::unique_ptr<v1::ExportService::Stub> stub_;
 };
 

@@ -71,6 +71,7 @@ class Sending {
     // Where a write fails the server has ended the call, often with a reason: Finish has it.
     if (writer->Write(request) && WriteFrom(from, writer.get())) writer->WritesDone();
     TF_RETURN_IF_ERROR(EndOfCall(writer->Finish()));
+    if (!response.has_mesh()) return AnswerWasLost();
     return std::move(*response.mutable_mesh());
   }
 

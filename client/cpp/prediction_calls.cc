@@ -117,9 +117,10 @@ absl::Status PredictionCalls::Delete(const std::string& name) {
   v1::DeletePredictionRequest request;
   request.set_name(name);
   google::protobuf::Empty response;
-  return Call("", CallRepeat::kIfNothingWasDone, [&](grpc::ClientContext* context) {
-    return stub_->DeletePrediction(context, request, &response);
-  });
+  return RunDeletion(routes_, "", std::chrono::system_clock::now() + call_deadline_,
+                     [&](grpc::ClientContext* context) {
+                       return stub_->DeletePrediction(context, request, &response);
+                     });
 }
 
 absl::StatusOr<Positions> PredictionCalls::ReadPositions(const std::string& name) {

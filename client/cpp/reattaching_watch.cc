@@ -24,6 +24,7 @@ std::optional<v1::WatchFrame> ReattachingWatch::Receive() {
     std::optional<v1::WatchFrame> frame = watch->Receive();
     if (frame.has_value()) {
       form_ = watch->form();
+      Judge(*frame);
       return frame;
     }
     end_ = watch->Finish();
@@ -33,10 +34,19 @@ std::optional<v1::WatchFrame> ReattachingWatch::Receive() {
           client_->Watch(session_, options_.watch, kNoPatience);
       if (!next.ok()) return next.status();
       Adopt(*std::move(next));
+      awaits_drag_ = saw_drag_;
       return absl::OkStatus();
     });
   }
   return std::nullopt;
+}
+
+void ReattachingWatch::Judge(const v1::WatchFrame& frame) {
+  const bool is_of_drag = frame.origin() == v1::WATCH_ORIGIN_DRAG;
+  falls_back_ = !is_of_drag && awaits_drag_;
+  if (falls_back_) return;
+  saw_drag_ = is_of_drag;
+  awaits_drag_ = false;
 }
 
 void ReattachingWatch::Ack(const v1::WatchFrame& frame) {

@@ -19,7 +19,7 @@ namespace tissueform {
 
 // A watch that outlives its connection and the server that held its session: where it breaks
 // another one of the same session begins. Frames are then numbered anew; what was received last
-// stays good until the next comes.
+// stays good until the next comes, and where that falls_back for some seconds more.
 //
 // One thread receives and acknowledges; Cancel may be called from others. It comes back within
 // Receive. The client must outlive it.
@@ -40,6 +40,12 @@ class ReattachingWatch {
 
   // Blocks until the next frame. Empty when the watch has ended; Finish says how.
   std::optional<v1::WatchFrame> Receive();
+
+  // Of the frame that was received last: it shows what was committed, or the mesh at rest, but only
+  // because another watch has begun, while the last one showed a drag that has not come back yet.
+  // Who draws keeps the drag's last frame for a while: the server that has just taken the session
+  // does not know it. Of the receiving thread.
+  bool falls_back() const { return falls_back_; }
 
   // The frame that was received last, and all before it, were used. Where that cannot be said the
   // watch begins anew: the server would soon send nothing more.
@@ -62,6 +68,7 @@ class ReattachingWatch {
         options_(std::move(options)),
         reattachment_(options_.reattachment) {}
 
+  void Judge(const v1::WatchFrame& frame);
   void Adopt(std::unique_ptr<WatchStream> watch) ABSL_LOCKS_EXCLUDED(mutex_);
   std::shared_ptr<WatchStream> Current() const ABSL_LOCKS_EXCLUDED(mutex_);
 
@@ -76,6 +83,9 @@ class ReattachingWatch {
   // The receiving thread's.
   v1::WatchForm form_;
   absl::Status end_;
+  bool saw_drag_ = false;     // in the last frame that did not fall back
+  bool awaits_drag_ = false;  // since the watch began anew
+  bool falls_back_ = false;
 
   mutable Mutex mutex_;
   // Replaced by the receiving thread alone.

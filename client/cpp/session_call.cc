@@ -89,6 +89,22 @@ absl::Status RunSessionCall(SessionRoutes* routes, const std::string& session, C
   }
 }
 
+absl::Status RunDeletion(SessionRoutes* routes, const std::string& session,
+                         std::chrono::system_clock::time_point deadline,
+                         const std::function<grpc::Status(grpc::ClientContext*)>& attempt) {
+  bool lost = false;
+  const absl::Status status = RunSessionCall(
+      routes, session, CallRepeat::kAlways, deadline, [&](grpc::ClientContext* context) {
+        grpc::Status deleted = attempt(context);
+        // The attempt that was lost has done it.
+        if (lost && deleted.error_code() == grpc::StatusCode::NOT_FOUND) return grpc::Status::OK;
+        lost = lost || !deleted.ok();
+        return deleted;
+      });
+  if (status.ok()) routes->Forget(session);
+  return status;
+}
+
 CallRepeat PrepareToRepeat(const SessionRoutes& routes, v1::CreateSessionRequest* request) {
   if (request->request_id().empty() && routes.in_cluster()) {
     std::random_device random;

@@ -93,6 +93,12 @@ absl::Status RunSessionCall(SessionRoutes* routes, const std::string& session, C
                             std::chrono::system_clock::time_point deadline,
                             const std::function<grpc::Status(grpc::ClientContext*)>& attempt);
 
+// The same of a call that deletes: NOT_FOUND after an attempt that was lost says that it was done.
+// What is deleted is forgotten by `routes` where it is a session.
+absl::Status RunDeletion(SessionRoutes* routes, const std::string& session,
+                         std::chrono::system_clock::time_point deadline,
+                         const std::function<grpc::Status(grpc::ClientContext*)>& attempt);
+
 // How creating and updating a session may be repeated. In a cluster a new session without a
 // request_id is given one: what was created by an attempt that was lost is then found again.
 CallRepeat PrepareToRepeat(const SessionRoutes& routes, v1::CreateSessionRequest* request);

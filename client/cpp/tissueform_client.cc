@@ -73,23 +73,9 @@ TissueformClient::TissueformClient(const std::shared_ptr<grpc::Channel>& channel
       deform_(v1::DeformService::NewStub(channel)),
       server_info_(v1::ServerInfoService::NewStub(channel)),
       predictions_(channel, options.call_deadline, &routes_),
-      cases_(channel, options.call_deadline),
-      exports_(channel, options.call_deadline),
+      cases_(channel, options.call_deadline, &routes_),
+      exports_(channel, options.call_deadline, &routes_),
       access_(channel, options.call_deadline, &routes_) {}
-
-absl::Status TissueformClient::CallToDelete(
-    const std::string& session, const std::function<grpc::Status(grpc::ClientContext*)>& attempt) {
-  bool lost = false;
-  const absl::Status status = Call(session, CallRepeat::kAlways, [&](grpc::ClientContext* context) {
-    grpc::Status deleted = attempt(context);
-    // The attempt that was lost has done it.
-    if (lost && deleted.error_code() == grpc::StatusCode::NOT_FOUND) return grpc::Status::OK;
-    lost = lost || !deleted.ok();
-    return deleted;
-  });
-  if (status.ok()) routes_.Forget(session);
-  return status;
-}
 
 absl::StatusOr<v1::ServerInfo> TissueformClient::GetServerInfo() {
   v1::ServerInfo info;
@@ -159,7 +145,7 @@ absl::Status TissueformClient::DeleteMesh(const std::string& name) {
   v1::DeleteMeshRequest request;
   request.set_name(name);
   google::protobuf::Empty response;
-  return CallToDelete("", [&](grpc::ClientContext* context) {
+  return RunDeletion(&routes_, "", Deadline(), [&](grpc::ClientContext* context) {
     return meshes_->DeleteMesh(context, request, &response);
   });
 }
@@ -230,7 +216,7 @@ absl::Status TissueformClient::DeleteSession(const std::string& name) {
   v1::DeleteSessionRequest request;
   request.set_name(name);
   google::protobuf::Empty response;
-  return CallToDelete(name, [&](grpc::ClientContext* context) {
+  return RunDeletion(&routes_, name, Deadline(), [&](grpc::ClientContext* context) {
     return sessions_->DeleteSession(context, request, &response);
   });
 }

@@ -46,8 +46,9 @@ namespace tissueform {
 // Behind one name may stand a cluster. Then a call goes to the server that has the session, and is
 // tried again for kFailoverPatience where that one is away: reads, and what is done once when it
 // is done twice (CallRepeat::kAlways), after any loss; UpdateSession with an etag, sessions with an
-// id of their own and predictions without a request_id only where a server says that it has done
-// nothing. Of what a call deletes NOT_FOUND after a loss says that it was deleted.
+// id of their own, predictions and exports without a request_id, and UpdateExport only where a
+// server says that it has done nothing. Of what a call deletes NOT_FOUND after a loss says that it
+// was deleted.
 //
 // Thread-safe.
 class TissueformClient {
@@ -148,8 +149,6 @@ class TissueformClient {
                     const std::function<grpc::Status(grpc::ClientContext*)>& attempt) {
     return RunSessionCall(&routes_, session, repeat, Deadline(), attempt);
   }
-  absl::Status CallToDelete(const std::string& session,
-                            const std::function<grpc::Status(grpc::ClientContext*)>& attempt);
 
   const Options options_;
   const std::shared_ptr<TokenFile> token_;  // null: none

@@ -20,6 +20,7 @@
 
 #include "client/cpp/client_call.h"
 #include "client/cpp/mesh_upload.h"
+#include "client/cpp/session_call.h"
 #include "core/base/software_version.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
@@ -41,9 +42,11 @@ constexpr std::chrono::seconds kCallDeadline{20};
 constexpr double kLeewaySeconds = 60;
 constexpr double kNoticedSeconds = 5;
 
-void SetDeadline(grpc::ClientContext* context) {
-  context->set_deadline(std::chrono::system_clock::now() + kCallDeadline);
+std::chrono::system_clock::time_point Deadline() {
+  return std::chrono::system_clock::now() + kCallDeadline;
 }
+
+void SetDeadline(grpc::ClientContext* context) { context->set_deadline(Deadline()); }
 
 std::string AdviceFor(const absl::Status& status) {
   switch (status.code()) {
@@ -95,11 +98,8 @@ SessionRequest RequestOf(const std::string& mesh) {
 }
 
 // One pose, one frame.
-absl::Status DragOnce(v1::DeformService::Stub* stub, const std::string& session) {
-  grpc::ClientContext context;
-  SetDeadline(&context);
-  AddSessionHeader(session, &context);
-  const auto call = stub->Deform(&context);
+absl::Status DragOnce(v1::DeformService::Stub* stub, SessionRoutes* routes,
+                      const std::string& session) {
   v1::DeformRequest begin;
   begin.mutable_configuration()->set_session(session);
   v1::DeformRequest pose;
@@ -107,12 +107,17 @@ absl::Status DragOnce(v1::DeformService::Stub* stub, const std::string& session)
   *pose.mutable_pose()->add_poses() =
       ToProto(NamedPose{.handle = "far", .pose = {.translation_mm = {0, 0, 1}}});
   bool answered = false;
-  if (call->Write(begin) && call->Write(pose)) {
-    call->WritesDone();
-    v1::DeformResponse response;
-    while (call->Read(&response)) answered = answered || response.has_frame();
-  }
-  const absl::Status end = FromGrpcStatus(call->Finish());
+  const absl::Status end = RunSessionCall(routes, session, CallRepeat::kAlways, Deadline(),
+                                          [&](grpc::ClientContext* context) {
+                                            const auto call = stub->Deform(context);
+                                            if (call->Write(begin) && call->Write(pose)) {
+                                              call->WritesDone();
+                                              v1::DeformResponse response;
+                                              while (call->Read(&response))
+                                                answered = answered || response.has_frame();
+                                            }
+                                            return call->Finish();
+                                          });
   return !end.ok() || answered ? end : absl::InternalError("the drag ended without a frame");
 }
 
@@ -180,16 +185,20 @@ void DoctorCalls::CheckCaller(DoctorReport* report) const {
   report->Add(std::move(line));
 }
 
-void DoctorCalls::CheckServer(DoctorReport* report) const {
+void DoctorCalls::CheckServer(DoctorReport* report) {
   grpc::ClientContext context;
   SetDeadline(&context);
   v1::ServerInfo info;
   const absl::Status status =
       FromGrpcStatus(v1::ServerInfoService::NewStub(channel_)->GetServerInfo(&context, {}, &info));
   if (!status.ok()) return report->Add(FailedCall("version", "", status));
-  DoctorLine version = {.check = "version",
-                        .text = absl::StrCat("server ", info.version(), ", this program ",
-                                             SoftwareVersion(), ", protocol ", info.api_version())};
+  const std::string node = NodeOf(context);
+  routes_.Remember("", node);
+  DoctorLine version = {
+      .check = "version",
+      .text = absl::StrCat(
+          "server ", info.version(), node.empty() ? "" : absl::StrCat(" (", node, " of a cluster)"),
+          ", this program ", SoftwareVersion(), ", protocol ", info.api_version())};
   if (info.version() != SoftwareVersion()) {
     version.finding = Finding::kWarning;
     version.advice = "they understand each other; to have all features install the same version";
@@ -210,7 +219,7 @@ void DoctorCalls::CheckServer(DoctorReport* report) const {
   }
 }
 
-DoctorLine DoctorCalls::CheckWork() const {
+DoctorLine DoctorCalls::CheckWork() {
   constexpr char kCheck[] = "work";
   const Stopwatch watch;
   const absl::StatusOr<TetMesh> tets = TwoTets();
@@ -222,18 +231,21 @@ DoctorLine DoctorCalls::CheckWork() const {
   const auto mesh = SendMesh(meshes.get(), payload, payload.Sha256(), kCallDeadline, upload);
   if (!mesh.ok()) return FailedCall(kCheck, "upload: ", mesh.status());
   v1::Session session;
-  {
-    grpc::ClientContext context;
-    SetDeadline(&context);
-    const absl::Status made = FromGrpcStatus(v1::SessionService::NewStub(channel_)->CreateSession(
-        &context, ToProto(RequestOf(mesh->name())), &session));
-    if (!made.ok()) {
-      Delete(mesh->name(), "");
-      return FailedCall(kCheck, "session: ", made);
-    }
+  v1::CreateSessionRequest request = ToProto(RequestOf(mesh->name()));
+  const auto sessions = v1::SessionService::NewStub(channel_);
+  const absl::Status made =
+      RunSessionCall(&routes_, "", PrepareToRepeat(routes_, &request), Deadline(),
+                     [&](grpc::ClientContext* context) {
+                       grpc::Status status = sessions->CreateSession(context, request, &session);
+                       if (status.ok()) routes_.Remember(session.name(), NodeOf(*context));
+                       return status;
+                     });
+  absl::Status dragged;
+  if (made.ok()) {
+    dragged = DragOnce(v1::DeformService::NewStub(channel_).get(), &routes_, session.name());
   }
-  const absl::Status dragged = DragOnce(v1::DeformService::NewStub(channel_).get(), session.name());
   Delete(mesh->name(), session.name());
+  if (!made.ok()) return FailedCall(kCheck, "session: ", made);
   if (!dragged.ok()) return FailedCall(kCheck, "drag: ", dragged);
   return {
       .check = kCheck,
@@ -241,20 +253,22 @@ DoctorLine DoctorCalls::CheckWork() const {
                               watch.Seconds() * 1e3)};
 }
 
-void DoctorCalls::Delete(const std::string& mesh, const std::string& session) const {
+void DoctorCalls::Delete(const std::string& mesh, const std::string& session) {
   google::protobuf::Empty ignored;
   if (!session.empty()) {
-    grpc::ClientContext context;
-    SetDeadline(&context);
     v1::DeleteSessionRequest request;
     request.set_name(session);
-    v1::SessionService::NewStub(channel_)->DeleteSession(&context, request, &ignored);
+    const auto sessions = v1::SessionService::NewStub(channel_);
+    RunDeletion(&routes_, session, Deadline(), [&](grpc::ClientContext* context) {
+      return sessions->DeleteSession(context, request, &ignored);
+    }).IgnoreError();
   }
-  grpc::ClientContext context;
-  SetDeadline(&context);
   v1::DeleteMeshRequest request;
   request.set_name(mesh);
-  v1::MeshService::NewStub(channel_)->DeleteMesh(&context, request, &ignored);
+  const auto meshes = v1::MeshService::NewStub(channel_);
+  RunDeletion(&routes_, "", Deadline(), [&](grpc::ClientContext* context) {
+    return meshes->DeleteMesh(context, request, &ignored);
+  }).IgnoreError();
 }
 
 }  // namespace tissueform

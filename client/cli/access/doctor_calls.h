@@ -11,6 +11,7 @@
 #include "grpcpp/client_context.h"
 
 #include "client/cli/access/doctor_report.h"
+#include "client/cpp/session_routes.h"
 
 namespace tissueform {
 
@@ -24,15 +25,17 @@ class DoctorCalls {
   // Whom the server takes the caller for, and how far the clocks are apart: two lines.
   void CheckCaller(DoctorReport* report) const;
   // Versions of both sides, and what the server takes: two lines.
-  void CheckServer(DoctorReport* report) const;
-  // A mesh of two tets is uploaded, made a session, dragged, and deleted.
-  DoctorLine CheckWork() const;
+  void CheckServer(DoctorReport* report);
+  // A mesh of two tets is uploaded, made a session, dragged, and deleted; in a cluster (CheckServer
+  // hears of it) at the server that has the session, and again where one is lost meanwhile.
+  DoctorLine CheckWork();
 
  private:
   // Deletes both, whatever there is of them.
-  void Delete(const std::string& mesh, const std::string& session) const;
+  void Delete(const std::string& mesh, const std::string& session);
 
   const std::shared_ptr<grpc::Channel> channel_;
+  SessionRoutes routes_;  // self-synchronised
 };
 
 }  // namespace tissueform

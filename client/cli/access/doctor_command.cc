@@ -76,7 +76,7 @@ DoctorReport AskDoctor(const ServerConnection& server) {
                 .text = std::string(channel.status().message())});
     return report;
   }
-  const DoctorCalls calls(*channel);
+  DoctorCalls calls(*channel);
   report.Add(calls.CheckHealth());
   if (report.last_failed()) return report;
   calls.CheckCaller(&report);
