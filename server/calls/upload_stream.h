@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -19,6 +20,11 @@ namespace tissueform {
 
 // A call that takes something in messages, piece by piece. Deletes itself when gRPC is done with
 // it.
+//
+// A good answer waits for the client to end its stream, or to send nothing for kEndPatience, for
+// kMostEndPatience in all, and what it still sends is dropped: HAProxy resets the stream of a call
+// that is answered before, and clients may lose the answer to that. Errors are not waited with: who
+// is refused is to stop sending, and code and words arrive in the details (docs/scaling.md).
 //
 // One thing at a time is under way: a read, or a job on a worker that takes what was read, checks
 // the whole or ends the call. So no message is read before the one before is written, and no thread
@@ -41,7 +47,13 @@ class UploadStream : public grpc::ServerReadReactor<Request> {
   void OnReadDone(bool ok) override {
     MutexLock lock(mutex_);
     if (state_ == State::kEnded) return;  // the client was silent for too long
-    if (ok) {
+    if (state_ == State::kAnswered) {
+      if (ok && std::chrono::steady_clock::now() < last_end_) {
+        Read();
+      } else {
+        EndWell();
+      }
+    } else if (ok) {
       state_ = State::kWorking;
       pool_->Post(Lane::kStore, [this] { TakeMessage(); });
     } else {
@@ -50,12 +62,13 @@ class UploadStream : public grpc::ServerReadReactor<Request> {
   }
 
   void OnDone() override {
-    DeadlineTimer::Id deadline;
+    std::pair<DeadlineTimer::Id, DeadlineTimer::Id> deadlines;
     {
       MutexLock lock(mutex_);  // whoever called Finish may still hold it
-      deadline = deadline_;
+      deadlines = {deadline_, answer_deadline_};
     }
-    timer_->Cancel(deadline);
+    timer_->Cancel(deadlines.first);
+    timer_->Cancel(deadlines.second);
     delete this;
   }
 
@@ -88,10 +101,11 @@ class UploadStream : public grpc::ServerReadReactor<Request> {
   virtual absl::Status WasSilent() const = 0;
 
  private:
-  enum class State { kReading, kWorking, kEnded };
+  enum class State { kReading, kWorking, kAnswered, kEnded };
+  static constexpr std::chrono::milliseconds kEndPatience{1000};
+  static constexpr std::chrono::milliseconds kMostEndPatience{5000};
 
   void Read() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    state_ = State::kReading;
     last_heard_ = std::chrono::steady_clock::now();
     this->StartRead(&request_);
   }
@@ -107,14 +121,26 @@ class UploadStream : public grpc::ServerReadReactor<Request> {
     if (*after == After::kCheck) {
       pool_->Post(check_lane_, [this] { End(Check()); });
     } else {
+      state_ = State::kReading;
       Read();
     }
   }
   void End(const absl::Status& outcome) ABSL_LOCKS_EXCLUDED(mutex_) {
     Close();
     MutexLock lock(mutex_);
+    if (outcome.ok()) {
+      state_ = State::kAnswered;
+      last_end_ = std::chrono::steady_clock::now() + std::min(silence_, kMostEndPatience);
+      Read();
+      WaitForEnd();
+    } else {
+      state_ = State::kEnded;
+      this->Finish(scope_.End(outcome));
+    }
+  }
+  void EndWell() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     state_ = State::kEnded;
-    this->Finish(scope_.End(outcome));
+    this->Finish(scope_.End(absl::OkStatus()));
   }
   void PostEnd(absl::Status outcome) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     state_ = State::kEnded;
@@ -124,7 +150,7 @@ class UploadStream : public grpc::ServerReadReactor<Request> {
   // On the timer's thread.
   void EndIfSilent() ABSL_LOCKS_EXCLUDED(mutex_) {
     MutexLock lock(mutex_);
-    if (state_ == State::kEnded) return;
+    if (state_ == State::kAnswered || state_ == State::kEnded) return;
     const DeadlineTimer::TimePoint now = std::chrono::steady_clock::now();
     // While a job works the client is not waited for.
     const DeadlineTimer::TimePoint until =
@@ -137,6 +163,22 @@ class UploadStream : public grpc::ServerReadReactor<Request> {
   }
   void WaitForMore(DeadlineTimer::TimePoint until) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     deadline_ = timer_->Start(until, [this] { EndIfSilent(); });
+  }
+
+  void EndIfAtRest() ABSL_LOCKS_EXCLUDED(mutex_) {
+    MutexLock lock(mutex_);
+    if (state_ != State::kAnswered) return;
+    if (std::chrono::steady_clock::now() < RestsAt()) {
+      WaitForEnd();
+    } else {
+      EndWell();
+    }
+  }
+  void WaitForEnd() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    answer_deadline_ = timer_->Start(RestsAt(), [this] { EndIfAtRest(); });
+  }
+  DeadlineTimer::TimePoint RestsAt() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    return last_heard_ + std::min(silence_, kEndPatience);
   }
 
   CallScope scope_;
@@ -152,7 +194,9 @@ class UploadStream : public grpc::ServerReadReactor<Request> {
   Mutex mutex_;
   State state_ ABSL_GUARDED_BY(mutex_) = State::kReading;
   DeadlineTimer::TimePoint last_heard_ ABSL_GUARDED_BY(mutex_);
+  DeadlineTimer::TimePoint last_end_ ABSL_GUARDED_BY(mutex_);
   DeadlineTimer::Id deadline_ ABSL_GUARDED_BY(mutex_);
+  DeadlineTimer::Id answer_deadline_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace tissueform

@@ -36,8 +36,9 @@ struct CaseCall {
   CaseCall(WorkerPool* reactions, CaseService* service) : call(reactions) {
     call.Bind(service->UploadCase(nullptr, &response));
   }
-  // True when the call ends with this code.
+  // True when the call ends with this code; well only once the client has said all.
   bool EndsWith(Code code) {
+    if (code == Code::OK) call.CloseSending();
     const std::optional<grpc::Status> status = call.WaitUntilDone();
     EXPECT_TRUE(status.has_value()) << "it waits for ever";
     if (!status.has_value()) return false;

@@ -29,8 +29,9 @@ struct UploadCall {
     call.Bind(service->UploadMesh(nullptr, &response));
   }
 
-  // True when the call ends with this code.
+  // True when the call ends with this code; well only once the client has said all.
   bool EndsWith(Code code) {
+    if (code == Code::OK) call.CloseSending();
     const std::optional<grpc::Status> status = call.WaitUntilDone();
     EXPECT_TRUE(status.has_value()) << "it waits for ever";
     if (!status.has_value()) return false;
@@ -129,6 +130,45 @@ TEST_F(MeshUploadStreamTest, WhatCameBeforeTheClientLeftIsThere) {
   EXPECT_TRUE(third->response.already_existed());
 }
 
+TEST_F(MeshUploadStreamTest, AGoodAnswerWaitsForTheClientToEndItsStreamAndDropsWhatComes) {
+  ServiceLimits impatient = limits_;
+  impatient.upload_silence = std::chrono::milliseconds(300);
+  MeshService service(&gate_, impatient, &no_logins_.changes, &catalog_, &uploads_, &registry_,
+                      workers_.get(), &timer_);
+  for (const bool known : {false, true}) {
+    const auto begin = std::chrono::steady_clock::now();
+    const std::unique_ptr<UploadCall> open = Begin(&service);
+    open->call.Send(Chunk(0, total_, true));
+    open->call.Send(Chunk(0, total_, true));
+    EXPECT_TRUE(open->call.WaitUntilDone()->ok()) << "though its client never ends it";
+    EXPECT_EQ(open->response.already_existed(), known);
+    EXPECT_GE(std::chrono::steady_clock::now() - begin, impatient.upload_silence);
+  }
+  const std::unique_ptr<UploadCall> ended = Begin(&mesh_service_);
+  ended->call.Send(Chunk(0, total_, true));
+  EXPECT_TRUE(ended->EndsWith(Code::OK));
+  const std::unique_ptr<UploadCall> cancelled = Begin(&mesh_service_);
+  cancelled->call.Cancel();
+  EXPECT_FALSE(cancelled->call.WaitUntilDone()->ok());
+}
+
+TEST_F(MeshUploadStreamTest, AGoodAnswerDoesNotWaitForEverForAClientThatGoesOnSending) {
+  ServiceLimits impatient = limits_;
+  impatient.upload_silence = std::chrono::milliseconds(300);
+  MeshService service(&gate_, impatient, &no_logins_.changes, &catalog_, &uploads_, &registry_,
+                      workers_.get(), &timer_);
+  const std::unique_ptr<UploadCall> endless = Begin(&service);
+  endless->call.Send(Chunk(0, total_, true));
+  auto end = std::async(std::launch::async, [&] { return endless->call.WaitUntilDone(); });
+  while (end.wait_for(std::chrono::milliseconds(10)) != std::future_status::ready) {
+    endless->call.Send(Chunk(0, total_, true));
+  }
+  const std::optional<grpc::Status> status = end.get();
+  ASSERT_TRUE(status.has_value()) << "it waits for ever";
+  EXPECT_TRUE(status->ok()) << status->error_message();
+  EXPECT_FALSE(endless->response.mesh().name().empty());
+}
+
 TEST_F(MeshUploadStreamTest, ASecondCallIsRefusedWhileTheFirstSends) {
   const std::unique_ptr<UploadCall> first = Begin(&mesh_service_);
   first->call.Send(Chunk(0, 1000));
@@ -147,6 +187,7 @@ TEST_F(MeshUploadStreamTest, OfManyCallsAtOnceNoBytesMix) {
     for (int64_t offset = 0; offset < total_; offset += 700) {
       uploads.back()->call.Send(Chunk(offset, 700, offset + 700 >= total_));
     }
+    uploads.back()->call.CloseSending();
   }
   int taken = 0;
   for (const auto& upload : uploads) {
