@@ -4,7 +4,8 @@
 // tissueform-face-positions PLAN MODEL POSES.json OUT
 //
 // Where the surfaces of a plan are that follow its mesh, under other poses than its own, by the
-// prepared answers themselves: what the browser's answer from a file that moves is held against.
+// prepared answers that `tissueform export` puts into a file: what the browser's answer from that
+// file is held against.
 // POSES.json: of every handle ten numbers, rotation vector, pivot, translation, scale. OUT: float32
 // x y z of the vertices of all such surfaces, one after the other.
 
@@ -16,6 +17,7 @@
 #include "nlohmann/json.hpp"
 
 #include "client/cli/cases/packed_case.h"
+#include "client/cli/export/moving_data.h"
 #include "core/base/status_macros.h"
 #include "core/planning/model_names.h"
 #include "core/prepared_answers/create_response.h"
@@ -36,26 +38,30 @@ std::vector<HandlePose> ReadPoses(const std::string& path) {
   return poses;
 }
 
-// Of all vertices of the mesh.
+// Of these vertices of the mesh. Of others the columns would be compressed in another way.
 absl::StatusOr<FloatPositions> Displacements(const PlanProblem& problem, DeformationModel model,
+                                             const std::vector<int32_t>& vertices,
                                              const std::vector<HandlePose>& poses) {
   TF_ASSIGN_OR_RETURN(const auto preparation,
                       MeshPreparation::Create(*problem.mesh, problem.stiffness, problem.constraints,
                                               problem.deformer.preparation));
-  std::vector<int32_t> vertices(static_cast<size_t>(problem.mesh->positions().rows()));
-  for (size_t v = 0; v < vertices.size(); ++v) vertices[v] = static_cast<int32_t>(v);
   TF_ASSIGN_OR_RETURN(const auto response, CreateResponse(preparation, vertices, {.model = model}));
-  FloatPositions positions;
-  response->Evaluate(poses, &positions);
-  return FloatPositions(positions - problem.mesh->positions().cast<float>());
+  FloatPositions moves;
+  response->Evaluate(poses, &moves);
+  for (size_t v = 0; v < vertices.size(); ++v) {
+    moves.row(static_cast<Eigen::Index>(v)) -=
+        problem.mesh->positions().row(vertices[v]).cast<float>();
+  }
+  return moves;
 }
 
 absl::Status WritePositions(const std::string& plan, const std::string& model_name,
                             const std::string& poses, const std::string& out) {
-  TF_ASSIGN_OR_RETURN(const OpenedPlan opened, OpenPlan(plan, {}, ""));
+  TF_ASSIGN_OR_RETURN(OpenedPlan opened, OpenPlan(plan, {}, ""));
   TF_ASSIGN_OR_RETURN(const DeformationModel model, ModelFromName(model_name));
+  const std::vector<int32_t> vertices = FollowedVerticesOf(&opened.contents.surfaces);
   TF_ASSIGN_OR_RETURN(const FloatPositions moves,
-                      Displacements(opened.problem, model, ReadPoses(poses)));
+                      Displacements(opened.problem, model, vertices, ReadPoses(poses)));
   std::ofstream file(out, std::ios::binary);
   for (const CaseSurface& surface : opened.contents.surfaces) {
     if (!surface.follows) continue;

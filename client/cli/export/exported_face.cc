@@ -11,6 +11,7 @@
 #include "absl/strings/str_join.h"
 
 #include "core/answer_evaluator/answer_bytes.h"
+#include "core/answer_evaluator/answer_evaluator.h"
 #include "core/base/software_version.h"
 #include "core/base/status_macros.h"
 #include "core/planning/model_names.h"
@@ -49,8 +50,8 @@ absl::StatusOr<std::vector<bool>> FreeHandles(const std::vector<CaseHandle>& han
   return is_free;
 }
 
-absl::StatusOr<std::string> PrepareAnswers(const PlanProblem& problem, DeformationModel model,
-                                           const std::vector<int32_t>& vertices) {
+absl::StatusOr<PortableAnswers> PrepareAnswers(const PlanProblem& problem, DeformationModel model,
+                                               const std::vector<int32_t>& vertices) {
   TF_ASSIGN_OR_RETURN(const std::shared_ptr<MeshPreparation> preparation,
                       MeshPreparation::Create(*problem.mesh, problem.stiffness, problem.constraints,
                                               problem.deformer.preparation));
@@ -62,7 +63,28 @@ absl::StatusOr<std::string> PrepareAnswers(const PlanProblem& problem, Deformati
                         BandColumns::Create(preparation, *problem.uncertainty, vertices, nullptr));
     band->Describe(&answers);
   }
-  return WriteAnswers(answers);
+  return answers;
+}
+
+std::vector<AnswerPose> PosesOf(const std::vector<CaseHandle>& handles) {
+  std::vector<AnswerPose> poses;
+  for (const CaseHandle& handle : handles) {
+    AnswerPose& pose = poses.emplace_back();
+    std::copy_n(handle.pose.rotation_vector.data(), 3, pose.rotation_vector.begin());
+    std::copy_n(handle.pose.pivot_mm.data(), 3, pose.pivot_mm.begin());
+    std::copy_n(handle.pose.translation_mm.data(), 3, pose.translation_mm.begin());
+    pose.scale = handle.pose.scale;
+  }
+  return poses;
+}
+
+absl::Status BeyondAnswers(DeformationModel model) {
+  const bool is_linear = model == DeformationModel::kLinearElastic;
+  return absl::FailedPreconditionError(absl::StrCat(
+      "the plan moves bone further than the prepared answers of ", ModelName(model),
+      " reach, so that the file would never show it; choose ",
+      ModelName(is_linear ? DeformationModel::kGradientField : DeformationModel::kLinearElastic),
+      " with --model, or smaller moves in the plan"));
 }
 
 }  // namespace
@@ -80,7 +102,10 @@ absl::StatusOr<MovingData> ExportFace(OpenedPlan opened, const ExportedFaceOptio
   data.handles = std::move(contents.handles);
   data.surfaces = std::move(contents.surfaces);
   const std::vector<int32_t> vertices = FollowedVerticesOf(&data.surfaces);
-  TF_ASSIGN_OR_RETURN(data.answers, PrepareAnswers(problem, model, vertices));
+  TF_ASSIGN_OR_RETURN(PortableAnswers answers, PrepareAnswers(problem, model, vertices));
+  const AnswerEvaluator evaluator(std::move(answers));
+  if (!evaluator.Covers(PosesOf(data.handles))) return BeyondAnswers(model);
+  data.answers = WriteAnswers(evaluator.answers());
   return data;
 }
 

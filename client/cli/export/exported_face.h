@@ -24,7 +24,8 @@ struct ExportedFaceOptions {
 // gives ranges of the material. Takes what preparing that model takes.
 //
 // Errors: InvalidArgument (a model or a segment that is none; a model without prepared answers);
-// those of MeshPreparation, CreateResponse and BandColumns.
+// FailedPrecondition (the plan's own poses lie beyond the model's prepared answers); those of
+// MeshPreparation, CreateResponse and BandColumns.
 absl::StatusOr<MovingData> ExportFace(OpenedPlan opened, const ExportedFaceOptions& options);
 
 }  // namespace tissueform

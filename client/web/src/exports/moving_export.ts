@@ -3,11 +3,13 @@
 
 import type { CaseFile } from "../case/case_file";
 import type { HandleEntry } from "../case/manifest";
+import { makeEvaluator } from "../evaluation/evaluator";
 import type { Pose } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
 import { type MovingData, writeMovingData } from "../movingdata/moving_data";
 import { TEMPLATE_FILE, fillTemplate } from "../movingdata/page_template";
 import { seal } from "../movingdata/sealed_payload";
+import { posesOfCase } from "../planning/plan";
 
 export const LEAST_PASSWORD_LETTERS = 8;
 
@@ -44,13 +46,25 @@ function poseEntry(pose: Pose | undefined, handle: HandleEntry): HandleEntry["po
   return { rotationVectorDeg: degrees, pivotMm: pose.pivotMm, translationMm: pose.translationMm, scale: pose.scale };
 }
 
-/** `password`: "" for none. Rejects with an Error where the gateway does not have the page. */
+/** Whether the file will show its own plan, and not for ever the last picture before it. */
+async function showsPlan(data: MovingData): Promise<boolean> {
+  const poses = posesOfCase({ manifest: data });
+  const evaluator = await makeEvaluator(data.answers);
+  return evaluator.evaluate(data.handles.flatMap(({ name }) => poses.get(name) ?? []), false).coverage === "covered";
+}
+
+/** `password`: "" for none. Rejects with an Error where the gateway does not have the page, and where the answers do not reach the plan. */
 export async function movingFile(file: CaseFile, plan: MovingPlan, password: string): Promise<Blob> {
-  if (password !== "" && Array.from(password).length < LEAST_PASSWORD_LETTERS) {
+  if (password !== "" && Array.from(password.normalize("NFC")).length < LEAST_PASSWORD_LETTERS) {
     throw new Error(`a password of the file that moves has at least ${LEAST_PASSWORD_LETTERS} letters: better four words than one`);
+  }
+  const data = movingDataOf(file, plan);
+  if (!(await showsPlan(data))) {
+    const other = plan.model === "linear_elastic" ? "Gradient field" : "Linear elastic";
+    throw new Error(`the plan moves bone further than the prepared answers of this model reach, so that the file would never show it: choose ${other}, or smaller moves`);
   }
   const reply = await fetch(new URL(TEMPLATE_FILE, document.baseURI));
   if (!reply.ok) throw new Error(`the gateway does not have the page of files that move (${TEMPLATE_FILE}): build the planner anew by deploy/build_web.sh`);
   const template = await reply.text();
-  return new Blob([fillTemplate(template, await seal(writeMovingData(movingDataOf(file, plan)), password))], { type: "text/html" });
+  return new Blob([fillTemplate(template, await seal(writeMovingData(data), password))], { type: "text/html" });
 }

@@ -5,6 +5,7 @@ import { afterEach, expect, test, vi } from "vitest";
 import { openCase } from "../../src/case/case_file";
 import { movingDataOf, movingFile } from "../../src/exports/moving_export";
 import { readMovingData, writeMovingData } from "../../src/movingdata/moving_data";
+import { goldenBytes, goldenCases } from "../evaluation/golden_answers";
 import { smallCase, sourceOf } from "../testing/small_case";
 
 const answers = new Uint8Array([1, 2, 3]);
@@ -35,8 +36,24 @@ test("a short password is refused before anything is fetched", async () => {
   expect(fetched).not.toHaveBeenCalled();
 });
 
+const CASES = goldenCases("neo_hookean_third_order");
+const neoHookean = (number: number) => ({
+  poses: new Map([["mandible", CASES[number].poses[0]]]),
+  model: "neo_hookean",
+  answers: goldenBytes("neo_hookean_third_order").slice(),
+});
+
 test("a gateway without the page is said to have none", async () => {
   vi.stubGlobal("document", { baseURI: "http://127.0.0.1/" });
   vi.stubGlobal("fetch", async () => new Response("", { status: 404 }));
-  await expect(movingFile(await file(), plan, "")).rejects.toThrow("moving-file.html");
+  await expect(movingFile(await file(), neoHookean(1), "")).rejects.toThrow("moving-file.html");
+});
+
+test("a plan that the answers do not reach is refused in a sentence that names another model", async () => {
+  const fetched = vi.fn();
+  vi.stubGlobal("fetch", fetched);
+  expect([CASES[1].isCovered, CASES[7].isCovered]).toEqual([true, false]);
+  await expect(movingFile(await file(), neoHookean(7), "")).rejects.toThrow(/would never show it: choose Linear elastic/);
+  await expect(movingFile(await file(), { ...neoHookean(7), model: "linear_elastic" }, "")).rejects.toThrow("choose Gradient field");
+  expect(fetched).not.toHaveBeenCalled();
 });
