@@ -3,20 +3,21 @@
 
 #include "client/pacs_bridge/network/dicom_web_client.h"
 
-#include <cstdlib>
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <utility>
 
 #include "absl/strings/ascii.h"
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 #include <nlohmann/json.hpp>
 
 #include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "client/pacs_bridge/network/coming_objects.h"
+#include "client/pacs_bridge/network/dicom_web_answers.h"
 #include "client/pacs_bridge/network/http_exchange.h"
 #include "client/pacs_bridge/network/one_header.h"
 #include "core/base/certificates.h"
@@ -29,39 +30,8 @@ using Json = nlohmann::json;
 
 constexpr size_t kMostJsonBytes = 32 << 20;
 constexpr int64_t kMostSentBytes = int64_t{1} << 30;
-
-// The first value of an attribute of DICOM's JSON (PS3.18 F), as text; empty: none.
-std::string ValueOf(const Json& object, const char* tag) {
-  if (!object.is_object() || !object.contains(tag) || !object[tag].is_object()) return {};
-  const Json& attribute = object[tag];
-  if (!attribute.contains("Value") || !attribute["Value"].is_array() ||
-      attribute["Value"].empty()) {
-    return {};
-  }
-  const Json& value = attribute["Value"][0];
-  if (value.is_string()) return value.get<std::string>();
-  if (value.is_number_integer()) return absl::StrCat(value.get<int64_t>());
-  if (value.is_number()) return absl::StrCat(static_cast<int64_t>(value.get<double>()));
-  return {};
-}
-
-int NumberIn(const Json& object, const char* tag) {
-  const std::string text = ValueOf(object, tag);
-  return text.empty() ? 0 : std::atoi(text.c_str());
-}
-
-SeriesSummary SummaryFrom(const Json& object) {
-  SeriesSummary summary;
-  summary.study_uid = ValueOf(object, "0020000D");
-  summary.series_uid = ValueOf(object, "0020000E");
-  summary.modality = ValueOf(object, "00080060");
-  summary.description = ValueOf(object, "0008103E");
-  summary.study_date = ValueOf(object, "00080020");
-  summary.patient_id = ValueOf(object, "00100020");
-  summary.number = NumberIn(object, "00200011");
-  summary.instances = NumberIn(object, "00201209");
-  return summary;
-}
+// Answers of STOW-RS that say what became of the object.
+constexpr std::array<int, 3> kStowAnswers = {200, 202, 409};
 
 class DicomWebClient : public PacsClient {
  public:
@@ -84,7 +54,7 @@ class DicomWebClient : public PacsClient {
                                              "/series?includefield=0008103E&includefield=00080020"
                                              "&includefield=00100020&includefield=00201209")));
       for (const Json& object : answer) {
-        series.push_back(SummaryFrom(object));
+        series.push_back(SeriesSummaryFrom(object));
         if (series.back().study_uid.empty()) series.back().study_uid = study;
       }
     }
@@ -105,7 +75,7 @@ class DicomWebClient : public PacsClient {
     const std::string instances =
         absl::StrCat("/studies/", study_uid, "/series/", series_uid, "/instances");
     TF_ASSIGN_OR_RETURN(const Json answer, Query(absl::StrCat(instances, "?limit=1")));
-    const std::string instance = answer.empty() ? "" : ValueOf(answer[0], "00080018");
+    const std::string instance = answer.empty() ? "" : JsonValueOf(answer[0], "00080018");
     if (!IsDicomUid(instance)) return Missing("series");
     return KeepOneHeader(path, [&](const InstanceFolder& folder, InstanceSink* sink) {
       return Retrieve(absl::StrCat(instances, "/", instance), folder, sink).status();
@@ -120,18 +90,19 @@ class DicomWebClient : public PacsClient {
     if (absl::IsNotFound(answer.status())) return false;
     if (!answer.ok()) return answer.status();
     for (const Json& object : *answer) {
-      if (ValueOf(object, "00080018") == instance_uid) return true;
+      if (JsonValueOf(object, "00080018") == instance_uid) return true;
     }
     return false;
   }
 
   absl::StatusOr<std::vector<StoredObject>> Store(absl::Span<const std::string> paths) override {
     std::vector<StoredObject> stored;
+    std::vector<InstanceHeader> headers;
     for (const std::string& path : paths) {
-      TF_ASSIGN_OR_RETURN(const InstanceHeader header, ReadInstanceHeader(path));
-      stored.push_back({path, header.instance_uid});
+      TF_ASSIGN_OR_RETURN(headers.emplace_back(), ReadInstanceHeader(path));
+      stored.push_back({path, headers.back().instance_uid});
     }
-    for (StoredObject& object : stored) object.status = StoreOne(object);
+    for (size_t i = 0; i < stored.size(); ++i) stored[i].status = StoreOne(paths[i], headers[i]);
     return stored;
   }
 
@@ -176,7 +147,7 @@ class DicomWebClient : public PacsClient {
     TF_ASSIGN_OR_RETURN(const Json answer,
                         Query(absl::StrCat("/studies?AccessionNumber=", accession_number)));
     std::vector<std::string> studies;
-    for (const Json& object : answer) studies.push_back(ValueOf(object, "0020000D"));
+    for (const Json& object : answer) studies.push_back(JsonValueOf(object, "0020000D"));
     return studies;
   }
 
@@ -197,18 +168,18 @@ class DicomWebClient : public PacsClient {
     return objects.Finish();
   }
 
-  absl::Status StoreOne(const StoredObject& object) {
+  absl::Status StoreOne(const std::string& path, const InstanceHeader& header) {
     std::error_code error;
-    if (std::filesystem::file_size(object.path, error) > kMostSentBytes || error) {
-      return absl::InvalidArgumentError(absl::StrCat(object.path, ": too large to be sent"));
+    if (std::filesystem::file_size(path, error) > kMostSentBytes || error) {
+      return absl::InvalidArgumentError(absl::StrCat(path, ": too large to be sent"));
     }
-    std::ifstream file(object.path, std::ios::binary);
+    std::ifstream file(path, std::ios::binary);
     const std::string boundary = absl::StrCat("tissueform-", NewDicomUid());
     std::string body = absl::StrCat("--", boundary, "\r\nContent-Type: application/dicom\r\n\r\n");
     body.append(std::istreambuf_iterator<char>(file), {});
     absl::StrAppend(&body, "\r\n--", boundary, "--\r\n");
     std::string text;
-    TF_ASSIGN_OR_RETURN(const PacsHttpAnswer answer,
+    TF_ASSIGN_OR_RETURN(PacsHttpAnswer answer,
                         Exchange(peer_,
                                  {.path = "/studies",
                                   .headers = {absl::StrCat("Content-Type: multipart/related; "
@@ -221,15 +192,27 @@ class DicomWebClient : public PacsClient {
                                      text.append(piece.data(), piece.size());
                                    return absl::OkStatus();
                                  }));
-    if (answer.status != 200) return HttpFailed(answer, "an object (STOW-RS)");
-    // Stored only where it is listed: 00081199 ReferencedSOPSequence.
-    if (absl::StrContains(text, object.instance_uid)) {
-      const Json parsed = Json::parse(text, nullptr, false);
-      if (parsed.is_object() && parsed.contains("00081199")) return absl::OkStatus();
+    if (std::find(kStowAnswers.begin(), kStowAnswers.end(), answer.status) == kStowAnswers.end()) {
+      return HttpFailed(answer, "an object (STOW-RS)");
     }
-    return absl::FailedPreconditionError(absl::StrCat("the PACS '", peer_.name,
-                                                      "' does not say that it has the object ",
-                                                      object.instance_uid, ": see its log"));
+    if (text.empty()) text = std::move(answer.body);
+    return Confirmed(StatusOfStow(peer_.name, text, header.instance_uid, answer.status), header);
+  }
+
+  // Answers of STOW-RS differ from PACS to PACS, and our copy is deleted by what they say: so what
+  // the PACS finds when it is asked counts, where it answers queries.
+  absl::Status Confirmed(const absl::Status& told, const InstanceHeader& header) {
+    const absl::StatusOr<bool> there =
+        Has(header.study_uid, header.series_uid, header.instance_uid);
+    if (absl::IsUnimplemented(there.status()) || absl::IsFailedPrecondition(there.status())) {
+      return told;
+    }
+    if (!there.ok()) return told.ok() ? there.status() : told;
+    if (*there) return absl::OkStatus();
+    if (!told.ok()) return told;
+    return absl::UnavailableError(
+        absl::StrCat("the PACS '", peer_.name, "' says that it has the object ",
+                     header.instance_uid, " and does not find it: tried again"));
   }
 
   absl::Status HttpFailed(const PacsHttpAnswer& answer, absl::string_view what) const {

@@ -187,6 +187,7 @@ class PacsClientTest : public ::testing::TestWithParam<PeerKind> {
 // A header comes by C-GET, not by C-MOVE.
 class PacsHeaderTest : public PacsClientTest {};
 class TlsPacsClientTest : public PacsClientTest {};
+class WebPacsClientTest : public PacsClientTest {};
 
 TEST_P(PacsClientTest, WhatIsStoredIsFoundAndComesBackToTheLastBit) {
   EXPECT_THAT(client_->Echo(), IsOk());
@@ -270,6 +271,27 @@ TEST_P(TlsPacsClientTest, WithoutACertificateOfTheAuthorityNobodyIsServed) {
               StatusIs(absl::StatusCode::kUnauthenticated, HasSubstr("'orthanc'")));
 }
 
+TEST_P(WebPacsClientTest, WhatItsDiskDoesNotTakeIsNotStored) {
+  const CtSeries series = WriteCtSeries(home_ / "sent", {.slices = 1});
+  // Files where Orthanc wants to have folders: it answers 200 although it keeps nothing.
+  std::vector<fs::path> in_the_way;
+  for (int i = 0; i < 256; ++i) {
+    in_the_way.push_back(home_ / "store" / absl::StrCat(absl::Hex(i, absl::kZeroPad2)));
+    WriteTestFile(in_the_way.back(), "");
+  }
+  const auto refused = client_->Store(series.files);
+  ASSERT_THAT(refused.status(), IsOk());
+  EXPECT_THAT((*refused)[0].status,
+              StatusIs(absl::StatusCode::kUnavailable, HasSubstr(series.instance_uids[0])));
+  for (const fs::path& file : in_the_way) fs::remove(file);
+  const auto stored = client_->Store(series.files);
+  ASSERT_THAT(stored.status(), IsOk());
+  EXPECT_THAT((*stored)[0].status, IsOk());
+  const auto again = client_->Store(series.files);
+  ASSERT_THAT(again.status(), IsOk());
+  EXPECT_THAT((*again)[0].status, IsOk()) << "it has it already";
+}
+
 TEST_P(PacsClientTest, APacsThatHasGoneIsUnavailable) {
   haproxy_.reset();
   orthanc_.reset();
@@ -296,6 +318,7 @@ INSTANTIATE_TEST_SUITE_P(All, PacsClientTest,
 INSTANTIATE_TEST_SUITE_P(All, PacsHeaderTest, ::testing::Values(kGet, kWeb, kGetTls, kWebTls),
                          NameOfKind);
 INSTANTIATE_TEST_SUITE_P(All, TlsPacsClientTest, ::testing::Values(kGetTls, kWebTls), NameOfKind);
+INSTANTIATE_TEST_SUITE_P(All, WebPacsClientTest, ::testing::Values(kWeb), NameOfKind);
 
 TEST(PacsClient, WrongTitlesAreToldApart) {
   RecordingSink sink;
