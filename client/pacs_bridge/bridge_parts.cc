@@ -26,17 +26,6 @@ PacsPeer PeerOf(const BridgeOptions& options) {
   return peer;
 }
 
-// What the PACS says that a series has.
-absl::StatusOr<int64_t> CountImages(PacsClient* pacs, const std::string& study_uid,
-                                    const std::string& series_uid) {
-  TF_ASSIGN_OR_RETURN(const std::vector<SeriesSummary> study,
-                      pacs->FindSeries({.study_uid = study_uid}));
-  for (const SeriesSummary& series : study) {
-    if (series.series_uid == series_uid) return series.instances;
-  }
-  return absl::NotFoundError("the PACS has no such series");
-}
-
 }  // namespace
 
 ReceiverOptions ReceiverOptionsOf(const BridgeOptions& options) {
@@ -70,8 +59,8 @@ absl::StatusOr<std::unique_ptr<BridgeParts>> BridgeParts::Open(const BridgeOptio
     TF_ASSIGN_OR_RETURN(intake.rules, RulesOf(options));
   }
   if (PacsClient* const pacs = parts->counting_pacs_.get()) {
-    intake.count_images = [pacs](const std::string& study, const std::string& series) {
-      return CountImages(pacs, study, series);
+    intake.find_series = [pacs](const std::string& study) {
+      return pacs->FindSeries({.study_uid = study});
     };
   }
   parts->intake_ = std::make_unique<SeriesIntake>(parts->queue_.get(), std::move(intake));

@@ -43,6 +43,9 @@ constexpr char kQueueTables[] =
     "uid TEXT NOT NULL UNIQUE, file TEXT NOT NULL, sent INTEGER NOT NULL, "
     "PRIMARY KEY (export, key)) STRICT;";
 
+// What came later than the first queues of this version, whose programs pass over it.
+constexpr char kLaterTables[] = "CREATE INDEX IF NOT EXISTS series_by_state ON series(state);";
+
 absl::StatusOr<int64_t> PragmaOf(Database& database, const char* sql) {
   Database::Query query = database.Prepare(sql);
   TF_ASSIGN_OR_RETURN(const bool row, query.Step());
@@ -88,8 +91,12 @@ absl::StatusOr<std::unique_ptr<BridgeQueue>> BridgeQueue::OpenForReading(
 absl::Status BridgeQueue::PrepareTables() {
   return Change([](Database& database) -> absl::Status {
     TF_ASSIGN_OR_RETURN(const int64_t version, PragmaOf(database, "PRAGMA user_version"));
-    if (version != 0) return CheckVersion(database, version);
+    if (version != 0) {
+      TF_RETURN_IF_ERROR(CheckVersion(database, version));
+      return database.Execute(kLaterTables);
+    }
     TF_RETURN_IF_ERROR(database.Execute(kQueueTables));
+    TF_RETURN_IF_ERROR(database.Execute(kLaterTables));
     return database.Execute(absl::StrCat("PRAGMA application_id=", kQueueApplicationId,
                                          ";PRAGMA user_version=", kQueueVersion));
   });

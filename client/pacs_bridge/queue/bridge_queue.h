@@ -44,6 +44,7 @@ class BridgeQueue {
 
   std::string received_folder() const { return path_ + "/received"; }
   std::string plan_folder(const std::string& series) const { return path_ + "/plans/" + series; }
+  std::string plan_path(const std::string& series) const { return plan_folder(series) + "/plan"; }
   std::string header_path(const std::string& series) const {
     return path_ + "/headers/" + series + ".dcm";
   }

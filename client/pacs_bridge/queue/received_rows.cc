@@ -12,10 +12,14 @@
 namespace tissueform {
 namespace {
 
-#define TF_SERIES_COLUMNS                                                                         \
+#define TF_IMAGE_COUNT "(SELECT COUNT(*) FROM images WHERE images.series = series.key)"
+#define TF_SERIES_FIELDS                                                                          \
   "SELECT key, study_uid, uid, frame_uid, modality, state, reason, recipe, case_name, attempts, " \
-  "last_error, first_s, done_s, has_files, has_header, (SELECT COUNT(*) FROM images WHERE "       \
-  "images.series = series.key) FROM series "
+  "last_error, first_s, done_s, has_files, has_header, "
+#define TF_SERIES_COLUMNS TF_SERIES_FIELDS TF_IMAGE_COUNT " FROM series "
+
+// States of a series of which nothing was made yet: more images may change what is.
+#define TF_NOT_BUILT "('incomplete', 'complete', 'passed_over', 'chosen')"
 
 absl::Status InsertStudy(Database& database, const QueuedStudy& study) {
   return database.Prepare("INSERT OR IGNORE INTO studies VALUES (?, ?, ?, ?, ?, ?, ?, ?)")
@@ -76,6 +80,8 @@ constexpr char kByKey[] = TF_SERIES_COLUMNS "WHERE key = ?";
 constexpr char kByUid[] = TF_SERIES_COLUMNS "WHERE uid = ?";
 constexpr char kByCase[] = TF_SERIES_COLUMNS "WHERE case_name = ? AND case_name <> '' LIMIT 1";
 constexpr char kOfStudy[] = TF_SERIES_COLUMNS "WHERE study_uid = ? ORDER BY first_s, key";
+// Counting images takes as long as there are images.
+constexpr char kOfState[] = TF_SERIES_FIELDS "0 FROM series WHERE state = ? ORDER BY first_s, key";
 constexpr char kAll[] = TF_SERIES_COLUMNS "WHERE ? = '' ORDER BY first_s, key";
 
 }  // namespace
@@ -101,10 +107,9 @@ absl::StatusOr<QueuedSeries> ReceivedRows::Add(const QueuedStudy& study, const Q
     if (any_new) {
       TF_RETURN_IF_ERROR(
           database
-              .Prepare(
-                  "UPDATE series SET has_files = 1, done_s = CASE WHEN state IN "
-                  "('incomplete', 'complete') THEN 0 ELSE done_s END, state = CASE WHEN state "
-                  "IN ('incomplete', 'complete') THEN 'receiving' ELSE state END WHERE key = ?")
+              .Prepare("UPDATE series SET has_files = 1, done_s = CASE WHEN state IN " TF_NOT_BUILT
+                       " THEN 0 ELSE done_s END, state = CASE WHEN state IN " TF_NOT_BUILT
+                       " THEN 'receiving' ELSE state END WHERE key = ?")
               .Bind(found->key)
               .Run());
     }
@@ -137,6 +142,46 @@ absl::Status ReceivedRows::Update(const QueuedSeries& series) {
     if (database.total_changes() > before) return absl::OkStatus();
     return absl::NotFoundError(absl::StrCat("no series ", series.key, " in the queue"));
   });
+}
+
+absl::Status ReceivedRows::UpdateStep(const QueuedSeries& series, SeriesState before) {
+  return queue_->Change([&](Database& database) -> absl::Status {
+    const int64_t changes = database.total_changes();
+    TF_RETURN_IF_ERROR(
+        database
+            .Prepare("UPDATE series SET state = ?, case_name = ?, attempts = ?, last_error = ?, "
+                     "done_s = ? WHERE key = ? AND state = ? AND (state <> 'chosen' "
+                     "OR " TF_IMAGE_COUNT " = ?)")
+            .Bind(SeriesStateName(series.state))
+            .Bind(series.case_name)
+            .Bind(series.attempts)
+            .Bind(series.last_error)
+            .Bind(series.done_s)
+            .Bind(series.key)
+            .Bind(SeriesStateName(before))
+            .Bind(series.images)
+            .Run());
+    if (database.total_changes() > changes) return absl::OkStatus();
+    return absl::AbortedError("more images have come meanwhile");
+  });
+}
+
+absl::StatusOr<bool> ReceivedRows::Remark(const std::string& key, const std::string& remark) {
+  bool is_new = false;
+  const absl::Status done = queue_->Change([&](Database& database) -> absl::Status {
+    const int64_t changes = database.total_changes();
+    TF_RETURN_IF_ERROR(
+        database
+            .Prepare("UPDATE series SET reason = CASE WHEN reason = '' THEN ?1 ELSE reason || '; ' "
+                     "|| ?1 END WHERE key = ?2 AND instr(reason, ?1) = 0")
+            .Bind(remark)
+            .Bind(key)
+            .Run());
+    is_new = database.total_changes() > changes;
+    return absl::OkStatus();
+  });
+  TF_RETURN_IF_ERROR(done);
+  return is_new;
 }
 
 absl::Status ReceivedRows::UpdatePatient(const std::string& study_uid,
@@ -196,6 +241,10 @@ absl::StatusOr<QueuedSeries> ReceivedRows::GetByCase(const std::string& case_nam
 }
 
 absl::StatusOr<std::vector<QueuedSeries>> ReceivedRows::List() { return Select(kAll, ""); }
+
+absl::StatusOr<std::vector<QueuedSeries>> ReceivedRows::ListOfState(SeriesState state) {
+  return Select(kOfState, SeriesStateName(state));
+}
 
 absl::StatusOr<std::vector<QueuedSeries>> ReceivedRows::ListStudy(const std::string& study_uid) {
   return Select(kOfStudy, study_uid);

@@ -20,8 +20,9 @@ class ReceivedRows {
   explicit ReceivedRows(BridgeQueue* queue) : queue_(queue) {}
 
   // Puts images of one series there, and the series and its study where they are new: then `series`
-  // gets `new_key` as its key. An image that is there stays. The state goes back to kReceiving
-  // where the series was incomplete. Returns the series as it is now.
+  // gets `new_key` as its key. An image that is there stays. Something new makes a series
+  // kReceiving again of which nothing is built: what was decided was decided of a part. Returns the
+  // series as it is now.
   //
   // Errors: FailedPrecondition: the series is known as one of another study.
   absl::StatusOr<QueuedSeries> Add(const QueuedStudy& study, const QueuedSeries& series,
@@ -30,6 +31,12 @@ class ReceivedRows {
 
   // Writes all of the series but its key and UIDs. Errors: NotFound.
   absl::Status Update(const QueuedSeries& series);
+  // Writes what a step of work changes (state, case, attempts, last error, done) where the series
+  // still is in the state `before`, and, where it was chosen, has as many images as `series`.
+  // Errors: Aborted: it is not; nothing is written.
+  absl::Status UpdateStep(const QueuedSeries& series, SeriesState before);
+  // Adds to the reason, once. Returns whether it was not there.
+  absl::StatusOr<bool> Remark(const std::string& key, const std::string& remark);
   absl::Status UpdatePatient(const std::string& study_uid, const PatientIdentity& patient);
 
   absl::StatusOr<QueuedSeries> Get(const std::string& key);  // NotFound
@@ -37,6 +44,8 @@ class ReceivedRows {
   // Of which series a case was made; NotFound: none of this bridge.
   absl::StatusOr<QueuedSeries> GetByCase(const std::string& case_name);
   absl::StatusOr<std::vector<QueuedSeries>> List();
+  // Without their number of images, as often as one likes.
+  absl::StatusOr<std::vector<QueuedSeries>> ListOfState(SeriesState state);
   absl::StatusOr<std::vector<QueuedSeries>> ListStudy(const std::string& study_uid);
   absl::StatusOr<QueuedStudy> GetStudy(const std::string& uid);
   absl::StatusOr<std::vector<QueuedImage>> ListImages(const std::string& series);

@@ -114,13 +114,20 @@ absl::Status PlanWork::Step(QueuedSeries* series) {
     }
   }
   TF_FAULT_POINT("plan.stepped");
-  TF_RETURN_IF_ERROR(rows_.Update(*series));
+  const absl::Status kept = rows_.UpdateStep(*series, before);
+  if (absl::IsAborted(kept)) {
+    // The plan lacks what has come while it was built.
+    std::error_code ignored;
+    fs::remove_all(queue_->plan_path(series->key), ignored);
+    TF_ASSIGN_OR_RETURN(*series, rows_.Get(series->key));
+  }
+  TF_RETURN_IF_ERROR(kept);
   return status;
 }
 
 absl::Status PlanWork::Build(QueuedSeries* series) {
   const std::string folder = queue_->plan_folder(series->key);
-  const std::string plan = folder + "/plan";
+  const std::string plan = queue_->plan_path(series->key);
   TF_RETURN_IF_ERROR(MakeFolder(folder));
   std::error_code ignored;
   if (!fs::exists(plan + "/plan.json", ignored)) {

@@ -46,10 +46,12 @@ class PlanWork {
   PlanWork(BridgeQueue* queue, CaseServer* server, PlanWorkOptions options)
       : queue_(queue), rows_(queue), server_(server), options_(std::move(options)) {}
 
-  // The next step of `series`, whose new state is written to the queue and into it. An error that
-  // is no transient one makes the series kFailed, with the reason; the others count an attempt.
+  // The next step of `series`, which was read from the queue, and whose new state is written there
+  // and into it. An error that is no transient one makes the series kFailed, with the reason; the
+  // others count an attempt.
   //
-  // Errors: those of the step, for whoever tells them; they hold nothing of a patient.
+  // Errors: those of the step, for whoever tells them; they hold nothing of a patient. Aborted:
+  // more images have come while the plan was built: it is thrown away, and `series` is read anew.
   absl::Status Step(QueuedSeries* series);
 
  private:

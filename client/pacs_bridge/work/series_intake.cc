@@ -14,6 +14,7 @@
 
 #include "client/pacs_bridge/dicom/dicom_file.h"
 #include "core/base/status_macros.h"
+#include "server/store/durable_file.h"
 #include "server/store/fault_points.h"
 
 namespace tissueform {
@@ -29,10 +30,16 @@ bool IsModality(const std::string& text) {
          });
 }
 
-bool HasPlan(SeriesState state) {
-  return state == SeriesState::kChosen || state == SeriesState::kBuilt ||
-         state == SeriesState::kPacked || state == SeriesState::kPublished;
+constexpr char kCameLate[] = "images came after its plan was built, which lacks them";
+constexpr char kOfAnotherStudy[] =
+    "images of the same series name another study, too; look at what sends them";
+
+bool IsBuilt(SeriesState state) {
+  return state == SeriesState::kBuilt || state == SeriesState::kPacked ||
+         state == SeriesState::kPublished;
 }
+
+bool HasPlan(SeriesState state) { return state == SeriesState::kChosen || IsBuilt(state); }
 
 }  // namespace
 
@@ -43,6 +50,7 @@ void SeriesIntake::Arrived(const std::string& file, const InstanceHeader& image)
   MutexLock lock(mutex_);
   arrivals_.push_back({file, image});
   progress_[image.series_uid] = {.last = options_.now()};
+  studies_[image.study_uid] = {.last = options_.now()};
 }
 
 void SeriesIntake::Ended(const std::vector<std::string>& series_uids, bool released) {
@@ -77,7 +85,14 @@ absl::Status SeriesIntake::Recover() {
   return absl::OkStatus();
 }
 
-absl::Status SeriesIntake::PutSeries(const std::vector<const Arrival*>& arrivals) {
+absl::StatusOr<std::vector<std::string>> SeriesIntake::RemarkOn(const QueuedSeries& series,
+                                                                const std::string& remark) {
+  TF_ASSIGN_OR_RETURN(const bool is_new, rows_.Remark(series.key, remark));
+  return is_new ? std::vector<std::string>{series.key} : std::vector<std::string>();
+}
+
+absl::StatusOr<std::vector<std::string>> SeriesIntake::PutSeries(
+    const std::vector<const Arrival*>& arrivals) {
   const InstanceHeader& first = arrivals.front()->image;
   const QueuedStudy study = {.uid = first.study_uid,
                              .patient = IdentityOf(first),
@@ -98,18 +113,35 @@ absl::Status SeriesIntake::PutSeries(const std::vector<const Arrival*>& arrivals
                       .class_uid = arrival->image.class_uid,
                       .file = arrival->file});
   }
+  const absl::StatusOr<QueuedSeries> before = rows_.GetByUid(series.uid);
+  if (!before.ok() && !absl::IsNotFound(before.status())) return before.status();
   const absl::StatusOr<QueuedSeries> kept = rows_.Add(study, series, NewQueueKey(), images);
   // Of two studies at once: it stays on the disk, and nothing is made of it.
-  if (absl::IsFailedPrecondition(kept.status())) return absl::OkStatus();
+  if (absl::IsFailedPrecondition(kept.status()) && before.ok()) {
+    if (HasPlan(before->state)) return RemarkOn(*before, kOfAnotherStudy);
+    TF_RETURN_IF_ERROR(Write(*before, SeriesState::kFailed, kOfAnotherStudy));
+    return std::vector<std::string>{before->key};
+  }
   TF_RETURN_IF_ERROR(kept.status());
+  if (kept->state != SeriesState::kReceiving) {  // images that came again, or late
+    MutexLock lock(mutex_);
+    progress_.erase(kept->uid);
+  }
   TF_ASSIGN_OR_RETURN(const QueuedStudy known, rows_.GetStudy(study.uid));
-  if (one_patient && known.patient == study.patient) return absl::OkStatus();
-  if (HasPlan(kept->state)) return absl::OkStatus();
-  return Write(*kept, SeriesState::kFailed,
-               "its images say different things of their patient; look at what sends them");
+  const bool same_patient = one_patient && known.patient == study.patient;
+  if (!same_patient && !HasPlan(kept->state)) {
+    TF_RETURN_IF_ERROR(
+        Write(*kept, SeriesState::kFailed,
+              "its images say different things of their patient; look at what sends them"));
+    return std::vector<std::string>{kept->key};
+  }
+  if (IsBuilt(kept->state) && before.ok() && kept->images > before->images) {
+    return RemarkOn(*kept, kCameLate);
+  }
+  return std::vector<std::string>();
 }
 
-absl::StatusOr<std::set<std::string>> SeriesIntake::Flush() {
+absl::StatusOr<std::vector<std::string>> SeriesIntake::Flush() {
   std::vector<Arrival> arrivals;
   {
     MutexLock lock(mutex_);
@@ -117,18 +149,28 @@ absl::StatusOr<std::set<std::string>> SeriesIntake::Flush() {
   }
   std::map<std::string, std::vector<const Arrival*>> by_series;
   for (const Arrival& arrival : arrivals) by_series[arrival.image.series_uid].push_back(&arrival);
-  std::set<std::string> touched;
+  std::vector<std::string> changed;
   for (const auto& [uid, of_series] : by_series) {
-    if (const absl::Status status = PutSeries(of_series); !status.ok()) {
+    const absl::StatusOr<std::vector<std::string>> keys = PutSeries(of_series);
+    if (!keys.ok()) {
       // What was put there already is known by its UID the next time.
       MutexLock lock(mutex_);
       arrivals_.insert(arrivals_.begin(), arrivals.begin(), arrivals.end());
-      return status;
+      return keys.status();
     }
-    touched.insert(uid);
+    changed.insert(changed.end(), keys->begin(), keys->end());
   }
   TF_FAULT_POINT("intake.flushed");
-  return touched;
+  return changed;
+}
+
+const std::vector<SeriesSummary>* SeriesIntake::AskPacs(const std::string& study_uid) {
+  if (!options_.find_series) return nullptr;
+  auto found = told_.find(study_uid);
+  if (found == told_.end()) {
+    found = told_.emplace(study_uid, options_.find_series(study_uid)).first;
+  }
+  return found->second.ok() ? &*found->second : nullptr;
 }
 
 absl::StatusOr<std::optional<SeriesState>> SeriesIntake::Judge(const QueuedSeries& series) {
@@ -140,52 +182,93 @@ absl::StatusOr<std::optional<SeriesState>> SeriesIntake::Judge(const QueuedSerie
   const bool quiet = options_.now() - progress.last >= options_.quiet;
   if (!quiet && (!progress.ended || progress.aborted || progress.asked)) return std::nullopt;
   std::optional<int64_t> expected;
-  if (options_.count_images) {
-    const absl::StatusOr<int64_t> count = options_.count_images(series.study_uid, series.uid);
-    if (count.ok() && *count > 0) expected = *count;
+  if (const std::vector<SeriesSummary>* const study = AskPacs(series.study_uid)) {
+    for (const SeriesSummary& told : *study) {
+      if (told.series_uid == series.uid && told.instances > 0) expected = told.instances;
+    }
+  }
+  {
     MutexLock lock(mutex_);
     progress_[series.uid].asked = true;
   }
-  if (expected.has_value() && series.images >= *expected) return SeriesState::kComplete;
+  TF_ASSIGN_OR_RETURN(const QueuedSeries counted, rows_.Get(series.key));
+  if (expected.has_value() && counted.images >= *expected) return SeriesState::kComplete;
   if (!quiet) return std::nullopt;
   if (expected.has_value() || progress.aborted) return SeriesState::kIncomplete;
   TF_ASSIGN_OR_RETURN(const SeriesFacts facts, FactsOf(series));
   return facts.missing > 0 ? SeriesState::kIncomplete : SeriesState::kComplete;
 }
 
+bool SeriesIntake::MayBeChosen(const SeriesSummary& series) const {
+  return series.modality.empty() || std::any_of(options_.rules.begin(), options_.rules.end(),
+                                                [&series](const SeriesRule& rule) {
+                                                  return rule.modality == series.modality;
+                                                });
+}
+
+absl::StatusOr<bool> SeriesIntake::IsAllThere(const std::string& study_uid) {
+  StudyProgress progress;
+  {
+    MutexLock lock(mutex_);
+    StudyProgress& kept =
+        studies_.try_emplace(study_uid, StudyProgress{.last = options_.now()}).first->second;
+    progress = std::exchange(kept, {.last = kept.last, .asked = true});
+  }
+  if (options_.now() - progress.last >= options_.quiet) return true;
+  if (progress.asked) return false;
+  const std::vector<SeriesSummary>* const told = AskPacs(study_uid);
+  if (told == nullptr) return false;
+  TF_ASSIGN_OR_RETURN(const std::vector<QueuedSeries> known, rows_.ListStudy(study_uid));
+  std::map<std::string, int64_t> images;
+  for (const QueuedSeries& series : known) images[series.uid] = series.images;
+  return std::all_of(told->begin(), told->end(), [&](const SeriesSummary& series) {
+    const auto found = images.find(series.series_uid);
+    return !MayBeChosen(series) || (found != images.end() && found->second >= series.instances);
+  });
+}
+
+void SeriesIntake::ForgetOldStudies(const std::set<std::string>& waiting) {
+  MutexLock lock(mutex_);
+  std::erase_if(studies_, [&](const auto& study) {
+    return !waiting.contains(study.first) && options_.now() - study.second.last >= options_.quiet;
+  });
+}
+
 absl::StatusOr<std::vector<std::string>> SeriesIntake::Settle() {
-  TF_RETURN_IF_ERROR(Flush().status());
-  TF_ASSIGN_OR_RETURN(const std::vector<QueuedSeries> all, rows_.List());
-  std::vector<std::string> changed;
-  std::set<std::string> studies;
+  told_.clear();
+  TF_ASSIGN_OR_RETURN(std::vector<std::string> changed, Flush());
   std::set<std::string> busy;
-  for (const QueuedSeries& series : all) {
-    SeriesState state = series.state;
-    if (state == SeriesState::kReceiving) {
-      TF_ASSIGN_OR_RETURN(const std::optional<SeriesState> judged, Judge(series));
-      if (judged.has_value()) {
-        state = *judged;
-        TF_RETURN_IF_ERROR(Write(series, state,
-                                 state == SeriesState::kIncomplete
-                                     ? "it has stopped midway; what is missing completes it"
-                                     : ""));
-        changed.push_back(series.key);
-      }
-    }
-    if (state == SeriesState::kReceiving) {
+  TF_ASSIGN_OR_RETURN(const std::vector<QueuedSeries> receiving,
+                      rows_.ListOfState(SeriesState::kReceiving));
+  for (const QueuedSeries& series : receiving) {
+    TF_ASSIGN_OR_RETURN(const std::optional<SeriesState> judged, Judge(series));
+    if (!judged.has_value()) {
       busy.insert(series.study_uid);
-    } else {
-      MutexLock lock(mutex_);
-      progress_.erase(series.uid);  // of an image that came again
+      continue;
     }
-    if (state == SeriesState::kComplete) studies.insert(series.study_uid);
+    TF_RETURN_IF_ERROR(Write(series, *judged,
+                             *judged == SeriesState::kIncomplete
+                                 ? "it has stopped midway; what is missing completes it"
+                                 : ""));
+    changed.push_back(series.key);
+    MutexLock lock(mutex_);
+    if (const auto study = studies_.find(series.study_uid); study != studies_.end()) {
+      study->second.asked = false;
+    }
   }
-  if (options_.rules.empty()) return changed;
-  for (const std::string& study : studies) {
-    if (busy.contains(study)) continue;
-    TF_ASSIGN_OR_RETURN(const std::vector<std::string> keys, ChooseOfStudy(study));
-    changed.insert(changed.end(), keys.begin(), keys.end());
+  std::set<std::string> waiting = busy;
+  if (!options_.rules.empty()) {
+    TF_ASSIGN_OR_RETURN(const std::vector<QueuedSeries> complete,
+                        rows_.ListOfState(SeriesState::kComplete));
+    for (const QueuedSeries& series : complete) {
+      if (!waiting.insert(series.study_uid).second) continue;
+      TF_ASSIGN_OR_RETURN(const bool all_there, IsAllThere(series.study_uid));
+      if (!all_there) continue;
+      TF_ASSIGN_OR_RETURN(const std::vector<std::string> keys, ChooseOfStudy(series.study_uid));
+      changed.insert(changed.end(), keys.begin(), keys.end());
+    }
   }
+  ForgetOldStudies(waiting);
   std::sort(changed.begin(), changed.end());
   changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
   return changed;
@@ -262,6 +345,10 @@ absl::Status SeriesIntake::Choose(QueuedSeries series, const std::string& recipe
   }
   if (recipe.empty()) return absl::FailedPreconditionError("no recipe; give --recipe FILE");
   TF_RETURN_IF_ERROR(KeepHeader(&series));
+  // A plan that is there is one of other images, or by another recipe.
+  std::error_code failed;
+  fs::remove_all(queue_->plan_path(series.key), failed);
+  if (failed) return FileError(failed.value(), "cannot remove", queue_->plan_path(series.key));
   TF_FAULT_POINT("intake.header_kept");
   series.recipe = recipe;
   series.attempts = 0;

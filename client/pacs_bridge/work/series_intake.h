@@ -15,6 +15,7 @@
 #include "absl/status/statusor.h"
 
 #include "client/pacs_bridge/dicom/instance_header.h"
+#include "client/pacs_bridge/network/pacs_client.h"
 #include "client/pacs_bridge/queue/received_rows.h"
 #include "client/pacs_bridge/series/series_pick.h"
 #include "core/base/mutex.h"
@@ -25,11 +26,9 @@ struct SeriesIntakeOptions {
   std::vector<SeriesRule> rules = {};  // none: nothing is chosen
   // A series is complete, or has stopped midway, when nothing came for so long.
   std::chrono::milliseconds quiet{30'000};
-  // How many images the PACS has of a series; empty, or an error: nobody knows. Called on the
-  // thread of Settle.
-  std::function<absl::StatusOr<int64_t>(const std::string& study_uid,
-                                        const std::string& series_uid)>
-      count_images = {};
+  // What the PACS has of a study; empty, or an error: nobody knows. Called on the thread of Settle.
+  std::function<absl::StatusOr<std::vector<SeriesSummary>>(const std::string& study_uid)>
+      find_series = {};
   std::function<std::chrono::steady_clock::time_point()> now = std::chrono::steady_clock::now;
 };
 
@@ -41,8 +40,14 @@ struct SeriesIntakeOptions {
 //   * when its association has ended and the queue has as many images as the PACS says, at once;
 //   * when nothing came for `quiet`, and the PACS says so; or nobody can say, its association was
 //     released by its sender, and no slice between its first and its last is missing.
-// Otherwise it is incomplete after `quiet`, and nothing is made of it unless more comes. What is
-// chosen waits for all series of the study that are being received.
+// Otherwise it is incomplete after `quiet`, and nothing is made of it unless more comes.
+//
+// One of a study is chosen when none of it is being received and
+//   * the queue has all that the PACS says of the study, of modalities that a rule takes: at once;
+//   * or nothing of the study came for `quiet`: a PACS may send one series after the other, or send
+//     while it receives itself.
+// What comes of a series later undoes its choice until a plan is built of it; after that its reason
+// says that the plan lacks it.
 //
 // Arrived and Ended: any thread. The others: one thread.
 class SeriesIntake {
@@ -60,7 +65,8 @@ class SeriesIntake {
   absl::Status Recover();
 
   // Puts what has arrived into the queue, and moves series on by the clock. Returns keys of series
-  // whose state has changed. Errors: those of the queue; what was to be put there is kept.
+  // whose state or reason has changed. Errors: those of the queue; what was to be put there is
+  // kept.
   absl::StatusOr<std::vector<std::string>> Settle();
 
   // What a series is, by its files. Errors: FailedPrecondition: its files are deleted; those of
@@ -84,10 +90,25 @@ class SeriesIntake {
     bool asked = false;    // the PACS, since the last image
   };
 
-  absl::StatusOr<std::set<std::string>> Flush();
-  absl::Status PutSeries(const std::vector<const Arrival*>& arrivals);
+  // Of a study of which something came lately.
+  struct StudyProgress {
+    std::chrono::steady_clock::time_point last = {};
+    bool asked = false;  // the PACS, since something has changed
+  };
+
+  // Both return keys of series of which there is something to tell.
+  absl::StatusOr<std::vector<std::string>> Flush();
+  absl::StatusOr<std::vector<std::string>> PutSeries(const std::vector<const Arrival*>& arrivals);
+  absl::StatusOr<std::vector<std::string>> RemarkOn(const QueuedSeries& series,
+                                                    const std::string& remark);
   // Complete, incomplete, or nothing as long as it may go on.
   absl::StatusOr<std::optional<SeriesState>> Judge(const QueuedSeries& series);
+  // Whether nothing that may be chosen of a study is still to come.
+  absl::StatusOr<bool> IsAllThere(const std::string& study_uid);
+  // What the PACS has of a study, asked once in a round of Settle; null: nobody knows.
+  const std::vector<SeriesSummary>* AskPacs(const std::string& study_uid);
+  bool MayBeChosen(const SeriesSummary& series) const;
+  void ForgetOldStudies(const std::set<std::string>& waiting);
   absl::StatusOr<std::vector<std::string>> ChooseOfStudy(const std::string& study_uid);
   absl::Status Write(QueuedSeries series, SeriesState state, const std::string& reason);
   absl::Status KeepHeader(QueuedSeries* series);
@@ -97,10 +118,13 @@ class SeriesIntake {
   const SeriesIntakeOptions options_;
 
   ReceivedRows rows_;
+  // Of the thread of Settle.
+  std::map<std::string, absl::StatusOr<std::vector<SeriesSummary>>> told_;  // by study
 
   Mutex mutex_;
   std::vector<Arrival> arrivals_ ABSL_GUARDED_BY(mutex_);
   std::map<std::string, Progress> progress_ ABSL_GUARDED_BY(mutex_);  // by UID
+  std::map<std::string, StudyProgress> studies_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace tissueform

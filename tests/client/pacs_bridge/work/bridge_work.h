@@ -51,15 +51,32 @@ class BridgeWork : public ::testing::Test {
     ExportWorkOptions work;
     work.warn = [this](const std::string& line) { warnings_.push_back(line); };
     work_ = std::make_unique<ExportWork>(queue_.get(), server_.get(), pacs_.get(), &writer_, work);
+    UseRule(SmallRule());
+  }
+
+  // Begins the intake anew.
+  void UseRule(const SeriesRule& rule) {
     SeriesIntakeOptions options;
-    options.rules = {SmallRule()};
+    options.rules = {rule};
     options.quiet = std::chrono::seconds(30);
-    options.count_images = [this](const std::string&, const std::string&) {
-      return count_ < 0 ? absl::StatusOr<int64_t>(absl::UnavailableError("no PACS"))
-                        : absl::StatusOr<int64_t>(count_);
-    };
+    options.find_series = [this](const std::string& study) { return FindSeries(study); };
     options.now = [this] { return now_; };
     intake_ = std::make_unique<SeriesIntake>(queue_.get(), options);
+  }
+
+  // What the PACS says of a study.
+  absl::StatusOr<std::vector<SeriesSummary>> FindSeries(const std::string& study) {
+    ++asked_;
+    if (count_ < 0) return absl::UnavailableError("no PACS");
+    std::vector<SeriesSummary> all = elsewhere_;
+    const std::vector<QueuedSeries> known = *rows_.ListStudy(study);
+    for (const QueuedSeries& series : known) {
+      all.push_back({.study_uid = study,
+                     .series_uid = series.uid,
+                     .modality = "CT",
+                     .instances = static_cast<int>(count_)});
+    }
+    return all;
   }
 
   // Shows a series to the intake, but for some slices.
@@ -140,7 +157,9 @@ class BridgeWork : public ::testing::Test {
   std::vector<std::string> warnings_;
   std::unique_ptr<ExportWork> work_;
   std::chrono::steady_clock::time_point now_ = std::chrono::steady_clock::now();
-  int64_t count_ = -1;  // what the PACS counts; -1: it cannot be asked
+  int64_t count_ = -1;  // what the PACS counts of each series; -1: it cannot be asked
+  std::vector<SeriesSummary> elsewhere_ = {};  // what it has besides
+  int asked_ = 0;
   std::unique_ptr<SeriesIntake> intake_;
 };
 

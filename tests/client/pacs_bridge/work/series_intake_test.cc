@@ -18,9 +18,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using testing::IsOk;
 using ::testing::Not;
+using testing::StatusIs;
 
 class SeriesIntakeTest : public testing::BridgeWork {};
 
@@ -91,6 +93,167 @@ TEST_F(SeriesIntakeTest, TheChoiceWaitsForAllSeriesOfTheStudy) {
   Settle();
   EXPECT_EQ(StateOf(first), SeriesState::kPassedOver);
   EXPECT_EQ(StateOf(second), SeriesState::kChosen);
+}
+
+TEST_F(SeriesIntakeTest, TheChoiceWaitsForASeriesThatThePacsHasAndHasNotSentYet) {
+  testing::CtSeriesOptions sharp;
+  sharp.study_uid = "1.2.840.1";
+  testing::CtSeriesOptions soft = sharp;
+  soft.kernel = "H30s";
+  soft.series_uid = "1.2.840.3";
+  count_ = 8;
+  elsewhere_ = {{.series_uid = soft.series_uid, .modality = "CT", .instances = 8}};
+  const testing::CtSeries first = Receive("a", sharp);
+  intake_->Ended({first.series_uid}, true);
+  Settle();
+  EXPECT_EQ(StateOf(first), SeriesState::kComplete);
+  Settle();
+  EXPECT_EQ(StateOf(first), SeriesState::kComplete);
+  EXPECT_EQ(asked_, 1) << "the PACS is asked when something has changed";
+  const testing::CtSeries second = Receive("b", soft);
+  intake_->Ended({second.series_uid}, true);
+  Settle();
+  EXPECT_EQ(StateOf(first), SeriesState::kPassedOver);
+  EXPECT_EQ(StateOf(second), SeriesState::kChosen);
+}
+
+TEST_F(SeriesIntakeTest, TheChoiceWaitsNoLongerThanTheStudyIsQuiet) {
+  count_ = 8;
+  elsewhere_ = {{.series_uid = "1.2.840.3", .modality = "CT", .instances = 8}};
+  const testing::CtSeries series = Receive("a");
+  intake_->Ended({series.series_uid}, true);
+  Settle();
+  EXPECT_EQ(StateOf(series), SeriesState::kComplete);
+  WaitQuietly();
+  Settle();
+  EXPECT_EQ(StateOf(series), SeriesState::kChosen);
+}
+
+TEST_F(SeriesIntakeTest, TheChoiceDoesNotWaitForWhatNoRuleTakes) {
+  count_ = 8;
+  elsewhere_ = {{.series_uid = "1.2.840.3", .modality = "SR", .instances = 1}};
+  const testing::CtSeries series = Receive("a");
+  intake_->Ended({series.series_uid}, true);
+  Settle();
+  EXPECT_EQ(StateOf(series), SeriesState::kChosen);
+}
+
+// A PACS that forwards what it has while the rest is on its way to it.
+class SeriesInTwoPartsTest : public SeriesIntakeTest {
+ protected:
+  // The first slices, which are all that the PACS has.
+  void ReceiveFirst(size_t slices) {
+    std::vector<size_t> later;
+    for (size_t i = slices; i < 8; ++i) later.push_back(i);
+    count_ = static_cast<int64_t>(slices);
+    series_ = Receive("a", {}, later);
+    intake_->Ended({series_.series_uid}, true);
+    Settle();
+  }
+  void ReceiveRest() {
+    for (size_t i = static_cast<size_t>(count_); i < 8; ++i) {
+      fs::rename(root_ / ("a" + std::to_string(i)), series_.files[i]);
+      intake_->Arrived(series_.files[i], *ReadInstanceHeader(series_.files[i]));
+    }
+    count_ = 8;
+  }
+  void EndAssociation() {
+    intake_->Ended({series_.series_uid}, true);
+    Settle();
+  }
+  std::string Reason() { return rows_.GetByUid(series_.series_uid)->reason; }
+  // As if `plan build` had made it.
+  void PutPlan() {
+    const fs::path plan = queue_->plan_path(rows_.GetByUid(series_.series_uid)->key);
+    fs::create_directories(plan);
+    std::ofstream(plan / "plan.json") << "{}";
+  }
+
+  testing::CtSeries series_;
+};
+
+TEST_F(SeriesInTwoPartsTest, WhatWasPassedOverForItsFirstPartIsChosenWhenTheRestCame) {
+  ReceiveFirst(5);
+  EXPECT_EQ(StateOf(series_), SeriesState::kPassedOver) << "the rule wants 8 slices";
+  ReceiveRest();
+  EndAssociation();
+  EXPECT_EQ(StateOf(series_), SeriesState::kChosen);
+}
+
+class ChosenInTwoPartsTest : public SeriesInTwoPartsTest {
+ protected:
+  ChosenInTwoPartsTest() {
+    SeriesRule rule = testing::SmallRule();
+    rule.min_slices = 5;
+    UseRule(rule);
+  }
+};
+
+TEST_F(ChosenInTwoPartsTest, IsDecidedAnewUntilItsPlanIsBuilt) {
+  ReceiveFirst(5);
+  EXPECT_EQ(StateOf(series_), SeriesState::kChosen);
+  ReceiveRest();
+  Settle();
+  EXPECT_EQ(StateOf(series_), SeriesState::kReceiving);
+  EndAssociation();
+  EXPECT_EQ(StateOf(series_), SeriesState::kChosen);
+  EXPECT_THAT(Reason(), HasSubstr("8 axial slices"));
+}
+
+TEST_F(ChosenInTwoPartsTest, APlanThatWasBuiltOfThePartIsThrownAway) {
+  ReceiveFirst(5);
+  QueuedSeries series = *rows_.GetByUid(series_.series_uid);
+  PutPlan();
+  ReceiveRest();
+  EndAssociation();
+  ASSERT_EQ(StateOf(series_), SeriesState::kChosen);
+  PutPlan();  // whoever builds it did not hear of that
+  PlanWork work(queue_.get(), server_.get(), {});
+  EXPECT_THAT(work.Step(&series), StatusIs(absl::StatusCode::kAborted, HasSubstr("more images")));
+  EXPECT_EQ(series.state, SeriesState::kChosen);
+  EXPECT_EQ(series.images, 8);
+  EXPECT_FALSE(fs::exists(queue_->plan_path(series.key)));
+}
+
+TEST_F(ChosenInTwoPartsTest, ABuiltPlanStaysAndTheReasonSaysWhatItLacks) {
+  ReceiveFirst(5);
+  QueuedSeries series = *rows_.GetByUid(series_.series_uid);
+  PutPlan();
+  PlanWork work(queue_.get(), server_.get(), {});
+  ASSERT_THAT(work.Step(&series), IsOk());
+  ReceiveRest();
+  EXPECT_THAT(*intake_->Settle(), ::testing::ElementsAre(series.key));
+  EXPECT_EQ(StateOf(series_), SeriesState::kBuilt);
+  EXPECT_THAT(Reason(),
+              AllOf(HasSubstr("5 axial slices"), HasSubstr("images came after its plan")));
+  EXPECT_THAT(*intake_->Settle(), ::testing::IsEmpty()) << "it is told once";
+}
+
+TEST_F(SeriesIntakeTest, AnImageOfAnotherStudyIsToldAndLeftOut) {
+  testing::CtSeriesOptions one;
+  one.series_uid = "1.2.840.2";
+  const testing::CtSeries series = Receive("a", one);
+  WaitQuietly();
+  Settle();
+  ASSERT_EQ(StateOf(series), SeriesState::kChosen);
+  Receive("b", one);
+  EXPECT_THAT(*intake_->Settle(), ::testing::ElementsAre(rows_.GetByUid(series.series_uid)->key));
+  const QueuedSeries kept = *rows_.GetByUid(series.series_uid);
+  EXPECT_EQ(kept.images, 8);
+  EXPECT_THAT(kept.reason, HasSubstr("name another study"));
+}
+
+TEST_F(SeriesIntakeTest, OfTwoStudiesNothingIsMade) {
+  testing::CtSeriesOptions one;
+  one.series_uid = "1.2.840.2";
+  const testing::CtSeries series = Receive("a", one);
+  Settle();
+  Receive("b", one);
+  Settle();
+  WaitQuietly();
+  Settle();
+  EXPECT_EQ(StateOf(series), SeriesState::kFailed);
+  EXPECT_THAT(rows_.GetByUid(series.series_uid)->reason, HasSubstr("name another study"));
 }
 
 TEST_F(SeriesIntakeTest, AChoiceIsToldOnce) {
