@@ -126,17 +126,26 @@ absl::Status BridgeCommands::Fetch() const {
   }
   TF_ASSIGN_OR_RETURN(const std::vector<SeriesSummary> study,
                       parts->pacs()->FindSeries({.study_uid = name_}));
+  int failed = 0;
   for (const SeriesSummary& series : study) {
     TF_ASSIGN_OR_RETURN(
         const FetchCounts counts,
         parts->pacs()->FetchSeries(name_, series.series_uid, &parts->folder(), &parts->sink()));
+    // One that cannot read an object may end as if it had sent all (Orthanc 1.10).
+    const int failed_here = std::max(counts.failed, series.instances - counts.completed);
     absl::PrintF("series %d: %d objects, %d failed\n", series.number, counts.completed,
-                 counts.failed);
-    TF_RETURN_IF_ERROR(parts->intake().Settle().status());
+                 failed_here);
+    failed += failed_here;
   }
+  // One is chosen of all that have come.
+  TF_RETURN_IF_ERROR(parts->intake().Settle().status());
   TF_ASSIGN_OR_RETURN(const std::string table, StatusTable(&parts->queue()));
   absl::PrintF("\n%s", table);
-  return absl::OkStatus();
+  if (failed == 0) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      absl::StrCat(failed,
+                   " objects of the study did not come; look into the PACS's log and at "
+                   "the disk here, and fetch it again"));
 }
 
 absl::Status BridgeCommands::Series() const {

@@ -28,8 +28,8 @@ def new_uid():
     return f"2.25.{uuid.uuid4().int}"
 
 
-def write_series(folder, name="Demo^Dora", patient_id="DEMO-1", born="19700101", study="", number=1):
-    """UIDs of study and series; the files are those of the folder."""
+def write_series(folder, name="Demo^Dora", patient_id="DEMO-1", born="19700101", study="", number=1, alter=lambda image, index: None):
+    """UIDs of study and series; the files are those of the folder. `alter` may change an image before it is written."""
     folder = pathlib.Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     voxels = numpy.frombuffer(gzip.decompress(SOURCE.read_bytes()), dtype="<u2").reshape(SHAPE)
@@ -66,6 +66,7 @@ def write_series(folder, name="Demo^Dora", patient_id="DEMO-1", born="19700101",
         image.BitsAllocated, image.BitsStored, image.HighBit, image.PixelRepresentation = 16, 16, 15, 0
         image.RescaleIntercept, image.RescaleSlope, image.RescaleType = "-1024", "1", "HU"
         image.PixelData = pixels.tobytes()
+        alter(image, index)
         image.save_as(image.filename, write_like_original=False)
     return study, series
 

@@ -59,12 +59,22 @@ def children_of(process):
     return found + [pid for child in found for pid in children_of(child)]
 
 
+def state_of(pid):
+    """The letter of /proc: "T" is stopped, "Z" ended and not asked for; empty: there is none."""
+    try:
+        return pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return ""
+
+
 def runs(pid):
     """Not ended, or ended and not asked for."""
-    try:
-        return pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
+    return state_of(pid) not in ("", "Z")
+
+
+def most_memory_mib(pid):
+    """The most that was resident so far."""
+    return int(re.search(r"VmHWM:\s+(\d+) kB", pathlib.Path(f"/proc/{pid}/status").read_text()).group(1)) / 1024
 
 
 class Authority:
@@ -103,6 +113,7 @@ class Stack:
         self.programs, self.folder = pathlib.Path(programs), pathlib.Path(folder)
         self.recipe, self.quiet_s, self.plan_threads = recipe, quiet_s, plan_threads
         self.by_web = by_web
+        self.bridge_program, self.environment = self.programs / "tissueform-pacs", QUICK
         self.folder.mkdir(parents=True, exist_ok=True)
         self.running = {}
         self.authority = Authority(self.folder / "tls")
@@ -124,7 +135,7 @@ class Stack:
 
     def start(self, name, command):
         with open(self.log(name), "ab") as log:
-            process = subprocess.Popen(list(map(str, command)), stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=self.folder, env=QUICK)
+            process = subprocess.Popen(list(map(str, command)), stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=self.folder, env=self.environment)
         self.running[name] = process
         return process
 
@@ -288,7 +299,7 @@ backend orthanc
                 "--server-key", key, "--worklist-listen", f"{HOST}:{self.worklist_port}", "--planner-url", f"http://localhost:{self.gateway_port}/"]
 
     def start_bridge(self, more=()):
-        self.start("bridge", [self.programs / "tissueform-pacs", "run", *self.bridge_options(), *more])
+        self.start("bridge", [self.bridge_program, "run", *self.bridge_options(), *more])
         self.wait_for("the bridge", lambda: self.listens(self.bridge_dicom), needs="bridge")
 
     def bridge_status(self):
