@@ -161,8 +161,10 @@ absl::Status BridgeCommands::Build() const {
   TF_ASSIGN_OR_RETURN(const auto parts, BridgeParts::Open(*options_));
   ReceivedRows rows(&parts->queue());
   TF_ASSIGN_OR_RETURN(QueuedSeries series, rows.Get(name_));
-  if (series.state != SeriesState::kChosen && series.state != SeriesState::kBuilt) {
-    const std::string recipe = options_->recipe.empty() ? series.recipe : options_->recipe;
+  const std::string recipe = options_->recipe.empty() ? series.recipe : options_->recipe;
+  // What was chosen goes on; all else begins anew, also a plan that lies there, since the recipe
+  // may say something else now.
+  if (series.state != SeriesState::kChosen || series.recipe != recipe) {
     TF_RETURN_IF_ERROR(parts->intake().Choose(series, recipe, "chosen by hand"));
     TF_ASSIGN_OR_RETURN(series, rows.Get(name_));
   }

@@ -43,7 +43,7 @@ struct QueuedSeries {
   SeriesState state = SeriesState::kReceiving;
   std::string reason = {};     // why chosen, passed over or failed; nothing of a patient
   std::string recipe = {};     // file, of a chosen one
-  std::string case_name = {};  // "cases/{sha256}" when it is packed
+  std::string case_name = {};  // "cases/{sha256}" when it is packed: the last one
   int64_t attempts = 0;        // of the step that is next
   std::string last_error = {};
   int64_t first_s = 0;  // wall clock, to be told and for retention

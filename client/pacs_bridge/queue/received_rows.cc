@@ -66,6 +66,33 @@ absl::StatusOr<bool> InsertImage(Database& database, const std::string& series,
   return database.total_changes() > before;
 }
 
+// Cases of earlier plans stay known: there are predictions of them.
+absl::Status KeepCase(Database& database, const QueuedSeries& series) {
+  if (series.case_name.empty()) return absl::OkStatus();
+  return database
+      .Prepare("INSERT OR IGNORE INTO cases SELECT ?, key, " TF_IMAGE_COUNT
+               " FROM series WHERE key = ?")
+      .Bind(series.case_name)
+      .Bind(series.key)
+      .Run();
+}
+
+absl::StatusOr<std::vector<QueuedImage>> ReadImages(BridgeQueue* queue, const char* sql,
+                                                    const std::string& value) {
+  std::vector<QueuedImage> images;
+  const absl::Status done = queue->Read([&](Database& database) -> absl::Status {
+    Database::Query row = database.Prepare(sql);
+    row.Bind(value);
+    for (;;) {
+      TF_ASSIGN_OR_RETURN(const bool found, row.Step());
+      if (!found) return absl::OkStatus();
+      images.push_back({TextOf(row, 0), TextOf(row, 1), TextOf(row, 2), TextOf(row, 3)});
+    }
+  });
+  TF_RETURN_IF_ERROR(done);
+  return images;
+}
+
 absl::StatusOr<std::optional<QueuedSeries>> FindSeries(Database& database, const char* sql,
                                                        const std::string& value) {
   Database::Query query = database.Prepare(sql);
@@ -78,7 +105,8 @@ absl::StatusOr<std::optional<QueuedSeries>> FindSeries(Database& database, const
 
 constexpr char kByKey[] = TF_SERIES_COLUMNS "WHERE key = ?";
 constexpr char kByUid[] = TF_SERIES_COLUMNS "WHERE uid = ?";
-constexpr char kByCase[] = TF_SERIES_COLUMNS "WHERE case_name = ? AND case_name <> '' LIMIT 1";
+constexpr char kByCase[] =
+    TF_SERIES_COLUMNS "WHERE key = (SELECT series FROM cases WHERE name = ?)";
 constexpr char kOfStudy[] = TF_SERIES_COLUMNS "WHERE study_uid = ? ORDER BY first_s, key";
 // Counting images takes as long as there are images.
 constexpr char kOfState[] = TF_SERIES_FIELDS "0 FROM series WHERE state = ? ORDER BY first_s, key";
@@ -139,7 +167,7 @@ absl::Status ReceivedRows::Update(const QueuedSeries& series) {
             .Bind(int64_t{series.has_header})
             .Bind(series.key)
             .Run());
-    if (database.total_changes() > before) return absl::OkStatus();
+    if (database.total_changes() > before) return KeepCase(database, series);
     return absl::NotFoundError(absl::StrCat("no series ", series.key, " in the queue"));
   });
 }
@@ -161,7 +189,7 @@ absl::Status ReceivedRows::UpdateStep(const QueuedSeries& series, SeriesState be
             .Bind(SeriesStateName(before))
             .Bind(series.images)
             .Run());
-    if (database.total_changes() > changes) return absl::OkStatus();
+    if (database.total_changes() > changes) return KeepCase(database, series);
     return absl::AbortedError("more images have come meanwhile");
   });
 }
@@ -274,24 +302,24 @@ absl::StatusOr<QueuedStudy> ReceivedRows::GetStudy(const std::string& uid) {
 }
 
 absl::StatusOr<std::vector<QueuedImage>> ReceivedRows::ListImages(const std::string& series) {
-  std::vector<QueuedImage> images;
-  const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {
-    Database::Query row = database.Prepare(
-        "SELECT series, uid, class_uid, file FROM images WHERE series = ? ORDER BY uid");
-    row.Bind(series);
-    for (;;) {
-      TF_ASSIGN_OR_RETURN(const bool found, row.Step());
-      if (!found) return absl::OkStatus();
-      images.push_back({TextOf(row, 0), TextOf(row, 1), TextOf(row, 2), TextOf(row, 3)});
-    }
-  });
-  TF_RETURN_IF_ERROR(done);
-  return images;
+  return ReadImages(queue_,
+                    "SELECT series, uid, class_uid, file FROM images WHERE series = ? ORDER BY uid",
+                    series);
+}
+
+absl::StatusOr<std::vector<QueuedImage>> ReceivedRows::ListSources(const std::string& case_name) {
+  // Rows are numbered as they come.
+  return ReadImages(queue_,
+                    "SELECT * FROM (SELECT series, uid, class_uid, file FROM images WHERE series = "
+                    "(SELECT series FROM cases WHERE name = ?1) ORDER BY rowid "
+                    "LIMIT (SELECT images FROM cases WHERE name = ?1)) ORDER BY uid",
+                    case_name);
 }
 
 absl::Status ReceivedRows::Forget(const std::string& series) {
   return queue_->Change([&](Database& database) -> absl::Status {
     TF_RETURN_IF_ERROR(database.Prepare("DELETE FROM images WHERE series = ?").Bind(series).Run());
+    TF_RETURN_IF_ERROR(database.Prepare("DELETE FROM cases WHERE series = ?").Bind(series).Run());
     TF_RETURN_IF_ERROR(database.Prepare("DELETE FROM series WHERE key = ?").Bind(series).Run());
     return database.Execute("DELETE FROM studies WHERE uid NOT IN (SELECT study_uid FROM series)");
   });

@@ -41,7 +41,8 @@ class ReceivedRows {
 
   absl::StatusOr<QueuedSeries> Get(const std::string& key);  // NotFound
   absl::StatusOr<QueuedSeries> GetByUid(const std::string& uid);
-  // Of which series a case was made; NotFound: none of this bridge.
+  // Of which series a case was made, the present one or an earlier one; NotFound: none of this
+  // bridge.
   absl::StatusOr<QueuedSeries> GetByCase(const std::string& case_name);
   absl::StatusOr<std::vector<QueuedSeries>> List();
   // Without their number of images, as often as one likes.
@@ -49,6 +50,8 @@ class ReceivedRows {
   absl::StatusOr<std::vector<QueuedSeries>> ListStudy(const std::string& study_uid);
   absl::StatusOr<QueuedStudy> GetStudy(const std::string& uid);
   absl::StatusOr<std::vector<QueuedImage>> ListImages(const std::string& series);
+  // The images that a case was made of.
+  absl::StatusOr<std::vector<QueuedImage>> ListSources(const std::string& case_name);
   // Takes the images' files out of the queue before they are deleted; the images stay known.
   absl::Status ForgetFiles(const std::string& series);
   // All that is known of a series, and of its study where that has no other.

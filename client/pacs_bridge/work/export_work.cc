@@ -181,7 +181,7 @@ absl::StatusOr<ExportMaterial> ExportWork::Gather(const QueuedExport& queued) {
   TF_RETURN_IF_ERROR(MakeFolder(folder));
   ExportMaterial material;
   material.header = folder + "/header.dcm";
-  material.case_path = CasePathOf(*queue_, series.key);
+  material.case_path = CasePathOf(*queue_, series.key, queued.case_name);
   std::error_code failed;
   if (!fs::exists(material.case_path, failed)) {
     material.case_path = folder + "/case.tfcase";
@@ -196,7 +196,7 @@ absl::StatusOr<ExportMaterial> ExportWork::Gather(const QueuedExport& queued) {
         "that");
   }
   TF_ASSIGN_OR_RETURN(material.asked, server_->GetExport(queued.name));
-  TF_ASSIGN_OR_RETURN(material.sources, received_.ListImages(series.key));
+  TF_ASSIGN_OR_RETURN(material.sources, received_.ListSources(queued.case_name));
   material.series_uid = series.uid;
   material.pictures = folder + "/pictures";
   material.folder = folder + "/written";

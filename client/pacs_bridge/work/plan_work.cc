@@ -12,6 +12,7 @@
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
 
 #include "client/cpp/backoff.h"
 #include "client/pacs_bridge/work/tissueform_command.h"
@@ -35,6 +36,7 @@ constexpr std::chrono::minutes kPackTime{10};
 constexpr int64_t kMostPackAttempts = 20;
 constexpr size_t kMostErrorBytes = 512;
 constexpr size_t kCaseTitleDigits = 8;
+constexpr char kCases[] = "cases/";
 
 // The images of one series as the only ones of a folder, whatever else lies beside them.
 absl::Status LinkImages(const std::vector<QueuedImage>& images, const std::string& folder) {
@@ -78,8 +80,10 @@ std::string TitleOfSeries(const std::string& key) {
   return absl::StrCat("Case ", key.substr(0, kCaseTitleDigits));
 }
 
-std::string CasePathOf(const BridgeQueue& queue, const std::string& series) {
-  return queue.plan_folder(series) + "/case.tfcase";
+std::string CasePathOf(const BridgeQueue& queue, const std::string& series,
+                       const std::string& case_name) {
+  return absl::StrCat(queue.plan_folder(series), "/", absl::StripPrefix(case_name, kCases),
+                      ".tfcase");
 }
 
 absl::Status PlanWork::Step(QueuedSeries* series) {
@@ -179,9 +183,9 @@ absl::Status PlanWork::Pack(QueuedSeries* series) {
   TF_FAULT_POINT("plan.packed");
   TF_ASSIGN_OR_RETURN(OpenFile file, OpenFile::Open(fresh, O_RDWR));
   TF_RETURN_IF_ERROR(file.Sync());
-  TF_RETURN_IF_ERROR(RenameDurably(fresh, CasePathOf(*queue_, series->key)));
-  TF_ASSIGN_OR_RETURN(const std::string bytes, ReadCaseFile(CasePathOf(*queue_, series->key)));
-  series->case_name = absl::StrCat("cases/", Sha256Hex({bytes}));
+  TF_ASSIGN_OR_RETURN(const std::string bytes, ReadCaseFile(fresh));
+  series->case_name = absl::StrCat(kCases, Sha256Hex({bytes}));
+  TF_RETURN_IF_ERROR(RenameDurably(fresh, CasePathOf(*queue_, series->key, series->case_name)));
   series->state = SeriesState::kPacked;
   return absl::OkStatus();
 }
@@ -190,7 +194,8 @@ absl::Status PlanWork::Publish(QueuedSeries* series) {
   if (server_ == nullptr) {
     return absl::FailedPreconditionError("no server to publish to; give --server HOST:PORT");
   }
-  TF_ASSIGN_OR_RETURN(const std::string bytes, ReadCaseFile(CasePathOf(*queue_, series->key)));
+  TF_ASSIGN_OR_RETURN(const std::string bytes,
+                      ReadCaseFile(CasePathOf(*queue_, series->key, series->case_name)));
   TF_FAULT_POINT("plan.publishing");
   TF_ASSIGN_OR_RETURN(const std::string name, server_->Publish(bytes, TitleOfSeries(series->key)));
   TF_FAULT_POINT("plan.published");

@@ -31,7 +31,7 @@ struct PlanWorkOptions {
 // From a chosen series to a case on the server, one durable step after the other:
 //
 //   chosen     `plan build` by the rule's recipe, as a limited child, into plans/KEY/plan
-//   built      `case pack` into plans/KEY/case.tfcase, whose SHA-256 becomes the case's name
+//   built      `case pack` into plans/KEY/{sha256}.tfcase, which names the case
 //   packed     the case to the server
 //   published
 //
@@ -67,7 +67,9 @@ class PlanWork {
 
 // What a case of the series is called where others see it: "Case 1a2b3c4d".
 std::string TitleOfSeries(const std::string& key);
-// The case's file in the plan's folder.
-std::string CasePathOf(const BridgeQueue& queue, const std::string& series);
+// The file of a case ("cases/{sha256}") in the plan's folder; a series has another one for every
+// plan that was built of it.
+std::string CasePathOf(const BridgeQueue& queue, const std::string& series,
+                       const std::string& case_name);
 
 }  // namespace tissueform

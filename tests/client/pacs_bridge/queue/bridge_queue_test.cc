@@ -4,6 +4,9 @@
 #include "client/pacs_bridge/queue/bridge_queue.h"
 
 #include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -111,6 +114,61 @@ TEST_F(BridgeQueueTest, GoesOnWithASeriesThatHadStopped) {
       << "nothing new has come";
   EXPECT_EQ(rows.Add(Study(), Series(), "x", {{.uid = "2", .class_uid = "c", .file = "g"}})->state,
             SeriesState::kReceiving);
+}
+
+TEST_F(BridgeQueueTest, DecidesAnewOnlyOfWhatNoPlanIsBuilt) {
+  ReceivedRows rows(queue_.get());
+  int image = 0;
+  for (const auto& [state, after] : std::vector<std::pair<SeriesState, SeriesState>>{
+           {SeriesState::kComplete, SeriesState::kReceiving},
+           {SeriesState::kPassedOver, SeriesState::kReceiving},
+           {SeriesState::kChosen, SeriesState::kReceiving},
+           {SeriesState::kBuilt, SeriesState::kBuilt},
+           {SeriesState::kPublished, SeriesState::kPublished},
+           {SeriesState::kFailed, SeriesState::kFailed}}) {
+    QueuedSeries series = *rows.Add(Study(), Series(), "k", {});
+    series.state = state;
+    ASSERT_THAT(rows.Update(series), IsOk());
+    const std::string uid = std::to_string(++image);
+    EXPECT_EQ(rows.Add(Study(), Series(), "k", {{.uid = uid, .class_uid = "c", .file = "f" + uid}})
+                  ->state,
+              after);
+  }
+}
+
+TEST_F(BridgeQueueTest, DoesNotTakeAStepOfASeriesThatHasGrown) {
+  ReceivedRows rows(queue_.get());
+  QueuedSeries series =
+      *rows.Add(Study(), Series(), "k", {{.uid = "1", .class_uid = "c", .file = "f"}});
+  series.state = SeriesState::kChosen;
+  ASSERT_THAT(rows.Update(series), IsOk());
+  QueuedSeries built = series;
+  built.state = SeriesState::kBuilt;
+  ASSERT_THAT(rows.Add(Study(), Series(), "k", {{.uid = "2", .class_uid = "c", .file = "g"}}),
+              IsOk());
+  EXPECT_THAT(rows.UpdateStep(built, SeriesState::kChosen), StatusIs(absl::StatusCode::kAborted));
+  ASSERT_THAT(rows.Update(series), IsOk());  // chosen again
+  EXPECT_THAT(rows.UpdateStep(built, SeriesState::kChosen), StatusIs(absl::StatusCode::kAborted));
+  built.images = 2;
+  EXPECT_THAT(rows.UpdateStep(built, SeriesState::kChosen), IsOk());
+  EXPECT_EQ(rows.Get("k")->state, SeriesState::kBuilt);
+}
+
+TEST_F(BridgeQueueTest, KnowsTheCasesOfEarlierPlans) {
+  ReceivedRows rows(queue_.get());
+  QueuedSeries series =
+      *rows.Add(Study(), Series(), "k", {{.uid = "1", .class_uid = "c", .file = "f"}});
+  for (const char* name : {"cases/1", "cases/2"}) {
+    series.case_name = name;
+    ASSERT_THAT(rows.Update(series), IsOk());
+  }
+  EXPECT_EQ(rows.GetByCase("cases/1")->key, "k");
+  EXPECT_EQ(rows.GetByCase("cases/2")->key, "k");
+  EXPECT_THAT(rows.GetByCase("cases/3").status(), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_THAT(rows.GetByCase("").status(), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_EQ(rows.ListSources("cases/1")->size(), 1);
+  EXPECT_THAT(rows.Forget("k"), IsOk());
+  EXPECT_THAT(rows.GetByCase("cases/1").status(), StatusIs(absl::StatusCode::kNotFound));
 }
 
 TEST_F(BridgeQueueTest, RefusesASeriesOfTwoStudies) {

@@ -37,8 +37,8 @@ void Pass(const char*) {
 // In place of `plan build` and `case pack`, which take long.
 absl::Status StandInForPacking(BridgeQueue* queue, QueuedSeries* series) {
   TF_ASSIGN_OR_RETURN(const std::string bytes, SerializeCase(SampleCase()));
-  std::ofstream(CasePathOf(*queue, series->key)) << bytes;
   series->case_name = "cases/" + Sha256Hex({bytes});
+  std::ofstream(CasePathOf(*queue, series->key, series->case_name)) << bytes;
   series->state = SeriesState::kPacked;
   return ReceivedRows(queue).Update(*series);
 }

@@ -105,8 +105,8 @@ class BridgeWork : public ::testing::Test {
     contents.title = series.key;
     const std::string bytes = *SerializeCase(contents);
     std::filesystem::create_directories(queue_->plan_folder(series.key));
-    std::ofstream(CasePathOf(*queue_, series.key)) << bytes;
     series.case_name = "cases/" + Sha256Hex({bytes});
+    std::ofstream(CasePathOf(*queue_, series.key, series.case_name)) << bytes;
     series.state = SeriesState::kPublished;
     series.done_s = 1'000'000;
     EXPECT_THAT(rows_.Update(series), IsOk());

@@ -229,6 +229,28 @@ TEST_F(ChosenInTwoPartsTest, ABuiltPlanStaysAndTheReasonSaysWhatItLacks) {
   EXPECT_THAT(*intake_->Settle(), ::testing::IsEmpty()) << "it is told once";
 }
 
+TEST_F(ChosenInTwoPartsTest, ACaseHasTheImagesThatItsPlanWasBuiltOf) {
+  ReceiveFirst(5);
+  const QueuedSeries series = MakeCase(series_);
+  ReceiveRest();
+  Settle();
+  EXPECT_EQ(rows_.ListImages(series.key)->size(), 8);
+  const std::vector<QueuedImage> sources = *rows_.ListSources(series.case_name);
+  std::vector<std::string> uids;
+  for (const QueuedImage& image : sources) uids.push_back(image.uid);
+  EXPECT_THAT(uids, ::testing::UnorderedElementsAreArray(series_.instance_uids.begin(),
+                                                         series_.instance_uids.begin() + 5));
+}
+
+TEST_F(SeriesInTwoPartsTest, AnotherRecipeLeavesNothingOfTheEarlierPlan) {
+  ReceiveFirst(8);
+  PutPlan();
+  const QueuedSeries series = *rows_.GetByUid(series_.series_uid);
+  ASSERT_THAT(intake_->Choose(series, "other.json", "chosen by hand"), IsOk());
+  EXPECT_FALSE(fs::exists(queue_->plan_path(series.key)));
+  EXPECT_EQ(rows_.GetByUid(series_.series_uid)->recipe, "other.json");
+}
+
 TEST_F(SeriesIntakeTest, AnImageOfAnotherStudyIsToldAndLeftOut) {
   testing::CtSeriesOptions one;
   one.series_uid = "1.2.840.2";
