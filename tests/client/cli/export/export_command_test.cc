@@ -90,6 +90,26 @@ TEST_F(ExportCommandTest, WhatCannotBeMadeSaysWhyAndLeavesNothing) {
   EXPECT_THAT(Files(), IsEmpty());
 }
 
+// Answers of gradient_field are prepared up to 30 degrees.
+TEST_F(ExportCommandTest, APlanBeyondWhatTheModelReachesIsRefusedWithAnotherModel) {
+  const std::string folder = SourcePath("tests/data/plans/tongue/");
+  std::string plan = Read(folder + "plan.json");
+  const auto replace = [&plan](const std::string& from, const std::string& to) {
+    ASSERT_NE(plan.find(from), std::string::npos);
+    plan.replace(plan.find(from), from.size(), to);
+  };
+  replace("[-20, 0, 0]", "[-40, 0, 0]");
+  replace("volumetricTongue.vtu", "tongue.vtu");
+  fs::copy_file(folder + "volumetricTongue.vtu", Path("tongue.vtu"));
+  Write("plan.json", plan);
+  EXPECT_THAT(Run({"export", "plan.json", "--html", "t.html"}),
+              FailsWith(1, AllOf(HasSubstr("gradient_field"), HasSubstr("never show"),
+                                 HasSubstr("choose linear_elastic"))));
+  EXPECT_FALSE(fs::exists(Path("t.html")));
+  EXPECT_THAT(Run({"export", "plan.json", "--html", "t.html", "--model", "linear_elastic"}),
+              Succeeds());
+}
+
 TEST_F(ExportCommandTest, ATitleIsWarnedOfAndUnderAPasswordNotReadable) {
   Write("password", "correct horse battery");
   const ProcessResult result = Export({"--title", "Chin forward", "--password-file", "password"});
