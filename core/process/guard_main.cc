@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
-// tissueform-guard GRACE_MS PROGRAM [ARGUMENT]...
+// tissueform-guard GRACE_MS MEMORY_BYTES SECONDS FILE_BYTES PROGRAM [ARGUMENT]...
 //
 // Runs a program that is not ours, and so cannot watch a pipe itself, until it ends or standard
 // input does (guarded_program.h starts it). It has one thread and no library that could start one:
@@ -19,14 +19,30 @@
 #include <unistd.h>
 
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <sys/wait.h>
 
 namespace {
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kLimitsMemory = false;
+#else
+constexpr bool kLimitsMemory = true;
+#endif
+
+constexpr int kFirstWord = 5;  // of the program, among ours
+constexpr long long kMostGraceMs = 3600 * 1000;
 constexpr int kWrongUse = 2;
 constexpr int kCannotStart = 126;
 constexpr int kNoSuchProgram = 127;
+
+// -1: it is none.
+long long NumberOf(const char* word) {
+  char* end = nullptr;
+  const long long number = std::strtoll(word, &end, 10);
+  return end == word || *end != '\0' ? -1 : number;
+}
 
 void ReplaceByNothing(int descriptor, int flags) {
   const int nothing = open("/dev/null", flags | O_CLOEXEC);
@@ -34,13 +50,35 @@ void ReplaceByNothing(int descriptor, int flags) {
   close(nothing);
 }
 
+// What the program may use; 0: no limit.
+struct Limits {
+  long long memory_bytes;
+  long long seconds;
+  long long file_bytes;
+};
+
+void SetLimit(int resource, long long value) {
+  if (value == 0) return;
+  const rlimit limit{static_cast<rlim_t>(value), static_cast<rlim_t>(value)};
+  setrlimit(static_cast<__rlimit_resource>(resource), &limit);
+}
+
+void Bind(const Limits& limits) {
+  if (kLimitsMemory) SetLimit(RLIMIT_AS, limits.memory_bytes);
+  SetLimit(RLIMIT_CPU, limits.seconds);
+  SetLimit(RLIMIT_FSIZE, limits.file_bytes);
+  // So that writing fails, as on a full disk.
+  if (limits.file_bytes != 0) std::signal(SIGXFSZ, SIG_IGN);
+}
+
 // In the child, between fork and exec.
-[[noreturn]] void Become(char** words, pid_t guard, const sigset_t& former) {
+[[noreturn]] void Become(char** words, pid_t guard, const sigset_t& former, const Limits& limits) {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != guard) _exit(kCannotStart);  // which ended before prctl
   ReplaceByNothing(STDIN_FILENO, O_RDONLY);
   sigprocmask(SIG_SETMASK, &former, nullptr);
+  Bind(limits);
   execvp(words[0], words);
   const int error = errno;
   std::fprintf(stderr, "tissueform-guard: cannot start %s: %s\n", words[0], std::strerror(error));
@@ -93,10 +131,15 @@ int Watch(pid_t program, int signals, int grace_ms) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  char* end = nullptr;
-  const long grace_ms = argc < 3 ? -1 : std::strtol(argv[1], &end, 10);
-  if (grace_ms < 0 || grace_ms > 3600 * 1000 || *end != '\0') {
-    std::fprintf(stderr, "use: tissueform-guard GRACE_MS PROGRAM [ARGUMENT]...\n");
+  const bool enough = argc > kFirstWord;
+  const long long grace_ms = enough ? NumberOf(argv[1]) : -1;
+  const Limits limits = {enough ? NumberOf(argv[2]) : -1, enough ? NumberOf(argv[3]) : -1,
+                         enough ? NumberOf(argv[4]) : -1};
+  if (grace_ms < 0 || grace_ms > kMostGraceMs || limits.memory_bytes < 0 || limits.seconds < 0 ||
+      limits.file_bytes < 0) {
+    std::fprintf(stderr,
+                 "use: tissueform-guard GRACE_MS MEMORY_BYTES SECONDS FILE_BYTES PROGRAM "
+                 "[ARGUMENT]...\n");
     return kWrongUse;
   }
   sigset_t signals;
@@ -111,7 +154,7 @@ int main(int argc, char** argv) {
     std::perror("tissueform-guard");
     return kCannotStart;
   }
-  if (program == 0) Become(argv + 2, guard, former);
+  if (program == 0) Become(argv + kFirstWord, guard, former, limits);
   setpgid(program, program);                  // whoever of the two is first
   ReplaceByNothing(STDOUT_FILENO, O_WRONLY);  // whose end is the program's alone
   return Watch(program, arriving, static_cast<int>(grace_ms));

@@ -43,8 +43,10 @@ absl::StatusOr<std::string> ProgramPath(const std::string& program) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<GuardedProgram>> GuardedProgram::Start(
-    ChildOptions options, std::chrono::milliseconds grace) {
-  std::vector<std::string> words = {absl::StrCat(grace.count())};
+    ChildOptions options, std::chrono::milliseconds grace, const ProgramLimits& limits) {
+  std::vector<std::string> words = {
+      absl::StrCat(grace.count()), absl::StrCat(limits.max_memory_bytes),
+      absl::StrCat(limits.max_seconds), absl::StrCat(limits.max_file_bytes)};
   TF_ASSIGN_OR_RETURN(words.emplace_back(), ProgramPath(options.program));
   words.insert(words.end(), options.arguments.begin(), options.arguments.end());
   options.arguments = std::move(words);

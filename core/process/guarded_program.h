@@ -4,6 +4,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -13,6 +14,13 @@
 #include "core/process/child_process.h"
 
 namespace tissueform {
+
+// What a program, and each that it starts, may use; 0: as much as this process.
+struct ProgramLimits {
+  int64_t max_memory_bytes = 0;  // of addresses; not under sanitizers, which reserve terabytes
+  int max_seconds = 0;           // of processor time: then SIGKILL
+  int64_t max_file_bytes = 0;    // of every file that it writes: beyond, writing fails
+};
 
 // A program that is not one of our helpers (an X server, a solver, a server of ours) and so does
 // not watch a pipe: it runs under tissueform-guard, which ends it and what it has started when this
@@ -27,7 +35,8 @@ class GuardedProgram {
   //
   // Errors: NotFound (no such program), those of ChildProcess::Start and FindProgram.
   static absl::StatusOr<std::unique_ptr<GuardedProgram>> Start(ChildOptions options,
-                                                               std::chrono::milliseconds grace);
+                                                               std::chrono::milliseconds grace,
+                                                               const ProgramLimits& limits = {});
   // Ends it, and waits until it has ended.
   ~GuardedProgram();
   GuardedProgram(const GuardedProgram&) = delete;

@@ -116,6 +116,32 @@ TEST(GuardedProgramTest, SignalToTheGuardReachesTheProgram) {
   EXPECT_EQ(program->Wait().exit_code, 6);
 }
 
+int ExitCodeWithin(const ProgramLimits& limits, const std::string& script) {
+  const auto program = GuardedProgram::Start(Shell(script), kGrace, limits);
+  return program.ok() ? (*program)->Wait().exit_code : -1;
+}
+
+TEST(GuardedProgramTest, ItHasNoMoreProcessorTimeThanItMay) {
+  EXPECT_EQ(ExitCodeWithin({.max_seconds = 1}, "while :; do :; done"), 128 + SIGKILL);
+}
+
+TEST(GuardedProgramTest, ItsFilesAreNoLargerThanTheyMayBe) {
+  const std::string file = ::testing::TempDir() + "guarded_file";
+  const std::string write = "head -c 4096 /dev/zero > " + file + " && exit 9";
+  EXPECT_EQ(ExitCodeWithin({.max_file_bytes = 4096}, write), 9);
+  EXPECT_EQ(ExitCodeWithin({.max_file_bytes = 4095}, write), 1) << "told, and not ended";
+}
+
+TEST(GuardedProgramTest, ItHasNoMoreMemoryThanItMay) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers reserve terabytes of addresses";
+#endif
+  // dd asks for its block at once.
+  const std::string need = "dd if=/dev/zero of=/dev/null bs=512M count=1 && exit 9";
+  EXPECT_EQ(ExitCodeWithin({.max_memory_bytes = int64_t{2} << 30}, need), 9);
+  EXPECT_EQ(ExitCodeWithin({.max_memory_bytes = int64_t{256} << 20}, need), 1);
+}
+
 // The pipe is held open by all that was started, and by nothing else.
 class KilledStarterTest : public ::testing::Test {
  protected:

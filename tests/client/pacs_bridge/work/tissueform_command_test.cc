@@ -81,6 +81,21 @@ TEST_F(TissueformCommandTest, WhoEndsTheBridgeEndsIt) {
   EXPECT_THAT(Run(Waiting()), StatusIs(absl::StatusCode::kCancelled));
 }
 
+TEST_F(TissueformCommandTest, WhatItMayUseEndsIt) {
+  const auto make = [&](const char* keys, const ProgramLimits& limits) {
+    return RunTissueform({"token", "keygen", "--out", (folder_ / keys).string()}, "this",
+                         (folder_ / "log").string(), kLong, cancel_, limits);
+  };
+  EXPECT_THAT(make("few", {.max_file_bytes = 16}),
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("this failed: ")));
+  EXPECT_THAT(make("enough", {.max_file_bytes = 1 << 20}), IsOk());
+}
+
+TEST_F(TissueformCommandTest, ADiskWithoutRoomIsKnown) {
+  EXPECT_FALSE(HasRoom("/proc")) << "nothing can be written there";
+  EXPECT_TRUE(HasRoom("/nowhere")) << "what cannot be asked is no reason to give up";
+}
+
 TEST_F(TissueformCommandTest, ItsTimeEndsIt) {
   EXPECT_THAT(Run(Waiting(), std::chrono::seconds(0)),
               StatusIs(absl::StatusCode::kDeadlineExceeded));
