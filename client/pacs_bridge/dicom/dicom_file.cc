@@ -3,12 +3,17 @@
 
 #include "client/pacs_bridge/dicom/dicom_file.h"
 
+#include <cerrno>
+#include <fcntl.h>
 #include <filesystem>
 #include <fstream>
+#include <unistd.h>
 
 #include "absl/strings/str_cat.h"
 #include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcostrma.h>
 #include <dcmtk/dcmdata/dctk.h>
+#include <dcmtk/dcmdata/dcwcache.h>
 
 #include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "client/pacs_bridge/dicom/partial_file.h"
@@ -76,6 +81,60 @@ void RemovePrivateAndDrawn(DcmItem* item) {
   }
 }
 
+// Keeps what the disk says of what is written. DCMTK's own stream does not tell of a disk that is
+// full, and of a small file it writes nothing before it closes it, without looking.
+class FileConsumer final : public DcmConsumer {
+ public:
+  explicit FileConsumer(const std::string& path)
+      : path_(path), descriptor_(open(path.c_str(), O_WRONLY | O_CLOEXEC)) {
+    if (descriptor_ < 0) failure_ = ErrorOfFile(errno, path_);
+  }
+  ~FileConsumer() override { Close().IgnoreError(); }
+  FileConsumer(const FileConsumer&) = delete;
+  FileConsumer& operator=(const FileConsumer&) = delete;
+
+  OFBool good() const override { return OFTrue; }
+  OFCondition status() const override { return EC_Normal; }
+  OFBool isFlushed() const override { return OFTrue; }
+  offile_off_t avail() const override { return kMostAtOnceBytes; }
+  void flush() override {}
+  offile_off_t write(const void* bytes, offile_off_t count) override {
+    const auto* next = static_cast<const char*>(bytes);
+    for (auto left = static_cast<size_t>(count); failure_.ok() && left > 0;) {
+      const ssize_t done = ::write(descriptor_, next, left);
+      if (done < 0 && errno == EINTR) continue;
+      if (done < 0) {
+        failure_ = ErrorOfFile(errno, path_);
+      } else {
+        next += done;
+        left -= static_cast<size_t>(done);
+      }
+    }
+    return count;
+  }
+
+  // What went wrong so far.
+  absl::Status Close() {
+    if (descriptor_ >= 0 && close(descriptor_) != 0 && failure_.ok()) {
+      failure_ = ErrorOfFile(errno, path_);
+    }
+    descriptor_ = -1;
+    return failure_;
+  }
+
+ private:
+  static constexpr offile_off_t kMostAtOnceBytes = 1 << 30;
+
+  const std::string path_;
+  int descriptor_;
+  absl::Status failure_;
+};
+
+class FileOutput final : public DcmOutputStream {
+ public:
+  explicit FileOutput(FileConsumer* consumer) : DcmOutputStream(consumer) {}
+};
+
 }  // namespace
 
 absl::Status PrepareDcmtk() {
@@ -113,12 +172,21 @@ absl::Status SaveDicomFile(const std::string& path, DcmDataset* dataset) {
   TF_RETURN_IF_ERROR(PrepareDcmtk());
   TF_ASSIGN_OR_RETURN(PartialFile partial, PartialFile::Create(absl::StrCat(path, ".partial")));
   DcmFileFormat file(dataset, OFFalse);
-  const OFCondition written = file.saveFile(partial.path().c_str(), EXS_LittleEndianExplicit,
-                                            EET_ExplicitLength, EGL_recalcGL);
+  FileConsumer consumer(partial.path());
+  OFCondition written;
+  {
+    FileOutput output(&consumer);
+    DcmWriteCache cache;
+    file.transferInit();
+    written =
+        file.write(output, EXS_LittleEndianExplicit, EET_ExplicitLength, &cache, EGL_recalcGL);
+    file.transferEnd();
+  }
   file.getAndRemoveDataset();  // the caller's
+  TF_RETURN_IF_ERROR(consumer.Close());
   if (written.bad()) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        path, ": cannot be written as DICOM: ", written.text(), "; is the disk full?"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(path, ": cannot be written as DICOM: ", written.text()));
   }
   return partial.Publish(path);
 }

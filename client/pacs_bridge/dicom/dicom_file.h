@@ -42,7 +42,8 @@ absl::StatusOr<std::unique_ptr<DcmFileFormat>> LoadDicomHeader(const std::string
 // Writes a data set as explicit little endian, all or nothing, readable by its owner alone (0600),
 // synced.
 //
-// Errors: those of PartialFile; InvalidArgument when DCMTK cannot write it.
+// Errors: those of PartialFile (a full disk is DISK_FULL); InvalidArgument when DCMTK cannot write
+// it.
 absl::Status SaveDicomFile(const std::string& path, DcmDataset* dataset);
 
 // Copies a file's header, without pixels and without private elements, to another: enough to give

@@ -12,12 +12,13 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
 namespace {
 
-absl::Status SystemSays(const std::string& path) { return absl::ErrnoToStatus(errno, path); }
+absl::Status SystemSays(const std::string& path) { return ErrorOfFile(errno, path); }
 
 absl::Status SyncAt(const std::string& path, int flags) {
   const int descriptor = open(path.c_str(), flags | O_CLOEXEC);
@@ -29,6 +30,15 @@ absl::Status SyncAt(const std::string& path, int flags) {
 }
 
 }  // namespace
+
+absl::Status ErrorOfFile(int error_number, const std::string& path) {
+  if (error_number == ENOSPC || error_number == EDQUOT || error_number == EFBIG) {
+    return WithReason(
+        absl::ResourceExhaustedError(absl::StrCat(path, ": the disk is full; free some space")),
+        ErrorReason::kDiskFull);
+  }
+  return absl::ErrnoToStatus(error_number, path);
+}
 
 absl::StatusOr<PartialFile> PartialFile::Create(std::string path) {
   unlink(path.c_str());

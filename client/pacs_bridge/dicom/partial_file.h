@@ -10,6 +10,10 @@
 
 namespace tissueform {
 
+// What the system says of a file by this number, with its path: ResourceExhausted (DISK_FULL) where
+// there is no room.
+absl::Status ErrorOfFile(int error_number, const std::string& path);
+
 // A file that a library writes by its name, and that nobody sees before it is whole and on the
 // disk. Its name ends in ".partial" by custom, so that what a crash leaves is known as such.
 class PartialFile {
@@ -17,7 +21,7 @@ class PartialFile {
   // An empty file that its owner alone may read, in place of what a crash has left there.
   //
   // Errors name the file: NotFound (no such folder), PermissionDenied, ResourceExhausted (disk
-  // full), or what the system says.
+  // full: DISK_FULL), or what the system says.
   static absl::StatusOr<PartialFile> Create(std::string path);
   // Removes what has not been published.
   ~PartialFile();

@@ -3,6 +3,7 @@
 
 #include "client/pacs_bridge/dicom/dicom_file.h"
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -13,9 +14,11 @@
 #include <dcmtk/dcmdata/dctk.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "client/pacs_bridge/dicom/instance_header.h"
 #include "client/pacs_bridge/dicom/patient_study.h"
+#include "core/base/error_reason.h"
 #include "tests/testing/ct_series.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"
@@ -57,6 +60,22 @@ TEST(DicomFile, AHeaderHasNeitherPixelsNorPrivateElementsAndOneReader) {
   EXPECT_FALSE((*file)->getDataset()->tagExists(DCM_PixelData));
   EXPECT_FALSE((*file)->getDataset()->tagExists(DcmTagKey(0x0029, 0x1010)));
   EXPECT_EQ(ReadInstanceHeader(header)->instance_uid, series.instance_uids[0]);
+}
+
+TEST(DicomFile, AFullDiskIsToldOfTheSmallestFileAndNothingIsLeft) {
+  const fs::path folder = EmptyTestFolder("dicom_full_disk");
+  const CtSeries series = OneSlice(folder);
+  rlimit before = {};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit full = {200, before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &full), 0);
+  const absl::Status status = CopyHeaderOnly(series.files[0], folder / "header");
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_TRUE(HasReason(status, ErrorReason::kDiskFull)) << status;
+  EXPECT_FALSE(fs::exists(folder / "header"));
+  EXPECT_FALSE(fs::exists(folder / "header.partial"));
 }
 
 TEST(DicomFile, AHeaderHasNothingThatIsDrawnOverPixels) {
