@@ -64,8 +64,16 @@ void AccessChanges::Heard(const AccessRows& rows) {
 }
 
 void AccessChanges::SessionGone(const std::string& id) {
-  MutexLock lock(access_.mutex_);
-  access_.index_.RemoveSession(id);
+  AccessRows rows;
+  {
+    MutexLock lock(access_.mutex_);
+    const ResourceIndex::Session* session = access_.index_.FindSession(id);
+    if (session != nullptr)
+      rows.shares = access_.table_.SharesOf(session->owner, SessionResource(id));
+    rows.links = access_.table_.LinksOf(id);
+    access_.index_.RemoveSession(id);
+  }
+  Erase(std::move(rows), WarnUnlessErased);
 }
 
 void AccessChanges::PredictionGone(const std::string& id) {
@@ -96,10 +104,19 @@ std::shared_ptr<AccessChanges::Unseen> AccessChanges::Begin(AccessRows erased, A
 }
 
 void AccessChanges::End(Unseen* unseen, bool kept) {
-  MutexLock lock(access_.mutex_);
-  unseen->ended = true;
-  unseen->kept = kept;
-  if (kept) access_.table_.Add(unseen->put);
+  AccessRows of_nothing;
+  {
+    MutexLock lock(access_.mutex_);
+    unseen->ended = true;
+    unseen->kept = kept;
+    if (!kept) return;
+    access_.table_.Add(unseen->put);
+    for (const FollowLinkRow& link : unseen->put.links) {
+      if (access_.index_.FindSession(link.session) == nullptr) of_nothing.links.push_back(link);
+    }
+  }
+  // Its session went while it was put there: it must not open the next one of that name.
+  Erase(std::move(of_nothing), WarnUnlessErased);
 }
 
 absl::Status AccessChanges::LookFor(const Principal& caller, absl::string_view resource) const {
@@ -263,16 +280,11 @@ absl::Status AccessChanges::ForsakeMesh(const Principal& caller, const std::stri
 }
 
 void AccessChanges::SessionRemoved(const std::string& id) {
-  AccessRows rows;
   {
     MutexLock lock(access_.mutex_);
-    const ResourceIndex::Session* session = access_.index_.FindSession(id);
-    if (session == nullptr) return;
-    rows.shares = access_.table_.SharesOf(session->owner, SessionResource(id));
-    rows.links = access_.table_.LinksOf(id);
-    access_.index_.RemoveSession(id);
+    if (access_.index_.FindSession(id) == nullptr) return;
   }
-  Erase(std::move(rows), WarnUnlessErased);
+  SessionGone(id);
 }
 
 void AccessChanges::PredictionRemoved(const std::string& id) {

@@ -55,7 +55,9 @@ class AccessChanges {
   absl::Status LearnAgain();
   // Rows that others have put there.
   void Heard(const AccessRows& rows);
-  // What others have deleted: their rows go by LearnAgain.
+  // What others have deleted: their rows go by LearnAgain. What is known of a session's rows is
+  // erased from the store, too: who deleted it may not have known all, and the next session of its
+  // name is another's.
   void SessionGone(const std::string& id);
   void PredictionGone(const std::string& id);
   void CaseGone(const CaseKey& key);

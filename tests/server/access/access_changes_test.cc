@@ -4,6 +4,7 @@
 #include "server/access/access_changes.h"
 
 #include <functional>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -213,6 +214,11 @@ class FollowingAccessChangesTest : public ::testing::Test {
   void Share() {
     changes_.Share(ann_, share_, [](const absl::Status& status) { EXPECT_THAT(status, IsOk()); });
   }
+  void Link(const std::string& digest) {
+    changes_.AddLink(
+        ann_, {.digest = digest, .session = "s", .expires_s = std::numeric_limits<int64_t>::max()},
+        [](const absl::Status& status) { EXPECT_THAT(status, IsOk()); });
+  }
   bool BobMayLook() { return access_.MaySession(bob_, "s", Need::kLook).ok(); }
 
   const Principal ann_{.name = "ann"};
@@ -257,6 +263,37 @@ TEST_F(FollowingAccessChangesTest, WhatIsGivenWhileAllIsReadStays) {
   store_.AfterReading([this] { Share(); });
   ASSERT_THAT(changes_.LearnAgain(), IsOk());
   EXPECT_TRUE(BobMayLook());
+}
+
+TEST_F(FollowingAccessChangesTest, WhatOneServerGivesWhileAnotherDeletesTheSessionOpensNoNextOne) {
+  Access access_there;
+  AccessChanges there({}, &store_.rows(), &access_there);
+  const auto add = [](AccessChanges* changes) {
+    SessionRecord session;
+    session.id = "s";
+    session.owner = "ann";
+    changes->Added(session);
+  };
+  add(&there);
+  there.SessionRemoved("s");
+  // Its notice has not come yet.
+  Link("1");
+  Share();
+  store_.Hold();
+  Link("2");
+  changes_.SessionGone("s");
+  store_.Release();  // the link is put there, then the rows that were known are erased
+  EXPECT_THAT(store_.Load()->links, IsEmpty());
+  EXPECT_THAT(store_.Load()->shares, IsEmpty());
+  add(&there);
+  ASSERT_THAT(there.LearnAgain(), IsOk());
+  add(&changes_);
+  ASSERT_THAT(changes_.LearnAgain(), IsOk());
+  for (const char* digest : {"1", "2"}) {
+    EXPECT_THAT(access_there.FindLink(digest).status(), StatusIs(Code::kUnauthenticated));
+    EXPECT_THAT(access_.FindLink(digest).status(), StatusIs(Code::kUnauthenticated));
+  }
+  EXPECT_FALSE(BobMayLook());
 }
 
 TEST_F(FollowingAccessChangesTest, WhatACallNamesAndNobodyKnowsIsLookedForBeforeItIsRefused) {
