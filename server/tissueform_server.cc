@@ -157,8 +157,7 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
   TF_RETURN_IF_ERROR(server->ServeMetrics());
   TF_RETURN_IF_ERROR(server->Listen());
   if (server->cluster_ != nullptr) {
-    const MemoryBudget& budget = server->budget_;
-    server->cluster_->Start([&budget] { return budget.limit_bytes() - budget.reserved_bytes(); });
+    server->cluster_->Start([raw = server.get()] { return raw->FreeBytes(); });
   }
   return server;
 }
@@ -182,9 +181,10 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       tokens_(std::move(parts.tokens)),
       quotas_(options.quotas),
       access_store_(std::move(parts.opened.access)),
+      access_([this] { return stores_->NowS(); }),
       access_changes_(options.access, access_store_.get(), &access_),
       export_store_(std::move(parts.opened.exports)),
-      exports_(options.exports, export_store_.get()),
+      exports_(options.exports, export_store_.get(), [this] { return stores_->NowS(); }),
       export_watches_(options.exports.max_watches),
       authenticator_(parts.authenticator == nullptr
                          ? nullptr
@@ -198,7 +198,8 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
              .node_name = cluster_ == nullptr ? "" : cluster_->name()}),
       budget_(options.memory_budget_bytes),
       stores_(WatchStores(std::move(parts.opened.stores), &access_changes_)),
-      catalog_(options.limits, &budget_, stores_->keeps() ? &stores_->meshes() : nullptr),
+      catalog_(options.limits, &budget_, stores_->keeps() ? &stores_->meshes() : nullptr,
+               Clock::System(), [stores = stores_.get()] { return stores->NowS(); }),
       uploads_(options.limits, &catalog_, &stores_->uploads()),
       pool_(std::make_unique<WorkerPool>(options.workers)),
       registry_(options.limits, &budget_, pool_.get(), &stores_->sessions(), &catalog_,
@@ -219,7 +220,8 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
                           &stores_->predictions(), &timer_),
       plan_service_(&gate_, &access_, &registry_),
       case_service_(&gate_, options.limits, &access_, &stores_->cases(), pool_.get(), &timer_),
-      access_service_(&gate_, &access_changes_, &registry_, &streams_, &watches_),
+      access_service_(&gate_, &access_changes_, &registry_, &streams_, &watches_,
+                      [this] { return stores_->NowS(); }),
       export_service_(&gate_, options.limits, &access_, &stores_->predictions(), &exports_,
                       &export_watches_, pool_.get(), &timer_),
       server_info_service_(&gate_, LimitsOf(options)) {
@@ -389,6 +391,11 @@ void TissueformServer::Reclaim(int64_t bytes) {
     meshes = catalog_.RemoveIdle(options_.limits.session_idle_ttl);
   }
   if (meshes > 0) spdlog::info("{} meshes that nobody uses have left memory", meshes);
+}
+
+int64_t TissueformServer::FreeBytes() const {
+  const int64_t reserved = budget_.reserved_bytes();
+  return budget_.limit_bytes() - reserved + registry_.EvictableBytes();
 }
 
 void TissueformServer::Ask(std::function<void()> answered) {

@@ -115,6 +115,8 @@ class TissueformServer {
 
   absl::Status LearnWhatIsKept();
   absl::Status Listen();
+  // What sessions may still take, where those that nobody uses leave for it.
+  int64_t FreeBytes() const;
   void Reclaim(int64_t bytes);
   void ReclaimOf(const std::string& owner, int64_t bytes);
   // Nothing is told without --metrics-port.

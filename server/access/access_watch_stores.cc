@@ -169,6 +169,8 @@ class WatchedStores final : public Stores {
   CaseStore& cases() override { return cases_; }
   CommitThread* commit_thread() override { return stores_->commit_thread(); }
   bool keeps() const override { return stores_->keeps(); }
+  int64_t NowS() const override { return stores_->NowS(); }
+  absl::Status AskTime() override { return stores_->AskTime(); }
   const DurationHistogram* latency() const override { return stores_->latency(); }
   std::string folder() const override { return stores_->folder(); }
 

@@ -14,8 +14,10 @@ absl::StatusOr<std::unique_ptr<PostgresStores>> PostgresStores::Open(
   TF_RETURN_IF_ERROR(PreparePostgresSchema(pool.get()));
   TF_ASSIGN_OR_RETURN(std::unique_ptr<UploadStore> uploads,
                       UploadStore::OpenTemporary(options.uploads));
-  return std::unique_ptr<PostgresStores>(
+  std::unique_ptr<PostgresStores> stores(
       new PostgresStores(options, std::move(pool), std::move(uploads)));
+  TF_RETURN_IF_ERROR(stores->AskTime());
+  return stores;
 }
 
 }  // namespace tissueform

@@ -10,6 +10,7 @@
 
 #include "server/access_store/access_store.h"
 #include "server/postgres_store/postgres_case_store.h"
+#include "server/postgres_store/postgres_clock.h"
 #include "server/postgres_store/postgres_mesh_store.h"
 #include "server/postgres_store/postgres_pool.h"
 #include "server/postgres_store/postgres_prediction_store.h"
@@ -20,7 +21,7 @@ namespace tissueform {
 
 struct PostgresStoresOptions {
   PostgresOptions database = {};
-  UnixClock clock = SystemUnixSeconds;
+  UnixClock clock = nullptr;  // null: the database's
   // Of meshes that have not arrived in full: they are this server's own, in a temporary folder that
   // goes with it. A client whose server is gone sends such a mesh anew.
   UploadLimits uploads = {};
@@ -40,6 +41,8 @@ class PostgresStores final : public Stores {
   CaseStore& cases() override { return cases_; }
   const DurationHistogram* latency() const override { return &pool_->latency(); }
   bool keeps() const override { return true; }
+  int64_t NowS() const override { return clock_(); }
+  absl::Status AskTime() override { return database_clock_.Ask(); }
 
   PostgresPool* pool() { return pool_.get(); }
 
@@ -48,13 +51,17 @@ class PostgresStores final : public Stores {
                  std::unique_ptr<UploadStore> uploads)
       : pool_(std::move(pool)),
         uploads_(std::move(uploads)),
-        sessions_(pool_.get(), options.clock),
+        database_clock_(pool_.get()),
+        clock_(options.clock ? options.clock : [this] { return database_clock_.NowS(); }),
+        sessions_(pool_.get(), clock_),
         meshes_(pool_.get()),
         predictions_(pool_.get()),
         cases_(pool_.get()) {}
 
   const std::unique_ptr<PostgresPool> pool_;
   const std::unique_ptr<UploadStore> uploads_;
+  PostgresClock database_clock_;
+  const UnixClock clock_;
   PostgresSessionStore sessions_;
   PostgresMeshStore meshes_;
   PostgresPredictionStore predictions_;

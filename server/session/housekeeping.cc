@@ -45,12 +45,14 @@ Housekeeping::Housekeeping(Options options, Stores* stores, SessionRegistry* reg
       registry_(registry),
       catalog_(catalog),
       started_(options_.clock->Now()),
-      started_s_(options_.unix_clock()),
+      started_s_(NowS()),
+      started_machine_s_(MachineS()),
       written_until_(started_) {}
 
 void Housekeeping::Start() {
   written_until_ = started_ = options_.clock->Now();
-  started_s_ = options_.unix_clock();
+  started_s_ = NowS();
+  started_machine_s_ = MachineS();
   thread_ = std::thread([this] { Work(); });
 }
 
@@ -84,7 +86,9 @@ Housekeeping::Removed Housekeeping::RunOnce() {
       std::chrono::duration_cast<std::chrono::seconds>(written_until_ - started_).count();
   // The machine's time, but never ahead of what has passed since the start.
   const int64_t now_s = started_s_ + passed + std::min<int64_t>(offset_s_, 0);
-  removed.uploads = RemoveUploads(now_s - options_.partial_uploads.count());
+  // Those are files of this machine.
+  const int64_t machine_now_s = std::min(MachineS(), started_machine_s_ + passed);
+  removed.uploads = RemoveUploads(machine_now_s - options_.partial_uploads.count());
   if (options_.retention_days > 0) {
     const int64_t before_s = now_s - options_.retention_days * kDaySeconds;
     removed.sessions = RemoveSessions(before_s);
@@ -110,8 +114,11 @@ Housekeeping::Removed Housekeeping::RunOnce() {
 }
 
 bool Housekeeping::WriteUse() {
+  const absl::Status asked = stores_->AskTime();
+  WarnUnlessOk(asked, "the store's time is not known");
+  if (!asked.ok()) return false;
   const Clock::TimePoint now = options_.clock->Now();
-  const int64_t unix_s = options_.unix_clock();
+  const int64_t unix_s = NowS();
   const int64_t offset_s = unix_s - started_s_ -
                            std::chrono::duration_cast<std::chrono::seconds>(now - started_).count();
   // A clock that was behind has been put right: what was used meanwhile has a time that is too
@@ -196,8 +203,7 @@ int Housekeeping::RemoveMeshes(int64_t before_s, const std::set<std::string>& of
     WarnUnlessOk(gone.status(), "a mesh that nobody used stays");
     removed += gone.ok() && *gone ? 1 : 0;
   }
-  WarnUnlessOk(stores_->meshes().Touch(of_unknown_age, options_.unix_clock()),
-               "times of use are not written");
+  WarnUnlessOk(stores_->meshes().Touch(of_unknown_age, NowS()), "times of use are not written");
   return removed;
 }
 

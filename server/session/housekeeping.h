@@ -28,7 +28,8 @@ namespace tissueform {
 // has sent or read, of no prediction; an export that has not changed. What was used while
 // the server ran is known by a clock that never goes back. The machine's clock only decides about
 // the rest, and only as far as it went on with that one: set back or forward while the server runs,
-// it deletes nothing early.
+// it deletes nothing early. Of a store that several servers share the database's clock decides, not
+// the machine's.
 //
 // RunOnce and WriteUse: one thread at a time, and not between Start and Stop.
 class Housekeeping {
@@ -40,7 +41,7 @@ class Housekeeping {
     std::function<absl::StatusOr<int>(int64_t before_s, int most)> remove_exports = {};
     std::chrono::seconds partial_uploads{24 * 3600};
     std::chrono::seconds interval{300};
-    UnixClock unix_clock = SystemUnixSeconds;
+    UnixClock unix_clock = nullptr;  // null: the store's, and of uploads the machine's
     const Clock* clock = Clock::System();
   };
   struct Removed {
@@ -74,6 +75,10 @@ class Housekeeping {
 
  private:
   void Work();
+  int64_t NowS() const { return options_.unix_clock ? options_.unix_clock() : stores_->NowS(); }
+  int64_t MachineS() const {
+    return options_.unix_clock ? options_.unix_clock() : SystemUnixSeconds();
+  }
   int RemoveUploads(int64_t before_s);
   int RemoveSessions(int64_t before_s);
   // What predictions are made from, by name.
@@ -96,6 +101,7 @@ class Housekeeping {
   // Of whoever runs a round.
   Clock::TimePoint started_;
   int64_t started_s_ = 0;
+  int64_t started_machine_s_ = 0;
   Clock::TimePoint written_until_;  // what was used until then is in the store
   int64_t offset_s_ = 0;            // of the machine's clock against the other one, when last read
 

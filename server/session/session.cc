@@ -114,9 +114,14 @@ absl::StatusOr<std::shared_ptr<SharedPreparation>> Session::OpenPreparation() co
   return models_->preparation;
 }
 
-int64_t Session::shared_bytes() const {
+std::shared_ptr<const SharedPreparation> Session::shared_preparation() const {
   MutexLock lock(mutex_);
-  return models_.has_value() ? models_->preparation->bytes_held() : 0;
+  return models_.has_value() ? models_->preparation : nullptr;
+}
+
+int64_t Session::shared_bytes() const {
+  const std::shared_ptr<const SharedPreparation> shared = shared_preparation();
+  return shared == nullptr ? 0 : shared->bytes_held();
 }
 
 bool Session::HasModel(DeformationModel model) const {

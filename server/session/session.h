@@ -103,7 +103,10 @@ class Session {
   // Grow when another model or prepared answers are first asked for. The second is what other
   // sessions may use as well, and is part of the first.
   int64_t bytes_held() const { return own_bytes_ + shared_bytes(); }
+  int64_t own_bytes() const { return own_bytes_; }
   int64_t shared_bytes() const;
+  // Whose bytes the shared ones are. Null once closed.
+  std::shared_ptr<const SharedPreparation> shared_preparation() const;
 
   // Where solves run, in LaneOf(model).
   Strand& strand() { return strand_; }

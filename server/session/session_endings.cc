@@ -168,6 +168,11 @@ int SessionEndings::Evict(const std::function<bool()>& enough,
   return count;
 }
 
+int64_t SessionEndings::EvictableBytes() const {
+  MutexLock lock(sessions_->mutex);
+  return sessions_->table.BytesUnusedSince(clock_->Now() - kInUse);
+}
+
 int SessionEndings::RemoveIdle() {
   const Clock::TimePoint until = clock_->Now() - limits_.session_idle_ttl;
   std::vector<std::string> ids;

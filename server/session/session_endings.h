@@ -51,6 +51,7 @@ class SessionEndings {
       ABSL_LOCKS_EXCLUDED(sessions_->mutex);
   int Evict(const std::function<bool()>& enough, const std::optional<std::string>& owner = {})
       ABSL_LOCKS_EXCLUDED(sessions_->mutex);
+  int64_t EvictableBytes() const ABSL_LOCKS_EXCLUDED(sessions_->mutex);
   int RemoveIdle() ABSL_LOCKS_EXCLUDED(sessions_->mutex);
   int RemoveUnused(const std::vector<std::string>& ids, Clock::TimePoint since)
       ABSL_LOCKS_EXCLUDED(sessions_->mutex);

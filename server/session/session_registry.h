@@ -169,6 +169,9 @@ class SessionRegistry {
     return endings_.Evict(enough, owner);
   }
 
+  // What Evict would give back at most.
+  int64_t EvictableBytes() const { return endings_.EvictableBytes(); }
+
   // Ends the sessions that were idle for longer than the TTL, records and all: for stores in
   // memory, whose meshes nobody else keeps. Returns how many.
   int RemoveIdle() { return endings_.RemoveIdle(); }

@@ -104,6 +104,21 @@ std::string SessionTable::LeastRecentlyUsed(Clock::TimePoint before,
   return oldest;
 }
 
+int64_t SessionTable::BytesUnusedSince(Clock::TimePoint before) const {
+  int64_t bytes = 0;
+  std::map<std::shared_ptr<const SharedPreparation>, bool> is_used;
+  for (const auto& [id, known] : known_) {
+    if (known.session == nullptr) continue;
+    const bool used = known.session->making() || known.session->last_used() >= before;
+    if (!used) bytes += known.session->own_bytes();
+    is_used[known.session->shared_preparation()] |= used;
+  }
+  for (const auto& [shared, used] : is_used) {
+    if (!used && shared != nullptr) bytes += shared->bytes_held();
+  }
+  return bytes;
+}
+
 int SessionTable::CountOf(const std::string& owner) const {
   const auto known = std::count_if(known_.begin(), known_.end(),
                                    [&](const auto& entry) { return entry.second.owner == owner; });

@@ -122,6 +122,9 @@ class SessionTable {
   // unless that is after `before` or something is being made for it. Empty when there is none.
   std::string LeastRecentlyUsed(Clock::TimePoint before,
                                 const std::optional<std::string>& owner) const;
+  // The memory of those that LeastRecentlyUsed names one after the other when they leave; what
+  // several share goes with the last of them.
+  int64_t BytesUnusedSince(Clock::TimePoint before) const;
   // Of this owner: those that are known, and those that are being made for the first time.
   int CountOf(const std::string& owner) const;
   // Of all: those used last at `until` or before.

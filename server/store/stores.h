@@ -3,7 +3,10 @@
 
 #pragma once
 
+#include <cstdint>
 #include <string>
+
+#include "absl/status/status.h"
 
 #include "core/base/duration_histogram.h"
 #include "server/store/case_store.h"
@@ -37,6 +40,12 @@ class Stores {
   virtual CommitThread* commit_thread() { return nullptr; }
   // What is acknowledged outlives the process; so must the rows of other rooms.
   virtual bool keeps() const = 0;
+
+  // Unix seconds, for what is kept: this machine's clock, or that of a database which several
+  // servers share, as it was asked last. Fast.
+  virtual int64_t NowS() const { return SystemUnixSeconds(); }
+  // Asks the database. Blocks. Errors: what the store says; then nobody knows what is old.
+  virtual absl::Status AskTime() { return absl::OkStatus(); }
 };
 
 }  // namespace tissueform

@@ -24,7 +24,6 @@
 #include "server/postgres_store/postgres_schema.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_schema.h"
-#include "tests/server/postgres_store/frozen_proxy.h"
 #include "tests/server/postgres_store/test_database.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/waiting_calls.h"
@@ -36,8 +35,10 @@ namespace {
 using ::testing::AllOf;
 using ::testing::AnyOf;
 using ::testing::ElementsAre;
+using ::testing::Ge;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Lt;
 using ::testing::Not;
 using Code = absl::StatusCode;
 
@@ -74,6 +75,27 @@ TEST_F(PostgresStoresTest, WhatOneServerKeepsAnotherFinds) {
   const std::string mesh = PutMesh(1);
   ASSERT_OK_AND_ASSIGN(const MeshPayload payload, other->meshes().Read(mesh));
   EXPECT_EQ(payload.View().Sha256(), mesh);
+}
+
+TEST_F(PostgresStoresTest, WhatIsKeptIsDatedByTheDatabasesClock) {
+  const auto set_year = [](const char* year) {
+    RunSql(absl::StrCat(
+        "CREATE OR REPLACE FUNCTION tissueform_now() RETURNS timestamptz VOLATILE LANGUAGE sql AS "
+        "'SELECT timestamptz ''",
+        year, "-02-03 00:00:00Z''';"));
+  };
+  const auto soon_after = [](int64_t then) { return AllOf(Ge(then), Lt(then + 3600)); };
+  constexpr int64_t kThen = 981'158'400;
+  set_year("2001");
+  ASSERT_OK_AND_ASSIGN(const auto stores,
+                       PostgresStores::Open({.database = TestDatabaseOptions()}));
+  EXPECT_THAT(stores->NowS(), soon_after(kThen));
+  ASSERT_OK_AND_ASSIGN(const SessionRecord made,
+                       CreateSession(stores->sessions(), SampleSession("s", 1)));
+  EXPECT_THAT(made.created_s, soon_after(kThen));
+  set_year("2002");
+  ASSERT_THAT(stores->AskTime(), IsOk());
+  EXPECT_THAT(stores->NowS(), soon_after(kThen + 365 * 24 * 3600));
 }
 
 TEST_F(PostgresStoresTest, ALargeBlobIsManyRowsAndIsReadAsItWas) {
@@ -231,16 +253,27 @@ TEST_F(PostgresStoresTest, ADatabaseThatIsNotThereIsUnavailable) {
               StatusIs(Code::kUnavailable, HasSubstr("postgresql://127.0.0.1:1/postgres")));
 }
 
-TEST_F(PostgresStoresTest, WhatMayNotBeWrittenIsToldToBeReadOnly) {
-  RunSql("ALTER DATABASE postgres SET default_transaction_read_only = on;");
-  auto read_only = PostgresStores::Open({.database = TestDatabaseOptions()});
-  absl::Status status = read_only.status();
-  if (read_only.ok()) {
-    status = CreateSession((*read_only)->sessions(), SampleSession("s", 1)).status();
-  }
-  RunSql(
-      "SET TRANSACTION READ WRITE; ALTER DATABASE postgres RESET default_transaction_read_only;");
-  EXPECT_THAT(status, StatusIs(Code::kFailedPrecondition, HasSubstr("read-only")));
+TEST_F(PostgresStoresTest, ADatabaseThatTakesNoWritesIsRefusedAtTheStartAndWaitedForByCalls) {
+  RunOutsideTransaction("DROP DATABASE IF EXISTS away WITH (FORCE)");
+  RunOutsideTransaction("CREATE DATABASE away");
+  PostgresOptions options = TestDatabaseOptions("away");
+  options.patience = std::chrono::milliseconds(150);
+  const auto hasty = OpenTestStores(SystemUnixSeconds, options);
+  options.patience = std::chrono::seconds(30);
+  const auto patient = OpenTestStores(SystemUnixSeconds, options);
+  ASSERT_THAT(CreateSession(hasty->sessions(), SampleSession("s", 1)), IsOk());
+  // As after a failover that has made a replica of it.
+  RunOutsideTransaction("ALTER DATABASE away SET default_transaction_read_only = on");
+  RunSql("SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE datname = 'away'");
+  EXPECT_THAT(PostgresStores::Open({.database = options}).status(),
+              StatusIs(Code::kFailedPrecondition, HasSubstr("read-only replica")));
+  std::promise<absl::Status> answer;
+  patient->sessions().CommitPoses("s", SamplePoses(5), 1,
+                                  [&](const absl::Status& status) { answer.set_value(status); });
+  EXPECT_THAT(CommitPoses(hasty->sessions(), "s", SamplePoses(4)),
+              StatusIs(Code::kUnavailable, HasSubstr("read-only replica")));
+  RunOutsideTransaction("ALTER DATABASE away RESET default_transaction_read_only");
+  EXPECT_THAT(answer.get_future().get(), IsOk());
 }
 
 TEST_F(PostgresStoresTest, CallsGoOnWhenTheDatabaseHasEndedTheirConnections) {
@@ -276,237 +309,12 @@ TEST_F(PostgresStoresTest, ACallWaitsForADatabaseThatComesBackAndNotForever) {
   EXPECT_EQ(SerializePoses(found.last_poses), SerializePoses(SamplePoses(5)));
 }
 
-TEST_F(PostgresStoresTest, AConnectionThroughWhichNothingComesIsGivenUpAndTheCallGoesOnOnAnother) {
-  FrozenProxy proxy(TestDatabasePort());
-  PostgresOptions options = TestDatabaseOptions();
-  options.url = absl::StrCat("postgresql://postgres@127.0.0.1:", proxy.port(), "/postgres");
-  options.unanswered_timeout = std::chrono::milliseconds(300);
-  const auto stores = OpenTestStores(SystemUnixSeconds, options);
-  ASSERT_THAT(CreateSession(stores->sessions(), SampleSession("s", 1)), IsOk());
-  const int before = proxy.accepted();
-  proxy.Freeze();
-  EXPECT_THAT(CommitPoses(stores->sessions(), "s", SamplePoses(7)), IsOk());
-  EXPECT_GT(proxy.accepted(), before);
-  ASSERT_OK_AND_ASSIGN(const SessionRecord found, GetSession(stores_->sessions(), "s"));
-  EXPECT_EQ(SerializePoses(found.last_poses), SerializePoses(SamplePoses(7)));
-}
-
-TEST_F(PostgresStoresTest, OfConnectionsThatFrozeTogetherACallWaitsForOneOnly) {
-  FrozenProxy proxy(TestDatabasePort());
-  PostgresOptions options = TestDatabaseOptions();
-  options.url = absl::StrCat("postgresql://postgres@127.0.0.1:", proxy.port(), "/postgres");
-  options.unanswered_timeout = std::chrono::milliseconds(1'500);
-  options.patience = std::chrono::milliseconds(2'800);
-  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
-  const auto select = [](PostgresTransaction& transaction) {
-    return transaction.Run("SELECT 1", {});
-  };
-  // Three at once, so that there are as many connections.
-  ASSERT_THAT(pool->Run([&](PostgresTransaction&) {
-    return pool->Run([&](PostgresTransaction&) { return pool->Run(select); });
-  }),
-              IsOk());
-  const int before = proxy.accepted();
-  proxy.Freeze();
-  EXPECT_THAT(pool->Run(select), IsOk());
-  EXPECT_EQ(proxy.accepted(), before + 1);
-}
-
-TEST_F(PostgresStoresTest, NobodyWaitsBeyondTheEndOfWaiting) {
-  FrozenProxy proxy(TestDatabasePort());
-  PostgresOptions options = TestDatabaseOptions();
-  options.url = absl::StrCat("postgresql://postgres@127.0.0.1:", proxy.port(), "/postgres");
-  options.patience = std::chrono::minutes(10);
-  options.unanswered_timeout = std::chrono::minutes(10);
-  options.max_connections = 2;
-  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
-  // One that waits for an answer, one that tries again, one that finds no connection free.
-  std::promise<void> begun;
-  const auto run = [&pool](const std::function<void()>& first, const char* sql) {
-    return std::async(std::launch::async, [&pool, first, sql] {
-      return pool->Run([&](PostgresTransaction& transaction) {
-        first();
-        return transaction.Execute(sql);
-      });
-    });
-  };
-  auto silent = run(
-      [&] {
-        proxy.FreezeAll();
-        begun.set_value();
-      },
-      "SELECT 1");
-  begun.get_future().wait();
-  auto connecting = run([] {}, "SELECT 1");
-  auto waiting = run([] {}, "SELECT 1");
-  pool->EndWaiting(PostgresPool::Clock::now());
-  for (auto* call : {&silent, &connecting, &waiting}) {
-    ASSERT_EQ(call->wait_for(std::chrono::seconds(60)), std::future_status::ready);
-    EXPECT_THAT(call->get(), StatusIs(Code::kUnavailable));
-  }
-  EXPECT_THAT(pool->Run([](PostgresTransaction&) { return absl::OkStatus(); }),
-              StatusIs(Code::kUnavailable));
-  proxy.Thaw();
-}
-
-TEST_F(PostgresStoresTest, WhatACallHasWaitedBeforeIsPartOfItsPatienceWhileTheDatabaseIsAway) {
-  RunOutsideTransaction("DROP DATABASE IF EXISTS away WITH (FORCE)");
-  RunOutsideTransaction("CREATE DATABASE away");
-  PostgresOptions options = TestDatabaseOptions("away");
-  options.patience = std::chrono::minutes(10);
-  options.waited = [] { return std::chrono::hours(1); };
-  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
-  const auto select = [](PostgresTransaction& transaction) {
-    return transaction.Run("SELECT 1", {});
-  };
-  EXPECT_THAT(pool->Run(select), IsOk()) << "it was a queue that was slow";
-  RunOutsideTransaction("ALTER DATABASE away ALLOW_CONNECTIONS false");
-  RunSql("SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE datname = 'away'");
-  EXPECT_THAT(pool->Run(select, PostgresPool::Clock::now() + std::chrono::milliseconds(100)),
-              StatusIs(Code::kUnavailable));
-  EXPECT_THAT(pool->Run(select), StatusIs(Code::kUnavailable, HasSubstr("in time")));
-  RunOutsideTransaction("ALTER DATABASE away ALLOW_CONNECTIONS true");
-  EXPECT_THAT(pool->Run(select, PostgresPool::Clock::now() + options.patience), IsOk());
-  EXPECT_THAT(pool->Run(select), IsOk());
-}
-
-TEST_F(PostgresStoresTest, OfACommitThatIsNotAnsweredNobodyClaimsToKnow) {
-  FrozenProxy proxy(TestDatabasePort());
-  PostgresOptions options = TestDatabaseOptions();
-  options.url = absl::StrCat("postgresql://postgres@127.0.0.1:", proxy.port(), "/postgres");
-  options.unanswered_timeout = std::chrono::milliseconds(300);
-  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
-  int calls = 0;
-  EXPECT_THAT(pool->Run([&](PostgresTransaction& transaction) {
-    ++calls;
-    const absl::Status status =
-        transaction.Execute("INSERT INTO blobs (sha256, bytes) VALUES ('x', 1)");
-    proxy.Freeze();
-    return status;
-  }),
-              StatusIs(Code::kUnavailable, HasSubstr("may have been kept")));
-  EXPECT_EQ(calls, 1) << "it is not tried again";
-}
-
-TEST_F(PostgresStoresTest, WhoFindsAllConnectionsInUseIsToldSoWhenItsTimeIsOver) {
-  PostgresOptions options = TestDatabaseOptions();
-  options.max_connections = 1;
-  options.patience = std::chrono::milliseconds(200);
-  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
-  std::promise<void> begun;
-  std::promise<void> released;
-  std::thread holder([&] {
-    EXPECT_THAT(pool->Run([&](PostgresTransaction&) {
-      begun.set_value();
-      released.get_future().wait();
-      return absl::OkStatus();
-    }),
-                IsOk());
-  });
-  begun.get_future().wait();
-  EXPECT_THAT(pool->Run([](PostgresTransaction&) { return absl::OkStatus(); }),
-              StatusIs(Code::kUnavailable, HasSubstr("all 1 connections")));
-  released.set_value();
-  holder.join();
-  EXPECT_THAT(pool->Run([](PostgresTransaction&) { return absl::OkStatus(); }), IsOk());
-}
-
-TEST_F(PostgresStoresTest, WhatHasWaitedForTooLongIsNotBegun) {
-  bool called = false;
-  EXPECT_THAT(stores_->pool()->Run(
-                  [&](PostgresTransaction&) {
-                    called = true;
-                    return absl::OkStatus();
-                  },
-                  PostgresPool::Clock::now() - std::chrono::milliseconds(1)),
-              StatusIs(Code::kUnavailable, HasSubstr("in time")));
-  EXPECT_FALSE(called);
-}
-
 TEST_F(PostgresStoresTest, ADatabaseWithoutTlsIsNotTalkedToWhereTlsIsAskedFor) {
   PostgresOptions options = TestDatabaseOptions();
   absl::StrAppend(&options.url, "?sslmode=verify-full&sslrootcert=/nowhere.pem");
   EXPECT_THAT(PostgresStores::Open({.database = options}).status(),
               StatusIs(Code::kUnavailable, AnyOf(HasSubstr("SSL"), HasSubstr("certificate"))));
 }
-
-TEST_F(PostgresStoresTest, WhatOthersLockOrWhatTakesTooLongIsEnded) {
-  PostgresOptions options = TestDatabaseOptions();
-  options.lock_timeout = std::chrono::milliseconds(50);
-  options.statement_timeout = std::chrono::milliseconds(100);
-  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
-  EXPECT_THAT(pool->Run([](PostgresTransaction& transaction) {
-    return transaction.Execute("SELECT pg_sleep(30)");
-  }),
-              StatusIs(Code::kUnavailable, HasSubstr("took too long")));
-  ASSERT_THAT(stores_->pool()->Run([&](PostgresTransaction& transaction) {
-    EXPECT_THAT(transaction.Execute("LOCK TABLE sessions"), IsOk());
-    EXPECT_THAT(pool->Run([](PostgresTransaction& other) {
-      return other.Run("SELECT count(*) FROM sessions", {});
-    }),
-                StatusIs(Code::kUnavailable, HasSubstr("hold the same rows")));
-    return absl::OkStatus();
-  }),
-              IsOk());
-}
-
-TEST_F(PostgresStoresTest, NothingOfAWorkThatFailsIsKept) {
-  EXPECT_THAT(stores_->pool()->Run([](PostgresTransaction& transaction) {
-    EXPECT_THAT(transaction.Execute("INSERT INTO blobs (sha256, bytes) VALUES ('x', 1)"), IsOk());
-    return absl::CancelledError("no");
-  }),
-              StatusIs(Code::kCancelled));
-  EXPECT_EQ(Count("blobs WHERE sha256 = 'x'"), 0);
-  EXPECT_THAT(stores_->pool()->Run([](PostgresTransaction& transaction) {
-    return transaction.Run("SELECT nothing", {});
-  }),
-              StatusIs(Code::kInternal, HasSubstr("SQLSTATE 42703")));
-}
-
-struct DatabaseError {
-  const char* name;
-  const char* sqlstate;
-  Code code;
-  const char* told;
-  int calls;  // of the work: more where another try may do better
-};
-
-class PostgresErrorTest : public PostgresStoresTest,
-                          public ::testing::WithParamInterface<DatabaseError> {};
-
-TEST_P(PostgresErrorTest, WhatTheDatabaseSaysIsOneLineWithItsCodeAndWithoutValues) {
-  const DatabaseError& error = GetParam();
-  int calls = 0;
-  const absl::Status status = stores_->pool()->Run([&](PostgresTransaction& transaction) {
-    if (++calls == 2) return absl::OkStatus();
-    return transaction.Execute(absl::StrCat("DO $$ BEGIN RAISE EXCEPTION 'no' USING ERRCODE = '",
-                                            error.sqlstate, "', DETAIL = 'hush'; END $$"));
-  });
-  EXPECT_EQ(calls, error.calls);
-  EXPECT_EQ(status.code(), error.code) << status;
-  EXPECT_THAT(std::string(status.message()),
-              AllOf(HasSubstr(error.told), Not(HasSubstr("hush")), Not(HasSubstr("\n"))));
-  if (!status.ok()) {
-    EXPECT_THAT(MessageForClients(status),
-                AllOf(Not(IsEmpty()), Not(HasSubstr("postgresql")), Not(HasSubstr("SQLSTATE")),
-                      Not(HasSubstr("host"))));
-  }
-  EXPECT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1)), IsOk()) << "calls go on";
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    Errors, PostgresErrorTest,
-    ::testing::Values(DatabaseError{"DiskFull", "53100", Code::kResourceExhausted, "make room", 1},
-                      DatabaseError{"ReadOnly", "25006", Code::kFailedPrecondition,
-                                    "read-only replica", 1},
-                      DatabaseError{"NoText", "22021", Code::kInvalidArgument, "UTF-8", 1},
-                      DatabaseError{"TooLong", "57014", Code::kUnavailable, "took too long", 1},
-                      DatabaseError{"Locked", "55P03", Code::kUnavailable, "others hold", 1},
-                      DatabaseError{"Deadlock", "40P01", Code::kOk, "", 2},
-                      DatabaseError{"ShuttingDown", "57P01", Code::kOk, "", 2},
-                      DatabaseError{"ConnectionLost", "08006", Code::kOk, "", 2},
-                      DatabaseError{"AnyOther", "XX000", Code::kInternal, "SQLSTATE XX000", 1}),
-    [](const auto& of) { return of.param.name; });
 
 TEST_F(PostgresStoresTest, AccessRowsAreKeptAsTheyWerePutLastAndDamagedOnesGiveNothing) {
   PostgresAccessStore store(stores_->pool());

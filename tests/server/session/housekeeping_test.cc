@@ -171,6 +171,45 @@ TEST_F(HousekeepingTest, WhatNobodyUsedForTheRetentionGoesAndNotASecondEarlier) 
   EXPECT_EQ(budget_.reserved_bytes(), 0);
 }
 
+// As a database that several servers share: with a time of its own.
+class SharedStores final : public Stores {
+ public:
+  SharedStores(Stores* stores, const std::atomic<int64_t>* now_s)
+      : stores_(*stores), now_s_(*now_s) {}
+
+  SessionStore& sessions() override { return stores_.sessions(); }
+  MeshStore& meshes() override { return stores_.meshes(); }
+  UploadStore& uploads() override { return stores_.uploads(); }
+  PredictionStore& predictions() override { return stores_.predictions(); }
+  CaseStore& cases() override { return stores_.cases(); }
+  bool keeps() const override { return true; }
+  int64_t NowS() const override { return now_s_; }
+  absl::Status AskTime() override { return answer; }
+
+  absl::Status answer;
+
+ private:
+  Stores& stores_;
+  const std::atomic<int64_t>& now_s_;
+};
+
+TEST_F(HousekeepingTest, WhatIsOldInAStoreThatSeveralServersShareItsClockSays) {
+  Create("a");
+  bar_.reset();
+  SharedStores shared(stores_.get(), &unix_s_);
+  // The machine that this runs on is years ahead of it.
+  Housekeeping housekeeping({.clock = &clock_}, &shared, registry_.get(), catalog_.get());
+  housekeeping.RunOnce();
+  Pass(30 * kDay);
+  EvictAll();
+  EXPECT_EQ(housekeeping.RunOnce().sessions, 0);
+  Pass(1);
+  shared.answer = absl::UnavailableError("away");
+  EXPECT_EQ(housekeeping.RunOnce().sessions, 0) << "nobody knows what is old";
+  shared.answer = absl::OkStatus();
+  EXPECT_EQ(housekeeping.RunOnce().sessions, 1);
+}
+
 TEST_F(HousekeepingTest, AUseIsWrittenDownAndARestartIsNone) {
   Create("used");
   Create("idle");

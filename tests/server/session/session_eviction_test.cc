@@ -129,6 +129,21 @@ class SessionEvictionTest : public ::testing::Test {
   int64_t mesh_bytes_ = 0;
 };
 
+TEST_F(SessionEvictionTest, WhatNobodyUsesIsWhatLeavingWouldGiveBack) {
+  EXPECT_EQ(registry_->EvictableBytes(), 0);
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first, Create("first").get());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> second, Create("second").get());
+  ASSERT_EQ(first->shared_preparation(), second->shared_preparation());
+  EXPECT_EQ(registry_->EvictableBytes(), 0) << "they were used until now";
+  clock_.Advance(2 * SessionRegistry::kInUse);
+  second->Touch();
+  EXPECT_EQ(registry_->EvictableBytes(), first->own_bytes()) << "the other needs what they share";
+  clock_.Advance(2 * SessionRegistry::kInUse);
+  EXPECT_EQ(registry_->EvictableBytes(), budget_.reserved_bytes() - mesh_bytes_);
+  EXPECT_EQ(EvictAll(), 2);
+  EXPECT_EQ(registry_->EvictableBytes(), 0);
+}
+
 TEST_F(SessionEvictionTest, WhatIsNotInUseGivesItsMemoryAndComesBackWithTheSameAnswers) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> before, Create("bar").get());
   const Positions answer = Answer(*before);
