@@ -19,31 +19,24 @@ constexpr std::chrono::milliseconds kBetweenTries{500};
 // After so long without a notice it is asked whether the database is there.
 constexpr std::chrono::seconds kSilence{3};
 
-absl::StatusOr<std::unique_ptr<PostgresConnection>> ConnectAndListen(const PostgresTarget& target) {
-  TF_ASSIGN_OR_RETURN(std::unique_ptr<PostgresConnection> connection,
-                      PostgresConnection::Open(target));
-  TF_RETURN_IF_ERROR(connection->Listen(kChannel));
-  return connection;
-}
-
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<ChangeListener>> ChangeListener::Start(
     const PostgresOptions& options, Callback told) {
   TF_ASSIGN_OR_RETURN(PostgresTarget target, TargetOf(options));
-  TF_ASSIGN_OR_RETURN(std::unique_ptr<PostgresConnection> connection, ConnectAndListen(target));
-  return std::unique_ptr<ChangeListener>(new ChangeListener(
-      std::move(target), options.unanswered_timeout, std::move(told), std::move(connection)));
+  std::unique_ptr<ChangeListener> listener(
+      new ChangeListener(std::move(target), options.unanswered_timeout, std::move(told)));
+  TF_RETURN_IF_ERROR(listener->Connect());
+  listener->thread_ = std::thread([raw = listener.get()] { raw->Loop(); });
+  return listener;
 }
 
 ChangeListener::ChangeListener(PostgresTarget target, std::chrono::milliseconds unanswered,
-                               Callback told, std::unique_ptr<PostgresConnection> connection)
+                               Callback told)
     : target_(std::move(target)),
       unanswered_(unanswered),
       told_(std::move(told)),
-      connection_(std::move(connection)),
-      watch_([this] { Watch(); }),
-      thread_([this] { Loop(); }) {}
+      watch_([this] { Watch(); }) {}
 
 ChangeListener::~ChangeListener() {
   {
@@ -51,7 +44,12 @@ ChangeListener::~ChangeListener() {
     ending_ = true;
     changed_.NotifyAll();
   }
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
+  {
+    MutexLock lock(mutex_);
+    ended_ = true;
+    changed_.NotifyAll();
+  }
   watch_.join();
 }
 
@@ -60,21 +58,31 @@ bool ChangeListener::ending() {
   return ending_;
 }
 
+absl::Status ChangeListener::Connect() {
+  TF_ASSIGN_OR_RETURN(std::unique_ptr<PostgresConnection> connection,
+                      PostgresConnection::Open(target_));
+  PostgresConnection* const opened = connection.get();
+  {
+    // Before it listens: that may not be answered.
+    MutexLock lock(mutex_);
+    connection_ = std::move(connection);
+  }
+  const absl::Status listens = opened->Listen(kChannel);
+  MutexLock lock(mutex_);
+  heard_ = std::chrono::steady_clock::now();
+  if (!listens.ok()) connection_.reset();
+  return listens;
+}
+
 bool ChangeListener::ConnectAgain() {
   {
     MutexLock lock(mutex_);
     connection_.reset();
   }
   while (!ending()) {
-    absl::StatusOr<std::unique_ptr<PostgresConnection>> connection = ConnectAndListen(target_);
-    const auto now = std::chrono::steady_clock::now();
+    if (Connect().ok()) return true;
     MutexLock lock(mutex_);
-    if (connection.ok()) {
-      connection_ = *std::move(connection);
-      heard_ = now;
-      return true;
-    }
-    const auto next = now + kBetweenTries;
+    const auto next = std::chrono::steady_clock::now() + kBetweenTries;
     while (!ending_ && std::chrono::steady_clock::now() < next) changed_.WaitUntil(mutex_, next);
   }
   return false;
@@ -95,7 +103,8 @@ absl::StatusOr<std::vector<std::string>> ChangeListener::Wait() {
 
 void ChangeListener::Watch() {
   MutexLock lock(mutex_);
-  while (!ending_) {
+  // To the end of its thread: what that waits for last may not be answered.
+  while (!ended_) {
     changed_.WaitUntil(mutex_, std::chrono::steady_clock::now() + kOneWait);
     if (connection_ != nullptr) {
       connection_->GiveUp(ending_ ? std::chrono::milliseconds(0) : unanswered_);

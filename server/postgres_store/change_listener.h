@@ -26,7 +26,7 @@ class ChangeListener {
  public:
   using Callback = std::function<void(const StoreChange&)>;
 
-  // What is committed after it has returned is told. Errors: those of PostgresConnection::Open.
+  // What is committed after it has returned is told. Errors: those of PostgresConnection.
   static absl::StatusOr<std::unique_ptr<ChangeListener>> Start(const PostgresOptions& options,
                                                                Callback told);
   // `told` is not called any longer.
@@ -35,9 +35,10 @@ class ChangeListener {
   ChangeListener& operator=(const ChangeListener&) = delete;
 
  private:
-  ChangeListener(PostgresTarget target, std::chrono::milliseconds unanswered, Callback told,
-                 std::unique_ptr<PostgresConnection> connection);
+  ChangeListener(PostgresTarget target, std::chrono::milliseconds unanswered, Callback told);
 
+  // Errors: those of PostgresConnection; then there is no connection.
+  absl::Status Connect() ABSL_LOCKS_EXCLUDED(mutex_);
   void Loop();
   // What was told; empty after a while without. Errors: the connection is of no use any longer.
   absl::StatusOr<std::vector<std::string>> Wait();
@@ -53,6 +54,7 @@ class ChangeListener {
   Mutex mutex_;
   ConditionVariable changed_;
   bool ending_ ABSL_GUARDED_BY(mutex_) = false;
+  bool ended_ ABSL_GUARDED_BY(mutex_) = false;  // its thread has
   // Used by its thread without the lock, and changed with it.
   std::unique_ptr<PostgresConnection> connection_;
   std::chrono::steady_clock::time_point heard_ = std::chrono::steady_clock::now();

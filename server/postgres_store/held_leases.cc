@@ -3,9 +3,17 @@
 
 #include "server/postgres_store/held_leases.h"
 
+#include <ctime>
 #include <utility>
 
 namespace tissueform {
+
+std::chrono::steady_clock::time_point AwakeOrNotNow() {
+  timespec now{};
+  clock_gettime(CLOCK_BOOTTIME, &now);
+  return std::chrono::steady_clock::time_point(std::chrono::seconds(now.tv_sec) +
+                                               std::chrono::nanoseconds(now.tv_nsec));
+}
 
 std::optional<int64_t> HeldLeases::EpochOf(const std::string& session,
                                            std::chrono::steady_clock::time_point now) {
@@ -51,13 +59,15 @@ std::vector<SessionLease> HeldLeases::Renewed(const std::vector<SessionLease>& r
   MutexLock lock(mutex_);
   std::map<std::string, SessionLease> before = std::exchange(leases_, {});
   for (const SessionLease& lease : renewed) {
+    const bool as_before = lease.answers_until == SessionLease::kAsBefore;
     const auto found = before.find(lease.session);
     if (found == before.end() || found->second.epoch != lease.epoch) {
-      strays->push_back(lease);
+      // One that was not renewed runs out.
+      if (!as_before) strays->push_back(lease);
       continue;
     }
+    leases_.emplace(lease.session, as_before ? found->second : lease);
     before.erase(found);
-    leases_.emplace(lease.session, lease);
   }
   lost.reserve(before.size());
   for (auto& [session, lease] : before) lost.push_back(std::move(lease));

@@ -30,8 +30,8 @@ class HeldLeases {
   std::vector<SessionLease> Acquired(const std::string& session, const LeaseAnswer& answer);
   // Takes one out.
   std::optional<SessionLease> Take(const std::string& session);
-  // Holds what was renewed; returns what is held no longer. Strays were acquired by a call whose
-  // answer was lost: nobody knows of them.
+  // Holds what was renewed, or is held as before; returns what is held no longer. Strays were
+  // acquired by a call whose answer was lost: nobody knows of them.
   std::vector<SessionLease> Renewed(const std::vector<SessionLease>& renewed,
                                     std::vector<SessionLease>* strays);
   // Takes out those that may not be answered any longer.

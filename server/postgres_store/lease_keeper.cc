@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/status_macros.h"
+#include "server/postgres_store/postgres_errors.h"
 
 namespace tissueform {
 
@@ -54,7 +55,7 @@ absl::Status LeaseKeeper::Silence() {
 }
 
 absl::Status LeaseKeeper::Asked(absl::Status answer) {
-  if (absl::IsUnavailable(answer)) {
+  if (absl::IsUnavailable(answer) && !OthersHoldRows(answer)) {
     silence_ = answer;
     silent_until_ = options_.clock() + options_.silence;
   } else {

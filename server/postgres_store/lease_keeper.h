@@ -28,9 +28,10 @@ class LeaseKeeper {
   struct Options {
     std::chrono::milliseconds renew_every{3'000};
     // After a call that the store did not answer nobody waits for another one for so long, but for
-    // renewals: it is answered as that was. After so long renewing is tried again.
+    // renewals: it is answered as that was. After so long renewing is tried again. A row that
+    // others have locked is an answer.
     std::chrono::milliseconds silence{1'000};
-    SteadyNow clock = std::chrono::steady_clock::now;
+    SteadyNow clock = AwakeOrNotNow;
   };
   // A session is held no longer: its streams end (SESSION_MOVED), its memory is free. Called once
   // for each lease that is lost, without a lock held.

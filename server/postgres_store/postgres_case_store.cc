@@ -55,12 +55,14 @@ class PostgresCaseWriter final : public CaseWriter {
 
   absl::StatusOr<CaseRecord> Keep() override {
     return AskPool<CaseRecord>(
-        pool_, [&](PostgresTransaction& transaction) -> absl::StatusOr<CaseRecord> {
+        pool_,
+        [&](PostgresTransaction& transaction) -> absl::StatusOr<CaseRecord> {
           TF_RETURN_IF_ERROR(
               PutBlob(transaction, record().sha256, bytes_,
                       [this](int64_t offset, int64_t size) { return file_.ReadAt(offset, size); }));
           return KeepCaseRow(transaction, record(), most_);
-        });
+        },
+        PostgresPool::Twice::kIsTwice);
   }
 
  private:

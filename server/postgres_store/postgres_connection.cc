@@ -9,6 +9,7 @@
 #include <unistd.h>
 #include <utility>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include <pqxx/pqxx>
 #include <sys/socket.h>
@@ -148,6 +149,12 @@ absl::Status PostgresConnection::Transact(
   };
   try {
     std::optional<pqxx::work> begun;
+    // What is not committed is taken back when it ends, by a statement like others.
+    const absl::Cleanup take_back = [&] {
+      const WaitForAnswer wait(&library_->waits_since);
+      begun.reset();
+      usable_ = usable_ && library_->connection.is_open();
+    };
     {
       const WaitForAnswer wait(&library_->waits_since);
       begun.emplace(library_->connection);
@@ -184,9 +191,12 @@ void PostgresConnection::GiveUp(std::chrono::milliseconds unanswered) {
 }
 
 absl::Status PostgresConnection::Listen(const std::string& channel) {
+  const WaitForAnswer wait(&library_->waits_since);
   try {
     library_->receiver =
         std::make_unique<NoticeReceiver>(library_->connection, channel, &library_->notices);
+    // The library says nothing of one that was lost then.
+    if (!library_->connection.is_open()) throw pqxx::broken_connection();
     return absl::OkStatus();
   } catch (...) {
     usable_ = false;

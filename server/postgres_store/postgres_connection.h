@@ -44,10 +44,10 @@ class PostgresTransaction {
 // One connection to a PostgreSQL database, and the only place that knows libpqxx. One thread at a
 // time, but for GiveUp.
 //
-// Errors of all: ResourceExhausted (the database's disk is full), FailedPrecondition (a read-only
-// replica; the password is refused), InvalidArgument (text that is no UTF-8), Unavailable (not
-// there; it ends a statement that takes too long), or Internal; they name the database and no
-// value.
+// Errors of all: ResourceExhausted (the database's disk is full), InvalidArgument (text that is no
+// UTF-8), Unavailable (not there; it ends a statement that takes too long; it has become a
+// read-only replica), or Internal; of Open also FailedPrecondition (a read-only replica; the
+// password is refused). They name the database and no value.
 class PostgresConnection {
  public:
   static absl::StatusOr<std::unique_ptr<PostgresConnection>> Open(const PostgresTarget& target);
@@ -59,8 +59,9 @@ class PostgresConnection {
   absl::Status Transact(const std::function<absl::Status(PostgresTransaction&)>& work,
                         PostgresOutcome* outcome);
 
-  // Any thread: where a statement has waited for its answer for so long its connection is cut, and
-  // it fails as one whose connection was lost.
+  // Any thread: where a statement (also one that begins or ends a transaction, or listens) has
+  // waited for its answer for so long its connection is cut, and it fails as one whose connection
+  // was lost.
   void GiveUp(std::chrono::milliseconds unanswered);
 
   // False when it is of no use any longer.

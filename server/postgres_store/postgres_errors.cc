@@ -3,9 +3,11 @@
 
 #include "server/postgres_store/postgres_errors.h"
 
+#include <algorithm>
 #include <vector>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/cord.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
@@ -33,9 +35,20 @@ absl::Status Told(StatusCode code, const std::string& name, absl::string_view wh
   return HidingDatabase(absl::Status(code, absl::StrCat("database ", name, ": ", what)), sentence);
 }
 
+constexpr char kReadOnly[] = "it is a read-only replica; name the primary (target_session_attrs)";
+constexpr char kNoChanges[] = "the server's database takes no changes now; try again in a minute";
+
+constexpr char kSameRowsUrl[] = "type.tissueform/OthersHoldRows";
+
+absl::Status HeldByOthers(const std::string& name, absl::string_view what) {
+  absl::Status status = Told(StatusCode::kUnavailable, name, what, kSameRows);
+  status.SetPayload(kSameRowsUrl, absl::Cord());
+  return status;
+}
+
 PostgresFailure SameRows(const std::string& name) {
   constexpr char kWhat[] = "others write the same rows; try again";
-  return {.status = Told(StatusCode::kUnavailable, name, kWhat, kSameRows), .transient = true};
+  return {.status = HeldByOthers(name, kWhat), .transient = true};
 }
 
 PostgresFailure LostConnection(const std::string& name, const std::exception& error) {
@@ -52,8 +65,8 @@ PostgresFailure FailureOf(const std::string& name, const pqxx::sql_error& error)
   }
   if (state == "25006") {
     // Where a failover has made a replica of what was the primary another connection may find it.
-    return {.status = Told(StatusCode::kFailedPrecondition, name,
-                           "it is a read-only replica; name the primary (target_session_attrs)"),
+    return {.status = Told(StatusCode::kUnavailable, name, kReadOnly, kNoChanges),
+            .transient = true,
             .connected = false};
   }
   if (state == "22021") {
@@ -61,8 +74,7 @@ PostgresFailure FailureOf(const std::string& name, const pqxx::sql_error& error)
   }
   if (state == "40001" || state == "40P01") return SameRows(name);
   if (state == "55P03") {
-    return {Told(StatusCode::kUnavailable, name,
-                 "others hold the same rows for too long; try again", kSameRows)};
+    return {HeldByOthers(name, "others hold the same rows for too long; try again")};
   }
   if (state == "57014") {
     return {
@@ -93,7 +105,20 @@ PostgresFailure FailureOfCaught(const std::string& name) {
   }
 }
 
+bool OthersHoldRows(const absl::Status& status) {
+  return status.GetPayload(kSameRowsUrl).has_value();
+}
+
 absl::Status ConnectError(const std::string& name, absl::string_view what) {
+  // Of all addresses: what another one says may pass.
+  const std::vector<absl::string_view> addresses =
+      absl::StrSplit(what, '\n', absl::SkipWhitespace());
+  if (!addresses.empty() &&
+      std::all_of(addresses.begin(), addresses.end(), [](absl::string_view address) {
+        return absl::StrContains(address, "session is read-only");
+      })) {
+    return Told(StatusCode::kFailedPrecondition, name, kReadOnly);
+  }
   if (absl::StrContains(what, "password authentication failed") ||
       absl::StrContains(what, "no password supplied")) {
     return Told(StatusCode::kFailedPrecondition, name,

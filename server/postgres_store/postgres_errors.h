@@ -22,6 +22,9 @@ struct PostgresFailure {
 // Of what is being caught; by SQLSTATE. `name` is that of the database.
 PostgresFailure FailureOfCaught(const std::string& name);
 
+// Whether that is UNAVAILABLE for what others do with the same rows: the database is there.
+bool OthersHoldRows(const absl::Status& status);
+
 // Of a connection that could not be made, for which there is no SQLSTATE.
 absl::Status ConnectError(const std::string& name, absl::string_view what);
 

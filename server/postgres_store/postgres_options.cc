@@ -87,10 +87,12 @@ void AddSettings(const PostgresOptions& options, Keywords* keywords) {
   settings["keepalives_interval"] = absl::StrCat(kProbeSeconds);
   settings["keepalives_count"] = absl::StrCat(kProbes);
   settings["tcp_user_timeout"] = absl::StrCat(kUnansweredMilliseconds);
+  // Of several addresses the primary; after a failover that is another one.
+  if (!settings.contains("target_session_attrs")) settings["target_session_attrs"] = "read-write";
   if (!settings.contains("application_name")) settings["application_name"] = "tissueform-server";
   absl::StrAppend(&settings["options"], " -c statement_timeout=", options.statement_timeout.count(),
                   " -c lock_timeout=", options.lock_timeout.count(),
-                  " -c idle_in_transaction_session_timeout=", options.statement_timeout.count(),
+                  " -c idle_in_transaction_session_timeout=", options.idle_timeout.count(),
                   " -c default_transaction_isolation=read\\ committed -c "
                   "client_min_messages=warning");
 }
@@ -100,7 +102,8 @@ void AddSettings(const PostgresOptions& options, Keywords* keywords) {
 absl::StatusOr<PostgresTarget> TargetOf(const PostgresOptions& options) {
   if (options.max_connections < 1 || options.connect_timeout.count() < 1 ||
       options.statement_timeout.count() < 1 || options.lock_timeout.count() < 1 ||
-      options.unanswered_timeout.count() < 1 || options.patience.count() < 1) {
+      options.idle_timeout.count() < 1 || options.unanswered_timeout.count() < 1 ||
+      options.patience.count() < 1) {
     return absl::InvalidArgumentError(
         "connections and timeouts of the store's database must be at least 1");
   }

@@ -34,6 +34,7 @@ absl::Status CheckDatabase(const std::string& name, PostgresTransaction& transac
   const auto refused = [&](const char* why) {
     return absl::FailedPreconditionError(absl::StrCat("database ", name, ": ", why));
   };
+  // Where the address has chosen one by its target_session_attrs.
   if (rows.Text(0, 0) == "true") {
     return refused("it is a read-only replica; name the primary (target_session_attrs)");
   }
@@ -52,13 +53,17 @@ absl::StatusOr<std::unique_ptr<PostgresPool>> PostgresPool::Open(const PostgresO
   TF_ASSIGN_OR_RETURN(PostgresTarget target, TargetOf(options));
   TF_ASSIGN_OR_RETURN(std::unique_ptr<PostgresConnection> connection,
                       PostgresConnection::Open(target));
-  PostgresOutcome outcome = PostgresOutcome::kFailed;
-  TF_RETURN_IF_ERROR(connection->Transact(
-      [&](PostgresTransaction& transaction) { return CheckDatabase(target.name, transaction); },
-      &outcome));
   std::unique_ptr<PostgresPool> pool(new PostgresPool(options, std::move(target)));
-  MutexLock lock(pool->mutex_);
-  pool->idle_.push_back(std::move(connection));
+  {
+    MutexLock lock(pool->mutex_);
+    pool->idle_.push_back(std::move(connection));
+  }
+  PostgresOutcome outcome = PostgresOutcome::kFailed;
+  TF_RETURN_IF_ERROR(pool->Try(
+      [&](PostgresTransaction& transaction) {
+        return CheckDatabase(pool->target().name, transaction);
+      },
+      Clock::now() + options.patience, &outcome));
   return pool;
 }
 
@@ -81,9 +86,9 @@ PostgresPool::Clock::duration PostgresPool::Patience() {
   return Clock::now() - failed_ < kLeastAnswer ? left : std::max<Clock::duration>(left, kMostLate);
 }
 
-absl::Status PostgresPool::Run(const Work& work, Clock::time_point deadline) {
+absl::Status PostgresPool::Run(const Work& work, Clock::time_point deadline, Twice twice) {
   const Clock::time_point begin = Clock::now();
-  absl::Status status = TryUntil(work, deadline);
+  absl::Status status = TryUntil(work, deadline, twice);
   latency_.Observe(Clock::now() - begin);
   if (TellsClientsOtherwise(status)) Tell(status);
   return status;
@@ -98,7 +103,7 @@ void PostgresPool::Tell(const absl::Status& failure) {
   spdlog::warn("{}", std::string(failure.message()));
 }
 
-absl::Status PostgresPool::TryUntil(const Work& work, Clock::time_point deadline) {
+absl::Status PostgresPool::TryUntil(const Work& work, Clock::time_point deadline, Twice twice) {
   {
     MutexLock lock(mutex_);
     deadline = std::min(deadline, latest_);
@@ -108,11 +113,17 @@ absl::Status PostgresPool::TryUntil(const Work& work, Clock::time_point deadline
     return HidingDatabase(absl::UnavailableError(
         absl::StrCat("database ", target_.name, ": it did not answer in time; try again later")));
   }
+  absl::Status lost;  // of a commit that may have been kept: that is true whatever came after it
   for (std::chrono::milliseconds pause = kFirstPause;; pause = std::min(2 * pause, kLongestPause)) {
     const Clock::time_point tried = Clock::now();
     PostgresOutcome outcome = PostgresOutcome::kFailed;
     absl::Status status = Try(work, deadline, &outcome);
-    if (outcome != PostgresOutcome::kTransient || !Pause(pause, tried, deadline)) return status;
+    const bool unknown = outcome == PostgresOutcome::kUnknown;
+    if (unknown) lost.Update(status);
+    const bool again =
+        outcome == PostgresOutcome::kTransient || (unknown && twice == Twice::kIsOnce);
+    if (!again) return status;
+    if (!Pause(pause, tried, deadline)) return lost.ok() ? status : lost;
   }
 }
 

@@ -29,6 +29,8 @@ class PostgresPool {
   // Reads and writes rows. Called again when another try may do better, so what it leaves outside
   // the database must be what its last call left.
   using Work = std::function<absl::Status(PostgresTransaction&)>;
+  // What a work is that is committed twice.
+  enum class Twice { kIsTwice, kIsOnce };
 
   // Connects once, so that what an operator must change is told at the start: errors are those of
   // TargetOf and PostgresConnection; FailedPrecondition when the database is a read-only replica,
@@ -38,7 +40,7 @@ class PostgresPool {
   ~PostgresPool();
 
   // Runs `work` in a transaction. A database that is not there is tried again until `deadline`; a
-  // commit of which nobody knows whether it was kept is not.
+  // commit of which nobody knows whether it was kept is where twice is once.
   //
   // A database that says nothing at all costs kMostLate more; one that falls silent within a
   // statement at most kLeastAnswer.
@@ -46,8 +48,10 @@ class PostgresPool {
   // Errors: what `work` says, those of PostgresConnection, and Unavailable (all connections are in
   // use until then; the database is not there until then, for whatever reason). Those of the
   // database are logged, and have a sentence for clients (store_errors.h).
-  absl::Status Run(const Work& work) { return Run(work, Clock::now() + Patience()); }
-  absl::Status Run(const Work& work, Clock::time_point deadline);
+  absl::Status Run(const Work& work, Twice twice = Twice::kIsTwice) {
+    return Run(work, Clock::now() + Patience(), twice);
+  }
+  absl::Status Run(const Work& work, Clock::time_point deadline, Twice twice = Twice::kIsTwice);
 
   static constexpr std::chrono::milliseconds kMostLate{1'000};
   static constexpr std::chrono::milliseconds kLeastAnswer{5'000};
@@ -67,7 +71,7 @@ class PostgresPool {
   // What is left of the options' for this thread's call while the database is away: a queue or a
   // job that was slow uses nothing up.
   Clock::duration Patience();
-  absl::Status TryUntil(const Work& work, Clock::time_point deadline);
+  absl::Status TryUntil(const Work& work, Clock::time_point deadline, Twice twice);
   absl::Status Try(const Work& work, Clock::time_point deadline, PostgresOutcome* outcome);
   // A place, with a connection or none.
   absl::StatusOr<std::unique_ptr<PostgresConnection>> Take(Clock::time_point deadline);
@@ -99,15 +103,18 @@ class PostgresPool {
   std::thread watch_;  // last: it uses the others
 };
 
-// What `work` finds.
+// What `work` finds, which only reads unless twice is said to be twice.
 template <typename Result>
 absl::StatusOr<Result> AskPool(
-    PostgresPool* pool, const std::function<absl::StatusOr<Result>(PostgresTransaction&)>& work) {
+    PostgresPool* pool, const std::function<absl::StatusOr<Result>(PostgresTransaction&)>& work,
+    PostgresPool::Twice twice = PostgresPool::Twice::kIsOnce) {
   absl::StatusOr<Result> result;
-  const absl::Status status = pool->Run([&](PostgresTransaction& transaction) {
-    result = work(transaction);
-    return result.status();
-  });
+  const absl::Status status = pool->Run(
+      [&](PostgresTransaction& transaction) {
+        result = work(transaction);
+        return result.status();
+      },
+      twice);
   return status.ok() ? std::move(result) : status;
 }
 

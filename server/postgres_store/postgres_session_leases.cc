@@ -10,6 +10,11 @@
 #include "server/store/store_errors.h"
 
 namespace tissueform {
+namespace {
+
+constexpr size_t kMostSeen = 10'000;
+
+}  // namespace
 
 PostgresSessionLeases::PostgresSessionLeases(PostgresPool* pool, std::string node,
                                              LeaseOptions options, SteadyNow clock)
@@ -28,12 +33,34 @@ SessionLease PostgresSessionLeases::LeaseFrom(std::chrono::steady_clock::time_po
 }
 
 absl::Status PostgresSessionLeases::Run(const PostgresPool::Work& work) {
-  return pool_->Run(work, PostgresPool::Clock::now() + options_.patience);
+  // Who holds a session already keeps its epoch, and releases what it holds under that alone.
+  return pool_->Run(work, PostgresPool::Clock::now() + options_.patience,
+                    PostgresPool::Twice::kIsOnce);
+}
+
+std::string PostgresSessionLeases::SeenTooLong(const std::string& session) {
+  MutexLock lock(mutex_);
+  const auto found = seen_.find(session);
+  if (found == seen_.end() || clock_() < found->second.since + options_.duration) return "";
+  return found->second.lease_until;
+}
+
+void PostgresSessionLeases::NoteSeen(const std::string& session, const std::string& too_late) {
+  MutexLock lock(mutex_);
+  if (too_late.empty()) {
+    seen_.erase(session);
+    return;
+  }
+  if (seen_.size() >= kMostSeen) seen_.clear();
+  Seen& seen = seen_[session];
+  if (seen.lease_until != too_late) seen = {.lease_until = too_late, .since = clock_()};
 }
 
 absl::StatusOr<LeaseAnswer> PostgresSessionLeases::Acquire(const std::string& session) {
   const auto asked = clock_();
+  const std::string seen = SeenTooLong(session);
   LeaseAnswer answer;
+  std::string too_late;
   TF_RETURN_IF_ERROR(Run([&](PostgresTransaction& transaction) -> absl::Status {
     TF_ASSIGN_OR_RETURN(
         const PostgresRows taken,
@@ -43,9 +70,10 @@ absl::StatusOr<LeaseAnswer> PostgresSessionLeases::Acquire(const std::string& se
             "$3, lease_until = tissueform_now() + $4::bigint * interval '1 millisecond' WHERE key "
             "= "
             "(SELECT key FROM sessions WHERE id = $1) AND (holder = $2 OR lease_until <= "
-            "tissueform_now()) RETURNING epoch",
-            {session, holder_, node_, int64_t{options_.duration.count()}}));
+            "tissueform_now() OR lease_until::text = $5) RETURNING epoch",
+            {session, holder_, node_, int64_t{options_.duration.count()}, seen}));
     answer = {};
+    too_late.clear();
     if (!taken.empty()) {
       answer.mine = true;
       answer.lease = LeaseFrom(asked, session, taken.Integer(0, 0));
@@ -53,13 +81,17 @@ absl::StatusOr<LeaseAnswer> PostgresSessionLeases::Acquire(const std::string& se
     }
     TF_ASSIGN_OR_RETURN(
         const PostgresRows held,
-        transaction.Query("SELECT node FROM session_states JOIN sessions ON sessions.key = "
-                          "session_states.key WHERE id = $1",
-                          {session}));
+        transaction.Query(
+            "SELECT node, CASE WHEN lease_until > tissueform_now() + $2::bigint * interval '1 "
+            "millisecond' THEN lease_until::text ELSE '' END FROM session_states JOIN sessions ON "
+            "sessions.key = session_states.key WHERE id = $1",
+            {session, int64_t{2 * options_.duration.count()}}));
     if (held.empty()) return NoSession(session);
     answer.node = std::string(held.Text(0, 0));
+    too_late = std::string(held.Text(0, 1));
     return absl::OkStatus();
   }));
+  NoteSeen(session, too_late);
   return answer;
 }
 
@@ -68,18 +100,23 @@ absl::StatusOr<std::vector<SessionLease>> PostgresSessionLeases::Renew() {
   std::vector<SessionLease> leases;
   TF_RETURN_IF_ERROR(Run([&](PostgresTransaction& transaction) -> absl::Status {
     leases.clear();
-    // Rows are locked by key, rising, as where they are touched.
+    // Where one row is locked by others the leases of all others would wait, and run out, with it.
     TF_ASSIGN_OR_RETURN(
         const PostgresRows rows,
         transaction.Query(
             "WITH mine AS (SELECT key FROM session_states WHERE holder = $1 AND lease_until > "
-            "tissueform_now() ORDER BY key FOR UPDATE) UPDATE session_states SET lease_until = "
-            "tissueform_now() + $2::bigint * interval '1 millisecond' FROM mine, sessions WHERE "
-            "session_states.key = mine.key AND sessions.key = mine.key RETURNING id, epoch",
+            "tissueform_now() ORDER BY key FOR UPDATE SKIP LOCKED), renewed AS (UPDATE "
+            "session_states SET lease_until = tissueform_now() + $2::bigint * interval '1 "
+            "millisecond' FROM mine WHERE session_states.key = mine.key RETURNING "
+            "session_states.key, epoch) SELECT id, epoch, 1 FROM renewed JOIN sessions ON "
+            "sessions.key = renewed.key UNION ALL SELECT id, epoch, 0 FROM session_states JOIN "
+            "sessions ON sessions.key = session_states.key WHERE holder = $1 AND lease_until > "
+            "tissueform_now() AND session_states.key NOT IN (SELECT key FROM renewed)",
             {holder_, int64_t{options_.duration.count()}}));
     leases.reserve(rows.size());
     for (size_t row = 0; row < rows.size(); ++row) {
       leases.push_back(LeaseFrom(asked, std::string(rows.Text(row, 0)), rows.Integer(row, 1)));
+      if (rows.Integer(row, 2) == 0) leases.back().answers_until = SessionLease::kAsBefore;
     }
     return absl::OkStatus();
   }));

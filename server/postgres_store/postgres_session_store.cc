@@ -20,18 +20,18 @@ PostgresSessionStore::PostgresSessionStore(PostgresPool* pool, UnixClock clock)
     // Half of the connections: reads and writes of blobs find some, too.
     : pool_(pool), clock_(std::move(clock)), jobs_((pool->options().max_connections + 1) / 2) {}
 
-void PostgresSessionStore::Submit(const std::string& key, PostgresPool::Work work,
+void PostgresSessionStore::Submit(const std::string& key, PostgresPool::Work work, Twice twice,
                                   StatusCallback done) {
   const auto deadline = PostgresPool::Clock::now() + pool_->options().patience;
-  jobs_.Submit(key, [this, deadline, work = std::move(work), done = std::move(done)] {
-    done(pool_->Run(work, deadline));
+  jobs_.Submit(key, [this, deadline, work = std::move(work), twice, done = std::move(done)] {
+    done(pool_->Run(work, deadline, twice));
   });
 }
 
 template <typename Result>
 void PostgresSessionStore::Ask(const std::string& key,
                                std::function<absl::StatusOr<Result>(PostgresTransaction&)> work,
-                               std::function<void(absl::StatusOr<Result>)> done) {
+                               Twice twice, std::function<void(absl::StatusOr<Result>)> done) {
   auto result = std::make_shared<absl::StatusOr<Result>>();
   Submit(
       key,
@@ -39,6 +39,7 @@ void PostgresSessionStore::Ask(const std::string& key,
         *result = work(transaction);
         return result->status();
       },
+      twice,
       [result, done = std::move(done)](absl::Status status) {
         done(status.ok() ? *std::move(result) : std::move(status));
       });
@@ -63,7 +64,7 @@ void PostgresSessionStore::Create(SessionRecord record, int64_t epoch, RecordCal
         TF_ASSIGN_OR_RETURN(kept.epoch, InsertSession(transaction, record));
         return kept;
       },
-      std::move(done));
+      Twice::kIsTwice, std::move(done));
 }
 
 void PostgresSessionStore::Get(const std::string& id, RecordCallback done) {
@@ -75,7 +76,7 @@ void PostgresSessionStore::Get(const std::string& id, RecordCallback done) {
         if (rows.empty()) return NoSession(id);
         return ReadSessionColumns(rows, 0);
       },
-      std::move(done));
+      Twice::kIsOnce, std::move(done));
 }
 
 void PostgresSessionStore::Update(SessionRecord record, int64_t epoch, RecordCallback done) {
@@ -96,9 +97,11 @@ void PostgresSessionStore::Update(SessionRecord record, int64_t epoch, RecordCal
         TF_RETURN_IF_ERROR(ReplaceSession(transaction, state.key, next));
         return next;
       },
-      std::move(done));
+      Twice::kIsTwice, std::move(done));
 }
 
+// Under one epoch nobody else writes meanwhile, and later calls for this session wait: the same
+// poses once more are the newest still.
 void PostgresSessionStore::CommitPoses(const std::string& id, std::vector<HandlePose> poses,
                                        int64_t epoch, StatusCallback done) {
   Submit(
@@ -107,7 +110,7 @@ void PostgresSessionStore::CommitPoses(const std::string& id, std::vector<Handle
        now_s = clock_()](PostgresTransaction& transaction) {
         return CommitRow(transaction, id, count, bytes, epoch, now_s);
       },
-      std::move(done));
+      Twice::kIsOnce, std::move(done));
 }
 
 void PostgresSessionStore::Delete(const std::string& id, const std::string& etag, int64_t epoch,
@@ -119,7 +122,7 @@ void PostgresSessionStore::Delete(const std::string& id, const std::string& etag
         TF_RETURN_IF_ERROR(CheckSessionWrite(id, etag, epoch, state.etag, state.epoch));
         return transaction.Run("DELETE FROM sessions WHERE key = $1", {state.key});
       },
-      std::move(done));
+      Twice::kIsTwice, std::move(done));
 }
 
 void PostgresSessionStore::List(const ListRequest& request, PageCallback done) {
@@ -141,7 +144,7 @@ void PostgresSessionStore::List(const ListRequest& request, PageCallback done) {
                                RowsOfPage(request.limit)}));
         return ReadPostgresPage<Page>(rows, request.limit, 0, ReadSessionColumns);
       },
-      std::move(done));
+      Twice::kIsOnce, std::move(done));
 }
 
 void PostgresSessionStore::Touch(std::vector<std::string> ids, int64_t now_s, StatusCallback done) {
@@ -156,7 +159,7 @@ void PostgresSessionStore::Touch(std::vector<std::string> ids, int64_t now_s, St
             "session_states.key FOR UPDATE OF session_states)",
             {now_s, names});
       },
-      std::move(done));
+      Twice::kIsOnce, std::move(done));
 }
 
 void PostgresSessionStore::ListUnused(int64_t before_s, int limit, PageCallback done) {
@@ -174,7 +177,7 @@ void PostgresSessionStore::ListUnused(int64_t before_s, int limit, PageCallback 
                               {before_s, int64_t{limit}}));
         return ReadPostgresPage<Page>(rows, limit, 0, ReadSessionColumns);
       },
-      std::move(done));
+      Twice::kIsOnce, std::move(done));
 }
 
 }  // namespace tissueform

@@ -38,10 +38,12 @@ class PostgresSessionStore final : public SessionStore {
   void ListUnused(int64_t before_s, int limit, PageCallback done) override;
 
  private:
-  void Submit(const std::string& key, PostgresPool::Work work, StatusCallback done);
+  using Twice = PostgresPool::Twice;
+
+  void Submit(const std::string& key, PostgresPool::Work work, Twice twice, StatusCallback done);
   template <typename Result>
   void Ask(const std::string& key, std::function<absl::StatusOr<Result>(PostgresTransaction&)> work,
-           std::function<void(absl::StatusOr<Result>)> done);
+           Twice twice, std::function<void(absl::StatusOr<Result>)> done);
 
   PostgresPool* const pool_;
   const UnixClock clock_;

@@ -16,6 +16,8 @@ namespace tissueform {
 
 // Where a server takes the time from that its leases run by. Any thread may call it.
 using SteadyNow = std::function<std::chrono::steady_clock::time_point()>;
+// Never goes back, and goes on while the machine sleeps, as a database elsewhere does.
+std::chrono::steady_clock::time_point AwakeOrNotNow();
 
 struct LeaseOptions {
   std::chrono::milliseconds duration{10'000};
@@ -29,8 +31,10 @@ struct LeaseOptions {
 // That a session is held, and until when its holder may answer.
 struct SessionLease {
   std::string session = {};
-  int64_t epoch = 0;  // under which it is written
-  std::chrono::steady_clock::time_point answers_until = {};
+  int64_t epoch = 0;                                         // under which it is written
+  std::chrono::steady_clock::time_point answers_until = {};  // kAsBefore: as known before
+
+  static constexpr std::chrono::steady_clock::time_point kAsBefore = {};
 };
 
 // What became of an Acquire.
@@ -59,6 +63,7 @@ class SessionLeases {
   virtual absl::StatusOr<LeaseAnswer> Acquire(const std::string& session) = 0;
 
   // The leases of all sessions that this still holds begin anew; returns those. Others are lost.
+  // One that somebody writes at this moment nobody waits for: it is held as before.
   virtual absl::StatusOr<std::vector<SessionLease>> Renew() = 0;
 
   // Others may take it at once. Nothing happens when it is not held under this epoch any longer.

@@ -3,11 +3,15 @@
 
 #include "tests/server/postgres_store/frozen_proxy.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <poll.h>
+#include <string>
 #include <unistd.h>
 
+#include "absl/strings/match.h"
+#include "absl/strings/string_view.h"
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -25,16 +29,21 @@ sockaddr_in Loopback(int port) {
   return address;
 }
 
-// False at the end of `from`.
-bool Move(int from, int to) {
+// With which the database says that it waits for statements.
+constexpr absl::string_view kReady("Z\0\0\0\5I", 6);
+
+// What there is; empty at the end.
+std::string Read(int from) {
   std::array<char, 16384> bytes{};
   const ssize_t count = read(from, bytes.data(), bytes.size());
-  if (count <= 0) return false;
-  for (ssize_t sent = 0; sent < count;) {
-    const ssize_t written =
-        send(to, bytes.data() + sent, static_cast<size_t>(count - sent), MSG_NOSIGNAL);
+  return {bytes.data(), static_cast<size_t>(std::max<ssize_t>(count, 0))};
+}
+
+bool Write(int to, absl::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = send(to, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (written <= 0) return false;
-    sent += written;
+    bytes.remove_prefix(static_cast<size_t>(written));
   }
   return true;
 }
@@ -73,6 +82,18 @@ void FrozenProxy::FreezeAll() {
   Freeze();
 }
 
+void FrozenProxy::FreezeAt(const std::string& text) {
+  MutexLock lock(mutex_);
+  stop_at_ = text;
+}
+
+bool FrozenProxy::StopsAt(absl::string_view bytes) {
+  MutexLock lock(mutex_);
+  if (stop_at_.empty() || !absl::StrContains(bytes, stop_at_)) return false;
+  stop_at_.clear();
+  return true;
+}
+
 void FrozenProxy::Accept() {
   while (!ending_) {
     pollfd waiting = {.fd = listener_, .events = POLLIN, .revents = 0};
@@ -81,14 +102,15 @@ void FrozenProxy::Accept() {
     if (client < 0) continue;
     ++accepted_;
     MutexLock lock(mutex_);
-    threads_.emplace_back([this, client, generation = shut_ ? -1 : generation_.load()] {
-      Forward(client, generation);
+    threads_.emplace_back([this, client, generation = shut_ ? -1 : generation_.load(),
+                           until_ready = shut_when_ready_.load()] {
+      Forward(client, generation, until_ready);
       close(client);
     });
   }
 }
 
-void FrozenProxy::Forward(int client, int generation) {
+void FrozenProxy::Forward(int client, int generation, bool until_ready) {
   const int database = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address = Loopback(database_port_);
   bool open = connect(database, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0;
@@ -98,8 +120,19 @@ void FrozenProxy::Forward(int client, int generation) {
     const bool frozen = generation != generation_;
     const int ready = poll(sides.data(), frozen ? 0 : 2, kPollMilliseconds);
     if (ready <= 0) continue;
-    if (sides[0].revents != 0) open = Move(client, database);
-    if (open && sides[1].revents != 0) open = Move(database, client);
+    if (sides[0].revents != 0) {
+      const std::string asked = Read(client);
+      if (StopsAt(asked)) {
+        generation = -1;
+        continue;
+      }
+      open = !asked.empty() && Write(database, asked);
+    }
+    if (open && sides[1].revents != 0) {
+      const std::string told = Read(database);
+      open = !told.empty() && Write(client, told);
+      if (until_ready && absl::EndsWith(told, kReady)) generation = -1;
+    }
   }
   close(database);
 }

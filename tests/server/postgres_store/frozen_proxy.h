@@ -8,6 +8,8 @@
 #include <thread>
 #include <vector>
 
+#include "absl/strings/string_view.h"
+
 #include "core/base/mutex.h"
 
 namespace tissueform::testing {
@@ -26,12 +28,20 @@ class FrozenProxy {
   void Freeze();
   // New ones too, until Thaw; those that were frozen stay so.
   void FreezeAll();
-  void Thaw() { shut_ = false; }
+  void Thaw() {
+    shut_ = false;
+    shut_when_ready_ = false;
+  }
+  // New ones once they stand, before the first statement, until Thaw. Without TLS.
+  void FreezeWhenReady() { shut_when_ready_ = true; }
+  // The first connection on which this comes from a client, which is not forwarded. Without TLS.
+  void FreezeAt(const std::string& text);
   int accepted() const { return accepted_; }
 
  private:
   void Accept();
-  void Forward(int client, int generation);
+  bool StopsAt(absl::string_view bytes);
+  void Forward(int client, int generation, bool until_ready);
 
   const int database_port_;
   int listener_ = -1;
@@ -39,8 +49,10 @@ class FrozenProxy {
   std::atomic<int> generation_ = 0;
   std::atomic<int> accepted_ = 0;
   std::atomic<bool> shut_ = false;
+  std::atomic<bool> shut_when_ready_ = false;
   std::atomic<bool> ending_ = false;
   Mutex mutex_;
+  std::string stop_at_ ABSL_GUARDED_BY(mutex_);
   std::vector<std::thread> threads_ ABSL_GUARDED_BY(mutex_);
   std::thread accepting_;
 };

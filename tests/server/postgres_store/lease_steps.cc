@@ -16,6 +16,14 @@ const char* NameOf(LeaseAction action) {
       return "acquires";
     case LeaseAction::kRenew:
       return "renews";
+    case LeaseAction::kAcquireLate:
+      return "acquires, later than it asked";
+    case LeaseAction::kRenewLate:
+      return "renews, later than it asked";
+    case LeaseAction::kAcquireSlowly:
+      return "acquires, and hears of it later";
+    case LeaseAction::kRenewSlowly:
+      return "renews, and hears of it later";
     case LeaseAction::kRelease:
       return "releases";
     case LeaseAction::kCommit:
@@ -41,11 +49,20 @@ std::string ToWords(const LeaseStep& step) {
 
 }  // namespace
 
-LeaseSteps AllLeaseSteps() {
+LeaseSteps PromptLeaseSteps() {
   LeaseSteps steps = {{LeaseAction::kWait, 0}, {LeaseAction::kMakeAgain, 0}};
   for (const LeaseAction action :
        {LeaseAction::kAcquire, LeaseAction::kRenew, LeaseAction::kRelease, LeaseAction::kCommit,
         LeaseAction::kCommitOld, LeaseAction::kDelete}) {
+    for (const int server : {0, 1}) steps.push_back({action, server});
+  }
+  return steps;
+}
+
+LeaseSteps AllLeaseSteps() {
+  LeaseSteps steps = PromptLeaseSteps();
+  for (const LeaseAction action : {LeaseAction::kAcquireLate, LeaseAction::kRenewLate,
+                                   LeaseAction::kAcquireSlowly, LeaseAction::kRenewSlowly}) {
     for (const int server : {0, 1}) steps.push_back({action, server});
   }
   return steps;
@@ -57,11 +74,13 @@ std::string ToString(const LeaseSteps& steps) {
   return words;
 }
 
-LeaseServers::LeaseServers(LeaseWorld* world) : world_(world), given_{world->FirstEpoch()} {
+LeaseServers::LeaseServers(LeaseWorld* world)
+    : world_(world),
+      leases_{SlowLeases(world, 0), SlowLeases(world, 1)},
+      given_{world->FirstEpoch()} {
   for (size_t server : {0, 1}) {
     keepers_[server] = std::make_unique<LeaseKeeper>(
-        world->leases(static_cast<int>(server)),
-        LeaseKeeper::Options{.clock = [world] { return world->Now(); }},
+        &leases_[server], LeaseKeeper::Options{.clock = [world] { return world->Now(); }},
         [this, server](const SessionLease&) { until_[server].reset(); });
   }
 }
@@ -77,13 +96,20 @@ std::string LeaseServers::TakeOne(const LeaseStep& step) {
   switch (step.action) {
     case LeaseAction::kAcquire:
       return Acquire(server);
-    case LeaseAction::kRenew: {
-      const absl::Status status = keepers_[server]->Renew();
-      if (until_[server].has_value()) {
-        until_[server] = world_->Now() + LeaseOptions().duration - LeaseOptions().margin;
-      }
-      return status.ToString();
-    }
+    case LeaseAction::kRenew:
+      return Renew(server);
+    case LeaseAction::kAcquireLate:
+      world_->DelayNext(kLeaseWait);
+      return Acquire(server);
+    case LeaseAction::kRenewLate:
+      world_->DelayNext(kLeaseWait);
+      return Renew(server);
+    case LeaseAction::kAcquireSlowly:
+      leases_[server].SlowNext(kLeaseWait);
+      return Acquire(server);
+    case LeaseAction::kRenewSlowly:
+      leases_[server].SlowNext(kLeaseWait);
+      return Renew(server);
     case LeaseAction::kRelease:
       until_[server].reset();
       return keepers_[server]->Release(world_->session()).ToString();
@@ -101,6 +127,15 @@ std::string LeaseServers::TakeOne(const LeaseStep& step) {
       return "";
   }
   return "";
+}
+
+std::string LeaseServers::Renew(size_t server) {
+  const auto asked = world_->Now();
+  const absl::Status status = keepers_[server]->Renew();
+  if (until_[server].has_value()) {
+    until_[server] = asked + LeaseOptions().duration - LeaseOptions().margin;
+  }
+  return status.ToString();
 }
 
 std::string LeaseServers::Acquire(size_t server) {

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/postgres_store/lease_keeper.h"
@@ -21,6 +22,12 @@ namespace tissueform::testing {
 enum class LeaseAction {
   kAcquire,
   kRenew,
+  // Time passes between when these are asked for and when the store does them,
+  kAcquireLate,
+  kRenewLate,
+  // or between that and when the answer comes.
+  kAcquireSlowly,
+  kRenewSlowly,
   kRelease,
   kCommit,     // as a server does that may answer
   kCommitOld,  // as one that was stopped goes on with, under the epoch that it had last
@@ -37,6 +44,8 @@ using LeaseSteps = std::vector<LeaseStep>;
 
 // Each that there is.
 LeaseSteps AllLeaseSteps();
+// Those in which no time passes while a call is under way.
+LeaseSteps PromptLeaseSteps();
 std::string ToString(const LeaseSteps& steps);
 
 // After two of them a holder answers no more, but its lease has not run out; after three it has.
@@ -55,6 +64,8 @@ class LeaseWorld {
   virtual int64_t MakeAgain() = 0;
   virtual int64_t FirstEpoch() const = 0;  // of the one that there is at the beginning
   virtual void Wait(std::chrono::milliseconds duration) = 0;
+  // So much time passes between when the next call of leases is made and when it is done.
+  virtual void DelayNext(std::chrono::milliseconds duration) = 0;
   virtual std::chrono::steady_clock::time_point Now() const = 0;
 };
 
@@ -71,6 +82,7 @@ class ModelLeaseWorld final : public LeaseWorld {
   }
   int64_t FirstEpoch() const override { return ModelStore::Session().epoch; }
   void Wait(std::chrono::milliseconds duration) override { store_.now += duration; }
+  void DelayNext(std::chrono::milliseconds duration) override { store_.next_delay = duration; }
   std::chrono::steady_clock::time_point Now() const override { return store_.now; }
 
   // Null where it was deleted.
@@ -82,6 +94,34 @@ class ModelLeaseWorld final : public LeaseWorld {
  private:
   ModelStore store_;
   std::array<ModelLeases, 2> leases_ = {ModelLeases(&store_, "A"), ModelLeases(&store_, "B")};
+};
+
+// Time may pass between when the store has done what it was asked for and when that is known.
+class SlowLeases final : public SessionLeases {
+ public:
+  explicit SlowLeases(LeaseWorld* world, int server)
+      : world_(*world), leases_(*world->leases(server)) {}
+
+  absl::StatusOr<LeaseAnswer> Acquire(const std::string& session) override {
+    return Answer(leases_.Acquire(session));
+  }
+  absl::StatusOr<std::vector<SessionLease>> Renew() override { return Answer(leases_.Renew()); }
+  absl::Status Release(const std::string& session, int64_t epoch) override {
+    return leases_.Release(session, epoch);
+  }
+
+  void SlowNext(std::chrono::milliseconds duration) { next_ = duration; }
+
+ private:
+  template <typename Result>
+  Result Answer(Result result) {
+    if (next_.count() > 0) world_.Wait(std::exchange(next_, {}));
+    return result;
+  }
+
+  LeaseWorld& world_;
+  SessionLeases& leases_;
+  std::chrono::milliseconds next_{0};
 };
 
 // The servers with what each of them knows.
@@ -109,6 +149,7 @@ class LeaseServers {
   }
   std::string TakeOne(const LeaseStep& step);
   std::string Acquire(size_t server);
+  std::string Renew(size_t server);
   std::string Commit(int server, std::optional<int64_t> epoch);
   std::string Delete(int server);
   std::string MakeAgain();
@@ -118,6 +159,7 @@ class LeaseServers {
   std::string NameOf(int64_t epoch) const;
 
   LeaseWorld* const world_;
+  std::array<SlowLeases, 2> leases_;
   std::array<std::unique_ptr<LeaseKeeper>, 2> keepers_;
   std::array<int64_t, 2> last_epochs_ = {0, 0};
   // Until when each has its lease in mind; nothing when it has none.

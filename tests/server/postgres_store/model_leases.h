@@ -39,6 +39,8 @@ struct ModelStore {
   std::map<std::string, Session> sessions = {};
   int64_t newest_epoch = Session().epoch;
   absl::Status failure = {};  // of all calls, which change nothing then
+  // So much time passes between when the next call is made and when it is done.
+  std::chrono::milliseconds next_delay{0};
 };
 
 class ModelLeases final : public SessionLeases {
@@ -48,6 +50,7 @@ class ModelLeases final : public SessionLeases {
 
   absl::StatusOr<LeaseAnswer> Acquire(const std::string& session) override {
     if (!store_->failure.ok()) return store_->failure;
+    const auto asked = Ask();
     const auto found = store_->sessions.find(session);
     if (found == store_->sessions.end()) return absl::NotFoundError("no session");
     ModelStore::Session& row = found->second;
@@ -56,15 +59,16 @@ class ModelLeases final : public SessionLeases {
     if (free) row.epoch = store_->NextEpoch();
     row.holder = holder_;
     row.node = holder_;
-    return LeaseAnswer{.mine = true, .lease = Begin(session, &row)};
+    return LeaseAnswer{.mine = true, .lease = Begin(asked, session, &row)};
   }
 
   absl::StatusOr<std::vector<SessionLease>> Renew() override {
     if (!store_->failure.ok()) return store_->failure;
+    const auto asked = Ask();
     std::vector<SessionLease> leases;
     for (auto& [session, row] : store_->sessions) {
       if (row.holder == holder_ && row.lease_until > store_->now) {
-        leases.push_back(Begin(session, &row));
+        leases.push_back(Begin(asked, session, &row));
       }
     }
     return leases;
@@ -81,11 +85,18 @@ class ModelLeases final : public SessionLeases {
   }
 
  private:
-  SessionLease Begin(const std::string& session, ModelStore::Session* row) {
+  // When it was; now it is done.
+  std::chrono::steady_clock::time_point Ask() {
+    const auto asked = store_->now;
+    store_->now += std::exchange(store_->next_delay, {});
+    return asked;
+  }
+  SessionLease Begin(std::chrono::steady_clock::time_point asked, const std::string& session,
+                     ModelStore::Session* row) {
     row->lease_until = store_->now + options_.duration;
     return {.session = session,
             .epoch = row->epoch,
-            .answers_until = store_->now + options_.duration - options_.margin};
+            .answers_until = asked + options_.duration - options_.margin};
   }
 
   ModelStore* const store_;

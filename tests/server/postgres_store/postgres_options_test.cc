@@ -11,6 +11,8 @@
 #include "gtest/gtest.h"
 #include <sys/stat.h>
 
+#include "server/postgres_store/lease_keeper.h"
+#include "server/postgres_store/session_leases.h"
 #include "tests/server/store/stores_case.h"
 #include "tests/testing/status_matchers.h"
 
@@ -31,10 +33,18 @@ TEST(PostgresOptionsTest, AUrlBecomesKeywordsAndANameForMessages) {
   options.password = "it's a \\secret";
   ASSERT_OK_AND_ASSIGN(const PostgresTarget target, TargetOf(options));
   EXPECT_EQ(target.name, "postgresql://db.example:5433/faces");
-  EXPECT_THAT(target.connection,
-              AllOf(HasSubstr("host='db.example'"), HasSubstr("dbname='faces'"),
-                    HasSubstr("user='ann'"), HasSubstr("password='it\\'s a \\\\secret'"),
-                    HasSubstr("statement_timeout=20000"), HasSubstr("tcp_user_timeout='10000'")));
+  EXPECT_THAT(
+      target.connection,
+      AllOf(HasSubstr("host='db.example'"), HasSubstr("dbname='faces'"), HasSubstr("user='ann'"),
+            HasSubstr("password='it\\'s a \\\\secret'"), HasSubstr("statement_timeout=20000"),
+            HasSubstr("idle_in_transaction_session_timeout=3000"),
+            HasSubstr("target_session_attrs='read-write'"), HasSubstr("tcp_user_timeout='10000'")));
+}
+
+TEST(PostgresOptionsTest, WhatAStoppedServerHasLockedIsFreeBeforeItsLeasesEnd) {
+  // Renewed just before, for the last time.
+  EXPECT_LT(PostgresOptions().idle_timeout,
+            LeaseOptions().duration - LeaseKeeper::Options().renew_every);
 }
 
 TEST(PostgresOptionsTest, AHostElsewhereIsAskedForItsCertificateUnlessTheUrlSaysOtherwise) {

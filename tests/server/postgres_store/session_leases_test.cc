@@ -19,6 +19,9 @@
 #include "gtest/gtest.h"
 
 #include "server/postgres_store/postgres_session_leases.h"
+#include "server/postgres_store/postgres_session_rows.h"
+#include "server/store/store_records.h"
+#include "server/store/store_rows.h"
 #include "tests/server/postgres_store/lease_steps.h"
 #include "tests/server/postgres_store/test_database.h"
 #include "tests/server/store/store_samples.h"
@@ -53,8 +56,8 @@ class PostgresLeaseWorld final : public LeaseWorld {
   PostgresLeaseWorld(PostgresStores* stores, int number)
       : stores_(stores),
         session_(absl::StrCat("s", number)),
-        a_(stores->pool(), "A", {}, [this] { return now_; }),
-        b_(stores->pool(), "B", {}, [this] { return now_; }) {
+        a_(stores->pool(), "A", {}, [this] { return Ask(); }),
+        b_(stores->pool(), "B", {}, [this] { return Ask(); }) {
     first_epoch_ = MakeAgain();
   }
 
@@ -81,12 +84,21 @@ class PostgresLeaseWorld final : public LeaseWorld {
     }),
                 IsOk());
   }
+  void DelayNext(milliseconds duration) override { next_delay_ = duration; }
   std::chrono::steady_clock::time_point Now() const override { return now_; }
 
  private:
+  // Leases ask for the time first; then they are done.
+  std::chrono::steady_clock::time_point Ask() {
+    const auto asked = now_;
+    if (next_delay_.count() > 0) Wait(std::exchange(next_delay_, {}));
+    return asked;
+  }
+
   PostgresStores* const stores_;
   const std::string session_;
   std::chrono::steady_clock::time_point now_{std::chrono::hours(1)};
+  milliseconds next_delay_{0};
   int64_t first_epoch_ = 0;
   PostgresSessionLeases a_;
   PostgresSessionLeases b_;
@@ -180,6 +192,34 @@ TEST_F(PostgresLeasesTest, WhoHasLostASessionWritesNothingOfItAnyMore) {
   EXPECT_EQ(record.epoch, second.lease.epoch);
 }
 
+TEST_F(PostgresLeasesTest, WhoStandsStillBetweenAWriteAndItsCommitKeepsNobodyFromTakingTheSession) {
+  ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1), kFreshEpoch), IsOk());
+  PostgresOptions options = TestDatabaseOptions();
+  options.idle_timeout = milliseconds(50);
+  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
+  PostgresSessionLeases old_owner(pool.get(), "A");
+  PostgresSessionLeases new_owner(stores_->pool(), "B");
+  ASSERT_OK_AND_ASSIGN(const LeaseAnswer first, old_owner.Acquire("s"));
+  ASSERT_THAT(CommitPoses(stores_->sessions(), "s", SamplePoses(1), first.lease.epoch), IsOk());
+  LeaseAnswer second;
+  const absl::Status late = pool->Run([&](PostgresTransaction& transaction) {
+    absl::Status written =
+        CommitRow(transaction, "s", 0, Seal(SerializePoses({})), first.lease.epoch, 1);
+    if (second.mine) return written;  // tried again
+    EXPECT_THAT(written, IsOk());
+    RunSql("UPDATE test_clock SET now = now + interval '10 seconds';");
+    const absl::StatusOr<LeaseAnswer> answer = new_owner.Acquire("s");
+    EXPECT_THAT(answer, IsOk());
+    if (answer.ok()) second = *answer;
+    return written;
+  });
+  EXPECT_TRUE(second.mine);
+  EXPECT_FALSE(late.ok());
+  ASSERT_OK_AND_ASSIGN(const SessionRecord kept, GetSession(stores_->sessions(), "s"));
+  EXPECT_EQ(kept.epoch, second.lease.epoch);
+  EXPECT_EQ(SerializePoses(kept.last_poses), SerializePoses(SamplePoses(1)));
+}
+
 TEST_F(PostgresLeasesTest, WhoHeldASessionWritesNothingOfTheNextOneOfItsName) {
   ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1), kFreshEpoch), IsOk());
   PostgresSessionLeases old_owner(stores_->pool(), "A");
@@ -204,6 +244,59 @@ TEST_F(PostgresLeasesTest, WhoHeldASessionWritesNothingOfTheNextOneOfItsName) {
   EXPECT_EQ(still.lease.epoch, after.lease.epoch);
 }
 
+TEST_F(PostgresLeasesTest, ASessionThatOthersWriteCostsTheLeasesOfNoOther) {
+  for (const char* session : {"s", "t"}) {
+    ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession(session, 1), kFreshEpoch), IsOk());
+  }
+  PostgresOptions options = TestDatabaseOptions();
+  options.lock_timeout = milliseconds(50);
+  ASSERT_OK_AND_ASSIGN(const auto pool, PostgresPool::Open(options));
+  std::chrono::steady_clock::time_point now{std::chrono::hours(1)};
+  PostgresSessionLeases leases(pool.get(), "A", {}, [&] { return now; });
+  std::vector<std::string> lost;
+  LeaseKeeper keeper(&leases, {.clock = [&] { return now; }},
+                     [&](const SessionLease& lease) { lost.push_back(lease.session); });
+  ASSERT_OK_AND_ASSIGN(const LeaseAnswer s, keeper.Acquire("s"));
+  const auto pass = [&](int seconds) {
+    now += std::chrono::seconds(seconds);
+    RunSql(absl::StrCat("UPDATE test_clock SET now = now + ", seconds, " * interval '1 second';"));
+  };
+  const auto lock_s = [](PostgresTransaction& transaction) {
+    return transaction.Run(
+        "SELECT 1 FROM session_states WHERE key = (SELECT key FROM sessions WHERE id = 's') FOR "
+        "UPDATE",
+        {});
+  };
+  ASSERT_THAT(stores_->pool()->Run([&](PostgresTransaction& transaction) {
+    EXPECT_THAT(lock_s(transaction), IsOk());
+    EXPECT_THAT(keeper.Acquire("s"), StatusIs(absl::StatusCode::kUnavailable));
+    EXPECT_THAT(keeper.Acquire("t"), IsOk()) << "the database answers";
+    pass(6);
+    EXPECT_THAT(keeper.Renew(), IsOk());
+    pass(2);
+    EXPECT_EQ(keeper.EpochOf("s"), s.lease.epoch) << "until its time is over";
+    return absl::OkStatus();
+  }),
+              IsOk());
+  ASSERT_THAT(keeper.Renew(), IsOk());
+  pass(8);
+  EXPECT_EQ(keeper.EpochOf("s"), s.lease.epoch);
+  ASSERT_THAT(keeper.Renew(), IsOk());
+  ASSERT_THAT(stores_->pool()->Run([&](PostgresTransaction& transaction) {
+    EXPECT_THAT(lock_s(transaction), IsOk());
+    pass(9);
+    EXPECT_THAT(keeper.Renew(), IsOk());
+    EXPECT_EQ(keeper.EpochOf("s"), std::nullopt);
+    EXPECT_THAT(lost, ::testing::IsEmpty());
+    pass(1);
+    EXPECT_THAT(keeper.Renew(), IsOk());
+    EXPECT_THAT(lost, ::testing::ElementsAre("s"));
+    EXPECT_NE(keeper.EpochOf("t"), std::nullopt);
+    return absl::OkStatus();
+  }),
+              IsOk());
+}
+
 TEST_F(PostgresLeasesTest, AnUnknownSessionIsNotFound) {
   PostgresSessionLeases leases(stores_->pool(), "A");
   EXPECT_THAT(leases.Acquire("nothing"),
@@ -211,6 +304,43 @@ TEST_F(PostgresLeasesTest, AnUnknownSessionIsNotFound) {
   EXPECT_THAT(leases.Release("nothing", 1), IsOk());
   ASSERT_OK_AND_ASSIGN(const auto renewed, leases.Renew());
   EXPECT_TRUE(renewed.empty());
+}
+
+TEST_F(PostgresLeasesTest, WhereTheDatabasesClockIsSetBackTheDeadKeepNothingAndTheLivingAll) {
+  for (const char* session : {"dead", "alive"}) {
+    ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession(session, 1), kFreshEpoch), IsOk());
+  }
+  std::chrono::steady_clock::time_point now{std::chrono::hours(1)};
+  const auto clock = [&] { return now; };
+  PostgresSessionLeases dead(stores_->pool(), "A", {}, clock);
+  PostgresSessionLeases alive(stores_->pool(), "B", {}, clock);
+  PostgresSessionLeases others(stores_->pool(), "C", {}, clock);
+  ASSERT_OK_AND_ASSIGN(const LeaseAnswer before, dead.Acquire("dead"));
+  ASSERT_THAT(alive.Acquire("alive"), IsOk());
+  RunSql("UPDATE test_clock SET now = now - interval '1 hour';");
+  const auto take = [&](const std::string& session) {
+    const absl::StatusOr<LeaseAnswer> answer = others.Acquire(session);
+    EXPECT_THAT(answer, IsOk());
+    return answer.value_or(LeaseAnswer());
+  };
+  EXPECT_FALSE(take("dead").mine);
+  EXPECT_FALSE(take("alive").mine);
+  const auto pass = [&](milliseconds time) {
+    now += time;
+    RunSql(absl::StrCat("UPDATE test_clock SET now = now + ", time.count(),
+                        " * interval '1 millisecond';"));
+  };
+  pass(milliseconds(3'000));
+  ASSERT_THAT(alive.Renew(), IsOk());
+  pass(milliseconds(6'999));
+  EXPECT_FALSE(take("dead").mine) << "its holder may answer still";
+  pass(milliseconds(1));
+  EXPECT_FALSE(take("alive").mine);
+  const LeaseAnswer taken = take("dead");
+  EXPECT_TRUE(taken.mine);
+  EXPECT_GT(taken.lease.epoch, before.lease.epoch);
+  ASSERT_OK_AND_ASSIGN(const std::vector<SessionLease> left, dead.Renew());
+  EXPECT_THAT(left, ::testing::IsEmpty());
 }
 
 TEST_F(PostgresLeasesTest, TheClockOfLeasesIsTheDatabases) {
