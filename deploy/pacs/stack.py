@@ -298,8 +298,10 @@ backend orthanc
                 "--accept-defects", "--server", f"localhost:{self.server_port}", "--server-ca", self.authority.certificate, "--server-cert", certificate,
                 "--server-key", key, "--worklist-listen", f"{HOST}:{self.worklist_port}", "--planner-url", f"http://localhost:{self.gateway_port}/"]
 
-    def start_bridge(self, more=()):
+    def start_bridge(self, more=(), wait=True):
         self.start("bridge", [self.bridge_program, "run", *self.bridge_options(), *more])
+        if not wait:
+            return
         self.wait_for("the bridge", lambda: self.listens(self.bridge_dicom), needs="bridge")
 
     def bridge_status(self):

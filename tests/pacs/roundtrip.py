@@ -6,16 +6,15 @@
   roundtrip.py PROGRAMS FOLDER [associations]     without the last word the bridge speaks DICOMweb
 
 A head goes to Orthanc by storescu, to the bridge, becomes a case; predictions go back into the patient's study. Checks what came
-back by dciodvfy, pydicom, dcmj2pnm and GDCM; looks for the patient's name where it must not be; kills each program at each step;
-tries peers that must be refused. Prints a line for each; exit code 1 when one fails, 77 when a program of others is missing.
+back (returned_objects.py); looks for the patient's name where it must not be; kills each program at each step (halts.py); tries
+peers and series that must be refused. Prints a line for each; exit code 1 when one fails, 77 when a program of others is missing.
 """
 
 import concurrent.futures
-import io
+import datetime
 import pathlib
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import threading
@@ -27,8 +26,12 @@ sys.dont_write_bytecode = True
 import stack
 
 try:
+    import bad_input
     import head_series
     import pydicom
+    import returned_objects
+    from halts import BRIDGE, EXPORT_POINTS, OTHERS, PLAN_POINTS, Halts
+    from returned_objects import objects_of, terms
 except ImportError as missing_module:
     print(f"skipped: {missing_module}")
     sys.exit(77)
@@ -39,7 +42,8 @@ RECIPE = HERE / "recipe.json"
 BUILD_S = 240
 # Four models (skin before and predicted, one segment, fixed bone), the capture, the report.
 OBJECTS = 6
-STL = "1.2.840.10008.5.1.4.1.1.104.3"
+# What the bridge may have resident.
+MOST_MIB = 200
 PLANTED = {"name": "Planted^Patricia", "patient_id": "PLANTED-4711", "born": "19610203"}
 OTHER = {"name": "Another^Anton", "patient_id": "OTHER-0815", "born": "19550607"}
 WORDS = [b"Planted", b"Patricia", b"PLANTED-4711", b"19610203", b"Another^Anton", b"OTHER-0815", b"19550607"]
@@ -75,9 +79,12 @@ def send(programs, prediction):
 def confirm(programs, export, looks=False):
     """The person's word; who looks waits for the pictures."""
     def form():
-        if looks and "<img" not in programs.worklist():
-            return None
-        return next((fields for fields in programs.forms() if fields.get("export") == export), None)
+        try:
+            if looks and "<img" not in programs.worklist():
+                return None
+            return next((fields for fields in programs.forms() if fields.get("export") == export), None)
+        except OSError:
+            return None  # the bridge has only just begun
     return programs.confirm(programs.wait_for(f"the question for {export}", form, needs="bridge"))
 
 
@@ -88,18 +95,6 @@ def wait_until_stored(programs, export):
             raise SystemExit(f"{lines[0]}\n{programs.log('bridge').read_text()[-2000:]}")
         return lines and " stored " in lines[0]
     programs.wait_for(f"{export} in the PACS", stored)
-
-
-def objects_of(programs, study):
-    """What is no CT image, by Orthanc's name: bytes, tags as Orthanc knows them, and as pydicom reads them."""
-    found = {}
-    for instance in programs.instances_of(study):
-        tags = programs.orthanc(f"/instances/{instance}/simplified-tags")
-        if tags["Modality"] == "CT":
-            continue
-        data = programs.orthanc_file(instance)
-        found[instance] = (data, tags, pydicom.dcmread(io.BytesIO(data)))
-    return found
 
 
 class Written(threading.Thread):
@@ -119,7 +114,7 @@ class Written(threading.Thread):
             for path in new:
                 try:
                     item = pydicom.dcmread(path)
-                    if item.SOPClassUID == STL:
+                    if item.SOPClassUID == returned_objects.STL:
                         self.models[item.SOPInstanceUID] = bytes(item.EncapsulatedDocument)
                     self.seen.add(path)
                 except (OSError, AttributeError, pydicom.errors.InvalidDicomError):
@@ -131,78 +126,20 @@ class Written(threading.Thread):
         return self.models
 
 
-def errors_of(path):
-    run = subprocess.run(["dciodvfy", path], capture_output=True, text=True, timeout=stack.PATIENCE_S, check=False)
-    return [line for line in (run.stdout + run.stderr).splitlines() if line.startswith("Error")]
+def moment_of(programs, pattern):
+    """When the bridge's log says this for the first time, in seconds."""
+    found = re.search(r"^\[([\d-]+ [\d:.]+)\].*" + pattern, programs.log("bridge").read_text(), re.MULTILINE)
+    if found is None:
+        raise SystemExit(f"the bridge's log has no line of {pattern!r}")
+    return datetime.datetime.fromisoformat(found.group(1)).timestamp()
 
 
-def terms(item):
-    """What the report names, with its numbers."""
-    for child in item.get("ContentSequence", []):
-        name = child.get("ConceptNameCodeSequence")
-        number = child.get("MeasuredValueSequence")
-        yield (name[0].CodeValue if name else "", number[0] if number else None)
-        yield from terms(child)
-
-
-def check_report(report):
-    found = list(terms(report))
-    names = {name for name, _ in found}
-    check("the report tells poses, movements of places and their band", {"MOVEMENT", "BAND"} <= names, str(sorted(names)))
-    bands = [float(number.NumericValue) for name, number in found if name == "BAND"]
-    check("a band is some of a movement and none is zero", bands and all(0 < band < 20 for band in bands), str(bands))
-    check("its numbers are mm, degrees or counts by UCUM",
-          all(number.MeasurementUnitsCodeSequence[0].CodingSchemeDesignator == "UCUM" for _, number in found if number is not None))
-
-
-def check_models(objects, original, written):
-    models = [item for _, _, item in objects.values() if item.SOPClassUID == STL]
-    check("there are models of skin and bone", len(models) >= 3, str(len(models)))
-    check("units are mm", all(model.MeasurementUnitsCodeSequence[0].CodeValue == "mm" for model in models))
-    check("models lie in the CT's frame of reference", all(model.FrameOfReferenceUID == original.FrameOfReferenceUID for model in models))
-    back = {model.SOPInstanceUID: bytes(model.EncapsulatedDocument) for model in models}
-    check("STL comes back byte for byte", len(back) > 0 and written == back, f"{len(written)} written, {len(back)} back")
-    for model in models:
-        length = model.EncapsulatedDocumentLength
-        stl = bytes(model.EncapsulatedDocument)[:length]
-        count = int.from_bytes(stl[80:84], "little")
-        check(f"{model.DocumentTitle} is a binary STL", len(stl) == 84 + 50 * count and count > 100, f"{len(stl)} bytes, {count} triangles")
-
-
-def check_capture(programs, path, frames):
-    folder = programs.folder / "frames"
-    folder.mkdir(exist_ok=True)
-    subprocess.run(["dcmj2pnm", "--write-png", "--all-frames", path, folder / "frame"], capture_output=True, timeout=stack.PATIENCE_S, check=False)
-    check("dcmj2pnm reads all frames of the capture", len(list(folder.glob("frame*"))) == frames, str(frames))
-    if shutil.which("gdcmraw"):
-        raw = programs.folder / "frames.raw"
-        run = subprocess.run(["gdcmconv", "--raw", path, programs.folder / "frames.dcm"], capture_output=True, timeout=stack.PATIENCE_S, check=False)
-        same = run.returncode == 0 and pydicom.dcmread(programs.folder / "frames.dcm").NumberOfFrames == frames
-        check("GDCM reads all frames of the capture", same, str(raw))
-
-
-def check_objects(programs, study, ct_folder, written):
-    original = pydicom.dcmread(next(pathlib.Path(ct_folder).glob("*.dcm")))
-    objects = objects_of(programs, study)
-    folder = programs.folder / "back"
-    folder.mkdir(exist_ok=True)
-    for instance, (data, tags, item) in objects.items():
-        path = folder / f"{instance}.dcm"
-        path.write_bytes(data)
-        found = errors_of(path)
-        check(f"dciodvfy finds no error in the {tags['Modality']}", not found, "; ".join(found[:4]))
-        same = all(tags.get(name, "") == str(item.get(name, "")) for name in ("SOPInstanceUID", "SeriesInstanceUID", "StudyInstanceUID", "SOPClassUID"))
-        check(f"Orthanc and pydicom agree on the UIDs of the {tags['Modality']}", same)
-        copied = ("PatientName", "PatientID", "PatientBirthDate", "StudyInstanceUID", "StudyID", "StudyDate", "AccessionNumber")
-        check(f"patient and study of the {tags['Modality']} are the CT's", all(item.get(name) == original.get(name) for name in copied))
-        if "NumberOfFrames" in item and item.Modality != "CT":
-            check_capture(programs, path, int(item.NumberOfFrames))
-    for _, _, item in objects.values():
-        if item.Modality == "SR":
-            check_report(item)
-    kinds = {tags["Modality"] for _, tags, _ in objects.values()}
-    check("there are models, a capture and a report", {"M3D", "SR"} <= kinds and len(kinds) >= 3, str(kinds))
-    check_models(objects, original, written)
+def print_times(programs):
+    """What the bridge adds to `plan build`."""
+    ended, chosen, built, published = (moment_of(programs, pattern) for pattern in (
+        r"association \d+ has ended: 93 objects", "is chosen", "chosen -> built", "packed -> published"))
+    print(f"     last slice to published case: {published - ended:.1f} s, of which plan build {built - chosen:.1f} s; "
+          f"beyond it {published - built + chosen - ended:.1f} s", flush=True)
 
 
 def check_secrets(programs):
@@ -225,6 +162,10 @@ def export_files(programs):
     prediction = re.search(r"predictions/\w+", listed).group(0)
     (folder / "list.txt").write_text(listed + programs.tissueform("prediction", "sent").stdout)
     programs.tissueform("prediction", "export", prediction, "--out", folder / "prediction.json")
+    programs.tissueform("prediction", "export", prediction, "--plan", next((programs.folder / "bridge").rglob("plan.json")), "--out", folder / "prediction.stl")
+    programs.tissueform("prediction", "export", prediction, "--png", folder / "pictures")
+    written = {path.suffix for path in folder.rglob("*") if path.is_file()}
+    check("a prediction is exported as data, surface and pictures", {".txt", ".json", ".stl", ".png"} <= written, str(written))
 
 
 def check_refusals(programs):
@@ -249,12 +190,6 @@ def check_refusals(programs):
                                                          capture_output=True, timeout=stack.PATIENCE_S, check=False).returncode != 0)
 
 
-def kill(programs, victim):
-    """As the power switch would, and on again."""
-    programs.stop(victim, signal.SIGKILL)
-    {"orthanc": programs.start_orthanc, "server": programs.start_server, "bridge": programs.start_bridge}[victim]()
-
-
 def check_end_while_building(programs):
     """SIGTERM while a plan is built: the bridge ends, and so do its children, if later by what it takes them to see that."""
     bridge = programs.running["bridge"]
@@ -262,44 +197,56 @@ def check_end_while_building(programs):
     programs.stop("bridge")
     check("SIGTERM while a plan is built ends the bridge with exit code 0", bridge.returncode == 0, str(bridge.returncode))
     programs.wait_for("the end of what builds the plan", lambda: not any(stack.runs(pid) for pid in building))
-    programs.start_bridge()
+    programs.start_bridge(wait=False)
 
 
-def check_kills_while_building(programs, count):
+def check_kills_while_building(programs, halts, count):
     """Two series are on their way while each program goes."""
+    halts.want(PLAN_POINTS[0])
     check_end_while_building(programs)
-    points = 0
-    for victim in ("bridge", "server", "orthanc", "bridge"):
-        kill(programs, victim)
-        points += 1
+    deaths = list(zip(PLAN_POINTS, (BRIDGE, OTHERS, BRIDGE, OTHERS, BRIDGE)))
+    for (point, victims), then in zip(deaths, [*PLAN_POINTS[1:], None]):
+        halts.kill_at(point, victims, then)
     published = wait_for_cases(programs, count)
-    check(f"{points} kills while plans are built: {count} cases", len(published) == count == len(set(programs.cases())), str(published))
-    return points
+    check(f"kills while plans are built: {count} cases", len(published) == count == len(set(programs.cases())), str(published))
 
 
-def check_kills_while_storing(programs, prediction, study):
-    """At each step of an export the bridge is killed, then the server, then the PACS; afterwards every object is there once."""
-    steps = ("asked", "confirmed", "fetched", "written", "sent", "told")
-    victims = ("bridge", "server", "orthanc")
+def check_kills_while_storing(programs, halts, prediction, study):
+    """At each step of an export server and PACS die, and in another export the bridge; afterwards every object is there once."""
     before = len(objects_of(programs, study))
-    of_one = None
-    for number, step in enumerate(steps):
-        export = send(programs, prediction)
-        programs.wait_for("the export in the queue", lambda name=export: name in export_states(programs), needs="bridge")
-        if step != "asked":
-            confirm(programs, export)
-            programs.wait_for(step, lambda name=export, reached=steps[number:]: export_states(programs).get(name) in reached, needs="bridge")
-        for victim in victims:
-            kill(programs, victim)
-        if step == "asked":
+    for number, point in enumerate(EXPORT_POINTS):
+        later = EXPORT_POINTS[(number + 1) % len(EXPORT_POINTS)]
+        deaths = sorted([(point, OTHERS), (later, BRIDGE)], key=lambda death: EXPORT_POINTS.index(death[0]))
+        halts.want(deaths[0][0])
+        export, confirmed = send(programs, prediction), False
+        for (place, victims), then in zip(deaths, (deaths[1][0], None)):
+            if place != "export.asked" and not confirmed:
+                confirmed = confirm(programs, export)
+            halts.kill_at(place, victims, then)
+        if not confirmed:
             confirm(programs, export)
         wait_until_stored(programs, export)
         after = len(objects_of(programs, study))
-        of_one = of_one or after - before
-        check(f"bridge, server and PACS killed when an export is {step}: each object once", after - before == of_one == OBJECTS,
-              f"{after - before} of {of_one}")
+        check(f"server and PACS killed at {point}, the bridge at {later}: each object once", after - before == OBJECTS, f"{after - before} of {OBJECTS}")
         before = after
-    return len(steps) * len(victims)
+
+
+def check_deleted_study(programs, studies, case):
+    """Somebody has deleted the study that a case is of."""
+    for study in studies:
+        for found in programs.orthanc("/tools/find", {"Level": "Study", "Query": {"StudyInstanceUID": study}}):
+            programs.orthanc(f"/studies/{found}", method="DELETE")
+    export = send(programs, programs.predict(case, title="Of a study that is gone", model="gradient_field"))
+    confirm(programs, export)
+    programs.wait_for("an export that has failed", lambda: export_states(programs).get(export) == "failed", needs="bridge")
+    notes = [entry["note"] for entry in programs.bridge_status()["exports"] if entry["name"] == export]
+    check("of a study that was deleted nothing is stored, and the bridge says so", len(notes) == 1 and "the series of this case no" in notes[0], str(notes))
+
+    def told():
+        lines = [line for line in programs.tissueform("prediction", "sent").stdout.splitlines() if line.startswith(export)]
+        return lines and " failed " in lines[0]
+    check("and whoever asked for it hears of it", programs.wait_for("the server hears of it", told))
+    check("the study does not come again", not any(programs.instances_of(study) for study in studies))
 
 
 def run(programs):
@@ -310,18 +257,20 @@ def run(programs):
     study, _ = head_series.write_series(programs.folder / "ct", **PLANTED)
     sent = programs.store_from_scanner(programs.folder / "ct")
     check("storescu gives the head to Orthanc", sent.returncode == 0 and len(programs.instances_of(study)) == 93, sent.stderr)
-    last_slice = time.monotonic()
     programs.send_to_bridge(study)
     case = next(iter(wait_for_cases(programs, 1).values()))
-    print(f"     last slice to published case: {time.monotonic() - last_slice:.1f} s")
+    print_times(programs)
     prediction = programs.predict(case)
     export = send(programs, prediction)
     written = Written(programs.folder / "bridge" / "objects")
     confirm(programs, export, looks=True)
     confirmed = time.monotonic()
     wait_until_stored(programs, export)
-    print(f"     word to stored: {time.monotonic() - confirmed:.1f} s")
-    check_objects(programs, study, programs.folder / "ct", written.end())
+    print(f"     word to stored: {time.monotonic() - confirmed:.1f} s", flush=True)
+    most_mib = stack.most_memory_mib(programs.running["bridge"].pid)
+    print(f"     the bridge had at most {most_mib:.0f} MiB")
+    check("the bridge keeps within its memory", most_mib < MOST_MIB, f"{most_mib:.0f} MiB")
+    returned_objects.check_objects(check, programs, study, programs.folder / "ct", written.end())
     check_refusals(programs)
 
     # A second study of the patient and another patient, at once.
@@ -330,9 +279,13 @@ def run(programs):
         studies = [made[0] for made in pool.map(lambda of: head_series.write_series(of[0], number=2, **of[1]), others)]
         list(pool.map(lambda of: programs.store_from_scanner(of[0]), others))
         list(pool.map(programs.send_to_bridge, studies))
-    points = check_kills_while_building(programs, 3)
-    points += check_kills_while_storing(programs, prediction, study)
-    print(f"     {points} kills")
+    halts = Halts(programs)
+    check_kills_while_building(programs, halts, 3)
+    # Of a model without a band, for which a server that was killed has nothing to prepare.
+    check_kills_while_storing(programs, halts, programs.predict(case, title="Often stored", model="gradient_field"), study)
+    print(f"     {len(halts.kills)} kills: {', '.join(f'{victim} at {point}' for point, victim in halts.kills)}")
+    wanted = {(point, victim) for point in EXPORT_POINTS for victim in BRIDGE + OTHERS}
+    check("each program was killed at each step of an export", wanted <= set(halts.kills), str(wanted - set(halts.kills)))
     by_patient = {}
     for of_case in set(published_cases(programs).values()) - {case}:
         export = send(programs, programs.predict(of_case, model="gradient_field"))
@@ -345,6 +298,8 @@ def run(programs):
         names = {name for _, _, item in objects.values() if item.Modality == "SR" for name, _ in terms(item)}
         check("where no band is known the report tells movements without one", "MOVEMENT" in names and "BAND" not in names, str(sorted(names)))
         check("and says why", "NO_BAND" in names, str(sorted(names)))
+    check_deleted_study(programs, studies, of_case)
+    bad_input.check_bad_series(check, programs, **PLANTED)
     export_files(programs)
     check_secrets(programs)
     print(f"     {time.monotonic() - began:.0f} s")
