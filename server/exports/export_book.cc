@@ -213,7 +213,7 @@ absl::StatusOr<ExportRecord> ExportBook::Update(const std::string& id, const Cha
   if (!MayFollow(record.state, change.state)) {
     return absl::InvalidArgumentError(
         "the state does not follow the one that it has; it goes from waiting over confirmation and "
-        "storing to stored or failed, and stays there");
+        "storing, which may go back to confirmation, to stored or failed, and stays there");
   }
   record.state = change.state;
   record.detail = change.detail;

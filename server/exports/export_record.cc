@@ -56,7 +56,8 @@ absl::StatusOr<ExportRecord> ParseExport(absl::string_view bytes) {
 }
 
 bool MayFollow(ExportState before, ExportState after) {
-  return before == after || (!IsDone(before) && after > before);
+  const bool seen_anew = before == ExportState::kStoring && after == ExportState::kConfirmation;
+  return before == after || seen_anew || (!IsDone(before) && after > before);
 }
 
 absl::Status StaleExport(absl::string_view id) {

@@ -12,7 +12,7 @@
 
 namespace tissueform {
 
-// As in tissueform.v1; a state never goes back.
+// As in tissueform.v1; forward only, but for a patient who turns out to be another one (MayFollow).
 enum class ExportState { kWaiting = 1, kConfirmation, kStoring, kStored, kFailed };
 
 inline bool IsDone(ExportState state) {
@@ -46,8 +46,9 @@ std::string SerializeExport(const ExportRecord& record);
 // Errors: DataLoss, for bytes that are none.
 absl::StatusOr<ExportRecord> ParseExport(absl::string_view bytes);
 
-// Whether an export may come from one state into another: into the same one, or forward from one
-// that is not done.
+// Whether an export may come from one state into another: into the same one, forward from one that
+// is not done, or from storing back to confirmation: the PACS names another patient by then than
+// the person has seen.
 bool MayFollow(ExportState before, ExportState after);
 
 // Aborted (STALE_ETAG): somebody else has changed it.

@@ -109,6 +109,17 @@ TEST_F(ExportsTest, AnExportIsWhatWasAskedAndGoesForwardOnly) {
               StatusIs(absl::StatusCode::kInvalidArgument));
 }
 
+TEST_F(ExportsTest, APatientWhoIsAnotherOneByThenIsSeenAnewWhileItIsStored) {
+  ASSERT_OK_AND_ASSIGN(const v1::Export made, exports().Create(Predict()));
+  ASSERT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_STORING)), IsOk());
+  EXPECT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_CONFIRMATION)), IsOk());
+  EXPECT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_WAITING)),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("does not follow")));
+  ASSERT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_STORED)), IsOk());
+  EXPECT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_CONFIRMATION)),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("does not follow")));
+}
+
 TEST_F(ExportsTest, OneOfAPredictionThatIsNotDoneIsGivenAgainAndADoneOneIsNot) {
   const std::string prediction = Predict();
   ASSERT_OK_AND_ASSIGN(const v1::Export made, exports().Create(prediction));
