@@ -49,6 +49,11 @@ void PrintPatient(const QueuedStudy& study, const QueuedExport& queued) {
       "  study of    %s\n",
       queued.name, ShownName(study.patient.name), ShownDate(study.patient.birth_date),
       study.patient.id, ShownDate(study.date));
+  if (!study.patient.readable) {
+    absl::PrintF(
+        "  a text of this patient cannot be read as it was meant: compare with the PACS before you "
+        "store\n");
+  }
   if (!queued.note.empty()) absl::PrintF("  note        %s\n", queued.note);
 }
 
@@ -77,7 +82,12 @@ BridgeCommands::BridgeCommands(CLI::App& app, const BridgeOptions* options) : op
   run_ = app.add_subcommand("run", "receive, build, publish and store, by rules, until SIGTERM");
   listen_ = app.add_subcommand("listen", "receive only, until SIGTERM");
   fetch_ = app.add_subcommand("fetch", "have the PACS send the series of a study");
-  fetch_->add_option("STUDY", name_, "its StudyInstanceUID")->required();
+  CLI::Option* const study = fetch_->add_option("STUDY", name_, "its StudyInstanceUID");
+  fetch_
+      ->add_option("--accession", accession_,
+                   "its accession number instead, by which the PACS may know several")
+      ->type_name("NUMBER")
+      ->excludes(study);
   series_ = app.add_subcommand("series", "what was received, and why it was chosen or not");
   build_ = app.add_subcommand("build", "build and pack the plan of a series, whatever rules say");
   build_->add_option("SERIES", name_, "its key, as `series` shows it")->required();
@@ -113,6 +123,9 @@ int BridgeCommands::Run() const {
 }
 
 absl::Status BridgeCommands::Fetch() const {
+  if (name_.empty() && accession_.empty()) {
+    return absl::InvalidArgumentError("which study? give its UID, or --accession NUMBER");
+  }
   if (!options_->has_pacs()) {
     return absl::FailedPreconditionError("which PACS? give --pacs HOST:PORT or --pacs-url URL");
   }
@@ -124,13 +137,14 @@ absl::Status BridgeCommands::Fetch() const {
     TF_ASSIGN_OR_RETURN(receiver, StorageReceiver::Start(ReceiverOptionsOf(options),
                                                          &parts->folder(), &parts->sink()));
   }
-  TF_ASSIGN_OR_RETURN(const std::vector<SeriesSummary> study,
-                      parts->pacs()->FindSeries({.study_uid = name_}));
+  TF_ASSIGN_OR_RETURN(
+      const std::vector<SeriesSummary> study,
+      parts->pacs()->FindSeries({.study_uid = name_, .accession_number = accession_}));
   int failed = 0;
   for (const SeriesSummary& series : study) {
-    TF_ASSIGN_OR_RETURN(
-        const FetchCounts counts,
-        parts->pacs()->FetchSeries(name_, series.series_uid, &parts->folder(), &parts->sink()));
+    TF_ASSIGN_OR_RETURN(const FetchCounts counts,
+                        parts->pacs()->FetchSeries(series.study_uid, series.series_uid,
+                                                   &parts->folder(), &parts->sink()));
     // One that cannot read an object may end as if it had sent all (Orthanc 1.10).
     const int failed_here = std::max(counts.failed, series.instances - counts.completed);
     absl::PrintF("series %d: %d objects, %d failed\n", series.number, counts.completed,

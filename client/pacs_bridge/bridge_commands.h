@@ -33,6 +33,7 @@ class BridgeCommands {
 
   const BridgeOptions* const options_;
   std::string name_ = {};  // a study, a series' key, an export
+  std::string accession_ = {};
   bool confirmed_ = false;
   bool json_ = false;
 

@@ -183,6 +183,14 @@ void AddRetention(CLI::App& app, RetentionOptions* retention) {
       app, "--keep-headers", retention->keep_headers.count() / 24, 0, 36500,
       [retention](int64_t days) { retention->keep_headers = std::chrono::hours(days * 24); },
       "days for which a header without pixels is kept, for where the PACS gives none");
+  AddNumber(
+      app, "--keep-asked", retention->keep_asked.count() / 24, 1, 36500,
+      [retention](int64_t days) { retention->keep_asked = std::chrono::hours(days * 24); },
+      "days for which a prediction waits for a person, with its pictures; then it has failed");
+  AddNumber(
+      app, "--keep-exports", retention->keep_exports.count() / 24, 0, 36500,
+      [retention](int64_t days) { retention->keep_exports = std::chrono::hours(days * 24); },
+      "days for which is known how storing a prediction has ended");
 }
 
 }  // namespace

@@ -68,7 +68,8 @@ absl::StatusOr<std::unique_ptr<BridgeParts>> BridgeParts::Open(const BridgeOptio
   parts->cancel_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   parts->writer_ = MakePredictionWriter(options.receiver.ae_title, parts->cancel_);
   parts->export_options_ = {.header_lifetime = options.retention.keep_headers,
-                            .warn = [](const std::string& line) { spdlog::warn("{}", line); }};
+                            .warn = [](const std::string& line) { spdlog::warn("{}", line); },
+                            .inform = [](const std::string& line) { spdlog::info("{}", line); }};
   TF_RETURN_IF_ERROR(parts->intake_->Recover());
   return parts;
 }

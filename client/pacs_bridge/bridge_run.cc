@@ -3,15 +3,20 @@
 
 #include "client/pacs_bridge/bridge_run.h"
 
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include "spdlog/spdlog.h"
 
 #include "client/pacs_bridge/bridge_parts.h"
@@ -71,13 +76,20 @@ absl::Status Serve(const BridgeOptions& options, BridgeRunKind kind) {
   planning.cancel = parts->cancel();
   PlanWork plans(&parts->queue(), parts->server(), planning);
   const std::unique_ptr<ExportWork> exports = everything ? parts->MakeExportWork() : nullptr;
-  BridgeService service({.queue = &parts->queue(),
-                         .intake = &parts->intake(),
-                         .plans = everything ? &plans : nullptr,
-                         .exports = exports.get(),
-                         .server = parts->server(),
-                         .retention = options.retention,
-                         .log = LogLine});
+  if (everything && exports == nullptr) {
+    LogLine(true,
+            "no PACS is named, so no prediction goes back to one; give --pacs HOST:PORT or "
+            "--pacs-url URL");
+  }
+  BridgeService service(
+      {.queue = &parts->queue(),
+       .intake = &parts->intake(),
+       .plans = everything ? &plans : nullptr,
+       .exports = exports.get(),
+       .server = parts->server(),
+       .retention = options.retention,
+       .most_plan_time = 2 * std::chrono::seconds(options.plan.max_seconds) + std::chrono::hours(1),
+       .log = LogLine});
   WakingSink sink(&parts->sink(), [&service] { service.Wake(); });
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<StorageReceiver> receiver,
                       StorageReceiver::Start(ReceiverOptionsOf(options), &parts->folder(), &sink));
@@ -90,7 +102,10 @@ absl::Status Serve(const BridgeOptions& options, BridgeRunKind kind) {
   }
   std::fflush(stdout);
   const SystemdWatchdog watchdog([&service](const std::function<void()>& answered) {
-    if (service.Lives()) answered();
+    const std::vector<std::string> stuck = service.Stuck();
+    if (stuck.empty()) return answered();
+    LogLine(true, absl::StrCat("at one step for too long: ", absl::StrJoin(stuck, ", "),
+                               "; systemd starts the bridge again"));
   });
   TellSystemdReady();
   WaitForEnd();

@@ -18,7 +18,7 @@ absl::StatusOr<std::string> StatusTable(BridgeQueue* queue);
 absl::StatusOr<std::string> StatusJson(BridgeQueue* queue);
 
 // Every series of the queue with what it is and why it was chosen or not, study by study: for a
-// person, who sees the study's date and description but no patient.
+// person, who sees the study's date and UID but no patient.
 absl::StatusOr<std::string> SeriesTable(BridgeQueue* queue, SeriesIntake* intake);
 
 }  // namespace tissueform

@@ -143,6 +143,26 @@ def check_store(programs, bridge, case, count):
     check("status names nobody", names_nobody(table + json.dumps(exports)))
 
 
+def check_merged(programs, bridge, case, study):
+    """A patient who is merged into another one after a person has looked."""
+    told = programs.tissueform("prediction", "send", programs.predict(case, title="Before the merge"))
+    export = re.search(r"exports/[\w-]+", told.stdout).group(0)
+    bridge.run("store", export)
+    name, = programs.orthanc("/tools/find", {"Level": "Patient", "Query": {"PatientID": PATIENT["patient_id"]}})
+    programs.orthanc(f"/patients/{name}/modify", {"Replace": {"PatientID": "MERGED-1"}, "Force": True, "KeepSource": False,
+                                                 "Keep": ["StudyInstanceUID", "SeriesInstanceUID", "SOPInstanceUID"]})
+    before = len(programs.instances_of(study))
+    check_refused("storing what is another patient's by now", bridge.run("store", export, "--patient-is-right"), "another patient ID")
+    state_of = {found["name"]: found["state"] for found in bridge.status()["exports"]}
+    check("it waits for a person again, and nothing is stored", state_of[export] == "asked" and len(programs.instances_of(study)) == before, str(state_of))
+    sent = programs.tissueform("prediction", "sent").stdout
+    check("of which the server knows", re.search(rf"{export}.*have changed", sent) is not None, sent)
+    shown = bridge.run("store", export)
+    check("who sees the patient of now, and that it has changed", "MERGED-1" in shown.stdout and "another patient ID" in shown.stdout, shown.stdout)
+    stored = bridge.run("store", export, "--patient-is-right")
+    check("and stores it for that one", stored.returncode == 0 and len(programs.instances_of(study)) == before + OBJECTS, stored.stdout + stored.stderr)
+
+
 def start_stranger(programs, port, bridge_port):
     """DCMTK's own archive."""
     area = programs.folder / "stranger"
@@ -215,6 +235,8 @@ def run(programs):
     for way, by_way in ways.items():
         check_fetched(way, by_way, study, programs.folder / "ct")
         check_refused(f"a study that the PACS has not, by {way}", by_way.run("fetch", "1.2.3"), "no such study")
+    by_number = Bridge(programs, "accession", associations).run("fetch", "--accession", "A1")
+    check("fetch by the accession number", by_number.returncode == 0 and f"{SLICES} objects, 0 failed" in by_number.stdout, by_number.stdout + by_number.stderr)
     check_series(bridge)
     case = check_way_to_the_server(programs, bridge)
     check_store(programs, bridge, case, lambda: len(programs.instances_of(study)))
@@ -222,6 +244,7 @@ def run(programs):
     server = ["--server", f"localhost:{programs.server_port}", "--server-ca", programs.authority.certificate, "--server-cert", certificate,
               "--server-key", key, "--accept-defects"]
     check_stranger(programs, study, Made(case, series, server))
+    check_merged(programs, bridge, case, study)
 
 
 def main():

@@ -38,6 +38,23 @@ const Json* ItemOf(const Json& answer, const char* sequence, const std::string& 
   return nullptr;
 }
 
+// A name with its groups as in a header: "=" between them.
+std::string NameIn(const Json& object, const char* tag) {
+  const Json::json_pointer first("/Value/0");
+  if (!object.is_object() || !object.contains(tag) || !object[tag].contains(first)) return {};
+  const Json& value = object[tag][first];
+  std::string name;
+  std::string between;
+  for (const char* group : {"Alphabetic", "Ideographic", "Phonetic"}) {
+    if (value.contains(group) && value[group].is_string()) {
+      absl::StrAppend(&name, between, value[group].get<std::string>());
+      between.clear();
+    }
+    between += "=";
+  }
+  return name;
+}
+
 }  // namespace
 
 std::string JsonValueOf(const Json& object, const char* tag) {
@@ -65,6 +82,15 @@ SeriesSummary SeriesSummaryFrom(const Json& object) {
   summary.number = NumberIn(object, "00200011");
   summary.instances = NumberIn(object, "00201209");
   return summary;
+}
+
+PatientSummary PatientSummaryFrom(const Json& object) {
+  PatientSummary patient;
+  patient.id = JsonValueOf(object, "00100020");
+  patient.issuer = JsonValueOf(object, "00100021");
+  patient.birth_date = JsonValueOf(object, "00100030");
+  patient.name = NameIn(object, "00100010");
+  return patient;
 }
 
 absl::Status StatusOfStow(absl::string_view peer_name, const std::string& text,

@@ -18,6 +18,7 @@ namespace tissueform {
 std::string JsonValueOf(const nlohmann::json& object, const char* tag);
 
 SeriesSummary SeriesSummaryFrom(const nlohmann::json& object);
+PatientSummary PatientSummaryFrom(const nlohmann::json& object);
 
 // Whether STOW-RS has stored an object that was sent alone: `text` is what the PACS answers with
 // HTTP status 200, 202 (stored with warnings) or 409 (refused). It is stored only where it is

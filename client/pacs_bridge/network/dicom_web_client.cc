@@ -37,8 +37,15 @@ class DicomWebClient : public PacsClient {
  public:
   explicit DicomWebClient(PacsPeer peer) : peer_(std::move(peer)) {}
 
-  absl::Status Echo() override {
-    return Query(absl::StrCat("/studies?StudyInstanceUID=", NewDicomUid())).status();
+  absl::StatusOr<PatientSummary> FindPatient(const std::string& study_uid) override {
+    TF_RETURN_IF_ERROR(CheckDicomUids({study_uid}));
+    TF_ASSIGN_OR_RETURN(
+        const Json answer,
+        Query(absl::StrCat("/studies?StudyInstanceUID=", study_uid, "&includefield=00100021")));
+    for (const Json& object : answer) {
+      if (JsonValueOf(object, "0020000D") == study_uid) return PatientSummaryFrom(object);
+    }
+    return Missing("study");
   }
 
   absl::StatusOr<std::vector<SeriesSummary>> FindSeries(const SeriesQuery& query) override {
@@ -224,6 +231,9 @@ class DicomWebClient : public PacsClient {
         return absl::PermissionDeniedError(message + ": let our certificate in there");
       case 404:
         return absl::NotFoundError(message);
+      case 405:
+      case 501:
+        return absl::UnimplementedError(message + ": allow it there");
       case 429:
       case 500:
       case 502:

@@ -127,10 +127,14 @@ absl::StatusOr<T_ASC_PresentationContextID> DimseAssociation::ContextOf(
     context = ASC_findAcceptedPresentationContextID(association_, abstract_syntax.c_str());
   }
   if (context != 0) return context;
+  if (transfer_syntax.empty()) {
+    return absl::UnimplementedError(absl::StrCat("the PACS '", peer_name_,
+                                                 "' does not offer the service ", abstract_syntax,
+                                                 ": allow it there"));
+  }
   return absl::FailedPreconditionError(
-      absl::StrCat("the PACS '", peer_name_, "' does not take the service or class ",
-                   abstract_syntax, transfer_syntax.empty() ? "" : " in the transfer syntax ",
-                   transfer_syntax, ": allow it there"));
+      absl::StrCat("the PACS '", peer_name_, "' does not take the class ", abstract_syntax,
+                   " in the transfer syntax ", transfer_syntax, ": allow it there"));
 }
 
 absl::Status DimseAssociation::Check(const OFCondition& condition, absl::string_view what) {

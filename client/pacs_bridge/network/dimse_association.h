@@ -34,7 +34,8 @@ class DimseAssociation {
   T_ASC_Association* get() const { return association_; }
   T_ASC_Network* network() const { return network_; }
 
-  // The context by which a class goes. Errors: FailedPrecondition when the peer has not taken it.
+  // The context by which a service, or a class in a transfer syntax, goes. Errors: Unimplemented
+  // when the peer has not taken the service, FailedPrecondition when it has not taken the class.
   absl::StatusOr<T_ASC_PresentationContextID> ContextOf(const std::string& abstract_syntax,
                                                         const std::string& transfer_syntax = {});
 

@@ -3,6 +3,7 @@
 
 #include "client/pacs_bridge/network/dimse_client.h"
 
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -44,6 +45,17 @@ SeriesSummary SummaryOf(DcmDataset* answer) {
   return summary;
 }
 
+PatientSummary PatientOf(DcmDataset* answer) {
+  DicomTexts texts(answer);
+  PatientSummary patient;
+  patient.name = texts.Get(DCM_PatientName);
+  patient.id = texts.Get(DCM_PatientID);
+  patient.issuer = texts.Get(DCM_IssuerOfPatientID);
+  patient.birth_date = texts.Get(DCM_PatientBirthDate);
+  patient.readable = texts.problem().empty();
+  return patient;
+}
+
 // What is to be sent, as its file says.
 struct OutgoingObject {
   std::string path;
@@ -75,19 +87,6 @@ class DimseClient : public PacsClient {
         secure_(std::move(secure)),
         seconds_(static_cast<int>(peer_.answer_time.count())) {}
 
-  absl::Status Echo() override {
-    TF_ASSIGN_OR_RETURN(
-        const auto association,
-        Associate({{std::string(kVerificationClass), {std::string(kImplicitLittleEndian)}}}));
-    TF_RETURN_IF_ERROR(association->ContextOf(std::string(kVerificationClass)).status());
-    DIC_US status = 0;
-    DcmDataset* detail = nullptr;
-    const OFCondition echoed = DIMSE_echoUser(association->get(), association->get()->nextMsgID++,
-                                              DIMSE_NONBLOCKING, seconds_, &status, &detail);
-    delete detail;
-    return association->Check(echoed, "it answered an echo");
-  }
-
   absl::StatusOr<std::vector<SeriesSummary>> FindSeries(const SeriesQuery& query) override {
     TF_ASSIGN_OR_RETURN(const auto association, Associate(FindContexts()));
     std::vector<std::string> studies;
@@ -115,6 +114,25 @@ class DimseClient : public PacsClient {
     }
     if (series.empty()) return NotThere("study");
     return series;
+  }
+
+  absl::StatusOr<PatientSummary> FindPatient(const std::string& study_uid) override {
+    TF_RETURN_IF_ERROR(CheckDicomUids({study_uid}));
+    TF_ASSIGN_OR_RETURN(const auto association, Associate(FindContexts()));
+    std::optional<PatientSummary> patient;
+    TF_RETURN_IF_ERROR(Find(association.get(),
+                            {"STUDY",
+                             {{DCM_StudyInstanceUID, study_uid},
+                              {DCM_PatientName, ""},
+                              {DCM_PatientID, ""},
+                              {DCM_IssuerOfPatientID, ""},
+                              {DCM_PatientBirthDate, ""}}},
+                            [&](DcmDataset* answer) {
+                              const std::string uid = DicomTexts(answer).Get(DCM_StudyInstanceUID);
+                              if (uid == study_uid) patient = PatientOf(answer);
+                            }));
+    if (!patient.has_value()) return NotThere("study");
+    return *patient;
   }
 
   absl::StatusOr<FetchCounts> FetchSeries(const std::string& study_uid,

@@ -76,7 +76,8 @@ class InstanceStream::File : public DcmConsumer {
   void Append(const char* bytes, size_t count) {
     written_ += static_cast<int64_t>(count);
     if (written_ > max_bytes_) {
-      return Fail(absl::ResourceExhaustedError(
+      // No want of room, after which its sender would try again and again.
+      return Fail(absl::InvalidArgumentError(
           absl::StrCat("an object has more than ", max_bytes_, " bytes")));
     }
     while (count > 0) {

@@ -57,8 +57,12 @@ absl::Status KeepOneHeader(
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<InstanceFolder> folder,
                       InstanceFolder::Open({.path = scratch.name(), .watermark_bytes = 0}));
   LastPath last;
-  TF_RETURN_IF_ERROR(fetch(*folder, &last));
-  if (last.path().empty()) return absl::NotFoundError("the PACS has sent no object of this series");
+  const absl::Status fetched = fetch(*folder, &last);
+  if (absl::IsNotFound(fetched) || (fetched.ok() && last.path().empty())) {
+    return absl::UnavailableError(
+        "the PACS lists an object of this series and does not send it: see its log");
+  }
+  TF_RETURN_IF_ERROR(fetched);
   return CopyHeaderOnly(last.path(), path);
 }
 

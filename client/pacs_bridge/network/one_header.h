@@ -14,10 +14,11 @@
 
 namespace tissueform {
 
-// Lets `fetch` bring one object into a folder beside `path`, keeps its header, without pixels, as
-// the file `path` (0600), and removes the rest.
+// Lets `fetch` bring one object that the PACS has listed into a folder beside `path`, keeps its
+// header, without pixels, as the file `path` (0600), and removes the rest.
 //
-// Errors: those of `fetch`, NotFound when nothing came, those of CopyHeaderOnly.
+// Errors: those of `fetch`, but Unavailable when nothing came, whatever it says of that; those of
+// CopyHeaderOnly.
 absl::Status KeepOneHeader(
     const std::string& path,
     const std::function<absl::Status(const InstanceFolder& folder, InstanceSink* sink)>& fetch);

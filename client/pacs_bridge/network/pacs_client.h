@@ -59,6 +59,15 @@ struct SeriesSummary {
   int instances = 0;  // 0: not told
 };
 
+// Whose a study is, as the PACS tells it. Texts are UTF-8.
+struct PatientSummary {
+  std::string name = {};
+  std::string id = {};
+  std::string issuer = {};      // of the ID; empty: not told, or none
+  std::string birth_date = {};  // YYYYMMDD; empty: not told, or none
+  bool readable = true;         // false: in a character set that is not known
+};
+
 struct FetchCounts {
   int completed = 0;
   int failed = 0;
@@ -74,17 +83,18 @@ struct StoredObject {
 //
 // Errors of all, one line each with the peer's name and what to do, without patient data:
 // Unavailable (it does not answer, or breaks off: try again), PermissionDenied (it refuses us),
-// DeadlineExceeded (silence), FailedPrecondition (it offers no such service), Unauthenticated (TLS
-// fails), InvalidArgument (an argument; an answer that cannot be understood: Internal).
+// DeadlineExceeded (silence), Unimplemented (it offers no such service), FailedPrecondition (it
+// refuses what is asked, with a status), Unauthenticated (TLS fails), InvalidArgument (an argument;
+// an answer that cannot be understood: Internal).
 class PacsClient {
  public:
   virtual ~PacsClient() = default;
 
-  // Whether it answers: C-ECHO; a query for nothing.
-  virtual absl::Status Echo() = 0;
-
-  // All series of a study. Errors: also NotFound.
+  // All series of a study, or of all with an accession number. Errors: also NotFound.
   virtual absl::StatusOr<std::vector<SeriesSummary>> FindSeries(const SeriesQuery& query) = 0;
+
+  // Whose a study is now. Errors: also NotFound.
+  virtual absl::StatusOr<PatientSummary> FindPatient(const std::string& study_uid) = 0;
 
   // Lets the objects of a series come: into the folder and to the sink, or, by C-MOVE, to the
   // receiver that the peer knows by own_ae_title. Returns when all have come or failed.

@@ -10,6 +10,24 @@ namespace {
 
 absl::Status NoExport() { return absl::NotFoundError("no such export in the queue"); }
 
+absl::Status WriteRow(Database& database, const QueuedExport& changed) {
+  const int64_t before = database.total_changes();
+  TF_RETURN_IF_ERROR(database
+                         .Prepare("UPDATE exports SET state = ?, note = ?, confirmed = ?, "
+                                  "attempts = ?, last_error = ?, first_s = ?, done_s = ? WHERE "
+                                  "name = ?")
+                         .Bind(BridgeExportStateName(changed.state))
+                         .Bind(changed.note)
+                         .Bind(changed.confirmed)
+                         .Bind(changed.attempts)
+                         .Bind(changed.last_error)
+                         .Bind(changed.first_s)
+                         .Bind(changed.done_s)
+                         .Bind(changed.name)
+                         .Run());
+  return database.total_changes() > before ? absl::OkStatus() : NoExport();
+}
+
 }  // namespace
 
 absl::StatusOr<QueuedExport> ExportRows::Add(const QueuedExport& asked) {
@@ -30,20 +48,25 @@ absl::StatusOr<QueuedExport> ExportRows::Add(const QueuedExport& asked) {
 }
 
 absl::Status ExportRows::Update(const QueuedExport& changed) {
+  return queue_->Change([&](Database& database) { return WriteRow(database, changed); });
+}
+
+absl::Status ExportRows::UpdateWithPatient(const QueuedExport& changed,
+                                           const std::string& study_uid,
+                                           const PatientIdentity& patient) {
   return queue_->Change([&](Database& database) -> absl::Status {
-    const int64_t before = database.total_changes();
-    TF_RETURN_IF_ERROR(database
-                           .Prepare("UPDATE exports SET state = ?, note = ?, confirmed = ?, "
-                                    "attempts = ?, last_error = ?, done_s = ? WHERE name = ?")
-                           .Bind(BridgeExportStateName(changed.state))
-                           .Bind(changed.note)
-                           .Bind(changed.confirmed)
-                           .Bind(changed.attempts)
-                           .Bind(changed.last_error)
-                           .Bind(changed.done_s)
-                           .Bind(changed.name)
-                           .Run());
-    return database.total_changes() > before ? absl::OkStatus() : NoExport();
+    TF_RETURN_IF_ERROR(WriteRow(database, changed));
+    return database
+        .Prepare(
+            "UPDATE studies SET patient_id = ?, issuer = ?, name = ?, birth_date = ?, "
+            "readable = ? WHERE uid = ?")
+        .Bind(patient.id)
+        .Bind(patient.issuer)
+        .Bind(patient.name)
+        .Bind(patient.birth_date)
+        .Bind(int64_t{patient.readable})
+        .Bind(study_uid)
+        .Run();
   });
 }
 
@@ -60,6 +83,30 @@ absl::Status ExportRows::Confirm(const std::string& name, const std::string& dig
             .Run());
     if (database.total_changes() > before) return absl::OkStatus();
     return absl::FailedPreconditionError("the export does not wait for a person's word");
+  });
+}
+
+absl::StatusOr<int> ExportRows::FailAsked(int64_t before_s, const std::string& note) {
+  int64_t failed = 0;
+  const absl::Status done = queue_->Change([&](Database& database) -> absl::Status {
+    const int64_t before = database.total_changes();
+    TF_RETURN_IF_ERROR(database
+                           .Prepare("UPDATE exports SET state = 'failed', note = ?, attempts = 0, "
+                                    "done_s = 0 WHERE state = 'asked' AND first_s < ?")
+                           .Bind(note)
+                           .Bind(before_s)
+                           .Run());
+    failed = database.total_changes() - before;
+    return absl::OkStatus();
+  });
+  TF_RETURN_IF_ERROR(done);
+  return static_cast<int>(failed);
+}
+
+absl::Status ExportRows::Remove(const std::string& name) {
+  return queue_->Change([&](Database& database) -> absl::Status {
+    TF_RETURN_IF_ERROR(database.Prepare("DELETE FROM objects WHERE export = ?").Bind(name).Run());
+    return database.Prepare("DELETE FROM exports WHERE name = ?").Bind(name).Run();
   });
 }
 

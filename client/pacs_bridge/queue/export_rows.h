@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "absl/status/statusor.h"
 
 #include "client/pacs_bridge/queue/bridge_queue.h"
+#include "client/pacs_bridge/queue/patient_identity.h"
 #include "client/pacs_bridge/queue/queued_export.h"
 
 namespace tissueform {
@@ -23,9 +25,18 @@ class ExportRows {
   absl::StatusOr<QueuedExport> Add(const QueuedExport& asked);
   // Writes all but name, key, prediction and case. Errors: NotFound.
   absl::Status Update(const QueuedExport& changed);
+  // Writes it as Update does, and with it who the patient of its study is now, both or neither.
+  absl::Status UpdateWithPatient(const QueuedExport& changed, const std::string& study_uid,
+                                 const PatientIdentity& patient);
   // A person says that the patient with this digest is the right one. Errors: NotFound;
   // FailedPrecondition: it does not wait for that.
   absl::Status Confirm(const std::string& name, const std::string& digest);
+
+  // Those that have waited for a person since before `before_s` become kFailed, with this note; the
+  // server is yet to be told. Returns how many.
+  absl::StatusOr<int> FailAsked(int64_t before_s, const std::string& note);
+  // All that is known of it, its objects' UIDs too. Nothing happens where it is not there.
+  absl::Status Remove(const std::string& name);
 
   absl::StatusOr<QueuedExport> Get(const std::string& name);  // NotFound
   absl::StatusOr<std::vector<QueuedExport>> List();

@@ -34,8 +34,8 @@ struct QueuedExport {
   std::string confirmed = {};  // DigestOf the patient that was shown to who confirmed
   int64_t attempts = 0;        // of the step that is next
   std::string last_error = {};
-  int64_t first_s = 0;
-  int64_t done_s = 0;
+  int64_t first_s = 0;  // when a person was asked, the last time; unix seconds
+  int64_t done_s = 0;   // when the server knew how it ended; 0: it does not
 };
 
 // One object that an export writes. Its UID is here before its first byte is.

@@ -4,6 +4,7 @@
 #include "client/pacs_bridge/work/bridge_service.h"
 
 #include <algorithm>
+#include <array>
 #include <ctime>
 #include <utility>
 
@@ -18,6 +19,10 @@ namespace {
 constexpr std::chrono::milliseconds kIntakePause{250};
 constexpr std::chrono::milliseconds kStepPause{1000};
 constexpr std::chrono::hours kDeletionPause{1};
+// Whether exports that wait were taken back, which no watch tells.
+constexpr std::chrono::minutes kLookPause{5};
+// What a thread may be late by when it comes back from its rest.
+constexpr std::chrono::minutes kMostLateness{1};
 // What a server may tell of before it is taken; each is told again by the next watch.
 constexpr size_t kMostHeard = 4096;
 constexpr char kWatch[] = "watch";  // among the keys of what is tried again
@@ -46,17 +51,18 @@ bool HasExportStep(const QueuedExport& queued) {
 }  // namespace
 
 BridgeService::BridgeService(BridgeServiceParts parts) : parts_(std::move(parts)) {
-  if (parts_.intake != nullptr) {
-    threads_.emplace_back([this] { Loop(kIntakePause, [this] { TakeIn(); }); });
-  }
-  if (parts_.plans != nullptr) {
-    threads_.emplace_back([this] { Loop(kStepPause, [this] { WorkOnPlans(); }); });
-  }
+  if (parts_.intake != nullptr) Start(Work::kIntake, kIntakePause, [this] { TakeIn(); });
+  if (parts_.plans != nullptr) Start(Work::kPlans, kStepPause, [this] { WorkOnPlans(); });
   if (parts_.exports != nullptr) {
-    threads_.emplace_back([this] { Loop(kStepPause, [this] { WorkOnExports(); }); });
-    threads_.emplace_back([this] { Loop(kStepPause, [this] { WorkOnPictures(); }); });
-    threads_.emplace_back([this] { Loop(kStepPause, [this] { WatchServer(); }); });
+    Start(Work::kExports, kStepPause, [this] { WorkOnExports(); });
+    Start(Work::kPictures, kStepPause, [this] { WorkOnPictures(); });
+    Start(Work::kWatch, kStepPause, [this] { WatchServer(); });
   }
+}
+
+void BridgeService::Start(Work work, std::chrono::milliseconds pause, std::function<void()> step) {
+  BeginStep(work);
+  threads_.emplace_back([this, work, pause, step = std::move(step)] { Loop(work, pause, step); });
 }
 
 BridgeService::~BridgeService() {
@@ -81,22 +87,50 @@ bool BridgeService::stopping() {
   return stopping_;
 }
 
-bool BridgeService::Lives() {
-  MutexLock lock(mutex_);
-  return std::exchange(rounds_seen_, rounds_) != rounds_ || threads_.empty();
+// More than the longest step takes whose peers keep within their own times.
+std::chrono::seconds BridgeService::MostTimeOf(Work work) const {
+  switch (work) {
+    case Work::kIntake:
+    case Work::kPictures:
+      return std::chrono::minutes(30);
+    case Work::kPlans:
+      return parts_.most_plan_time;
+    case Work::kExports:
+      return std::chrono::hours(1);
+    case Work::kWatch:
+      return std::chrono::minutes(3);
+  }
+  return {};
 }
 
-void BridgeService::Loop(std::chrono::milliseconds pause, const std::function<void()>& work) {
+void BridgeService::BeginStep(Work work) {
+  MutexLock lock(mutex_);
+  latest_[work] = parts_.now() + MostTimeOf(work);
+}
+
+std::vector<std::string> BridgeService::Stuck() {
+  constexpr std::array<const char*, 5> kNames = {"intake", "plans", "exports", "pictures", "watch"};
+  std::vector<std::string> stuck;
+  MutexLock lock(mutex_);
+  for (const auto& [work, latest] : latest_) {
+    if (parts_.now() > latest) stuck.push_back(kNames[static_cast<size_t>(work)]);
+  }
+  return stuck;
+}
+
+void BridgeService::Loop(Work work, std::chrono::milliseconds pause,
+                         const std::function<void()>& step) {
   int64_t seen = 0;
   while (!stopping()) {
+    BeginStep(work);
     {
       MutexLock lock(mutex_);
       seen = wakes_;
-      ++rounds_;
     }
-    work();
+    step();
     const auto until = std::chrono::steady_clock::now() + pause;
     MutexLock lock(mutex_);
+    latest_[work] = parts_.now() + pause + kMostLateness;
     while (!stopping_ && wakes_ == seen && changed_.WaitUntil(mutex_, until)) {
     }
   }
@@ -124,6 +158,7 @@ void BridgeService::TakeIn() {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_deletion_) return;
   next_deletion_ = now + kDeletionPause;
+  BeginStep(Work::kIntake);
   const absl::StatusOr<int> deleted = DeleteOld(parts_.queue, parts_.retention, std::time(nullptr));
   if (!deleted.ok() || *deleted > 0) {
     Tell(deleted.status(), "deleted what is older than it is kept");
@@ -136,6 +171,7 @@ void BridgeService::WorkOnPlans() {
   if (!all.ok()) return Tell(all.status(), "the queue cannot be read");
   for (QueuedSeries series : *all) {
     while (HasPlanStep(series.state) && !stopping() && plan_retries_.Due(series.key)) {
+      BeginStep(Work::kPlans);
       const std::string before = SeriesStateName(series.state);
       const absl::Status status = parts_.plans->Step(&series);
       if (absl::IsCancelled(status)) return;
@@ -188,8 +224,10 @@ void BridgeService::WorkOnExports() {
   ExportRows rows(parts_.queue);
   const absl::StatusOr<std::vector<QueuedExport>> all = rows.List();
   if (!all.ok()) return Tell(all.status(), "the queue cannot be read");
+  LookForTakenBack(*all);
   for (QueuedExport queued : *all) {
     while (HasExportStep(queued) && !stopping() && export_retries_.Due(queued.key)) {
+      BeginStep(Work::kExports);
       const std::string before = BridgeExportStateName(queued.state);
       const absl::Status status = parts_.exports->Step(&queued);
       Tell(status,
@@ -203,24 +241,54 @@ void BridgeService::WorkOnExports() {
   }
 }
 
-void BridgeService::WorkOnPictures() {
-  ExportRows rows(parts_.queue);
-  const absl::StatusOr<std::vector<QueuedExport>> all = rows.List();
-  if (!all.ok()) return Tell(all.status(), "the queue cannot be read");
-  for (const QueuedExport& queued : *all) {
-    if (queued.state != BridgeExportState::kAsked) {
-      drawn_.erase(queued.key);
-    } else if (!stopping() && drawn_.insert(queued.key).second) {
-      const absl::Status status = parts_.exports->Draw(queued);
-      if (absl::IsCancelled(status)) return;
-      if (!status.ok()) Tell(status, absl::StrCat(queued.name, " waits without pictures"));
+void BridgeService::LookForTakenBack(const std::vector<QueuedExport>& all) {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_look_) return;
+  next_look_ = now + kLookPause;
+  for (const QueuedExport& queued : all) {
+    if (queued.state != BridgeExportState::kAsked || stopping()) continue;
+    BeginStep(Work::kExports);
+    const absl::StatusOr<bool> still_asked = parts_.exports->IsStillAsked(queued);
+    // The watch tells of a server that is away, and all are looked at again.
+    if (IsTransient(still_asked.status())) return;
+    if (!still_asked.ok()) {
+      Tell(still_asked.status(), absl::StrCat(queued.name, " cannot be looked for"));
+    } else if (!*still_asked) {
+      Tell(absl::OkStatus(), absl::StrCat(queued.name, " is asked for no longer"));
     }
   }
 }
 
+void BridgeService::WorkOnPictures() {
+  ExportRows rows(parts_.queue);
+  const absl::StatusOr<std::vector<QueuedExport>> all = rows.List();
+  if (!all.ok()) return Tell(all.status(), "the queue cannot be read");
+  std::map<std::string, Drawing> drawings;
+  for (QueuedExport queued : *all) {
+    if (queued.state != BridgeExportState::kAsked) continue;
+    Drawing& drawing = drawings[queued.key] = drawings_[queued.key];
+    if (drawing.is_over || stopping() || !picture_retries_.Due(queued.key)) continue;
+    BeginStep(Work::kPictures);
+    queued.attempts = drawing.attempts++;
+    const absl::Status status = parts_.exports->Draw(queued);
+    if (absl::IsCancelled(status)) return;
+    if (!status.ok()) Tell(status, absl::StrCat(queued.name, " waits without pictures"));
+    drawing.is_over = !MayCome(status);
+    if (!drawing.is_over) picture_retries_.Failed(queued.key);
+  }
+  for (const auto& [key, drawing] : drawings_) {
+    if (!drawings.contains(key)) picture_retries_.Succeeded(key);
+  }
+  drawings_ = std::move(drawings);
+}
+
 void BridgeService::WatchServer() {
   if (!watch_retries_.Due(kWatch)) return;
-  const Cancellation cancelled([this] { return stopping(); });
+  // Asked every second as long as the watch lives.
+  const Cancellation cancelled([this] {
+    BeginStep(Work::kWatch);
+    return stopping();
+  });
   const absl::Status status = parts_.server->WatchExports(
       [this](const v1::Export& told) {
         {

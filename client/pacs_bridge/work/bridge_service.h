@@ -3,11 +3,12 @@
 
 #pragma once
 
-#include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
-#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -29,8 +30,12 @@ struct BridgeServiceParts {
   ExportWork* exports = nullptr;
   CaseServer* server = nullptr;  // to hear of exports
   RetentionOptions retention = {};
+  // How long building a plan may take before something must be wrong (Stuck).
+  std::chrono::seconds most_plan_time = std::chrono::hours(6);
   // One line about what was done, or went wrong; keys of the queue and nothing of a patient.
   std::function<void(bool wrong, const std::string& line)> log = {};
+  // By which Stuck measures; any thread.
+  std::function<std::chrono::steady_clock::time_point()> now = std::chrono::steady_clock::now;
 };
 
 // Moves everything in the queue on, each kind of work on a thread of its own: what comes in, plans
@@ -48,20 +53,33 @@ class BridgeService {
   // There is something new: an image, an association's end, a person's word. Any thread.
   void Wake() ABSL_LOCKS_EXCLUDED(mutex_);
 
-  // Whether every thread has come round since the last time this was asked, or is at work on a
-  // step: for a watchdog.
-  bool Lives() ABSL_LOCKS_EXCLUDED(mutex_);
+  // The work ("intake", "plans", "exports", "pictures", "watch") whose thread has been at one step
+  // for longer than any takes, or has not come back from its rest: for a watchdog.
+  std::vector<std::string> Stuck() ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
-  // Calls `work` until the end, at once when somebody wakes it and otherwise every `pause`.
-  void Loop(std::chrono::milliseconds pause, const std::function<void()>& work)
+  // The pictures of an export.
+  struct Drawing {
+    int64_t attempts = 0;
+    bool is_over = false;  // they are there, or cannot be drawn
+  };
+  enum class Work { kIntake, kPlans, kExports, kPictures, kWatch };
+
+  // Starts a thread that calls `step` until the end, at once when somebody wakes it and otherwise
+  // every `pause`.
+  void Start(Work work, std::chrono::milliseconds pause, std::function<void()> step);
+  void Loop(Work work, std::chrono::milliseconds pause, const std::function<void()>& step)
       ABSL_LOCKS_EXCLUDED(mutex_);
+  // A step of this work begins now, or goes on.
+  void BeginStep(Work work) ABSL_LOCKS_EXCLUDED(mutex_);
+  std::chrono::seconds MostTimeOf(Work work) const;
   void TakeIn();
   void WorkOnPlans();
   void TakeHeard() ABSL_LOCKS_EXCLUDED(mutex_);
   // False: it is to be taken later.
   bool TakeNow(const v1::Export& told);
   void WorkOnExports();
+  void LookForTakenBack(const std::vector<QueuedExport>& all);
   void WorkOnPictures();
   void WatchServer();
   void Tell(const absl::Status& status, const std::string& line);
@@ -75,14 +93,16 @@ class BridgeService {
   RetryTimes take_retries_;
   RetryTimes watch_retries_;
   std::chrono::steady_clock::time_point next_deletion_ = {};
-  std::set<std::string> drawn_;  // keys of exports that wait and were drawn, or could not be
+  std::chrono::steady_clock::time_point next_look_ = {};
+  RetryTimes picture_retries_;
+  std::map<std::string, Drawing> drawings_;  // by key of an export that waits
 
   Mutex mutex_;
   ConditionVariable changed_;
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
   int64_t wakes_ ABSL_GUARDED_BY(mutex_) = 0;
-  int64_t rounds_ ABSL_GUARDED_BY(mutex_) = 0;
-  int64_t rounds_seen_ ABSL_GUARDED_BY(mutex_) = -1;
+  // When the thread of a work must have come on.
+  std::map<Work, std::chrono::steady_clock::time_point> latest_ ABSL_GUARDED_BY(mutex_);
   std::deque<v1::Export> heard_ ABSL_GUARDED_BY(mutex_);
 
   std::vector<std::thread> threads_;

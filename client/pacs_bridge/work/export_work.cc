@@ -18,7 +18,6 @@
 #include "client/cpp/backoff.h"
 #include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "client/pacs_bridge/dicom/instance_header.h"
-#include "client/pacs_bridge/work/patient_header.h"
 #include "client/pacs_bridge/work/plan_work.h"
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
@@ -37,6 +36,9 @@ constexpr size_t kMostDetailBytes = 256;
 constexpr int64_t kMostExportAttempts = 1440;
 // A report without a band is better than none: a server that has no room for it is asked so often.
 constexpr int64_t kMostBandAttempts = 5;
+// Whether drawing fails for want of something that comes again, or for good, its program does not
+// say.
+constexpr int64_t kMostDrawAttempts = 20;
 constexpr char kBandFile[] = "band.f64";
 constexpr char kSeriesKey[] = "series:";
 
@@ -49,12 +51,8 @@ std::string DetailOf(const std::string& text) {
   return line;
 }
 
-// The PACS may come back, there may be room again, or the bridge is ending. A peer that dies in a
-// TLS handshake looks like one with a wrong certificate, and that may be renewed, too.
-bool MayCome(const absl::Status& status) {
-  return IsTransient(status) || absl::IsDeadlineExceeded(status) || absl::IsCancelled(status) ||
-         absl::IsUnauthenticated(status) || absl::IsPermissionDenied(status) ||
-         HasReason(status, ErrorReason::kDiskFull);
+bool IsDone(v1::ExportState state) {
+  return state == v1::EXPORT_STATE_STORED || state == v1::EXPORT_STATE_FAILED;
 }
 
 int CountSent(const std::vector<QueuedObject>& objects) {
@@ -64,12 +62,24 @@ int CountSent(const std::vector<QueuedObject>& objects) {
 
 }  // namespace
 
+bool MayCome(const absl::Status& status) {
+  // A peer that dies in a TLS handshake looks like one with a wrong certificate, and that may be
+  // renewed, too.
+  return IsTransient(status) || absl::IsDeadlineExceeded(status) || absl::IsCancelled(status) ||
+         absl::IsUnauthenticated(status) || absl::IsPermissionDenied(status) ||
+         HasReason(status, ErrorReason::kDiskFull);
+}
+
 absl::Status ExportWork::Take(const v1::Export& told) {
-  if (told.state() == v1::EXPORT_STATE_STORED || told.state() == v1::EXPORT_STATE_FAILED) {
+  if (IsDone(told.state())) return absl::OkStatus();
+  const absl::StatusOr<QueuedSeries> series = received_.GetByCase(told.case_());
+  if (absl::IsNotFound(series.status())) {
+    if (options_.inform) {
+      options_.inform(
+          absl::StrCat(told.name(), " is of a case of another bridge, and left to that"));
+    }
     return absl::OkStatus();
   }
-  const absl::StatusOr<QueuedSeries> series = received_.GetByCase(told.case_());
-  if (absl::IsNotFound(series.status())) return absl::OkStatus();
   TF_RETURN_IF_ERROR(series.status());
   QueuedExport asked;
   asked.name = told.name();
@@ -84,6 +94,7 @@ absl::Status ExportWork::Take(const v1::Export& told) {
     queued.state = BridgeExportState::kAsked;
     queued.note.clear();
     queued.last_error.clear();
+    queued.first_s = asked.first_s;
     queued.done_s = 0;
     TF_RETURN_IF_ERROR(rows_.Update(queued));
   }
@@ -91,6 +102,16 @@ absl::Status ExportWork::Take(const v1::Export& told) {
   TF_FAULT_POINT("export.asked");
   return server_->UpdateExport(queued.name, v1::EXPORT_STATE_CONFIRMATION,
                                "waits for a person at the work list of the bridge", 0);
+}
+
+absl::StatusOr<bool> ExportWork::IsStillAsked(const QueuedExport& queued) {
+  const absl::StatusOr<v1::Export> known = server_->GetExport(queued.name);
+  if (known.ok() && !IsDone(known->state())) return true;
+  if (!known.ok() && !absl::IsNotFound(known.status())) return known.status();
+  std::error_code ignored;
+  fs::remove_all(queue_->object_folder(queued.key), ignored);
+  TF_RETURN_IF_ERROR(rows_.Remove(queued.name));
+  return false;
 }
 
 absl::Status ExportWork::RunStep(QueuedExport* queued) {
@@ -141,37 +162,48 @@ absl::Status ExportWork::Fetch(QueuedExport* queued) {
   TF_ASSIGN_OR_RETURN(const QueuedSeries series, received_.GetByCase(queued->case_name));
   const std::string folder = queue_->object_folder(queued->key);
   TF_RETURN_IF_ERROR(MakeFolder(folder));
+  const std::string path = folder + "/header.dcm";
+  TF_ASSIGN_OR_RETURN(const FoundPatient found,
+                      FetchPatientHeader(pacs_,
+                                         {.series = series,
+                                          .kept = queue_->header_path(series.key),
+                                          .lifetime = options_.header_lifetime},
+                                         path));
+  TF_FAULT_POINT("export.header");
+  if (DigestOf(found.patient) != queued->confirmed) {
+    std::error_code ignored;
+    fs::remove(path, ignored);  // it may wait for long, and the header is the patient's
+    return AskAnew(queued, series.study_uid, found);
+  }
+  if (!found.has_header) {
+    return absl::FailedPreconditionError(absl::StrCat(found.remark, "; allow C-GET there"));
+  }
   TF_RETURN_IF_ERROR(
       server_->UpdateExport(queued->name, v1::EXPORT_STATE_STORING, "is being written", 0));
-  const std::string path = folder + "/header.dcm";
-  TF_RETURN_IF_ERROR(FetchPatientHeader(pacs_,
-                                        {.series = series,
-                                         .kept = queue_->header_path(series.key),
-                                         .lifetime = options_.header_lifetime},
-                                        path));
-  TF_FAULT_POINT("export.header");
-  TF_ASSIGN_OR_RETURN(const InstanceHeader header, ReadInstanceHeader(path));
-  if (header.study_uid != series.study_uid || header.series_uid != series.uid) {
-    return absl::FailedPreconditionError("the PACS gave a header of another series");
+  queued->state = BridgeExportState::kFetched;
+  if (!found.remark.empty()) {
+    queued->note = found.remark;
+    if (options_.warn) options_.warn(absl::StrCat(queued->name, ": ", found.remark));
   }
-  const PatientIdentity now = IdentityOf(header);
-  if (DigestOf(now) == queued->confirmed) {
-    queued->state = BridgeExportState::kFetched;
-    return absl::OkStatus();
-  }
-  // Whoever confirmed has seen somebody else: once more, with what the PACS says now.
-  std::error_code ignored;
-  fs::remove(path, ignored);  // it may wait for long, and the header is the patient's
-  TF_ASSIGN_OR_RETURN(const QueuedStudy study, received_.GetStudy(series.study_uid));
-  const std::string note = WhatHasChanged(study.patient, now);
-  TF_RETURN_IF_ERROR(received_.UpdatePatient(series.study_uid, now));
-  TF_FAULT_POINT("export.patient_changed");
+  return absl::OkStatus();
+}
+
+absl::Status ExportWork::AskAnew(QueuedExport* queued, const std::string& study_uid,
+                                 const FoundPatient& now) {
+  // The server first: what is told of the change must not be compared with what was written by it.
   TF_RETURN_IF_ERROR(server_->UpdateExport(queued->name, v1::EXPORT_STATE_CONFIRMATION,
                                            "the patient's data have changed: waits for a person",
                                            0));
-  queued->state = BridgeExportState::kAsked;
-  queued->note = note;
-  queued->confirmed.clear();
+  TF_FAULT_POINT("export.patient_told");
+  TF_ASSIGN_OR_RETURN(const QueuedStudy study, received_.GetStudy(study_uid));
+  QueuedExport asked = *queued;
+  asked.state = BridgeExportState::kAsked;
+  asked.note = WhatHasChanged(study.patient, now.patient);
+  if (!now.has_header) absl::StrAppend(&asked.note, "; ", now.remark);
+  asked.confirmed.clear();
+  asked.first_s = std::time(nullptr);
+  TF_RETURN_IF_ERROR(rows_.UpdateWithPatient(asked, study_uid, now.patient));
+  *queued = asked;
   return absl::OkStatus();
 }
 
@@ -220,7 +252,13 @@ absl::StatusOr<std::vector<double>> ExportWork::MakeShown(const QueuedExport& qu
   absl::StatusOr<std::vector<double>> band = BandOf(queued, material);
   std::error_code failed;
   if (!fs::exists(material.pictures, failed)) {
-    TF_RETURN_IF_ERROR(writer_->Draw(material, material.pictures));
+    const absl::Status drawn = writer_->Draw(material, material.pictures);
+    if (!drawn.ok() && (!MayCome(drawn) || absl::IsDeadlineExceeded(drawn))) {
+      const bool again = queued.attempts < kMostDrawAttempts;
+      return again ? absl::UnavailableError(drawn.message())
+                   : absl::FailedPreconditionError(drawn.message());
+    }
+    TF_RETURN_IF_ERROR(drawn);
   }
   return band;
 }
@@ -231,13 +269,12 @@ absl::Status ExportWork::Draw(const QueuedExport& queued) {
   if (fs::exists(folder / "pictures", failed) && fs::exists(folder / kBandFile, failed)) {
     return absl::OkStatus();
   }
-  TF_ASSIGN_OR_RETURN(const ExportMaterial material, Gather(queued));
-  const absl::Status status = MakeShown(queued, material).status();
-  // It may have failed meanwhile, and whoever told so has removed the folder.
+  const absl::StatusOr<ExportMaterial> material = Gather(queued);
+  const absl::Status status =
+      material.ok() ? MakeShown(queued, *material).status() : material.status();
+  // It may have failed meanwhile, or be gone, and whoever told so has removed the folder.
   const absl::StatusOr<QueuedExport> now = rows_.Get(queued.name);
-  if (now.ok() && now->done_s != 0) {
-    fs::remove_all(folder, failed);
-  }
+  if (now.ok() ? now->done_s != 0 : absl::IsNotFound(now.status())) fs::remove_all(folder, failed);
   return status;
 }
 
@@ -307,7 +344,9 @@ absl::Status ExportWork::SendMissing(const QueuedExport& queued,
     TF_ASSIGN_OR_RETURN(const InstanceHeader header, ReadInstanceHeader(object.file));
     const absl::StatusOr<bool> there = pacs_->Has(series.study_uid, header.series_uid, object.uid);
     // One that cannot be asked gets an object with the same UID again, which it knows by that.
-    if (!there.ok() && !absl::IsFailedPrecondition(there.status())) return there.status();
+    const bool can_be_asked =
+        !absl::IsUnimplemented(there.status()) && !absl::IsFailedPrecondition(there.status());
+    if (!there.ok() && can_be_asked) return there.status();
     if (there.ok() && *there) {
       object.sent = true;
       TF_RETURN_IF_ERROR(rows_.UpdateObject(queued.name, object));

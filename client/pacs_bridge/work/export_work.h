@@ -17,17 +17,24 @@
 #include "client/pacs_bridge/queue/received_rows.h"
 #include "client/pacs_bridge/work/case_server.h"
 #include "client/pacs_bridge/work/object_writer.h"
+#include "client/pacs_bridge/work/patient_header.h"
 #include "core/base/mutex.h"
 
 namespace tissueform {
 
 struct ExportWorkOptions {
-  // How long a kept header stands for the PACS's own where that cannot be asked for one.
+  // How long a kept header stands for the PACS's own where that gives nobody one.
   std::chrono::seconds header_lifetime = std::chrono::hours(24) * 90;
   // Told in one line what is left out although nothing stops for it; nothing of a patient. May be
   // empty.
   std::function<void(const std::string& line)> warn = {};
+  // The same of what is nothing to worry about.
+  std::function<void(const std::string& line)> inform = {};
 };
+
+// Whether another attempt at a step may succeed though nothing is changed here: the PACS may come
+// back, there may be room again, or the bridge is ending.
+bool MayCome(const absl::Status& status);
 
 // From a planner's wish to objects in the patient's study, one durable step after the other:
 //
@@ -54,13 +61,19 @@ class ExportWork {
         options_(options) {}
 
   // Takes what the server tells of an export into the queue. A case that is none of this bridge is
-  // another bridge's: nothing happens. Errors: those of the queue.
+  // another bridge's: nothing happens but a line that says so. Errors: those of the queue.
   absl::Status Take(const v1::Export& told);
 
   // Draws the pictures for one that is asked for, for who is to confirm it, and asks for its band;
-  // nothing happens where they are there. Step waits for it where it needs them. Errors: those of
-  // the server and of drawing; they keep nobody from confirming.
+  // nothing happens where they are there. Step waits for it where it needs them. `queued.attempts`
+  // says how often it was tried. Errors: those of the server and of drawing; they keep nobody from
+  // confirming.
   absl::Status Draw(const QueuedExport& queued) ABSL_LOCKS_EXCLUDED(mutex_);
+
+  // Whether the server still has an export that waits for a person. One that was taken back, has
+  // expired there or is done leaves the queue, with all that was made for it. Errors: those of the
+  // server and of the queue.
+  absl::StatusOr<bool> IsStillAsked(const QueuedExport& queued);
 
   // The next step of an export, whose new state is written to the queue and into it. An error that
   // is no transient one makes it kFailed. Also tells the server of one that waits or has failed.
@@ -71,6 +84,8 @@ class ExportWork {
  private:
   absl::Status RunStep(QueuedExport* queued);
   absl::Status Fetch(QueuedExport* queued);
+  // Back to the person: whoever confirmed has seen somebody else than the PACS names now.
+  absl::Status AskAnew(QueuedExport* queued, const std::string& study_uid, const FoundPatient& now);
   absl::StatusOr<ExportMaterial> Gather(const QueuedExport& queued);
   // Draws and asks what is not there yet, unless another thread does it for this export: then it
   // waits. Returns the band.

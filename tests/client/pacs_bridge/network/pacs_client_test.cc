@@ -190,7 +190,6 @@ class TlsPacsClientTest : public PacsClientTest {};
 class WebPacsClientTest : public PacsClientTest {};
 
 TEST_P(PacsClientTest, WhatIsStoredIsFoundAndComesBackToTheLastBit) {
-  EXPECT_THAT(client_->Echo(), IsOk());
   CtSeriesOptions options;
   options.slices = 3;
   options.character_set = "ISO_IR 100";
@@ -231,6 +230,16 @@ TEST_P(PacsClientTest, WhatIsStoredIsFoundAndComesBackToTheLastBit) {
     EXPECT_EQ((*found)[0].patient_id, options.patient_id);
   }
 
+  const auto patient = client_->FindPatient(series.study_uid);
+  ASSERT_THAT(patient.status(), IsOk());
+  EXPECT_EQ(patient->name, options.patient_name);
+  EXPECT_EQ(patient->id, options.patient_id);
+  EXPECT_THAT(patient->birth_date, ::testing::AnyOf("", options.birth_date));
+  EXPECT_THAT(patient->issuer, ::testing::AnyOf("", options.issuer_of_patient_id));
+  EXPECT_TRUE(patient->readable);
+  EXPECT_THAT(client_->FindPatient(NewDicomUid()).status(),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("no such study")));
+
   const auto fetched =
       client_->FetchSeries(series.study_uid, series.series_uid, folder_.get(), &sink_);
   ASSERT_THAT(fetched.status(), IsOk());
@@ -264,10 +273,10 @@ TEST_P(TlsPacsClientTest, WithoutACertificateOfTheAuthorityNobodyIsServed) {
   const TestAuthority stranger("Another authority");
   TestFiles foreign = stranger.IssueFiles(home_ / "keys", "foreign");
   peer_.tls = TlsFiles{foreign.certificate, foreign.key, files_->roots};
-  EXPECT_FALSE((*MakePacsClient(peer_))->Echo().ok());
+  EXPECT_FALSE((*MakePacsClient(peer_))->FindPatient(NewDicomUid()).ok());
   // The other way round: a peer that we cannot trust.
   peer_.tls = TlsFiles{files_->certificate, files_->key, foreign.roots};
-  EXPECT_THAT((*MakePacsClient(peer_))->Echo(),
+  EXPECT_THAT((*MakePacsClient(peer_))->FindPatient(NewDicomUid()).status(),
               StatusIs(absl::StatusCode::kUnauthenticated, HasSubstr("'orthanc'")));
 }
 
@@ -295,7 +304,8 @@ TEST_P(WebPacsClientTest, WhatItsDiskDoesNotTakeIsNotStored) {
 TEST_P(PacsClientTest, APacsThatHasGoneIsUnavailable) {
   haproxy_.reset();
   orthanc_.reset();
-  EXPECT_THAT(client_->Echo(), StatusIs(absl::StatusCode::kUnavailable, HasSubstr("'orthanc'")));
+  EXPECT_THAT(client_->FindPatient(NewDicomUid()).status(),
+              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("'orthanc'")));
   const CtSeries series = WriteCtSeries(home_ / "sent", {.slices = 1});
   EXPECT_THAT(client_->Store(series.files).status().ok()
                   ? client_->Store(series.files)->at(0).status
@@ -334,12 +344,13 @@ TEST(PacsClient, WrongTitlesAreToldApart) {
   peer.port = (*receiver)->port();
   peer.ae_title = "TISSUEFORM";
   peer.own_ae_title = "STRANGER";
-  EXPECT_THAT((*MakePacsClient(peer))->Echo(),
+  EXPECT_THAT((*MakePacsClient(peer))->FindPatient(NewDicomUid()).status(),
               StatusIs(absl::StatusCode::kPermissionDenied, HasSubstr("our AE title STRANGER")));
   peer.own_ae_title = "FRIEND";
-  EXPECT_THAT((*MakePacsClient(peer))->Echo(), IsOk());
+  const CtSeries series = WriteCtSeries(EmptyTestFolder("client_titles_sent"), {.slices = 1});
+  EXPECT_THAT((*MakePacsClient(peer))->Store(series.files), IsOk());
   peer.ae_title = "ELSEWHERE";
-  EXPECT_THAT((*MakePacsClient(peer))->Echo(),
+  EXPECT_THAT((*MakePacsClient(peer))->FindPatient(NewDicomUid()).status(),
               StatusIs(absl::StatusCode::kPermissionDenied, HasSubstr("is not called ELSEWHERE")));
 }
 

@@ -13,7 +13,10 @@
 #include <unistd.h>
 #include <vector>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
+#include "absl/strings/string_view.h"
 #include <arpa/inet.h>
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dctk.h>
@@ -27,6 +30,7 @@
 #include "tests/testing/ct_series.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"
+#include "tests/testing/test_paths.h"
 
 namespace tissueform {
 namespace {
@@ -91,6 +95,26 @@ class StorageReceiverTest : public ::testing::Test {
   std::unique_ptr<InstanceFolder> folder_;
   std::unique_ptr<StorageReceiver> receiver_;
 };
+
+TEST_F(StorageReceiverTest, AnObjectThatIsTooLargeIsNotToBeSentAgain) {
+  folder_options_.limits.max_file_bytes = 1000;
+  Start();
+  const ProgramEnd end = Send(WriteCtSeries(sent_, {.slices = 1}).files);
+  EXPECT_THAT(end.said, HasSubstr("Error: CannotUnderstand"));
+  EXPECT_THAT(Received(), IsEmpty());
+}
+
+TEST(ConformanceStatement, NamesEveryStorageClassThatIsTaken) {
+  const std::string statement =
+      absl::StrReplaceAll(BytesOfFile(testing::SourcePath("docs/pacs.md")), {{"\n", " "}});
+  for (int i = 0; i < numberOfDcmAllStorageSOPClassUIDs; ++i) {
+    const std::string uid = dcmAllStorageSOPClassUIDs[i];
+    const absl::string_view root = "1.2.840.10008.5.1.";
+    ASSERT_TRUE(absl::StartsWith(uid, root)) << uid;
+    EXPECT_THAT(statement, HasSubstr(absl::StrCat("`", uid.substr(root.size()), "` ",
+                                                  dcmFindNameOfUID(uid.c_str(), "?"))));
+  }
+}
 
 TEST_F(StorageReceiverTest, ASeriesComesToTheLastBitUnderNamesThatSayNothing) {
   Start();

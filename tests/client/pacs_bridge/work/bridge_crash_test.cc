@@ -32,6 +32,8 @@ using testing::IsOk;
 // The issue asks for twenty.
 constexpr int kLeastPoints = 20;
 constexpr size_t kObjects = 4;
+// From an export that is asked for to one that is asked for again, of a merged patient.
+constexpr int kPointsToTheSecondQuestion = 10;
 
 class BridgeCrashTest : public ::testing::Test {
  protected:
@@ -40,7 +42,17 @@ class BridgeCrashTest : public ::testing::Test {
     fs::create_directories(root_ / "world/server");
     fs::create_directories(root_ / "world/pacs");
     ASSERT_THAT(BridgeQueue::Open(state()), IsOk());
-    testing::WriteCtSeries(fs::path(state()) / "received");
+    series_ = testing::WriteCtSeries(fs::path(state()) / "received");
+  }
+  // The PACS has given the series to another patient.
+  void Merge() {
+    testing::CtSeriesOptions merged;
+    merged.study_uid = series_.study_uid;
+    merged.series_uid = series_.series_uid;
+    merged.patient_id = "MERGED-1";
+    fs::create_directories(root_ / "merged");
+    fs::copy_file(testing::WriteCtSeries(root_ / "merged", merged).files.front(),
+                  root_ / "world/merged.dcm");
   }
 
   std::string state() const { return (root_ / "state").string(); }
@@ -79,6 +91,7 @@ class BridgeCrashTest : public ::testing::Test {
   }
 
   fs::path root_;
+  testing::CtSeries series_;
 };
 
 TEST_F(BridgeCrashTest, EveryPlaceOfDeathLeavesOneOfEachObject) {
@@ -103,6 +116,27 @@ TEST_F(BridgeCrashTest, DeathAfterDeathComesToTheEnd) {
   for (int i = 0; i < 100 && end.signal == SIGKILL; ++i) end = Run(16);
   EXPECT_EQ(end.exit_code, 0);
   ExpectOneOfEach();
+}
+
+TEST_F(BridgeCrashTest, WhatAPersonIsToldOfAMergedPatientOutlivesEveryDeath) {
+  Begin("bridge_crash_merged_none");
+  Merge();
+  int points = 0;
+  ASSERT_EQ(Run(0, &points).exit_code, 0);
+  // What is written after that it is asked again differs in nothing from the other test.
+  ASSERT_GT(points, kPointsToTheSecondQuestion);
+  for (int point = 1; point <= kPointsToTheSecondQuestion; ++point) {
+    SCOPED_TRACE(absl::StrCat("killed at place ", point, " of ", points));
+    Begin("bridge_crash_merged");
+    Merge();
+    ASSERT_EQ(Run(point).signal, SIGKILL);
+    ASSERT_EQ(Run(0).exit_code, 0);
+    ExpectOneOfEach();
+    const auto queue = BridgeQueue::Open(state());
+    ASSERT_THAT(queue, IsOk());
+    EXPECT_THAT(ExportRows(queue->get()).Get("exports/1")->note,
+                ::testing::HasSubstr("another patient ID"));
+  }
 }
 
 }  // namespace

@@ -3,11 +3,14 @@
 
 #include "client/pacs_bridge/work/bridge_service.h"
 
+#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -99,14 +102,28 @@ class BridgeServiceTest : public testing::BridgeWork {
   }
 
   std::unique_ptr<BridgeService> Serve() {
-    return std::make_unique<BridgeService>(
-        BridgeServiceParts{.queue = queue_.get(),
-                           .exports = work_.get(),
-                           .server = server_.get(),
-                           .log = [this](bool, const std::string& line) { log_.Add(line); }});
+    return std::make_unique<BridgeService>(BridgeServiceParts{
+        .queue = queue_.get(),
+        .exports = work_.get(),
+        .server = server_.get(),
+        .log = [this](bool, const std::string& line) { log_.Add(line); },
+        .now = [this] { return std::chrono::steady_clock::now() + ahead_.load(); }});
+  }
+  // Waits until the service says that these, and no others, are stuck.
+  static std::vector<std::string> WaitForStuck(BridgeService* service,
+                                               const std::vector<std::string>& which) {
+    const auto until = std::chrono::steady_clock::now() + kPatience;
+    std::vector<std::string> stuck = service->Stuck();
+    while (stuck != which && std::chrono::steady_clock::now() < until) {
+      service->Wake();
+      std::this_thread::yield();
+      stuck = service->Stuck();
+    }
+    return stuck;
   }
 
   HeardLog log_;
+  std::atomic<std::chrono::hours> ahead_{std::chrono::hours(0)};
   SlowWriter slow_{&log_};
 };
 
@@ -129,6 +146,51 @@ TEST_F(BridgeServiceTest, WhatIsConfirmedWhileItIsDrawnIsDrawnOnce) {
   slow_.LetGo();
   EXPECT_TRUE(log_.WaitFor("exports/1: sent -> told"));
   EXPECT_EQ(slow_.drawn(), 1);
+}
+
+TEST_F(BridgeServiceTest, AThreadThatHangsIsToldThoughTheOthersGoOn) {
+  const auto service = Serve();
+  EXPECT_TRUE(log_.WaitFor("draws"));
+  EXPECT_THAT(service->Stuck(), ::testing::IsEmpty());
+  ahead_ = std::chrono::hours(2);
+  EXPECT_THAT(WaitForStuck(service.get(), {"pictures"}), ::testing::ElementsAre("pictures"));
+  slow_.LetGo();
+  EXPECT_THAT(WaitForStuck(service.get(), {}), ::testing::IsEmpty());
+}
+
+// Draws when it is asked a second time.
+class LateWriter final : public testing::HeaderWriter {
+ public:
+  explicit LateWriter(HeardLog* log) : log_(log) {}
+
+  absl::Status Draw(const ExportMaterial& material, const std::string& folder) override {
+    if (asked_.insert(material.asked.name()).second) return absl::FailedPreconditionError("no");
+    log_->Add("draws again");
+    return HeaderWriter::Draw(material, folder);
+  }
+
+ private:
+  HeardLog* const log_;
+  std::set<std::string> asked_;  // of the thread for pictures
+};
+
+TEST_F(BridgeServiceTest, PicturesThatFailOnceAreDrawnAgain) {
+  LateWriter late(&log_);
+  ExportWork work(queue_.get(), server_.get(), pacs_.get(), &late, ExportWorkOptions());
+  const BridgeService service({.queue = queue_.get(),
+                               .exports = &work,
+                               .server = server_.get(),
+                               .log = [this](bool, const std::string& line) { log_.Add(line); }});
+  EXPECT_TRUE(log_.WaitFor("exports/1 waits without pictures: no"));
+  EXPECT_TRUE(log_.WaitFor("draws again"));
+}
+
+TEST_F(BridgeServiceTest, WhatWasTakenBackIsLookedFor) {
+  server_->taken_back = {"exports/2"};
+  slow_.LetGo();
+  const auto service = Serve();
+  EXPECT_TRUE(log_.WaitFor("exports/2 is asked for no longer"));
+  EXPECT_EQ(exports_.List()->size(), 1);
 }
 
 // Tells of one export in a watch that lasts, and refuses the first word about it.

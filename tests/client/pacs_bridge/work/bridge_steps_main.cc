@@ -3,7 +3,8 @@
 
 // What the crash test kills: takes a series from received files to a published case, and an export
 // to the PACS, each as a folder. Ends itself by SIGKILL at the fault point that is passed as the
-// KILL_AT-th (0: never), and prints how many were passed.
+// KILL_AT-th (0: never), and prints how many were passed. Where WORLD_DIR has a merged.dcm the PACS
+// gives that as the series' header, and places count from the export on.
 //
 //   tissueform-bridge-steps STATE_DIR WORLD_DIR KILL_AT
 
@@ -87,17 +88,20 @@ absl::Status DoExport(BridgeQueue* queue, CaseServer* server, PacsClient* pacs,
   TF_RETURN_IF_ERROR(work.Take(told));
   ExportRows rows(queue);
   TF_ASSIGN_OR_RETURN(QueuedExport queued, rows.Get("exports/1"));
-  if (queued.state == BridgeExportState::kAsked) {
-    TF_ASSIGN_OR_RETURN(const QueuedStudy study, ReceivedRows(queue).GetStudy(series.study_uid));
-    TF_RETURN_IF_ERROR(rows.Confirm("exports/1", DigestOf(study.patient)));
-    TF_ASSIGN_OR_RETURN(queued, rows.Get("exports/1"));
+  while (queued.state != BridgeExportState::kTold) {
+    if (queued.state == BridgeExportState::kAsked) {
+      TF_ASSIGN_OR_RETURN(const QueuedStudy study, ReceivedRows(queue).GetStudy(series.study_uid));
+      TF_RETURN_IF_ERROR(rows.Confirm("exports/1", DigestOf(study.patient)));
+      TF_ASSIGN_OR_RETURN(queued, rows.Get("exports/1"));
+    }
+    TF_RETURN_IF_ERROR(work.Step(&queued));
   }
-  while (queued.state != BridgeExportState::kTold) TF_RETURN_IF_ERROR(work.Step(&queued));
   return absl::OkStatus();
 }
 
 absl::Status DoEverything(const std::string& state, const fs::path& world) {
-  fault_hook = Pass;
+  const fs::path merged = world / "merged.dcm";
+  if (!fs::exists(merged)) fault_hook = Pass;
   TF_ASSIGN_OR_RETURN(const auto queue, BridgeQueue::Open(state));
   testing::FolderCaseServer server(world / "server");
   testing::FolderPacs pacs(world / "pacs");
@@ -105,7 +109,8 @@ absl::Status DoEverything(const std::string& state, const fs::path& world) {
   TF_RETURN_IF_ERROR(DoSeries(queue.get(), &server, &series));
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedImage> images,
                       ReceivedRows(queue.get()).ListImages(series.key));
-  pacs.headers[series.uid] = images.front().file;
+  pacs.headers[series.uid] = fs::exists(merged) ? merged.string() : images.front().file;
+  fault_hook = Pass;
   return DoExport(queue.get(), &server, &pacs, series);
 }
 

@@ -6,10 +6,12 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 
 #include "client/pacs_bridge/dicom/dicom_file.h"
 #include "client/pacs_bridge/network/pacs_client.h"
@@ -17,10 +19,12 @@
 #include "client/pacs_bridge/work/object_writer.h"
 #include "core/base/status_macros.h"
 #include "core/mesh_payload/sha256.h"
+#include "server/exports/export_record.h"
 #include "tests/core/case_file/sample_case.h"
 
 // What lies about a bridge, as folders, so that it outlives a process that is killed: a server that
-// keeps cases, a PACS that keeps objects, a writer of objects that are headers only.
+// keeps cases and takes of an export the states that a server takes, a PACS that keeps objects, a
+// writer of objects that are headers only.
 namespace tissueform::testing {
 
 inline void AppendLine(const std::filesystem::path& file, const std::string& line) {
@@ -59,13 +63,19 @@ class FolderCaseServer : public CaseServer {
     return band;
   }
   absl::StatusOr<v1::Export> GetExport(const std::string& name) override {
+    TF_RETURN_IF_ERROR(away);
+    if (taken_back.contains(name)) return absl::NotFoundError("no such export");
     v1::Export found;
     found.set_name(name);
+    found.set_state(static_cast<v1::ExportState>(StateOf(name)));
     return found;
   }
   absl::Status UpdateExport(const std::string& name, v1::ExportState state,
                             const std::string& detail, int stored) override {
     TF_RETURN_IF_ERROR(away);
+    if (!MayFollow(StateOf(name), static_cast<ExportState>(state))) {
+      return absl::InvalidArgumentError("the state does not follow the one that it has");
+    }
     AppendLine(folder_ / "updates",
                absl::StrCat(name, " ", v1::ExportState_Name(state), " ", stored, " ", detail));
     return absl::OkStatus();
@@ -77,10 +87,21 @@ class FolderCaseServer : public CaseServer {
 
   absl::Status away = {};
   bool predictions_gone = false;
+  std::set<std::string> taken_back = {};      // exports
   std::string mesh = SampleCase().mesh.name;  // of its predictions
   absl::StatusOr<std::vector<double>> band = std::vector<double>();
 
  private:
+  // By the last update.
+  ExportState StateOf(const std::string& name) const {
+    v1::ExportState state = v1::EXPORT_STATE_WAITING;
+    for (const std::string& line : LinesOfFile(folder_ / "updates")) {
+      const std::vector<std::string> words = absl::StrSplit(line, ' ');
+      if (words[0] == name) v1::ExportState_Parse(words[1], &state);
+    }
+    return static_cast<ExportState>(state);
+  }
+
   const std::filesystem::path folder_;
 };
 
@@ -88,7 +109,6 @@ class FolderPacs final : public PacsClient {
  public:
   explicit FolderPacs(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  absl::Status Echo() override { return away; }
   absl::StatusOr<std::vector<SeriesSummary>> FindSeries(const SeriesQuery&) override {
     return absl::UnimplementedError("not here");
   }
@@ -96,9 +116,25 @@ class FolderPacs final : public PacsClient {
                                           InstanceSink*) override {
     return absl::UnimplementedError("not here");
   }
+  absl::StatusOr<PatientSummary> FindPatient(const std::string& study) override {
+    TF_RETURN_IF_ERROR(away);
+    TF_RETURN_IF_ERROR(query_service);
+    for (const auto& [uid, file] : headers) {
+      TF_ASSIGN_OR_RETURN(const InstanceHeader header, ReadInstanceHeader(file));
+      if (header.study_uid != study) continue;
+      PatientSummary patient = {.name = header.patient_name + "^^", .id = header.patient_id};
+      if (tells_optional_keys) {
+        patient.issuer = header.issuer_of_patient_id;
+        patient.birth_date = header.birth_date;
+      }
+      return patient;
+    }
+    return absl::NotFoundError("the PACS has no such study");
+  }
   absl::Status FetchHeader(const std::string&, const std::string& series,
                            const std::string& path) override {
     TF_RETURN_IF_ERROR(away);
+    TF_RETURN_IF_ERROR(header_service);
     const auto found = headers.find(series);
     if (found == headers.end()) return absl::NotFoundError("the PACS has no such series");
     return CopyHeaderOnly(found->second, path);
@@ -122,6 +158,9 @@ class FolderPacs final : public PacsClient {
 
   std::map<std::string, std::string> headers = {};  // by series: a file with the header
   absl::Status away = {};
+  absl::Status header_service = {};  // C-GET
+  absl::Status query_service = {};   // C-FIND, of a study's patient
+  bool tells_optional_keys = true;
 
  private:
   const std::filesystem::path folder_;
@@ -130,6 +169,8 @@ class FolderPacs final : public PacsClient {
 // Writes each object as the header of the source image under its own UID.
 class HeaderWriter : public ObjectWriter {
  public:
+  size_t more_bytes = 0;  // of each object
+
   absl::StatusOr<std::vector<std::string>> KeysOf(const ExportMaterial&) override {
     return std::vector<std::string>{"stl:skin", "stl:bone", "capture", "report", "series:models"};
   }

@@ -3,6 +3,8 @@
 
 #include "client/pacs_bridge/work/export_work.h"
 
+#include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -12,7 +14,9 @@
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include <sys/resource.h>
 
+#include "core/base/error_reason.h"
 #include "tests/client/pacs_bridge/work/bridge_work.h"
 
 namespace tissueform {
@@ -26,7 +30,19 @@ using testing::IsOk;
 using ::testing::Not;
 using testing::StatusIs;
 
-class ExportWorkTest : public testing::BridgeWork {};
+class ExportWorkTest : public testing::BridgeWork {
+ protected:
+  // The PACS gives the series another patient ID.
+  void Merge(const testing::CtSeries& series) {
+    testing::CtSeriesOptions merged;
+    merged.study_uid = series.study_uid;
+    merged.series_uid = series.series_uid;
+    merged.patient_id = "MERGED-1";
+    fs::create_directories(root_ / "merged");
+    pacs_->headers[series.series_uid] =
+        testing::WriteCtSeries(root_ / "merged", merged).files.front();
+  }
+};
 
 TEST_F(ExportWorkTest, AnExportGoesToThePacsAfterAPersonsWord) {
   const testing::CtSeries series = ReceiveWithCase("a");
@@ -99,13 +115,43 @@ TEST_F(ExportWorkTest, WhatIsDrawnOfAnExportThatHasFailedMeanwhileIsRemoved) {
   EXPECT_FALSE(fs::exists(queue_->object_folder(asked.key)));
 }
 
-TEST_F(ExportWorkTest, ACaseOfAnotherBridgeIsLeftToIt) {
+TEST_F(ExportWorkTest, WhatWasTakenBackLeavesTheQueueWithItsPictures) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  for (const char* name : {"exports/1", "exports/2", "exports/3"}) {
+    Ask(name, series);
+    ASSERT_THAT(work_->Draw(*exports_.Get(name)), IsOk());
+  }
+  const auto still_asked = [this](const std::string& name) {
+    return work_->IsStillAsked(*exports_.Get(name));
+  };
+  server_->taken_back = {"exports/1"};
+  ASSERT_THAT(server_->UpdateExport("exports/2", v1::EXPORT_STATE_FAILED, "", 0), IsOk());
+  for (const char* gone : {"exports/1", "exports/2"}) {
+    const QueuedExport before = *exports_.Get(gone);
+    EXPECT_FALSE(*still_asked(gone));
+    EXPECT_THAT(exports_.Get(gone), StatusIs(absl::StatusCode::kNotFound));
+    EXPECT_FALSE(fs::exists(queue_->object_folder(before.key)));
+    work_->Draw(before).IgnoreError();
+    EXPECT_FALSE(fs::exists(queue_->object_folder(before.key))) << "another thread had just begun";
+  }
+  EXPECT_TRUE(*still_asked("exports/3"));
+  server_->away = absl::UnavailableError("the server does not answer");
+  EXPECT_EQ(still_asked("exports/3").status(), server_->away);
+  EXPECT_EQ(StateOfExport("exports/3"), BridgeExportState::kAsked);
+}
+
+TEST_F(ExportWorkTest, ACaseOfAnotherBridgeIsLeftToItWhichIsSaid) {
+  std::vector<std::string> said;
+  ExportWorkOptions options;
+  options.inform = [&said](const std::string& line) { said.push_back(line); };
+  ExportWork work(queue_.get(), server_.get(), pacs_.get(), &writer_, options);
   v1::Export told;
   told.set_name("exports/1");
   told.set_case_("cases/unknown");
   told.set_state(v1::EXPORT_STATE_WAITING);
-  EXPECT_THAT(work_->Take(told), IsOk());
+  EXPECT_THAT(work.Take(told), IsOk());
   EXPECT_TRUE(exports_.List()->empty());
+  EXPECT_THAT(said, ::testing::ElementsAre(HasSubstr("exports/1 is of a case of another bridge")));
 }
 
 TEST_F(ExportWorkTest, APacsThatIsDownIsWaitedFor) {
@@ -152,13 +198,7 @@ TEST_F(ExportWorkTest, AMergedPatientGoesBackToThePerson) {
   const testing::CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
-  testing::CtSeriesOptions merged;
-  merged.study_uid = series.study_uid;
-  merged.series_uid = series.series_uid;
-  merged.patient_id = "MERGED-1";
-  fs::create_directories(root_ / "merged");
-  pacs_->headers[series.series_uid] =
-      testing::WriteCtSeries(root_ / "merged", merged).files.front();
+  Merge(series);
   EXPECT_THAT(Work("exports/1"), IsOk());
   EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kAsked);
   EXPECT_FALSE(
@@ -166,10 +206,190 @@ TEST_F(ExportWorkTest, AMergedPatientGoesBackToThePerson) {
   EXPECT_THAT(exports_.Get("exports/1")->note, HasSubstr("another patient ID"));
   EXPECT_THAT(exports_.Get("exports/1")->note, Not(HasSubstr("MERGED-1")));
   EXPECT_EQ(rows_.GetStudy(series.study_uid)->patient.id, "MERGED-1");
+  EXPECT_THAT(Updates(), ::testing::ElementsAre(HasSubstr("CONFIRMATION 0 waits for a person"),
+                                                HasSubstr("CONFIRMATION 0 the patient's data")));
   EXPECT_TRUE(Stored().empty());
   Confirm("exports/1");
   EXPECT_THAT(Work("exports/1"), IsOk());
   EXPECT_EQ(Stored().size(), 4);
+}
+
+TEST_F(ExportWorkTest, APatientWhoIsMergedWhileTheServerHearsOfStoringGoesBackToo) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  Ask("exports/1", series);
+  Confirm("exports/1");
+  // As a bridge leaves it that ended between the word to the server and its own row.
+  ASSERT_THAT(server_->UpdateExport("exports/1", v1::EXPORT_STATE_STORING, "is being written", 0),
+              IsOk());
+  Merge(series);
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kAsked);
+  EXPECT_THAT(Updates().back(), HasSubstr("CONFIRMATION 0 the patient's data"));
+}
+
+TEST_F(ExportWorkTest, WhoIsSeenAnewIsWrittenWhenTheServerKnows) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  Ask("exports/1", series);
+  Confirm("exports/1");
+  Merge(series);
+  server_->away = absl::UnavailableError("the server does not answer");
+  EXPECT_EQ(Work("exports/1"), server_->away);
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kConfirmed);
+  EXPECT_EQ(rows_.GetStudy(series.study_uid)->patient.id, "PLANTED-4711");
+  server_->away = absl::OkStatus();
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_THAT(exports_.Get("exports/1")->note, HasSubstr("another patient ID"));
+}
+
+// A PACS with C-FIND and C-MOVE.
+class NoHeaderTest : public ExportWorkTest {
+ protected:
+  NoHeaderTest() {
+    series_ = ReceiveWithCase("a");
+    Ask("exports/1", series_);
+    Confirm("exports/1");
+    pacs_->header_service = absl::UnimplementedError("the PACS does not offer C-GET");
+  }
+
+  testing::CtSeries series_;
+};
+
+TEST_F(NoHeaderTest, TheKeptHeaderStandsIfTheQueryNamesTheSamePatientAndThatIsSaid) {
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kTold);
+  EXPECT_EQ(Stored().size(), 4);
+  EXPECT_THAT(exports_.Get("exports/1")->note, HasSubstr("the header that was received on 2"));
+  EXPECT_THAT(warnings_, ::testing::ElementsAre(HasSubstr("exports/1: stored with the header")));
+}
+
+TEST_F(NoHeaderTest, WhatAQueryNeedNotTellIsNoOtherPatient) {
+  pacs_->tells_optional_keys = false;
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_EQ(Stored().size(), 4);
+}
+
+TEST_F(NoHeaderTest, WhereNobodyIsAskedTheKeptHeaderStands) {
+  pacs_->query_service = absl::UnimplementedError("the PACS does not offer C-FIND");
+  Merge(series_);
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_EQ(Stored().size(), 4);
+}
+
+TEST_F(NoHeaderTest, AMergedPatientGoesBackToThePersonAndNothingIsStoredWithTheOldHeader) {
+  Merge(series_);
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kAsked);
+  EXPECT_THAT(exports_.Get("exports/1")->note,
+              ::testing::AllOf(HasSubstr("another patient ID"), HasSubstr("gives no header"),
+                               Not(HasSubstr("MERGED-1"))));
+  EXPECT_EQ(rows_.GetStudy(series_.study_uid)->patient.id, "MERGED-1");
+  Confirm("exports/1");
+  EXPECT_THAT(Work("exports/1"),
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("allow C-GET")));
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kFailed);
+  EXPECT_TRUE(Stored().empty());
+}
+
+TEST_F(NoHeaderTest, AHeaderThatIsTooOldStandsForNothing) {
+  ExportWork work(queue_.get(), server_.get(), pacs_.get(), &writer_,
+                  {.header_lifetime = std::chrono::seconds(-1)});
+  QueuedExport queued = *exports_.Get("exports/1");
+  EXPECT_THAT(work.Step(&queued), StatusIs(absl::StatusCode::kFailedPrecondition,
+                                           HasSubstr("none is kept any longer")));
+  EXPECT_EQ(queued.state, BridgeExportState::kFailed);
+}
+
+TEST_F(NoHeaderTest, AStudyThatIsGoneIsToldAndNothingIsStored) {
+  pacs_->headers.clear();
+  EXPECT_THAT(Work("exports/1"), StatusIs(absl::StatusCode::kFailedPrecondition,
+                                          HasSubstr("the PACS has the series of this case no")));
+  EXPECT_TRUE(Stored().empty());
+}
+
+// What a PACS refuses with a status is asked again, and nothing else is taken in its place.
+TEST_F(NoHeaderTest, ARefusalIsNoAnswer) {
+  const absl::Status refused = absl::FailedPreconditionError("answers with status 0xa700");
+  for (absl::Status* service : {&pacs_->header_service, &pacs_->query_service}) {
+    const absl::Status before = *service;
+    *service = refused;
+    EXPECT_THAT(Work("exports/1"), StatusIs(absl::StatusCode::kUnavailable, HasSubstr("0xa700")));
+    EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kConfirmed);
+    *service = before;
+  }
+  EXPECT_TRUE(Stored().empty());
+  pacs_->header_service = absl::OkStatus();
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_EQ(Stored().size(), 4);
+  EXPECT_TRUE(warnings_.empty());
+}
+
+// While it is there, no file becomes larger than that.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    handler_ = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit full = {bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &full);
+  }
+  ~FullDisk() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit before_ = {};
+  sighandler_t handler_ = nullptr;
+};
+
+TEST_F(ExportWorkTest, AFullDiskIsWaitedFor) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  Ask("exports/1", series);
+  Confirm("exports/1");
+  writer_.more_bytes = 8 << 20;
+  {
+    // More than the queue needs, less than an object.
+    const FullDisk full(4 << 20);
+    const absl::Status status = Work("exports/1");
+    EXPECT_TRUE(HasReason(status, ErrorReason::kDiskFull)) << status;
+    EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kFetched);
+  }
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kTold);
+  EXPECT_EQ(Stored().size(), 4);
+}
+
+// Refuses to draw a number of times.
+class RefusingWriter final : public testing::HeaderWriter {
+ public:
+  absl::Status Draw(const ExportMaterial& material, const std::string& folder) override {
+    if (refusals-- > 0) return absl::FailedPreconditionError("drawing the pictures failed");
+    return HeaderWriter::Draw(material, folder);
+  }
+  int refusals = 0;
+};
+
+TEST_F(ExportWorkTest, DrawingThatFailsIsTriedAgainButNotForEver) {
+  RefusingWriter writer;
+  ExportWork work(queue_.get(), server_.get(), pacs_.get(), &writer, {});
+  const testing::CtSeries series = ReceiveWithCase("a");
+  for (const bool for_ever : {false, true}) {
+    const std::string name = for_ever ? "exports/2" : "exports/1";
+    Ask(name, series);
+    Confirm(name);
+    QueuedExport queued = *exports_.Get(name);
+    EXPECT_THAT(work.Step(&queued), IsOk());
+    writer.refusals = for_ever ? 1'000'000 : 3;
+    int attempts = 0;
+    while (queued.state == BridgeExportState::kFetched && attempts < 1000) {
+      work.Step(&queued).IgnoreError();
+      ++attempts;
+    }
+    EXPECT_EQ(queued.state, for_ever ? BridgeExportState::kFailed : BridgeExportState::kWritten);
+    EXPECT_EQ(attempts, for_ever ? 21 : 4);
+  }
 }
 
 TEST_F(ExportWorkTest, TwoStudiesAndTwoPatientsKeepTheirOwn) {

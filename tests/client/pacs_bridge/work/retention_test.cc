@@ -88,5 +88,41 @@ TEST_F(RetentionTest, WhatComesAnewOfAnOldSeriesIsNotDeletedWhileItComes) {
   EXPECT_TRUE(fs::exists(series.files.front()));
 }
 
+TEST_F(RetentionTest, WhatNobodyConfirmsFailsAndLeavesNoPictures) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  Ask("exports/1", series);
+  ASSERT_THAT(work_->Draw(*exports_.Get("exports/1")), IsOk());
+  const fs::path folder = queue_->object_folder(exports_.Get("exports/1")->key);
+  ASSERT_TRUE(fs::exists(folder / "pictures"));
+  EXPECT_THAT(DeleteOld(queue_.get(), {}, DaysFromNow(13)), IsOk());
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kAsked);
+  EXPECT_THAT(DeleteOld(queue_.get(), {}, DaysFromNow(15)), IsOk());
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kFailed);
+  EXPECT_THAT(Updates(), ::testing::Contains(::testing::HasSubstr(
+                             "FAILED 0 nobody has confirmed the patient for 14 days")));
+  EXPECT_FALSE(fs::exists(folder));
+}
+
+TEST_F(RetentionTest, HowAnExportHasEndedIsKnownForItsTime) {
+  const testing::CtSeries series = ReceiveWithCase("a");
+  for (const char* name : {"exports/1", "exports/2"}) {
+    Ask(name, series);
+    Confirm(name);
+  }
+  EXPECT_THAT(Work("exports/1"), IsOk());
+  pacs_->headers.clear();
+  EXPECT_FALSE(Work("exports/2").ok());
+  EXPECT_THAT(DeleteOld(queue_.get(), {}, DaysFromNow(31)), IsOk());
+  EXPECT_THAT(exports_.Get("exports/1"), StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_TRUE(exports_.ListObjects("exports/1")->empty());
+  EXPECT_EQ(StateOfExport("exports/2"), BridgeExportState::kFailed) << "which the server must know";
+  EXPECT_THAT(Work("exports/2"), IsOk());
+  EXPECT_THAT(DeleteOld(queue_.get(), {}, DaysFromNow(29)), IsOk());
+  EXPECT_THAT(exports_.Get("exports/2"), IsOk());
+  EXPECT_THAT(DeleteOld(queue_.get(), {}, DaysFromNow(31)), IsOk());
+  EXPECT_TRUE(exports_.List()->empty());
+}
+
 }  // namespace
 }  // namespace tissueform
