@@ -4,7 +4,6 @@
 #include "client/pacs_bridge/work/bridge_service.h"
 
 #include <algorithm>
-#include <array>
 #include <ctime>
 #include <utility>
 
@@ -21,11 +20,14 @@ constexpr std::chrono::milliseconds kStepPause{1000};
 constexpr std::chrono::hours kDeletionPause{1};
 // Whether exports that wait were taken back, which no watch tells.
 constexpr std::chrono::minutes kLookPause{5};
-// What a thread may be late by when it comes back from its rest.
-constexpr std::chrono::minutes kMostLateness{1};
 // What a server may tell of before it is taken; each is told again by the next watch.
 constexpr size_t kMostHeard = 4096;
-constexpr char kWatch[] = "watch";  // among the keys of what is tried again
+// Of the threads; the last is also among the keys of what is tried again.
+constexpr char kIntake[] = "intake";
+constexpr char kPlans[] = "plans";
+constexpr char kExports[] = "exports";
+constexpr char kPictures[] = "pictures";
+constexpr char kWatch[] = "watch";
 
 bool HasPlanStep(SeriesState state) {
   return state == SeriesState::kChosen || state == SeriesState::kBuilt ||
@@ -50,89 +52,24 @@ bool HasExportStep(const QueuedExport& queued) {
 
 }  // namespace
 
-BridgeService::BridgeService(BridgeServiceParts parts) : parts_(std::move(parts)) {
-  if (parts_.intake != nullptr) Start(Work::kIntake, kIntakePause, [this] { TakeIn(); });
-  if (parts_.plans != nullptr) Start(Work::kPlans, kStepPause, [this] { WorkOnPlans(); });
+BridgeService::BridgeService(BridgeServiceParts parts)
+    : parts_(std::move(parts)), threads_(parts_.now) {
+  constexpr std::chrono::minutes kMostTime{30};
+  if (parts_.intake != nullptr) {
+    threads_.Start({.name = kIntake, .pause = kIntakePause, .most_time = kMostTime},
+                   [this] { TakeIn(); });
+  }
+  if (parts_.plans != nullptr) {
+    threads_.Start({.name = kPlans, .pause = kStepPause, .most_time = parts_.most_plan_time},
+                   [this] { WorkOnPlans(); });
+  }
   if (parts_.exports != nullptr) {
-    Start(Work::kExports, kStepPause, [this] { WorkOnExports(); });
-    Start(Work::kPictures, kStepPause, [this] { WorkOnPictures(); });
-    Start(Work::kWatch, kStepPause, [this] { WatchServer(); });
-  }
-}
-
-void BridgeService::Start(Work work, std::chrono::milliseconds pause, std::function<void()> step) {
-  BeginStep(work);
-  threads_.emplace_back([this, work, pause, step = std::move(step)] { Loop(work, pause, step); });
-}
-
-BridgeService::~BridgeService() {
-  {
-    MutexLock lock(mutex_);
-    stopping_ = true;
-  }
-  changed_.NotifyAll();
-  for (std::thread& thread : threads_) thread.join();
-}
-
-void BridgeService::Wake() {
-  {
-    MutexLock lock(mutex_);
-    ++wakes_;
-  }
-  changed_.NotifyAll();
-}
-
-bool BridgeService::stopping() {
-  MutexLock lock(mutex_);
-  return stopping_;
-}
-
-// More than the longest step takes whose peers keep within their own times.
-std::chrono::seconds BridgeService::MostTimeOf(Work work) const {
-  switch (work) {
-    case Work::kIntake:
-    case Work::kPictures:
-      return std::chrono::minutes(30);
-    case Work::kPlans:
-      return parts_.most_plan_time;
-    case Work::kExports:
-      return std::chrono::hours(1);
-    case Work::kWatch:
-      return std::chrono::minutes(3);
-  }
-  return {};
-}
-
-void BridgeService::BeginStep(Work work) {
-  MutexLock lock(mutex_);
-  latest_[work] = parts_.now() + MostTimeOf(work);
-}
-
-std::vector<std::string> BridgeService::Stuck() {
-  constexpr std::array<const char*, 5> kNames = {"intake", "plans", "exports", "pictures", "watch"};
-  std::vector<std::string> stuck;
-  MutexLock lock(mutex_);
-  for (const auto& [work, latest] : latest_) {
-    if (parts_.now() > latest) stuck.push_back(kNames[static_cast<size_t>(work)]);
-  }
-  return stuck;
-}
-
-void BridgeService::Loop(Work work, std::chrono::milliseconds pause,
-                         const std::function<void()>& step) {
-  int64_t seen = 0;
-  while (!stopping()) {
-    BeginStep(work);
-    {
-      MutexLock lock(mutex_);
-      seen = wakes_;
-    }
-    step();
-    const auto until = std::chrono::steady_clock::now() + pause;
-    MutexLock lock(mutex_);
-    latest_[work] = parts_.now() + pause + kMostLateness;
-    while (!stopping_ && wakes_ == seen && changed_.WaitUntil(mutex_, until)) {
-    }
+    threads_.Start({.name = kExports, .pause = kStepPause, .most_time = 2 * kMostTime},
+                   [this] { WorkOnExports(); });
+    threads_.Start({.name = kPictures, .pause = kStepPause, .most_time = kMostTime},
+                   [this] { WorkOnPictures(); });
+    threads_.Start({.name = kWatch, .pause = kStepPause, .most_time = std::chrono::minutes(3)},
+                   [this] { WatchServer(); });
   }
 }
 
@@ -158,7 +95,7 @@ void BridgeService::TakeIn() {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_deletion_) return;
   next_deletion_ = now + kDeletionPause;
-  BeginStep(Work::kIntake);
+  threads_.BeginStep(kIntake);
   const absl::StatusOr<int> deleted = DeleteOld(parts_.queue, parts_.retention, std::time(nullptr));
   if (!deleted.ok() || *deleted > 0) {
     Tell(deleted.status(), "deleted what is older than it is kept");
@@ -171,7 +108,7 @@ void BridgeService::WorkOnPlans() {
   if (!all.ok()) return Tell(all.status(), "the queue cannot be read");
   for (QueuedSeries series : *all) {
     while (HasPlanStep(series.state) && !stopping() && plan_retries_.Due(series.key)) {
-      BeginStep(Work::kPlans);
+      threads_.BeginStep(kPlans);
       const std::string before = SeriesStateName(series.state);
       const absl::Status status = parts_.plans->Step(&series);
       if (absl::IsCancelled(status)) return;
@@ -227,7 +164,7 @@ void BridgeService::WorkOnExports() {
   LookForTakenBack(*all);
   for (QueuedExport queued : *all) {
     while (HasExportStep(queued) && !stopping() && export_retries_.Due(queued.key)) {
-      BeginStep(Work::kExports);
+      threads_.BeginStep(kExports);
       const std::string before = BridgeExportStateName(queued.state);
       const absl::Status status = parts_.exports->Step(&queued);
       Tell(status,
@@ -247,7 +184,7 @@ void BridgeService::LookForTakenBack(const std::vector<QueuedExport>& all) {
   next_look_ = now + kLookPause;
   for (const QueuedExport& queued : all) {
     if (queued.state != BridgeExportState::kAsked || stopping()) continue;
-    BeginStep(Work::kExports);
+    threads_.BeginStep(kExports);
     const absl::StatusOr<bool> still_asked = parts_.exports->IsStillAsked(queued);
     // The watch tells of a server that is away, and all are looked at again.
     if (IsTransient(still_asked.status())) return;
@@ -268,7 +205,7 @@ void BridgeService::WorkOnPictures() {
     if (queued.state != BridgeExportState::kAsked) continue;
     Drawing& drawing = drawings[queued.key] = drawings_[queued.key];
     if (drawing.is_over || stopping() || !picture_retries_.Due(queued.key)) continue;
-    BeginStep(Work::kPictures);
+    threads_.BeginStep(kPictures);
     queued.attempts = drawing.attempts++;
     const absl::Status status = parts_.exports->Draw(queued);
     if (absl::IsCancelled(status)) return;
@@ -286,7 +223,7 @@ void BridgeService::WatchServer() {
   if (!watch_retries_.Due(kWatch)) return;
   // Asked every second as long as the watch lives.
   const Cancellation cancelled([this] {
-    BeginStep(Work::kWatch);
+    threads_.BeginStep(kWatch);
     return stopping();
   });
   const absl::Status status = parts_.server->WatchExports(

@@ -8,9 +8,7 @@
 #include <deque>
 #include <functional>
 #include <map>
-#include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "client/pacs_bridge/work/export_work.h"
@@ -18,6 +16,7 @@
 #include "client/pacs_bridge/work/retention.h"
 #include "client/pacs_bridge/work/retry_times.h"
 #include "client/pacs_bridge/work/series_intake.h"
+#include "client/pacs_bridge/work/work_threads.h"
 #include "core/base/mutex.h"
 
 namespace tissueform {
@@ -46,16 +45,16 @@ class BridgeService {
  public:
   explicit BridgeService(BridgeServiceParts parts);
   // Ends what is between two steps; a plan that is being built must be cancelled by its descriptor.
-  ~BridgeService();
+  ~BridgeService() = default;
   BridgeService(const BridgeService&) = delete;
   BridgeService& operator=(const BridgeService&) = delete;
 
   // There is something new: an image, an association's end, a person's word. Any thread.
-  void Wake() ABSL_LOCKS_EXCLUDED(mutex_);
+  void Wake() { threads_.Wake(); }
 
   // The work ("intake", "plans", "exports", "pictures", "watch") whose thread has been at one step
   // for longer than any takes, or has not come back from its rest: for a watchdog.
-  std::vector<std::string> Stuck() ABSL_LOCKS_EXCLUDED(mutex_);
+  std::vector<std::string> Stuck() { return threads_.Stuck(); }
 
  private:
   // The pictures of an export.
@@ -63,16 +62,7 @@ class BridgeService {
     int64_t attempts = 0;
     bool is_over = false;  // they are there, or cannot be drawn
   };
-  enum class Work { kIntake, kPlans, kExports, kPictures, kWatch };
 
-  // Starts a thread that calls `step` until the end, at once when somebody wakes it and otherwise
-  // every `pause`.
-  void Start(Work work, std::chrono::milliseconds pause, std::function<void()> step);
-  void Loop(Work work, std::chrono::milliseconds pause, const std::function<void()>& step)
-      ABSL_LOCKS_EXCLUDED(mutex_);
-  // A step of this work begins now, or goes on.
-  void BeginStep(Work work) ABSL_LOCKS_EXCLUDED(mutex_);
-  std::chrono::seconds MostTimeOf(Work work) const;
   void TakeIn();
   void WorkOnPlans();
   void TakeHeard() ABSL_LOCKS_EXCLUDED(mutex_);
@@ -83,7 +73,7 @@ class BridgeService {
   void WorkOnPictures();
   void WatchServer();
   void Tell(const absl::Status& status, const std::string& line);
-  bool stopping() ABSL_LOCKS_EXCLUDED(mutex_);
+  bool stopping() { return threads_.stopping(); }
 
   const BridgeServiceParts parts_;
 
@@ -98,14 +88,9 @@ class BridgeService {
   std::map<std::string, Drawing> drawings_;  // by key of an export that waits
 
   Mutex mutex_;
-  ConditionVariable changed_;
-  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
-  int64_t wakes_ ABSL_GUARDED_BY(mutex_) = 0;
-  // When the thread of a work must have come on.
-  std::map<Work, std::chrono::steady_clock::time_point> latest_ ABSL_GUARDED_BY(mutex_);
   std::deque<v1::Export> heard_ ABSL_GUARDED_BY(mutex_);
 
-  std::vector<std::thread> threads_;
+  WorkThreads threads_;  // the last: they use all that stands before
 };
 
 }  // namespace tissueform

@@ -4,22 +4,17 @@
 #include "client/pacs_bridge/work/export_work.h"
 
 #include <algorithm>
-#include <cstring>
 #include <ctime>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <system_error>
 
-#include "absl/cleanup/cleanup.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 
-#include "client/cpp/backoff.h"
 #include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "client/pacs_bridge/dicom/instance_header.h"
 #include "client/pacs_bridge/work/plan_work.h"
-#include "core/base/error_reason.h"
+#include "client/pacs_bridge/work/retry_times.h"
 #include "core/base/status_macros.h"
 #include "core/case_file/case_reader.h"
 #include "server/store/durable_file.h"
@@ -34,12 +29,6 @@ namespace fs = std::filesystem;
 constexpr size_t kMostDetailBytes = 256;
 // Once a minute: a PACS may be down for a day.
 constexpr int64_t kMostExportAttempts = 1440;
-// A report without a band is better than none: a server that has no room for it is asked so often.
-constexpr int64_t kMostBandAttempts = 5;
-// Whether drawing fails for want of something that comes again, or for good, its program does not
-// say.
-constexpr int64_t kMostDrawAttempts = 20;
-constexpr char kBandFile[] = "band.f64";
 constexpr char kSeriesKey[] = "series:";
 
 bool IsSeriesKey(const std::string& key) { return absl::StartsWith(key, kSeriesKey); }
@@ -61,14 +50,6 @@ int CountSent(const std::vector<QueuedObject>& objects) {
 }
 
 }  // namespace
-
-bool MayCome(const absl::Status& status) {
-  // A peer that dies in a TLS handshake looks like one with a wrong certificate, and that may be
-  // renewed, too.
-  return IsTransient(status) || absl::IsDeadlineExceeded(status) || absl::IsCancelled(status) ||
-         absl::IsUnauthenticated(status) || absl::IsPermissionDenied(status) ||
-         HasReason(status, ErrorReason::kDiskFull);
-}
 
 absl::Status ExportWork::Take(const v1::Export& told) {
   if (IsDone(told.state())) return absl::OkStatus();
@@ -230,92 +211,29 @@ absl::StatusOr<ExportMaterial> ExportWork::Gather(const QueuedExport& queued) {
   TF_ASSIGN_OR_RETURN(material.asked, server_->GetExport(queued.name));
   TF_ASSIGN_OR_RETURN(material.sources, received_.ListSources(queued.case_name));
   material.series_uid = series.uid;
-  material.pictures = folder + "/pictures";
+  material.pictures = ExportPictures::FolderIn(folder);
   material.folder = folder + "/written";
   return material;
 }
 
-absl::StatusOr<std::vector<double>> ExportWork::MakeShown(const QueuedExport& queued,
-                                                          const ExportMaterial& material) {
-  {
-    MutexLock lock(mutex_);
-    while (making_.contains(queued.name)) made_.Wait(mutex_);
-    making_.insert(queued.name);
-  }
-  const absl::Cleanup done = [this, &queued] {
-    MutexLock lock(mutex_);
-    making_.erase(queued.name);
-    made_.NotifyAll();
-  };
-  // The band first: who sees the pictures may confirm at once, and then nothing is left to wait
-  // for.
-  absl::StatusOr<std::vector<double>> band = BandOf(queued, material);
-  std::error_code failed;
-  if (!fs::exists(material.pictures, failed)) {
-    const absl::Status drawn = writer_->Draw(material, material.pictures);
-    if (!drawn.ok() && (!MayCome(drawn) || absl::IsDeadlineExceeded(drawn))) {
-      const bool again = queued.attempts < kMostDrawAttempts;
-      return again ? absl::UnavailableError(drawn.message())
-                   : absl::FailedPreconditionError(drawn.message());
-    }
-    TF_RETURN_IF_ERROR(drawn);
-  }
-  return band;
-}
-
 absl::Status ExportWork::Draw(const QueuedExport& queued) {
-  const fs::path folder = queue_->object_folder(queued.key);
-  std::error_code failed;
-  if (fs::exists(folder / "pictures", failed) && fs::exists(folder / kBandFile, failed)) {
-    return absl::OkStatus();
-  }
+  const std::string folder = queue_->object_folder(queued.key);
+  if (ExportPictures::AreThere(folder)) return absl::OkStatus();
   const absl::StatusOr<ExportMaterial> material = Gather(queued);
   const absl::Status status =
-      material.ok() ? MakeShown(queued, *material).status() : material.status();
+      material.ok() ? pictures_.Make(queued, *material).status() : material.status();
   // It may have failed meanwhile, or be gone, and whoever told so has removed the folder.
   const absl::StatusOr<QueuedExport> now = rows_.Get(queued.name);
-  if (now.ok() ? now->done_s != 0 : absl::IsNotFound(now.status())) fs::remove_all(folder, failed);
+  if (now.ok() ? now->done_s != 0 : absl::IsNotFound(now.status())) {
+    std::error_code ignored;
+    fs::remove_all(folder, ignored);
+  }
   return status;
-}
-
-absl::StatusOr<std::vector<double>> ExportWork::AskBand(const QueuedExport& queued,
-                                                        const ExportMaterial& material) {
-  const absl::StatusOr<std::vector<double>> band =
-      server_->ReadBand(material.case_file, material.prediction.description);
-  const bool fits =
-      band.ok() &&
-      (band->empty() || band->size() == static_cast<size_t>(material.prediction.positions.rows()));
-  if (fits) return band;
-  if (!band.ok() && MayCome(band.status()) && queued.attempts < kMostBandAttempts) return band;
-  if (options_.warn) {
-    options_.warn(
-        absl::StrCat(queued.name, " is written without its band of uncertainty: ",
-                     band.ok() ? "it is not one number for each vertex" : band.status().message()));
-  }
-  return std::vector<double>();
-}
-
-absl::StatusOr<std::vector<double>> ExportWork::BandOf(const QueuedExport& queued,
-                                                       const ExportMaterial& material) {
-  const std::string path = queue_->object_folder(queued.key) + "/" + kBandFile;
-  const size_t vertices = static_cast<size_t>(material.prediction.positions.rows());
-  std::ifstream file(path, std::ios::binary);
-  if (file) {
-    const std::string kept{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-    std::vector<double> band(kept.size() / sizeof(double));
-    if (!band.empty()) std::memcpy(band.data(), kept.data(), band.size() * sizeof(double));
-    if (band.empty() || band.size() == vertices) return band;
-  }
-  TF_ASSIGN_OR_RETURN(const std::vector<double> band, AskBand(queued, material));
-  TF_RETURN_IF_ERROR(
-      WriteDurably(path, {absl::string_view(reinterpret_cast<const char*>(band.data()),
-                                            band.size() * sizeof(double))}));
-  return band;
 }
 
 absl::Status ExportWork::Write(QueuedExport* queued) {
   TF_ASSIGN_OR_RETURN(ExportMaterial material, Gather(*queued));
-  TF_ASSIGN_OR_RETURN(material.band_mm, MakeShown(*queued, material));
+  TF_ASSIGN_OR_RETURN(material.band_mm, pictures_.Make(*queued, material));
   TF_ASSIGN_OR_RETURN(const std::vector<std::string> keys, writer_->KeysOf(material));
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedObject> objects,
                       rows_.EnsureObjects(queued->name, keys, NewDicomUid));

@@ -5,20 +5,18 @@
 
 #include <chrono>
 #include <functional>
-#include <set>
 #include <string>
 #include <vector>
 
-#include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
 
 #include "client/pacs_bridge/network/pacs_client.h"
 #include "client/pacs_bridge/queue/export_rows.h"
 #include "client/pacs_bridge/queue/received_rows.h"
 #include "client/pacs_bridge/work/case_server.h"
+#include "client/pacs_bridge/work/export_pictures.h"
 #include "client/pacs_bridge/work/object_writer.h"
 #include "client/pacs_bridge/work/patient_header.h"
-#include "core/base/mutex.h"
 
 namespace tissueform {
 
@@ -31,10 +29,6 @@ struct ExportWorkOptions {
   // The same of what is nothing to worry about.
   std::function<void(const std::string& line)> inform = {};
 };
-
-// Whether another attempt at a step may succeed though nothing is changed here: the PACS may come
-// back, there may be room again, or the bridge is ending.
-bool MayCome(const absl::Status& status);
 
 // From a planner's wish to objects in the patient's study, one durable step after the other:
 //
@@ -58,7 +52,8 @@ class ExportWork {
         server_(server),
         pacs_(pacs),
         writer_(writer),
-        options_(options) {}
+        options_(options),
+        pictures_(server, writer, options.warn) {}
 
   // Takes what the server tells of an export into the queue. A case that is none of this bridge is
   // another bridge's: nothing happens but a line that says so. Errors: those of the queue.
@@ -68,7 +63,7 @@ class ExportWork {
   // nothing happens where they are there. Step waits for it where it needs them. `queued.attempts`
   // says how often it was tried. Errors: those of the server and of drawing; they keep nobody from
   // confirming.
-  absl::Status Draw(const QueuedExport& queued) ABSL_LOCKS_EXCLUDED(mutex_);
+  absl::Status Draw(const QueuedExport& queued);
 
   // Whether the server still has an export that waits for a person. One that was taken back, has
   // expired there or is done leaves the queue, with all that was made for it. Errors: those of the
@@ -87,17 +82,6 @@ class ExportWork {
   // Back to the person: whoever confirmed has seen somebody else than the PACS names now.
   absl::Status AskAnew(QueuedExport* queued, const std::string& study_uid, const FoundPatient& now);
   absl::StatusOr<ExportMaterial> Gather(const QueuedExport& queued);
-  // Draws and asks what is not there yet, unless another thread does it for this export: then it
-  // waits. Returns the band.
-  absl::StatusOr<std::vector<double>> MakeShown(const QueuedExport& queued,
-                                                const ExportMaterial& material)
-      ABSL_LOCKS_EXCLUDED(mutex_);
-  // Kept beside the pictures: a restart writes the same. Empty, with a warning, too, where the
-  // server cannot tell one.
-  absl::StatusOr<std::vector<double>> BandOf(const QueuedExport& queued,
-                                             const ExportMaterial& material);
-  absl::StatusOr<std::vector<double>> AskBand(const QueuedExport& queued,
-                                              const ExportMaterial& material);
   absl::Status Write(QueuedExport* queued);
   absl::Status Send(QueuedExport* queued);
   absl::Status SendMissing(const QueuedExport& queued, std::vector<QueuedObject>* objects);
@@ -111,10 +95,7 @@ class ExportWork {
   PacsClient* const pacs_;
   ObjectWriter* const writer_;
   const ExportWorkOptions options_;
-
-  Mutex mutex_;
-  ConditionVariable made_;
-  std::set<std::string> making_ ABSL_GUARDED_BY(mutex_);  // exports for which MakeShown works
+  ExportPictures pictures_;
 };
 
 }  // namespace tissueform

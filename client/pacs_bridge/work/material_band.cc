@@ -4,8 +4,10 @@
 #include "client/pacs_bridge/work/material_band.h"
 
 #include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <iterator>
 #include <memory>
-#include <optional>
 
 #include "absl/cleanup/cleanup.h"
 
@@ -13,6 +15,7 @@
 #include "core/answer_evaluator/pose_range.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/geometry_conversion.h"
+#include "server/store/durable_file.h"
 #include "tissueform/v1/session_service.pb.h"
 
 namespace tissueform {
@@ -76,6 +79,21 @@ std::string WhyNoMaterialBand(const CaseFile& contents, const v1::Prediction& pr
     return "a segment turns by more than 30 degrees, which linear elasticity takes for strain";
   }
   return "";
+}
+
+std::optional<std::vector<double>> ReadBandFile(const std::string& path, Eigen::Index vertices) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return std::nullopt;
+  const std::string kept{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  std::vector<double> band(kept.size() / sizeof(double));
+  if (!band.empty()) std::memcpy(band.data(), kept.data(), band.size() * sizeof(double));
+  if (!band.empty() && band.size() != static_cast<size_t>(vertices)) return std::nullopt;
+  return band;
+}
+
+absl::Status WriteBandFile(const std::string& path, const std::vector<double>& band_mm) {
+  return WriteDurably(path, {absl::string_view(reinterpret_cast<const char*>(band_mm.data()),
+                                               band_mm.size() * sizeof(double))});
 }
 
 }  // namespace tissueform

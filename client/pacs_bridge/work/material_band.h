@@ -3,11 +3,14 @@
 
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "Eigen/Core"
 #include "client/cpp/tissueform_client.h"
 #include "core/case_file/case_file.h"
 #include "tissueform/v1/prediction.pb.h"
@@ -30,5 +33,11 @@ absl::StatusOr<std::vector<double>> AskMaterialBand(TissueformClient* client,
 // or a segment turns so far that linear elasticity takes it for strain. Empty where there may be
 // one, and where the case is damaged.
 std::string WhyNoMaterialBand(const CaseFile& contents, const v1::Prediction& prediction);
+
+// A band in a file of the bridge: as it is in memory, on this machine alone. One of another length
+// than `vertices` counts as not kept; one of length 0 says that there is no band.
+std::optional<std::vector<double>> ReadBandFile(const std::string& path, Eigen::Index vertices);
+// Durable when it returns. Errors: the disk's.
+absl::Status WriteBandFile(const std::string& path, const std::vector<double>& band_mm);
 
 }  // namespace tissueform

@@ -3,32 +3,14 @@
 
 #pragma once
 
-#include <chrono>
 #include <string>
 
-#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
 #include "client/pacs_bridge/network/pacs_client.h"
-#include "client/pacs_bridge/queue/received_rows.h"
+#include "client/pacs_bridge/work/kept_header.h"
 
 namespace tissueform {
-
-// A header of a series that the bridge has kept, without pixels.
-struct KeptHeader {
-  const QueuedSeries& series;
-  std::string kept = {};  // its file, where series.has_header
-  std::chrono::seconds lifetime{0};
-};
-
-// Whose a series is now.
-struct FoundPatient {
-  PatientIdentity patient = {};
-  // False: the PACS gives nobody a header, and names another patient than the one that is kept.
-  bool has_header = true;
-  // Where the header is not the PACS's own: why, in one line without anything of a patient.
-  std::string remark = {};
-};
 
 // Puts what the PACS says of the patient now into the file `path`. Where it offers no service that
 // gives a header, the kept one stands for it as long as it may, if the PACS's query for the study

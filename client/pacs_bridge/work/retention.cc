@@ -10,10 +10,8 @@
 #include <system_error>
 #include <vector>
 
-#include "absl/strings/str_cat.h"
-
-#include "client/pacs_bridge/queue/export_rows.h"
 #include "client/pacs_bridge/queue/received_rows.h"
+#include "client/pacs_bridge/work/export_retention.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -23,10 +21,6 @@ namespace fs = std::filesystem;
 
 // What is younger may be on its way into the queue.
 constexpr std::chrono::hours kLeastAge{1};
-
-bool IsOver(int64_t since_s, std::chrono::hours kept, int64_t now_s) {
-  return since_s > 0 && now_s - since_s > std::chrono::seconds(kept).count();
-}
 
 int64_t SecondsOf(fs::file_time_type time) {
   const auto since = std::chrono::file_clock::to_sys(time).time_since_epoch();
@@ -76,33 +70,13 @@ bool MayBeForgotten(const QueuedSeries& series, std::chrono::hours kept, int64_t
          IsOver(series.done_s, kept, now_s);
 }
 
-absl::StatusOr<int> DeleteExports(BridgeQueue* queue, const RetentionOptions& options,
-                                  int64_t now_s) {
-  ExportRows rows(queue);
-  const auto days = std::chrono::duration_cast<std::chrono::hours>(options.keep_asked).count() / 24;
-  TF_ASSIGN_OR_RETURN(int changed,
-                      rows.FailAsked(now_s - std::chrono::seconds(options.keep_asked).count(),
-                                     absl::StrCat("nobody has confirmed the patient for ", days,
-                                                  " days; ask for it once more in the planner")));
-  TF_ASSIGN_OR_RETURN(const std::vector<QueuedExport> all, rows.List());
-  for (const QueuedExport& queued : all) {
-    if (!IsOver(queued.done_s, options.keep_exports, now_s)) continue;
-    std::error_code error;
-    fs::remove_all(queue->object_folder(queued.key), error);
-    if (error) continue;
-    TF_RETURN_IF_ERROR(rows.Remove(queued.name));
-    ++changed;
-  }
-  return changed;
-}
-
 }  // namespace
 
 absl::StatusOr<int> DeleteOld(BridgeQueue* queue, const RetentionOptions& options, int64_t now_s) {
   ReceivedRows rows(queue);
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedSeries> all, rows.List());
   TF_ASSIGN_OR_RETURN(int deleted, DeleteStrangers(queue, all, options.keep_images, now_s));
-  TF_ASSIGN_OR_RETURN(const int exports, DeleteExports(queue, options, now_s));
+  TF_ASSIGN_OR_RETURN(const int exports, DeleteOldExports(queue, options, now_s));
   deleted += exports;
   for (QueuedSeries series : all) {
     bool any = false;

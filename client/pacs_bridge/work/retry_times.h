@@ -7,9 +7,15 @@
 #include <map>
 #include <string>
 
+#include "absl/status/status.h"
+
 #include "client/cpp/backoff.h"
 
 namespace tissueform {
+
+// Whether another attempt at a step of an export may succeed though nothing is changed here: the
+// PACS may come back, there may be room again, or the bridge is ending.
+bool MayCome(const absl::Status& status);
 
 // When a step that failed is tried again, by the key of whose step it is: after a second, then
 // longer each time, up to a minute. By the monotonic clock, which nobody sets; after a restart

@@ -9,8 +9,8 @@ import { randomId } from "./session_opening";
 const STORAGE_KEY = "tissueform-sessions";
 const TAB_KEY = "tissueform-session";
 const MOST_REMEMBERED = 64;
-/** How long a page that is being reloaded may hold on to its session. */
-const RELOAD_MS = 1000;
+/** How long a page that is being reloaded may hold on to its session: on a busy machine it goes slowly. A tab that was duplicated waits as long. */
+const RELOAD_MS = 4000;
 
 interface Remembered {
   session: string;
