@@ -237,6 +237,7 @@ TEST_F(ChosenInTwoPartsTest, ACaseHasTheImagesThatItsPlanWasBuiltOf) {
   EXPECT_EQ(rows_.ListImages(series.key)->size(), 8);
   const std::vector<QueuedImage> sources = *rows_.ListSources(series.case_name);
   std::vector<std::string> uids;
+  uids.reserve(sources.size());
   for (const QueuedImage& image : sources) uids.push_back(image.uid);
   EXPECT_THAT(uids, ::testing::UnorderedElementsAreArray(series_.instance_uids.begin(),
                                                          series_.instance_uids.begin() + 5));
