@@ -76,7 +76,7 @@ void PostgresSessionStore::Get(const std::string& id, RecordCallback done) {
         if (rows.empty()) return NoSession(id);
         return ReadSessionColumns(rows, 0);
       },
-      Twice::kIsOnce, std::move(done));
+      Twice::kIsTwice, std::move(done));
 }
 
 void PostgresSessionStore::Update(SessionRecord record, int64_t epoch, RecordCallback done) {
