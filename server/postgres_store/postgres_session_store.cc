@@ -110,7 +110,7 @@ void PostgresSessionStore::CommitPoses(const std::string& id, std::vector<Handle
        now_s = clock_()](PostgresTransaction& transaction) {
         return CommitRow(transaction, id, count, bytes, epoch, now_s);
       },
-      Twice::kIsOnce, std::move(done));
+      Twice::kIsTwice, std::move(done));
 }
 
 void PostgresSessionStore::Delete(const std::string& id, const std::string& etag, int64_t epoch,
@@ -144,7 +144,7 @@ void PostgresSessionStore::List(const ListRequest& request, PageCallback done) {
                                RowsOfPage(request.limit)}));
         return ReadPostgresPage<Page>(rows, request.limit, 0, ReadSessionColumns);
       },
-      Twice::kIsOnce, std::move(done));
+      Twice::kIsTwice, std::move(done));
 }
 
 void PostgresSessionStore::Touch(std::vector<std::string> ids, int64_t now_s, StatusCallback done) {
@@ -159,7 +159,7 @@ void PostgresSessionStore::Touch(std::vector<std::string> ids, int64_t now_s, St
             "session_states.key FOR UPDATE OF session_states)",
             {now_s, names});
       },
-      Twice::kIsOnce, std::move(done));
+      Twice::kIsTwice, std::move(done));
 }
 
 void PostgresSessionStore::ListUnused(int64_t before_s, int limit, PageCallback done) {
@@ -177,7 +177,7 @@ void PostgresSessionStore::ListUnused(int64_t before_s, int limit, PageCallback 
                               {before_s, int64_t{limit}}));
         return ReadPostgresPage<Page>(rows, limit, 0, ReadSessionColumns);
       },
-      Twice::kIsOnce, std::move(done));
+      Twice::kIsTwice, std::move(done));
 }
 
 }  // namespace tissueform
