@@ -22,7 +22,12 @@ PostgresSessionStore::PostgresSessionStore(PostgresPool* pool, UnixClock clock)
 
 void PostgresSessionStore::Submit(const std::string& key, PostgresPool::Work work, Twice twice,
                                   StatusCallback done) {
-  const auto deadline = PostgresPool::Clock::now() + pool_->options().patience;
+  // Who asks for a session that is not here had better ask another server than wait for this one's
+  // database; what is to be kept waits.
+  constexpr std::chrono::milliseconds kMostForReads{2'000};
+  const auto patience = pool_->options().patience;
+  const auto deadline = PostgresPool::Clock::now() +
+                        (twice == Twice::kIsOnce ? std::min(patience, kMostForReads) : patience);
   jobs_.Submit(key, [this, deadline, work = std::move(work), twice, done = std::move(done)] {
     done(pool_->Run(work, deadline, twice));
   });
@@ -76,7 +81,7 @@ void PostgresSessionStore::Get(const std::string& id, RecordCallback done) {
         if (rows.empty()) return NoSession(id);
         return ReadSessionColumns(rows, 0);
       },
-      Twice::kIsTwice, std::move(done));
+      Twice::kIsOnce, std::move(done));
 }
 
 void PostgresSessionStore::Update(SessionRecord record, int64_t epoch, RecordCallback done) {
