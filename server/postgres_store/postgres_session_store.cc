@@ -18,16 +18,14 @@ namespace tissueform {
 
 PostgresSessionStore::PostgresSessionStore(PostgresPool* pool, UnixClock clock)
     // Half of the connections: reads and writes of blobs find some, too.
-    : pool_(pool), clock_(std::move(clock)), jobs_((pool->options().max_connections + 1) / 2) {}
+    : pool_(pool),
+      clock_(std::move(clock)),
+      jobs_((pool->options().max_connections + 1) / 2),
+      gets_((pool->options().max_connections + 1) / 2) {}
 
 void PostgresSessionStore::Submit(const std::string& key, PostgresPool::Work work, Twice twice,
                                   StatusCallback done) {
-  // Who asks for a session that is not here had better ask another server than wait for this one's
-  // database; what is to be kept waits.
-  constexpr std::chrono::milliseconds kMostForReads{2'000};
-  const auto patience = pool_->options().patience;
-  const auto deadline = PostgresPool::Clock::now() +
-                        (twice == Twice::kIsOnce ? std::min(patience, kMostForReads) : patience);
+  const auto deadline = PostgresPool::Clock::now() + pool_->options().patience;
   jobs_.Submit(key, [this, deadline, work = std::move(work), twice, done = std::move(done)] {
     done(pool_->Run(work, deadline, twice));
   });
@@ -73,15 +71,22 @@ void PostgresSessionStore::Create(SessionRecord record, int64_t epoch, RecordCal
 }
 
 void PostgresSessionStore::Get(const std::string& id, RecordCallback done) {
-  Ask<SessionRecord>(
-      id,
-      [id](PostgresTransaction& transaction) -> absl::StatusOr<SessionRecord> {
-        TF_ASSIGN_OR_RETURN(const PostgresRows rows,
-                            transaction.Query(TF_POSTGRES_SESSIONS "WHERE id = $1", {id}));
-        if (rows.empty()) return NoSession(id);
-        return ReadSessionColumns(rows, 0);
-      },
-      Twice::kIsOnce, std::move(done));
+  constexpr std::chrono::milliseconds kMostPatience{2'000};
+  const auto deadline =
+      PostgresPool::Clock::now() + std::min(pool_->options().patience, kMostPatience);
+  gets_.Submit(id, [this, id, deadline, done = std::move(done)] {
+    absl::StatusOr<SessionRecord> found;
+    const absl::Status status = pool_->Run(
+        [&](PostgresTransaction& transaction) -> absl::Status {
+          TF_ASSIGN_OR_RETURN(const PostgresRows rows,
+                              transaction.Query(TF_POSTGRES_SESSIONS "WHERE id = $1", {id}));
+          if (rows.empty()) return NoSession(id);
+          found = ReadSessionColumns(rows, 0);
+          return found.status();
+        },
+        deadline, Twice::kIsOnce);
+    done(status.ok() ? std::move(found) : status);
+  });
 }
 
 void PostgresSessionStore::Update(SessionRecord record, int64_t epoch, RecordCallback done) {

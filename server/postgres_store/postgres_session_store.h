@@ -16,7 +16,9 @@ namespace tissueform {
 
 // Session records in a PostgreSQL database that several servers share. Writes to one session are
 // made in the order of the calls; answers come on this store's threads. A call is answered after
-// PostgresOptions::patience at the latest, UNAVAILABLE where the database was not there.
+// PostgresOptions::patience at the latest, UNAVAILABLE where the database was not there; Get, which
+// no write holds up, after 2 s: who asks here for a session that is elsewhere had better ask
+// another server than wait for this one's database.
 //
 // The epoch that a write is refused by is that of the session's lease (session_leases.h): a server
 // that takes a session over raises it, so nobody who held it before writes any more. Nobody has a
@@ -47,7 +49,9 @@ class PostgresSessionStore final : public SessionStore {
 
   PostgresPool* const pool_;
   const UnixClock clock_;
-  OrderedJobs jobs_;  // last: its jobs use the others
+  // Last: their jobs use the others.
+  OrderedJobs jobs_;
+  OrderedJobs gets_;
 };
 
 }  // namespace tissueform
