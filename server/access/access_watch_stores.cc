@@ -25,6 +25,9 @@ class WatchedSessions final : public SessionStore {
     store_.Create(std::move(record), epoch, Telling(std::move(done)));
   }
   void Get(const std::string& id, RecordCallback done) override { store_.Get(id, std::move(done)); }
+  void Peek(const std::string& id, RecordCallback done) override {
+    store_.Peek(id, std::move(done));
+  }
   void Update(SessionRecord record, int64_t epoch, RecordCallback done) override {
     store_.Update(std::move(record), epoch, Telling(std::move(done)));
   }

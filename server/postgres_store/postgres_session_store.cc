@@ -21,7 +21,7 @@ PostgresSessionStore::PostgresSessionStore(PostgresPool* pool, UnixClock clock)
     : pool_(pool),
       clock_(std::move(clock)),
       jobs_((pool->options().max_connections + 1) / 2),
-      gets_((pool->options().max_connections + 1) / 2) {}
+      peeks_((pool->options().max_connections + 1) / 2) {}
 
 void PostgresSessionStore::Submit(const std::string& key, PostgresPool::Work work, Twice twice,
                                   StatusCallback done) {
@@ -70,18 +70,33 @@ void PostgresSessionStore::Create(SessionRecord record, int64_t epoch, RecordCal
       Twice::kIsTwice, std::move(done));
 }
 
+namespace {
+
+absl::StatusOr<SessionRecord> SelectSession(PostgresTransaction& transaction,
+                                            const std::string& id) {
+  TF_ASSIGN_OR_RETURN(const PostgresRows rows,
+                      transaction.Query(TF_POSTGRES_SESSIONS "WHERE id = $1", {id}));
+  if (rows.empty()) return NoSession(id);
+  return ReadSessionColumns(rows, 0);
+}
+
+}  // namespace
+
 void PostgresSessionStore::Get(const std::string& id, RecordCallback done) {
+  Ask<SessionRecord>(
+      id, [id](PostgresTransaction& transaction) { return SelectSession(transaction, id); },
+      Twice::kIsOnce, std::move(done));
+}
+
+void PostgresSessionStore::Peek(const std::string& id, RecordCallback done) {
   constexpr std::chrono::milliseconds kMostPatience{2'000};
   const auto deadline =
       PostgresPool::Clock::now() + std::min(pool_->options().patience, kMostPatience);
-  gets_.Submit(id, [this, id, deadline, done = std::move(done)] {
+  peeks_.Submit(id, [this, id, deadline, done = std::move(done)] {
     absl::StatusOr<SessionRecord> found;
     const absl::Status status = pool_->Run(
-        [&](PostgresTransaction& transaction) -> absl::Status {
-          TF_ASSIGN_OR_RETURN(const PostgresRows rows,
-                              transaction.Query(TF_POSTGRES_SESSIONS "WHERE id = $1", {id}));
-          if (rows.empty()) return NoSession(id);
-          found = ReadSessionColumns(rows, 0);
+        [&](PostgresTransaction& transaction) {
+          found = SelectSession(transaction, id);
           return found.status();
         },
         deadline, Twice::kIsOnce);
@@ -120,7 +135,7 @@ void PostgresSessionStore::CommitPoses(const std::string& id, std::vector<Handle
        now_s = clock_()](PostgresTransaction& transaction) {
         return CommitRow(transaction, id, count, bytes, epoch, now_s);
       },
-      Twice::kIsTwice, std::move(done));
+      Twice::kIsOnce, std::move(done));
 }
 
 void PostgresSessionStore::Delete(const std::string& id, const std::string& etag, int64_t epoch,
@@ -154,7 +169,7 @@ void PostgresSessionStore::List(const ListRequest& request, PageCallback done) {
                                RowsOfPage(request.limit)}));
         return ReadPostgresPage<Page>(rows, request.limit, 0, ReadSessionColumns);
       },
-      Twice::kIsTwice, std::move(done));
+      Twice::kIsOnce, std::move(done));
 }
 
 void PostgresSessionStore::Touch(std::vector<std::string> ids, int64_t now_s, StatusCallback done) {
@@ -169,7 +184,7 @@ void PostgresSessionStore::Touch(std::vector<std::string> ids, int64_t now_s, St
             "session_states.key FOR UPDATE OF session_states)",
             {now_s, names});
       },
-      Twice::kIsTwice, std::move(done));
+      Twice::kIsOnce, std::move(done));
 }
 
 void PostgresSessionStore::ListUnused(int64_t before_s, int limit, PageCallback done) {
@@ -187,7 +202,7 @@ void PostgresSessionStore::ListUnused(int64_t before_s, int limit, PageCallback 
                               {before_s, int64_t{limit}}));
         return ReadPostgresPage<Page>(rows, limit, 0, ReadSessionColumns);
       },
-      Twice::kIsTwice, std::move(done));
+      Twice::kIsOnce, std::move(done));
 }
 
 }  // namespace tissueform

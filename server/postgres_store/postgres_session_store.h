@@ -14,11 +14,10 @@
 
 namespace tissueform {
 
-// Session records in a PostgreSQL database that several servers share. Writes to one session are
-// made in the order of the calls; answers come on this store's threads. A call is answered after
-// PostgresOptions::patience at the latest, UNAVAILABLE where the database was not there; Get, which
-// no write holds up, after 2 s: who asks here for a session that is elsewhere had better ask
-// another server than wait for this one's database.
+// Session records in a PostgreSQL database that several servers share. What is asked of one session
+// is done in the order of the calls; answers come on this store's threads. A call is answered after
+// PostgresOptions::patience at the latest, UNAVAILABLE where the database was not there; Peek,
+// which has threads of its own, after 2 s.
 //
 // The epoch that a write is refused by is that of the session's lease (session_leases.h): a server
 // that takes a session over raises it, so nobody who held it before writes any more. Nobody has a
@@ -30,6 +29,7 @@ class PostgresSessionStore final : public SessionStore {
 
   void Create(SessionRecord record, int64_t epoch, RecordCallback done) override;
   void Get(const std::string& id, RecordCallback done) override;
+  void Peek(const std::string& id, RecordCallback done) override;
   void Update(SessionRecord record, int64_t epoch, RecordCallback done) override;
   void CommitPoses(const std::string& id, std::vector<HandlePose> poses, int64_t epoch,
                    StatusCallback done) override;
@@ -51,7 +51,7 @@ class PostgresSessionStore final : public SessionStore {
   const UnixClock clock_;
   // Last: their jobs use the others.
   OrderedJobs jobs_;
-  OrderedJobs gets_;
+  OrderedJobs peeks_;
 };
 
 }  // namespace tissueform

@@ -69,11 +69,19 @@ void SessionNews::Changed(const SessionRecord& record) {
   Learn(record);
 }
 
-void SessionNews::Ask(const std::string& id, const std::function<void(absl::Status)>& done) {
-  store_->Get(id, [this, done](const absl::StatusOr<SessionRecord>& record) {
+SessionStore::RecordCallback SessionNews::Learning(const std::function<void(absl::Status)>& done) {
+  return [this, done](const absl::StatusOr<SessionRecord>& record) {
     if (record.ok()) Learn(*record);
     done(record.status());
-  });
+  };
+}
+
+void SessionNews::Ask(const std::string& id, const std::function<void(absl::Status)>& done) {
+  store_->Get(id, Learning(done));
+}
+
+void SessionNews::AskBriefly(const std::string& id, const std::function<void(absl::Status)>& done) {
+  store_->Peek(id, Learning(done));
 }
 
 }  // namespace tissueform

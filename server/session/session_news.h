@@ -34,10 +34,12 @@ class SessionNews {
   void Changed(const SessionRecord& record) ABSL_LOCKS_EXCLUDED(sessions_->mutex);
 
   // Learns a session from the store. `done` comes from this thread or one of the store's. Errors:
-  // those of SessionStore::Get.
+  // those of SessionStore::Get, or of Peek where the caller may ask another server.
   void Ask(const std::string& id, const std::function<void(absl::Status)>& done);
+  void AskBriefly(const std::string& id, const std::function<void(absl::Status)>& done);
 
  private:
+  SessionStore::RecordCallback Learning(const std::function<void(absl::Status)>& done);
   KnownSession KnownFrom(const SessionRecord& record) const;
 
   SharedSessionTable* const sessions_;

@@ -41,12 +41,12 @@ void SessionRegistry::HandOver(std::chrono::steady_clock::time_point deadline) {
   }
 }
 
-void SessionRegistry::WhenKnown(const std::string& id, const std::function<void()>& then,
+void SessionRegistry::WhenKnown(const std::string& id, Ask ask, const std::function<void()>& then,
                                 const StatusCallback& refuse) {
   if (!holds_->shared() || Knows(id)) {
     then();
   } else {
-    news_.Ask(id, [then, refuse](const absl::Status& asked) {
+    (news_.*ask)(id, [then, refuse](const absl::Status& asked) {
       if (asked.ok() || absl::IsNotFound(asked)) {
         then();  // which says so
       } else {
@@ -58,7 +58,7 @@ void SessionRegistry::WhenKnown(const std::string& id, const std::function<void(
 
 void SessionRegistry::Delete(const std::string& id, const StatusCallback& done) {
   WhenKnown(
-      id, [this, id, done] { endings_.Delete(id, done); }, done);
+      id, &SessionNews::Ask, [this, id, done] { endings_.Delete(id, done); }, done);
 }
 
 SessionRegistry::SessionCallback SessionRegistry::NamingRoom(const SessionCallback& done) const {
@@ -79,7 +79,8 @@ void SessionRegistry::Create(SessionRecord record, const std::shared_ptr<const S
   }
   // The same request may have been made of another server, before anything is prepared for it.
   WhenKnown(
-      record.id, [this, record, mesh, waiter] { makings_.Create(record, mesh, waiter); }, done);
+      record.id, &SessionNews::Ask,
+      [this, record, mesh, waiter] { makings_.Create(record, mesh, waiter); }, done);
 }
 
 void SessionRegistry::Open(const std::string& id, CancelFlag cancelled, const SessionCallback& done,
@@ -90,7 +91,7 @@ void SessionRegistry::Open(const std::string& id, CancelFlag cancelled, const Se
   }
   const SessionWaiter waiter{std::move(cancelled), NamingRoom(done), tell};
   WhenKnown(
-      id, [this, id, waiter] { makings_.Open(id, waiter); }, done);
+      id, &SessionNews::AskBriefly, [this, id, waiter] { makings_.Open(id, waiter); }, done);
 }
 
 std::shared_ptr<Session> SessionRegistry::Loaded(const std::string& id) {
@@ -147,7 +148,7 @@ void SessionRegistry::Update(const std::string& id, const std::string& etag,
                                  [cancelled = std::move(cancelled)] { return cancelled->load(); }),
                              .tell = std::move(tell)};
   WhenKnown(
-      id,
+      id, &SessionNews::Ask,
       [this, id, etag, change = std::move(change), caller, done] {
         if (absl::Status refusal = makings_.AdmitRemaking(id); !refusal.ok()) {
           done(std::move(refusal));

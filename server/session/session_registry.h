@@ -213,9 +213,11 @@ class SessionRegistry {
   WorkerPool& pool() { return *pool_; }
 
  private:
+  using Ask = void (SessionNews::*)(const std::string&, const std::function<void(absl::Status)>&);
+
   SessionCallback NamingRoom(const SessionCallback& done) const;
   // `then` when a session that is there is known; `refuse` when that cannot be found out.
-  void WhenKnown(const std::string& id, const std::function<void()>& then,
+  void WhenKnown(const std::string& id, Ask ask, const std::function<void()>& then,
                  const StatusCallback& refuse);
   void StartUpdate(const std::string& id, const std::string& etag,
                    const SessionMaker::Change& change, const SessionCaller& caller,

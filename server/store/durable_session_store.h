@@ -22,6 +22,7 @@ class DurableSessionStore final : public SessionStore {
 
   void Create(SessionRecord record, int64_t epoch, RecordCallback done) override;
   void Get(const std::string& id, RecordCallback done) override;
+  void Peek(const std::string& id, RecordCallback done) override { Get(id, std::move(done)); }
   void Update(SessionRecord record, int64_t epoch, RecordCallback done) override;
   void CommitPoses(const std::string& id, std::vector<HandlePose> poses, int64_t epoch,
                    StatusCallback done) override;

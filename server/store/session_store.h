@@ -60,8 +60,12 @@ class SessionStore {
   // was deleted by another server.
   virtual void Create(SessionRecord record, int64_t epoch, RecordCallback done) = 0;
 
-  // Errors: NotFound.
+  // Of what was asked for this id before, all is in it. Errors: NotFound.
   virtual void Get(const std::string& id, RecordCallback done) = 0;
+
+  // As Get, for who had better ask another server than wait for this one's store: behind nothing
+  // that was asked before, which the record may lack, and for 2 s at most.
+  virtual void Peek(const std::string& id, RecordCallback done) = 0;
 
   // Replaces the record of this id, if record.etag is still its etag; `done` gets it with its new
   // one. Errors: NotFound, FailedPrecondition (the epoch is older), Aborted (the etag is another;

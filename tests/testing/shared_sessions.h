@@ -230,6 +230,7 @@ class SharedSessionStore final : public SessionStore {
   void Get(const std::string& id, RecordCallback done) override {
     shared_.store_.Get(id, std::move(done));
   }
+  void Peek(const std::string& id, RecordCallback done) override { Get(id, std::move(done)); }
   void Update(SessionRecord record, int64_t epoch, RecordCallback done) override {
     absl::StatusOr<SessionRecord> updated;
     const std::string id = record.id;

@@ -212,23 +212,6 @@ absl::StatusOr<bool> ReceivedRows::Remark(const std::string& key, const std::str
   return is_new;
 }
 
-absl::Status ReceivedRows::UpdatePatient(const std::string& study_uid,
-                                         const PatientIdentity& patient) {
-  return queue_->Change([&](Database& database) {
-    return database
-        .Prepare(
-            "UPDATE studies SET patient_id = ?, issuer = ?, name = ?, birth_date = ?, "
-            "readable = ? WHERE uid = ?")
-        .Bind(patient.id)
-        .Bind(patient.issuer)
-        .Bind(patient.name)
-        .Bind(patient.birth_date)
-        .Bind(int64_t{patient.readable})
-        .Bind(study_uid)
-        .Run();
-  });
-}
-
 absl::StatusOr<QueuedSeries> ReceivedRows::SelectOne(const char* sql, const std::string& value) {
   std::optional<QueuedSeries> found;
   const absl::Status done = queue_->Read([&](Database& database) -> absl::Status {

@@ -37,7 +37,6 @@ class ReceivedRows {
   absl::Status UpdateStep(const QueuedSeries& series, SeriesState before);
   // Adds to the reason, once. Returns whether it was not there.
   absl::StatusOr<bool> Remark(const std::string& key, const std::string& remark);
-  absl::Status UpdatePatient(const std::string& study_uid, const PatientIdentity& patient);
 
   absl::StatusOr<QueuedSeries> Get(const std::string& key);  // NotFound
   absl::StatusOr<QueuedSeries> GetByUid(const std::string& uid);

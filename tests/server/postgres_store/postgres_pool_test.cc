@@ -159,19 +159,48 @@ TEST_F(PostgresPoolTest, OfACommitThatIsNotAnsweredNobodyClaimsToKnow) {
   EXPECT_EQ(calls, 1) << "it is not tried again";
 }
 
+TEST_F(PostgresPoolTest, WhoGetsASessionHasItsCommitsAndWhoPeeksDoesNotWaitForThem) {
+  FrozenProxy proxy(TestDatabasePort());
+  PostgresOptions options = Through(proxy);
+  options.unanswered_timeout = std::chrono::milliseconds(300);
+  options.max_connections = 2;  // one thread for commits, one for who asks
+  const auto stores = OpenTestStores(SystemUnixSeconds, options);
+  ASSERT_THAT(CreateSession(stores->sessions(), SampleSession("s", 1)), IsOk());
+  proxy.FreezeAll();
+  std::promise<absl::Status> committed;
+  std::future<absl::Status> answer = committed.get_future();
+  stores->sessions().CommitPoses("s", SamplePoses(7), 1,
+                                 [&](const absl::Status& status) { committed.set_value(status); });
+  std::promise<absl::StatusOr<SessionRecord>> got;
+  stores->sessions().Get("s", [&](auto record) { got.set_value(std::move(record)); });
+  std::promise<absl::Status> peeked;
+  stores->sessions().Peek("s", [&](const auto& record) { peeked.set_value(record.status()); });
+  EXPECT_THAT(peeked.get_future().get(), StatusIs(Code::kUnavailable));
+  EXPECT_EQ(answer.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
+  proxy.Thaw();
+  EXPECT_THAT(answer.get(), IsOk());
+  ASSERT_OK_AND_ASSIGN(const SessionRecord found, got.get_future().get());
+  EXPECT_EQ(SerializePoses(found.last_poses), SerializePoses(SamplePoses(7)));
+}
+
 TEST_F(PostgresPoolTest, WhatIsDoneOnceWhenItIsDoneTwiceGoesOnWhenItsCommitIsNotAnswered) {
   FrozenProxy proxy(TestDatabasePort());
   PostgresOptions options = Through(proxy);
   options.unanswered_timeout = std::chrono::milliseconds(300);
   options.idle_timeout = std::chrono::milliseconds(200);  // until what has locked is free
   const auto stores = OpenTestStores(SystemUnixSeconds, options);
-  ASSERT_THAT(CreateSession(stores->sessions(), SampleSession("s", 1), kFreshEpoch), IsOk());
+  ASSERT_OK_AND_ASSIGN(const SessionRecord made,
+                       CreateSession(stores->sessions(), SampleSession("s", 1), kFreshEpoch));
   PostgresSessionLeases leases(stores->pool(), "a", {.patience = options.patience});
   int connections = proxy.accepted();
   const auto lose_next_commit = [&] {
     proxy.FreezeAt("COMMIT");
     ++connections;
   };
+  lose_next_commit();
+  EXPECT_THAT(CommitPoses(stores->sessions(), "s", SamplePoses(7), made.epoch), IsOk());
+  ASSERT_OK_AND_ASSIGN(const SessionRecord found, GetSession(stores->sessions(), "s"));
+  EXPECT_EQ(SerializePoses(found.last_poses), SerializePoses(SamplePoses(7)));
   lose_next_commit();
   ASSERT_OK_AND_ASSIGN(const LeaseAnswer taken, leases.Acquire("s"));
   EXPECT_TRUE(taken.mine);

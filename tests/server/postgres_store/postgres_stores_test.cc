@@ -61,6 +61,17 @@ class PostgresStoresTest : public ::testing::Test {
     return record.sha256;
   }
 
+  // A database of its own, made anew, that an administrator may take away.
+  static void MakeAway() {
+    RunOutsideTransaction("DROP DATABASE IF EXISTS away WITH (FORCE)");
+    RunOutsideTransaction("CREATE DATABASE away");
+  }
+  static std::unique_ptr<PostgresStores> OpenAway(std::chrono::milliseconds patience) {
+    PostgresOptions options = TestDatabaseOptions("away");
+    options.patience = patience;
+    return OpenTestStores(SystemUnixSeconds, options);
+  }
+
   std::unique_ptr<PostgresStores> stores_;
 };
 
@@ -254,18 +265,14 @@ TEST_F(PostgresStoresTest, ADatabaseThatIsNotThereIsUnavailable) {
 }
 
 TEST_F(PostgresStoresTest, ADatabaseThatTakesNoWritesIsRefusedAtTheStartAndWaitedForByCalls) {
-  RunOutsideTransaction("DROP DATABASE IF EXISTS away WITH (FORCE)");
-  RunOutsideTransaction("CREATE DATABASE away");
-  PostgresOptions options = TestDatabaseOptions("away");
-  options.patience = std::chrono::milliseconds(150);
-  const auto hasty = OpenTestStores(SystemUnixSeconds, options);
-  options.patience = std::chrono::seconds(30);
-  const auto patient = OpenTestStores(SystemUnixSeconds, options);
+  MakeAway();
+  const auto hasty = OpenAway(std::chrono::milliseconds(150));
+  const auto patient = OpenAway(std::chrono::seconds(30));
   ASSERT_THAT(CreateSession(hasty->sessions(), SampleSession("s", 1)), IsOk());
   // As after a failover that has made a replica of it.
   RunOutsideTransaction("ALTER DATABASE away SET default_transaction_read_only = on");
   RunSql("SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE datname = 'away'");
-  EXPECT_THAT(PostgresStores::Open({.database = options}).status(),
+  EXPECT_THAT(PostgresStores::Open({.database = TestDatabaseOptions("away")}).status(),
               StatusIs(Code::kFailedPrecondition, HasSubstr("read-only replica")));
   std::promise<absl::Status> answer;
   patient->sessions().CommitPoses("s", SamplePoses(5), 1,
@@ -287,14 +294,9 @@ TEST_F(PostgresStoresTest, CallsGoOnWhenTheDatabaseHasEndedTheirConnections) {
 }
 
 TEST_F(PostgresStoresTest, ACallWaitsForADatabaseThatComesBackAndNotForever) {
-  // A database of its own, whose door the administrator shuts.
-  RunOutsideTransaction("DROP DATABASE IF EXISTS away WITH (FORCE)");
-  RunOutsideTransaction("CREATE DATABASE away");
-  PostgresOptions options = TestDatabaseOptions("away");
-  options.patience = std::chrono::milliseconds(150);
-  const auto hasty = OpenTestStores(SystemUnixSeconds, options);
-  options.patience = std::chrono::seconds(30);
-  const auto patient = OpenTestStores(SystemUnixSeconds, options);
+  MakeAway();
+  const auto hasty = OpenAway(std::chrono::milliseconds(150));
+  const auto patient = OpenAway(std::chrono::seconds(30));
   ASSERT_THAT(CreateSession(hasty->sessions(), SampleSession("s", 1)), IsOk());
   RunOutsideTransaction("ALTER DATABASE away ALLOW_CONNECTIONS false");
   RunSql("SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE datname = 'away'");

@@ -156,8 +156,9 @@ TEST_F(WorkListTest, AFormFromElsewhereIsRefused) {
 TEST_F(WorkListTest, APatientWhoChangedSinceThePageWasShownIsNotConfirmed) {
   Start();
   const std::string page = Curl("");
-  ASSERT_THAT(ReceivedRows(queue_.get()).UpdatePatient("1.2", {.id = "MERGED", .name = "M"}),
-              IsOk());
+  ExportRows rows(queue_.get());
+  ASSERT_OK_AND_ASSIGN(const QueuedExport asked, rows.Get("exports/1"));
+  ASSERT_THAT(rows.UpdateWithPatient(asked, "1.2", {.id = "MERGED", .name = "M"}), IsOk());
   EXPECT_THAT(Curl(FormOf(page), "/store"), StartsWith("HTTP/1.1 409"));
   EXPECT_EQ(State(), BridgeExportState::kAsked);
 }
