@@ -7,9 +7,10 @@
 # targets; every target is compiled with the same options (-fPIC, executables too) so that they fit.
 option(TISSUEFORM_PRECOMPILED_HEADERS "Precompile the large headers" ON)
 
-# Tests are compiled with -O1 in Release: what they call is in the libraries, and -O3 takes half as long again.
+# Tests and commands are compiled with -O1 in Release: what they call is in the libraries, and -O3 takes half as long again.
 # Their precompiled headers need the same options.
-set(_tissueform_test_options $<$<CONFIG:Release>:-O1>)
+set(_tissueform_quick "test|command")
+set(_tissueform_quick_options $<$<CONFIG:Release>:-O1>)
 
 function(_tissueform_precompiled name)
   set(target tissueform_precompiled_${name})
@@ -21,8 +22,8 @@ function(_tissueform_precompiled name)
     set(header "<cmake/precompiled/${name}.h>")  # a name without the checkout's path: see CompilerCache.cmake
   endif()
   target_precompile_headers(${target} PRIVATE "${header}")
-  if(name MATCHES "test")
-    target_compile_options(${target} PRIVATE ${_tissueform_test_options})
+  if(name MATCHES "${_tissueform_quick}")
+    target_compile_options(${target} PRIVATE ${_tissueform_quick_options})
   endif()
 endfunction()
 
@@ -40,28 +41,26 @@ function(tissueform_precompile_headers)
 endfunction()
 
 function(_tissueform_use_precompiled target name)
+  if(name MATCHES "${_tissueform_quick}")
+    target_compile_options(${target} PRIVATE ${_tissueform_quick_options})
+  endif()
   if(TARGET tissueform_precompiled_${name})
     target_precompile_headers(${target} REUSE_FROM tissueform_precompiled_${name})
   endif()
 endfunction()
 
 # Unity builds put some files together, so that what they include is read, and what they instantiate made, once. Which files
-# may be together, source_names.py says. The sanitizers' presets put all files together (CMAKE_UNITY_BUILD), the others those
-# of tests and of commands, each of which would compile GoogleTest's or CLI11's templates again: two thirds of the time. The
-# rest is built without: there a missing include shall be seen.
-option(TISSUEFORM_TOGETHER "Compile up to eight files of tests, and of commands, at once" ON)
+# may be together, source_names.py says. `dev` is built without: there a missing include shall be seen.
+option(TISSUEFORM_TOGETHER "Compile up to eight files of a target at once" ON)
 set(_tissueform_most_together 8)
-if(CMAKE_UNITY_BUILD OR TISSUEFORM_TOGETHER)
+if(TISSUEFORM_TOGETHER)
+  set(CMAKE_UNITY_BUILD ON)
   find_package(Python3 3.11 REQUIRED COMPONENTS Interpreter)
   # GCC takes the file that is compiled for the one that a class belongs to.
   add_compile_options($<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
 endif()
 
-# PRECOMPILED: which of the headers the target uses; those of tests and commands say that it is one.
-function(_tissueform_put_together target precompiled)
-  if(TISSUEFORM_TOGETHER AND precompiled MATCHES "test|command")
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON)
-  endif()
+function(_tissueform_put_together target)
   get_target_property(together ${target} UNITY_BUILD)
   if(NOT together)
     return()
@@ -93,7 +92,7 @@ function(tissueform_library name)
   set(target tissueform_${name})
   if(ARG_SOURCES)
     add_library(${target} STATIC ${ARG_SOURCES})
-    _tissueform_put_together(${target} ${ARG_PRECOMPILED} ${ARG_SOURCES})
+    _tissueform_put_together(${target} ${ARG_SOURCES})
     _tissueform_use_precompiled(${target} ${ARG_PRECOMPILED})
     set(scope PUBLIC)
   else()
@@ -120,7 +119,7 @@ function(tissueform_binary name)
     set(ARG_PRECOMPILED library)
   endif()
   add_executable(${name} ${ARG_SOURCES})
-  _tissueform_put_together(${name} ${ARG_PRECOMPILED} ${ARG_SOURCES})
+  _tissueform_put_together(${name} ${ARG_SOURCES})
   _tissueform_use_precompiled(${name} ${ARG_PRECOMPILED})
   _tissueform_resolve(deps ${ARG_DEPS})
   target_link_libraries(${name} PRIVATE ${deps})
@@ -157,12 +156,11 @@ function(tissueform_test name)
   endif()
   set(target ${name}_test)
   add_executable(${target} ${ARG_SOURCES})
-  _tissueform_put_together(${target} ${ARG_PRECOMPILED} ${ARG_SOURCES})
+  _tissueform_put_together(${target} ${ARG_SOURCES})
   _tissueform_use_precompiled(${target} ${ARG_PRECOMPILED})
   _tissueform_resolve(deps ${ARG_DEPS})
   target_link_libraries(${target} PRIVATE ${deps} GTest::gmock GTest::gtest_main)
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
-  target_compile_options(${target} PRIVATE ${_tissueform_test_options})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()

@@ -105,7 +105,8 @@ void AddPacs(CLI::App& app, PacsPeer* pacs) {
       "speak to it by TLS, with --dicom-cert, --dicom-key and --dicom-ca");
   app.add_option("--pacs-url", pacs->url,
                  "the PACS by DICOMweb instead: https://pacs.example.org/dicom-web")
-      ->type_name("URL");
+      ->type_name("URL")
+      ->excludes("--pacs");
 }
 
 void AddPlans(CLI::App& app, BridgeOptions* options) {
@@ -228,14 +229,18 @@ absl::StatusOr<std::string> StateFolderOf(const BridgeOptions& options) {
 }
 
 absl::StatusOr<std::vector<SeriesRule>> RulesOf(const BridgeOptions& options) {
-  if (!options.rules.empty()) return ReadSeriesRules(options.rules);
-  if (options.recipe.empty()) {
+  std::vector<SeriesRule> rules;
+  if (!options.rules.empty()) {
+    TF_ASSIGN_OR_RETURN(rules, ReadSeriesRules(options.rules));
+  } else if (!options.recipe.empty()) {
+    rules.emplace_back().recipe = options.recipe;
+  } else {
     return absl::FailedPreconditionError(
         "it is not said what becomes a plan; give --rules FILE or --recipe FILE");
   }
-  SeriesRule rule;
-  rule.recipe = options.recipe;
-  return std::vector<SeriesRule>{rule};
+  // At the start and not when the first head has come.
+  TF_RETURN_IF_ERROR(CheckRecipes(rules));
+  return rules;
 }
 
 }  // namespace tissueform

@@ -4,11 +4,13 @@
 #include "server/gateway/server_choice.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <numeric>
 #include <set>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 
 #include "core/base/error_reason.h"
@@ -19,6 +21,7 @@ namespace tissueform {
 namespace {
 
 constexpr size_t kMaxNodeName = 64;
+constexpr uint32_t kMostPort = 65535;
 
 bool IsNodeName(absl::string_view name) {
   const auto allowed = [](char c) {
@@ -26,6 +29,15 @@ bool IsNodeName(absl::string_view name) {
   };
   return !name.empty() && name.size() <= kMaxNodeName &&
          std::all_of(name.begin(), name.end(), allowed);
+}
+
+// "unix:/PATH", or something with a port.
+bool IsAddress(absl::string_view text) {
+  if (absl::StartsWith(text, "unix:")) return true;
+  const size_t colon = text.rfind(':');
+  uint32_t port = 0;
+  return colon != absl::string_view::npos && colon > 0 &&
+         absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port <= kMostPort;
 }
 
 absl::Status WrongNode(absl::string_view why) {
@@ -51,6 +63,10 @@ absl::Status ServerChoice::Check(const std::vector<NodeAddress>& servers) {
     const std::string which = absl::StrCat("--server ", node, node.empty() ? "" : "=", address);
     if (address.empty()) {
       return absl::InvalidArgumentError(absl::StrCat(which, " has no address; give NODE=ADDRESS"));
+    }
+    if (!IsAddress(address)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(which, " is no address; give HOST:PORT or unix:/PATH"));
     }
     if (node.empty()) continue;
     if (!IsNodeName(node)) {

@@ -8,12 +8,14 @@
 #include <libpq-fe.h>
 #include <map>
 #include <memory>
+#include <set>
 #include <vector>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "absl/strings/str_split.h"
+#include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 #include <sys/stat.h>
 
@@ -68,6 +70,11 @@ absl::Status ChooseEncryption(Keywords* keywords) {
   if (mode == "allow" || mode == "prefer") {
     return absl::InvalidArgumentError(
         absl::StrCat("sslmode=", mode, " may encrypt or not; say verify-full, require or disable"));
+  }
+  // What libpq would find out only when it connects, as if the database were away.
+  const std::set<absl::string_view> known = {"", "disable", "require", "verify-ca", "verify-full"};
+  if (!known.contains(mode)) {
+    return absl::InvalidArgumentError("no such sslmode; say verify-full, require or disable");
   }
   const std::string& host =
       keywords->contains("hostaddr") ? (*keywords)["hostaddr"] : (*keywords)["host"];

@@ -17,11 +17,11 @@
 namespace tissueform {
 
 PostgresSessionStore::PostgresSessionStore(PostgresPool* pool, UnixClock clock)
-    // Half of the connections: reads and writes of blobs find some, too.
+    // Three quarters of the connections: reads and writes of blobs find some, too.
     : pool_(pool),
       clock_(std::move(clock)),
       jobs_((pool->options().max_connections + 1) / 2),
-      peeks_((pool->options().max_connections + 1) / 2) {}
+      peeks_((pool->options().max_connections + 3) / 4) {}
 
 void PostgresSessionStore::Submit(const std::string& key, PostgresPool::Work work, Twice twice,
                                   StatusCallback done) {

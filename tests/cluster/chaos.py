@@ -14,6 +14,7 @@ import os
 import pathlib
 import random
 import shutil
+import signal
 import sys
 import time
 
@@ -45,15 +46,26 @@ import stranger  # noqa: E402
 SCENARIOS = ["kills", "stop", "split", "drain", "restart", "gone"]
 
 
+def at_least(least, kind):
+    """A number of an option."""
+    def number(text):
+        value = kind(text)
+        if not least <= value < float("inf"):
+            raise argparse.ArgumentTypeError(f"{text} is not at least {least}")
+        return value
+    number.__name__ = kind.__name__
+    return number
+
+
 def parse():
     parser = argparse.ArgumentParser(prog="deploy/cluster.sh chaos", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--programs", required=True, help=argparse.SUPPRESS)
-    parser.add_argument("--kills", type=int, default=20, help="kill -9 of servers, gateways and HAProxy (default: 20)")
-    parser.add_argument("--seconds", type=float, help="over how long (default: 2 for each kill)")
+    parser.add_argument("--kills", type=at_least(0, int), default=20, help="kill -9 of servers, gateways and HAProxy (default: 20)")
+    parser.add_argument("--seconds", type=at_least(1, float), help="over how long (default: 2 for each kill)")
     parser.add_argument("--seed", type=int, help="of everything that is left to chance; the seed of a run that failed repeats what it did")
-    parser.add_argument("--drags", type=int, default=6)
+    parser.add_argument("--drags", type=at_least(2, int), default=6)
     parser.add_argument("--nodes", type=int, default=3, choices=range(1, 6))
-    parser.add_argument("--gone", type=float, default=60, metavar="SECONDS", help="how long PostgreSQL is away in `gone` (default: 60)")
+    parser.add_argument("--gone", type=at_least(1, float), default=60, metavar="SECONDS", help="how long PostgreSQL is away in `gone` (default: 60)")
     parser.add_argument("--only", nargs="+", choices=SCENARIOS, default=SCENARIOS, help="scenarios, of all that there are")
     parser.add_argument("--state", default=ROOT / "build/cluster-chaos", metavar="FOLDER", help="where logs stand (default: build/cluster-chaos)")
     parser.add_argument("--keep-logs", action="store_true", help="leave the logs there at the end; they stay when something was not so")
@@ -206,6 +218,8 @@ def main():
         print("\n".join(missing))
         sys.exit(SKIPPED)
     seed = options.seed if options.seed is not None else random.SystemRandom().randrange(10**6)
+    # Whoever ends this ends what it has started.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     sys.exit(chaos(options, seed))
 
 

@@ -108,6 +108,16 @@ def check_refused(what, end, words):
     check(f"{what} is refused in one line", end.returncode == 1 and len(line.splitlines()) == 1 and words in line, f"{end.returncode} {line}")
 
 
+def check_wrong_options(programs, options):
+    """Told at the start, and not when the first head has come."""
+    broken, at = programs.folder / "broken.json", options.index("--recipe") + 1
+    broken.write_text('{"format": ')
+    for what, recipe, words in (("a recipe that is a folder", programs.folder, "recipe"), ("a recipe that is no JSON", broken, "broken.json: line 1")):
+        check_refused(what, Bridge(programs, "wrong", [*options[:at], recipe, *options[at + 1:]]).run("run"), words)
+    both = Bridge(programs, "wrong", [*options, "--pacs", "localhost:104"]).run("run")
+    check("two PACS are refused in one line", both.returncode == 2 and len(both.stderr.splitlines()) == 1, both.stderr)
+
+
 def check_way_to_the_server(programs, bridge):
     """From a fetched series to a case; its key."""
     key = bridge.status()["series"][0]["key"]
@@ -230,6 +240,7 @@ def run(programs):
     for by_web, options in ((True, web), (False, associations)):
         programs.by_web = by_web
         options += programs.bridge_options()[2:]
+    check_wrong_options(programs, web)
     bridge = Bridge(programs, "bridge", web)
     ways = {"C-GET": Bridge(programs, "get", associations), "C-MOVE": Bridge(programs, "move", [*associations, "--pacs-fetch", "move"]), "WADO-RS": bridge}
     for way, by_way in ways.items():

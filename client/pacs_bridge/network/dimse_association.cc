@@ -3,8 +3,11 @@
 
 #include "client/pacs_bridge/network/dimse_association.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include <dcmtk/dcmnet/dimse.h>
 #include <dcmtk/dcmnet/dul.h>
@@ -59,6 +62,19 @@ absl::Status NotReached(const PacsPeer& peer, const OFCondition& condition, bool
 }
 
 }  // namespace
+
+absl::Status CheckAeTitle(const std::string& title) {
+  constexpr size_t kMostCharacters = 16;
+  const bool is_good =
+      !title.empty() && title.size() <= kMostCharacters &&
+      std::all_of(title.begin(), title.end(), [](char letter) {
+        return absl::ascii_isprint(static_cast<unsigned char>(letter)) && letter != '\\';
+      });
+  if (is_good) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("the AE title '", absl::CHexEscape(title),
+                   "' is none: write 1 to 16 characters of ASCII without a backslash"));
+}
 
 absl::StatusOr<std::unique_ptr<DimseAssociation>> DimseAssociation::Request(
     const PacsPeer& peer, DcmTransportLayer* secure, const std::vector<ProposedContext>& contexts) {

@@ -19,6 +19,9 @@
 
 namespace tissueform {
 
+// Errors: InvalidArgument, what an AE title is.
+absl::Status CheckAeTitle(const std::string& title);
+
 // An association that we have asked a PACS for. One thread.
 class DimseAssociation {
  public:

@@ -16,6 +16,7 @@
 
 #include "client/pacs_bridge/dicom/dicom_text.h"
 #include "client/pacs_bridge/dicom/dicom_uid.h"
+#include "client/pacs_bridge/network/dimse_association.h"
 #include "client/pacs_bridge/network/dimse_queries.h"
 #include "client/pacs_bridge/network/one_header.h"
 #include "core/base/status_macros.h"
@@ -304,9 +305,9 @@ class DimseClient : public PacsClient {
 absl::StatusOr<std::unique_ptr<PacsClient>> MakeDimseClient(const PacsPeer& peer) {
   TF_RETURN_IF_ERROR(PrepareDicomNetwork());
   for (const std::string& title : {peer.ae_title, peer.own_ae_title}) {
-    if (title.empty() || title.size() > 16) {
+    if (const absl::Status good = CheckAeTitle(title); !good.ok()) {
       return absl::InvalidArgumentError(
-          absl::StrCat("the PACS '", peer.name, "': an AE title has 1 to 16 characters"));
+          absl::StrCat("the PACS '", peer.name, "': ", good.message()));
     }
   }
   if (peer.host.empty() || peer.port < 1 || peer.port > 65535) {

@@ -17,6 +17,7 @@
 #include <sys/socket.h>
 
 #include "client/pacs_bridge/network/address_set.h"
+#include "client/pacs_bridge/network/dimse_association.h"
 #include "client/pacs_bridge/network/listening_socket.h"
 #include "client/pacs_bridge/network/socket_layer.h"
 #include "client/pacs_bridge/network/storage_association.h"
@@ -28,7 +29,6 @@ namespace {
 
 // Connections beyond max_associations that are told so; more are closed without a word.
 constexpr int kTold = 16;
-constexpr size_t kMostTitleCharacters = 16;
 
 absl::Status CheckOptions(const ReceiverOptions& options) {
   if (options.max_associations < 1) {
@@ -36,12 +36,7 @@ absl::Status CheckOptions(const ReceiverOptions& options) {
   }
   std::vector<std::string> titles = options.calling_ae_titles;
   titles.push_back(options.ae_title);
-  for (const std::string& title : titles) {
-    if (title.empty() || title.size() > kMostTitleCharacters) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("the AE title '", title, "' has not 1 to 16 characters"));
-    }
-  }
+  for (const std::string& title : titles) TF_RETURN_IF_ERROR(CheckAeTitle(title));
   return absl::OkStatus();
 }
 

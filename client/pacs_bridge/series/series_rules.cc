@@ -3,9 +3,11 @@
 
 #include "client/pacs_bridge/series/series_rules.h"
 
+#include <cstddef>
 #include <filesystem>
 #include <map>
 
+#include "absl/strings/str_cat.h"
 #include "nlohmann/json.hpp"
 
 #include "core/base/status_macros.h"
@@ -17,6 +19,8 @@ namespace tissueform {
 namespace {
 
 using RulesJson = nlohmann::json;
+
+constexpr size_t kMostRecipeBytes = 1 << 20;
 
 const JsonSchema& RulesSchema() {
   static const JsonSchema* const schema = new JsonSchema(SeriesRulesSchemaText());
@@ -74,6 +78,18 @@ absl::StatusOr<std::vector<SeriesRule>> ParseSeriesRules(const std::string& json
   std::vector<SeriesRule> rules;
   for (const RulesJson& rule : document.at("rules")) rules.push_back(RuleOf(rule, folder));
   return rules;
+}
+
+absl::Status CheckRecipes(const std::vector<SeriesRule>& rules) {
+  for (const SeriesRule& rule : rules) {
+    TF_ASSIGN_OR_RETURN(const std::string text,
+                        ReadJsonText(rule.recipe, "recipe", kMostRecipeBytes));
+    if (const auto json = ParseJsonStrictly(text); !json.ok()) {
+      return absl::Status(json.status().code(),
+                          absl::StrCat("recipe ", rule.recipe, ": ", json.status().message()));
+    }
+  }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::vector<SeriesRule>> ReadSeriesRules(const std::string& path) {

@@ -52,4 +52,8 @@ absl::StatusOr<std::vector<SeriesRule>> ReadSeriesRules(const std::string& path)
 absl::StatusOr<std::vector<SeriesRule>> ParseSeriesRules(const std::string& json,
                                                          const std::string& folder);
 
+// Whether their recipes are there and are JSON; what is in them, `plan build` judges.
+// Errors: those of ReadJsonText, InvalidArgument with line and column.
+absl::Status CheckRecipes(const std::vector<SeriesRule>& rules);
+
 }  // namespace tissueform

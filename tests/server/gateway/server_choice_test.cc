@@ -58,6 +58,8 @@ INSTANTIATE_TEST_SUITE_P(
     Servers, BadServersTest,
     ::testing::Values(BadServers{"NoAddress", {"a="}, "no address"},
                       BadServers{"Nothing", {""}, "no address"},
+                      BadServers{"NoPort", {"a=h"}, "give HOST:PORT"},
+                      BadServers{"PortBeyondAll", {"h:99999"}, "give HOST:PORT"},
                       BadServers{"Space", {"a b=h:1"}, "letters"},
                       BadServers{"LongName", {std::string(65, 'n') + "=h:1"}, "64"},
                       BadServers{"TwoOfOneName", {"a=h:1", "a=h:2"}, "another server"}),
@@ -66,7 +68,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(ServerChoice, TakesNamesAsServersHaveThem) {
   EXPECT_TRUE(ServerChoice::Check(ThreeNodes()).ok());
   EXPECT_TRUE(ServerChoice::Check({ParseNodeAddress("rack-1.b_2:50051=h:1")}).ok());
-  EXPECT_TRUE(ServerChoice::Check({{.address = "h:1"}, {.address = "h:2"}}).ok());
+  EXPECT_TRUE(ServerChoice::Check({{.address = "h:1"}, {.address = "unix:/run/h"}}).ok());
 }
 
 TEST(ServerChoice, ANodeIsStrict) {

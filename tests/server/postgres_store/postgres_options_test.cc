@@ -58,7 +58,7 @@ TEST(PostgresOptionsTest, AHostElsewhereIsAskedForItsCertificateUnlessTheUrlSays
   EXPECT_THAT(target.connection, HasSubstr("sslmode='verify-full'")) << "a name is no address";
   ASSERT_OK_AND_ASSIGN(target, TargetOf(Url("postgresql://db.example/faces?sslmode=disable")));
   EXPECT_THAT(target.connection, HasSubstr("sslmode='disable'"));
-  for (const char* mode : {"allow", "prefer"}) {
+  for (const char* mode : {"allow", "prefer", "verify"}) {
     EXPECT_THAT(TargetOf(Url(std::string("postgresql://db.example/f?sslmode=") + mode)),
                 StatusIs(Code::kInvalidArgument, HasSubstr("verify-full")));
   }

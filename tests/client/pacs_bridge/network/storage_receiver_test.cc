@@ -362,6 +362,8 @@ TEST(StorageReceiver, OptionsThatCannotBeAreTold) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("write 10.1.2.3")));
   EXPECT_THAT(started({.ae_title = "SEVENTEENLETTERS!"}),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("1 to 16 characters")));
+  EXPECT_THAT(started({.calling_ae_titles = {"SCANNER", "A\\B"}}),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("without a backslash")));
   EXPECT_THAT(started({.address = "nowhere"}),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("to listen at")));
   const auto first = StorageReceiver::Start({}, folder->get(), &sink);
