@@ -3,7 +3,6 @@
 
 #include "client/pacs_bridge/series/series_rules.h"
 
-#include <cstddef>
 #include <filesystem>
 #include <map>
 
@@ -19,8 +18,6 @@ namespace tissueform {
 namespace {
 
 using RulesJson = nlohmann::json;
-
-constexpr size_t kMostRecipeBytes = 1 << 20;
 
 const JsonSchema& RulesSchema() {
   static const JsonSchema* const schema = new JsonSchema(SeriesRulesSchemaText());
@@ -39,29 +36,24 @@ SeriesPreference PreferenceOf(const std::string& name) {
   return names->at(name);
 }
 
-template <typename Value>
-void TakeValue(const RulesJson& json, const char* key, Value* value) {
-  if (json.contains(key)) *value = json.at(key).get<Value>();
-}
-
 SeriesRule RuleOf(const RulesJson& json, const std::string& folder) {
   SeriesRule rule;
-  TakeValue(json, "name", &rule.name);
+  rule.name = json.value("name", rule.name);
   const std::filesystem::path recipe(json.at("recipe").get<std::string>());
   rule.recipe = (recipe.is_absolute() ? recipe : std::filesystem::path(folder) / recipe).string();
-  TakeValue(json, "modality", &rule.modality);
-  TakeValue(json, "axial_only", &rule.axial_only);
-  TakeValue(json, "min_slices", &rule.min_slices);
-  TakeValue(json, "max_spacing_mm", &rule.max_spacing_mm);
-  TakeValue(json, "max_thickness_mm", &rule.max_thickness_mm);
-  TakeValue(json, "min_coverage_mm", &rule.min_coverage_mm);
-  TakeValue(json, "max_coverage_mm", &rule.max_coverage_mm);
-  TakeValue(json, "max_missing", &rule.max_missing);
-  TakeValue(json, "hounsfield", &rule.hounsfield);
-  TakeValue(json, "derived", &rule.derived);
-  TakeValue(json, "contrast", &rule.contrast);
-  TakeValue(json, "description_has", &rule.description_has);
-  TakeValue(json, "description_lacks", &rule.description_lacks);
+  rule.modality = json.value("modality", rule.modality);
+  rule.axial_only = json.value("axial_only", rule.axial_only);
+  rule.min_slices = json.value("min_slices", rule.min_slices);
+  rule.max_spacing_mm = json.value("max_spacing_mm", rule.max_spacing_mm);
+  rule.max_thickness_mm = json.value("max_thickness_mm", rule.max_thickness_mm);
+  rule.min_coverage_mm = json.value("min_coverage_mm", rule.min_coverage_mm);
+  rule.max_coverage_mm = json.value("max_coverage_mm", rule.max_coverage_mm);
+  rule.max_missing = json.value("max_missing", rule.max_missing);
+  rule.hounsfield = json.value("hounsfield", rule.hounsfield);
+  rule.derived = json.value("derived", rule.derived);
+  rule.contrast = json.value("contrast", rule.contrast);
+  rule.description_has = json.value("description_has", rule.description_has);
+  rule.description_lacks = json.value("description_lacks", rule.description_lacks);
   if (json.contains("prefer")) {
     rule.prefer.clear();
     for (const RulesJson& name : json.at("prefer")) rule.prefer.push_back(PreferenceOf(name));
@@ -83,10 +75,10 @@ absl::StatusOr<std::vector<SeriesRule>> ParseSeriesRules(const std::string& json
 absl::Status CheckRecipes(const std::vector<SeriesRule>& rules) {
   for (const SeriesRule& rule : rules) {
     TF_ASSIGN_OR_RETURN(const std::string text,
-                        ReadJsonText(rule.recipe, "recipe", kMostRecipeBytes));
-    if (const auto json = ParseJsonStrictly(text); !json.ok()) {
-      return absl::Status(json.status().code(),
-                          absl::StrCat("recipe ", rule.recipe, ": ", json.status().message()));
+                        ReadJsonText(rule.recipe, "recipe", kMostRulesBytes));
+    const absl::Status read = ParseJsonStrictly(text).status();
+    if (!read.ok()) {
+      return {read.code(), absl::StrCat("recipe ", rule.recipe, ": ", read.message())};
     }
   }
   return absl::OkStatus();
