@@ -112,7 +112,7 @@ def check_wrong_options(programs, options):
     """Told at the start, and not when the first head has come."""
     broken, at = programs.folder / "broken.json", options.index("--recipe") + 1
     broken.write_text('{"format": ')
-    for what, recipe, words in (("a recipe that is a folder", programs.folder, "recipe"), ("a recipe that is no JSON", broken, "broken.json: line 1")):
+    for what, recipe, words in (("a recipe that is a folder", programs.folder, "recipe"), ("a recipe that is no JSON", broken, "broken.json: not valid JSON at line 1")):
         check_refused(what, Bridge(programs, "wrong", [*options[:at], recipe, *options[at + 1:]]).run("run"), words)
     both = Bridge(programs, "wrong", [*options, "--pacs", "localhost:104"]).run("run")
     check("two PACS are refused in one line", both.returncode == 2 and len(both.stderr.splitlines()) == 1, both.stderr)
