@@ -76,8 +76,7 @@ absl::Status CheckRecipes(const std::vector<SeriesRule>& rules) {
   for (const SeriesRule& rule : rules) {
     TF_ASSIGN_OR_RETURN(const std::string text,
                         ReadJsonText(rule.recipe, "recipe", kMostRulesBytes));
-    const absl::Status read = ParseJsonStrictly(text).status();
-    if (!read.ok()) {
+    if (const absl::Status read = ParseJsonStrictly(text).status(); !read.ok()) {
       return {read.code(), absl::StrCat("recipe ", rule.recipe, ": ", read.message())};
     }
   }
