@@ -17,11 +17,11 @@
 namespace tissueform {
 
 PostgresSessionStore::PostgresSessionStore(PostgresPool* pool, UnixClock clock)
-    // Three quarters of the connections: reads and writes of blobs find some, too.
+    // Half of the connections: reads and writes of blobs find some, too.
     : pool_(pool),
       clock_(std::move(clock)),
       jobs_((pool->options().max_connections + 1) / 2),
-      peeks_((pool->options().max_connections + 3) / 4) {}
+      peeks_((pool->options().max_connections + 1) / 2) {}
 
 void PostgresSessionStore::Submit(const std::string& key, PostgresPool::Work work, Twice twice,
                                   StatusCallback done) {
@@ -88,11 +88,31 @@ void PostgresSessionStore::Get(const std::string& id, RecordCallback done) {
       Twice::kIsOnce, std::move(done));
 }
 
+bool PostgresSessionStore::MayPeek() {
+  MutexLock lock(peeks_mutex_);
+  if (!silent_) return true;
+  if (asked_again_ || PostgresPool::Clock::now() < silent_until_) return false;
+  asked_again_ = true;
+  return true;
+}
+
+void PostgresSessionStore::NotePeek(bool answered) {
+  constexpr std::chrono::seconds kPause{1};
+  MutexLock lock(peeks_mutex_);
+  silent_ = !answered;
+  asked_again_ = false;
+  silent_until_ = PostgresPool::Clock::now() + kPause;
+}
+
 void PostgresSessionStore::Peek(const std::string& id, RecordCallback done) {
   constexpr std::chrono::milliseconds kMostPatience{2'000};
   const auto deadline =
       PostgresPool::Clock::now() + std::min(pool_->options().patience, kMostPatience);
   peeks_.Submit(id, [this, id, deadline, done = std::move(done)] {
+    if (!MayPeek()) {
+      done(absl::UnavailableError("the server's database does not answer; try again in a minute"));
+      return;
+    }
     absl::StatusOr<SessionRecord> found;
     const absl::Status status = pool_->Run(
         [&](PostgresTransaction& transaction) {
@@ -100,6 +120,7 @@ void PostgresSessionStore::Peek(const std::string& id, RecordCallback done) {
           return found.status();
         },
         deadline, Twice::kIsOnce);
+    NotePeek(!absl::IsUnavailable(status));
     done(status.ok() ? std::move(found) : status);
   });
 }
