@@ -88,31 +88,11 @@ void PostgresSessionStore::Get(const std::string& id, RecordCallback done) {
       Twice::kIsOnce, std::move(done));
 }
 
-bool PostgresSessionStore::MayPeek() {
-  MutexLock lock(peeks_mutex_);
-  if (!silent_) return true;
-  if (asked_again_ || PostgresPool::Clock::now() < silent_until_) return false;
-  asked_again_ = true;
-  return true;
-}
-
-void PostgresSessionStore::NotePeek(bool answered) {
-  constexpr std::chrono::seconds kPause{1};
-  MutexLock lock(peeks_mutex_);
-  silent_ = !answered;
-  asked_again_ = false;
-  silent_until_ = PostgresPool::Clock::now() + kPause;
-}
-
 void PostgresSessionStore::Peek(const std::string& id, RecordCallback done) {
   constexpr std::chrono::milliseconds kMostPatience{2'000};
   const auto deadline =
       PostgresPool::Clock::now() + std::min(pool_->options().patience, kMostPatience);
   peeks_.Submit(id, [this, id, deadline, done = std::move(done)] {
-    if (!MayPeek()) {
-      done(absl::UnavailableError("the server's database does not answer; try again in a minute"));
-      return;
-    }
     absl::StatusOr<SessionRecord> found;
     const absl::Status status = pool_->Run(
         [&](PostgresTransaction& transaction) {
@@ -120,7 +100,6 @@ void PostgresSessionStore::Peek(const std::string& id, RecordCallback done) {
           return found.status();
         },
         deadline, Twice::kIsOnce);
-    NotePeek(!absl::IsUnavailable(status));
     done(status.ok() ? std::move(found) : status);
   });
 }

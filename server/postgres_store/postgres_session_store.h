@@ -8,9 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "absl/base/thread_annotations.h"
-
-#include "core/base/mutex.h"
 #include "server/postgres_store/ordered_jobs.h"
 #include "server/postgres_store/postgres_pool.h"
 #include "server/store/session_store.h"
@@ -52,15 +49,6 @@ class PostgresSessionStore final : public SessionStore {
 
   PostgresPool* const pool_;
   const UnixClock clock_;
-  // While the database does not answer one peek at a time asks it, a second after the last; who
-  // comes meanwhile hears at once that it does not.
-  bool MayPeek() ABSL_LOCKS_EXCLUDED(peeks_mutex_);
-  void NotePeek(bool answered) ABSL_LOCKS_EXCLUDED(peeks_mutex_);
-
-  Mutex peeks_mutex_;
-  bool silent_ ABSL_GUARDED_BY(peeks_mutex_) = false;
-  bool asked_again_ ABSL_GUARDED_BY(peeks_mutex_) = false;  // somebody does
-  PostgresPool::Clock::time_point silent_until_ ABSL_GUARDED_BY(peeks_mutex_) = {};
   // Last: their jobs use the others.
   OrderedJobs jobs_;
   OrderedJobs peeks_;
