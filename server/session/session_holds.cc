@@ -134,7 +134,7 @@ void SessionHolds::GiveUp(const std::string& id) {
 
 bool SessionHolds::Post(WorkerPool::Job job) {
   MutexLock lock(pool_mutex_);
-  if (!stopped_) pool_->Post(Lane::kStore, std::move(job));
+  if (!stopped_) pool_->Post(Lane::kLeases, std::move(job));
   return !stopped_;
 }
 

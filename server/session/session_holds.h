@@ -82,7 +82,7 @@ class SessionHolds : public std::enable_shared_from_this<SessionHolds> {
   bool shared() const { return shared_; }
 
   // Takes a session whose record is kept, where nobody else holds it: at once where the store is
-  // not shared, else in Lane::kStore. Errors: those of SessionOwnership::Acquire; Unavailable (the
+  // not shared, else in Lane::kLeases. Errors: those of SessionOwnership::Acquire; Unavailable (the
   // server ends, or has begun to hand over).
   void Take(const std::string& id, const TakenCallback& done);
   // The same; blocks.
@@ -92,8 +92,8 @@ class SessionHolds : public std::enable_shared_from_this<SessionHolds> {
   // Whether it may be answered and written under some epoch.
   bool Holds(const std::string& id) const;
 
-  // Ends a hold; `then`, in Lane::kStore or at once, when others may take the session if it was the
-  // last one.
+  // Ends a hold; `then`, in Lane::kLeases or at once, when others may take the session if it was
+  // the last one.
   void GiveBack(SessionHoldPtr hold, const std::function<void()>& then);
 
   // Nothing is taken from now on.

@@ -12,6 +12,7 @@
 
 #include "core/base/error_reason.h"
 #include "server/session/quotas.h"
+#include "server/session/session_refusals.h"
 
 namespace tissueform {
 
@@ -313,6 +314,18 @@ void SessionMakings::FinishRestore(const MakingPtr& making,
   if (result.ok()) observer_(making->id, SessionEvent::kRestored);
   for (const SessionWaiter& waiter : waiters) {
     waiter.done(result);
+  }
+}
+
+void SessionMakings::Lost(const std::string& id) {
+  std::vector<SessionWaiter> waiters;
+  {
+    MutexLock lock(sessions_->mutex);
+    const MakingPtr making = sessions_->table.FindMaking(id);
+    if (making != nullptr && making->restores) waiters = std::exchange(making->waiters, {});
+  }
+  for (const SessionWaiter& waiter : waiters) {
+    waiter.done(SessionMoved(""));
   }
 }
 

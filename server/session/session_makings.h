@@ -40,6 +40,10 @@ class SessionMakings {
       ABSL_LOCKS_EXCLUDED(sessions_->mutex);
   void CancelWait(const SessionWaiter::CancelFlag& cancelled) ABSL_LOCKS_EXCLUDED(sessions_->mutex);
 
+  // This server may not answer the session: who waits for it to be made from its record is told
+  // SESSION_MOVED, and need not wait for a store that may be away.
+  void Lost(const std::string& id) ABSL_LOCKS_EXCLUDED(sessions_->mutex);
+
   // See SessionRegistry.
   void set_most_of_owner(int most) { most_of_owner_ = most; }
 

@@ -34,11 +34,16 @@ void SessionRegistry::HandOver(std::chrono::steady_clock::time_point deadline) {
   holds_->StopTaking();
   for (const std::string& id : holds_->Held()) {
     holds_->GiveUp(id);
-    endings_.Lost(id);
+    Lost(id);
     commits_.WaitFor(id, deadline);
     // A commit that is still under way is refused once another server has the session.
     if (std::chrono::steady_clock::now() < deadline) holds_->Release(id);
   }
+}
+
+void SessionRegistry::Lost(const std::string& id) {
+  endings_.Lost(id);
+  if (!holds_->Holds(id)) makings_.Lost(id);
 }
 
 void SessionRegistry::WhenKnown(const std::string& id, Ask ask, const std::function<void()>& then,

@@ -94,7 +94,8 @@ class SessionRegistry {
 
   // This server does not hold the session any longer: it leaves memory, and what streams and
   // watches there are of it are told (Event::kMoved). Nothing where it has been taken anew since.
-  void Lost(const std::string& id) { endings_.Lost(id); }
+  // Who waits for it to be made from its record hears so, too.
+  void Lost(const std::string& id);
 
   // The end of a server whose store is shared: takes no session any more, and gives those that it
   // holds to others, one after the other: its streams and watches end (Event::kMoved), commits

@@ -17,7 +17,7 @@ namespace {
 // is a factor of 1.25 in shares of a processor, and a thread of a higher share that wakes up takes
 // the processor at once. The last lane keeps a ninth of one beside frames that never end, so that
 // preparations end, and with them the locks that they hold for a moment.
-constexpr std::array<int, kNumLanes> kNiceness = {0, 2, 5, 5, 10};
+constexpr std::array<int, kNumLanes> kNiceness = {0, 2, 5, 5, 5, 10};
 
 // Only ever downwards, which needs no privilege. Where the system refuses it all lanes are equal.
 void BecomeNicer(int steps) {

@@ -24,10 +24,11 @@ enum class Lane {
   kFrames,      // products of prepared answers: below a millisecond, somebody looks at it
   kSolves,      // one back-substitution, and what ends sessions
   kIterations,  // answers of many solves
-  kStore,       // waits for the disk
+  kLeases,      // takes sessions and gives them back: waits for the store for 2 s, not as kStore may
+  kStore,       // waits for the store: a disk, or a database that may be away for half a minute
   kBatch,       // factorisations, checks of meshes: seconds
 };
-inline constexpr size_t kNumLanes = 5;
+inline constexpr size_t kNumLanes = 6;
 
 // The threads that do all numerical work. Jobs of a lane start in the order of posting.
 //

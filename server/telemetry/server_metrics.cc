@@ -20,7 +20,7 @@ constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 // In the order of Lane.
 constexpr std::array<const char*, kNumLanes> kLaneNames = {"frames", "solves", "iterations",
-                                                           "store", "batch"};
+                                                           "leases", "store",  "batch"};
 
 template <typename Number>
 MetricsPage::Read ReadNumber(const std::atomic<Number>& number) {

@@ -3,6 +3,8 @@
 //
 // Two servers with one store (server/session/session_registry.h).
 
+#include <atomic>
+#include <chrono>
 #include <future>
 #include <memory>
 #include <random>
@@ -165,6 +167,37 @@ TEST_F(HeldSessionsTest, ASessionThatIsLostWhileItIsMadeIsNotGivenOut) {
   EXPECT_EQ(b_.registry.size(), 0);
   b_.ownership.set_acquired(nullptr);
   EXPECT_THAT(b_.Open("s"), IsOk());
+}
+
+// As uploads may for half a minute while the database is away.
+TEST_F(HeldSessionsTest, WhoMayNotHaveASessionHearsSoThoughAllWorkersWaitForTheStore) {
+  ASSERT_THAT(a_.Create("s"), IsOk());
+  const std::promise<void> store = b_.HoldUp(Lane::kStore);
+  const absl::Status refused = b_.Open("s").status();
+  EXPECT_TRUE(IsMoved(refused)) << refused;
+  EXPECT_EQ(NodeIn(refused), "a");
+}
+
+TEST_F(HeldSessionsTest, WhoWaitsForASessionThatIsLostMeanwhileDoesNotWaitForTheStore) {
+  ASSERT_THAT(a_.Create("s"), IsOk());
+  ASSERT_EQ(a_.EvictAll(), 1);
+  a_.Settle();
+  std::promise<void> store = a_.HoldUp(Lane::kStore);
+  std::promise<absl::Status> opened;
+  a_.registry.Open("s", std::make_shared<std::atomic<bool>>(),
+                   [&opened](const Node::Opened& session) { opened.set_value(session.status()); });
+  while (!a_.ownership.EpochOf("s").has_value()) std::this_thread::yield();
+  a_.registry.Lost("s");
+  std::future<absl::Status> answer = opened.get_future();
+  EXPECT_EQ(answer.wait_for(std::chrono::seconds(0)), std::future_status::timeout) << "it is held";
+  shared_.Wait(kPastTheLease);
+  for (const std::string& id : a_.ownership.TakeEnded()) a_.registry.Lost(id);
+  const absl::Status refused = answer.get();
+  EXPECT_TRUE(IsMoved(refused)) << refused;
+  ASSERT_THAT(b_.Open("s"), IsOk()) << "and elsewhere it is found";
+  store.set_value();
+  a_.Settle();
+  EXPECT_EQ(a_.registry.size(), 0) << "what nobody waits for is not kept";
 }
 
 TEST_F(HeldSessionsTest, AnEvictedSessionIsOthersUnlessSomebodyHasIt) {

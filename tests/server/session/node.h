@@ -80,11 +80,18 @@ class Node {
   }
   // Until workers have let go of what they have answered with, and what was given back by that is.
   void Settle() {
-    for (const Lane lane : {Lane::kSolves, Lane::kBatch, Lane::kStore, Lane::kStore}) {
+    for (const Lane lane :
+         {Lane::kSolves, Lane::kBatch, Lane::kStore, Lane::kLeases, Lane::kStore, Lane::kLeases}) {
       std::promise<void> done;
       pool_->Post(lane, [&done] { done.set_value(); });
       done.get_future().wait();
     }
+  }
+  // The worker of this lane waits until the promise is kept, or gone.
+  std::promise<void> HoldUp(Lane lane) {
+    std::promise<void> go;
+    pool_->Post(lane, [gone = go.get_future().share()] { gone.wait(); });
+    return go;
   }
   // How often this session was told to have moved.
   int CountMoved(const std::string& id) {
