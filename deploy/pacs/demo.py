@@ -115,6 +115,12 @@ def run(programs, web):
     captured(programs, verified(programs, study))
 
 
+def end_once(*_):
+    """For SIGTERM, which timeout(1) sends twice: the second one must not end the ending."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    sys.exit(128 + signal.SIGTERM)
+
+
 def main():
     parser = argparse.ArgumentParser(prog="deploy/pacs/demo.sh", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--programs", required=True, help=argparse.SUPPRESS)
@@ -126,7 +132,7 @@ def main():
     if missing:
         sys.exit(f"missing: {', '.join(missing)}; deploy/install_packages.sh build installs them")
     # Whoever ends this ends what it has started: also by SIGTERM, and where a shell has it pass over Ctrl-C.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    signal.signal(signal.SIGTERM, end_once)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     folder = words.folder or tempfile.mkdtemp(prefix="tissueform-pacs-")
     with stack.Stack(pathlib.Path(words.programs).resolve(), pathlib.Path(folder).resolve(), HERE / "recipe.json") as programs:

@@ -209,6 +209,12 @@ def report(ledger, load, run):
     print(f"violations: {len(ledger.violations)}")
 
 
+def end_once(*_):
+    """For SIGTERM, which timeout(1) sends twice: the second one must not end the ending."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    sys.exit(128 + signal.SIGTERM)
+
+
 def main():
     options = parse()
     missing = arena_module.missing_programs()
@@ -219,7 +225,7 @@ def main():
         sys.exit(SKIPPED)
     seed = options.seed if options.seed is not None else random.SystemRandom().randrange(10**6)
     # Whoever ends this ends what it has started.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    signal.signal(signal.SIGTERM, end_once)
     sys.exit(chaos(options, seed))
 
 
