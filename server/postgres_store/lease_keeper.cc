@@ -11,6 +11,13 @@
 #include "server/postgres_store/postgres_errors.h"
 
 namespace tissueform {
+namespace {
+
+bool IsAsBefore(const SessionLease& lease) {
+  return lease.answers_until == SessionLease::kAsBefore;
+}
+
+}  // namespace
 
 LeaseKeeper::LeaseKeeper(SessionLeases* leases, Options options, LostCallback lost)
     : leases_(leases), options_(std::move(options)), lost_(std::move(lost)) {}
@@ -74,9 +81,10 @@ std::optional<int64_t> LeaseKeeper::EpochOf(const std::string& session) {
   return held_.EpochOf(session, options_.clock());
 }
 
-absl::Status LeaseKeeper::Renew() {
+absl::StatusOr<std::chrono::milliseconds> LeaseKeeper::Renew() {
   std::vector<SessionLease> lost;
   absl::Status status;
+  std::chrono::milliseconds next = options_.renew_every;
   {
     MutexLock calls(calls_);
     const absl::StatusOr<std::vector<SessionLease>> renewed = leases_->Renew();
@@ -86,9 +94,13 @@ absl::Status LeaseKeeper::Renew() {
     for (const SessionLease& stray : strays) {
       status.Update(leases_->Release(stray.session, stray.epoch));
     }
+    if (renewed.ok() && std::any_of(renewed->begin(), renewed->end(), IsAsBefore)) {
+      next = std::min(next, options_.again);
+    }
   }
   TellLost(lost);
-  return status;
+  TF_RETURN_IF_ERROR(status);
+  return next;
 }
 
 void LeaseKeeper::TellLost(const std::vector<SessionLease>& lost) {
@@ -107,7 +119,7 @@ void LeaseKeeper::Loop() {
       if (ending_) return;
     }
     // Why not, the next call of somebody says; what runs out is told in any case.
-    pause = Renew().ok() ? options_.renew_every : std::min(options_.renew_every, options_.silence);
+    pause = Renew().value_or(std::min(options_.renew_every, options_.silence));
   }
 }
 

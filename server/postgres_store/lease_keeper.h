@@ -31,6 +31,9 @@ class LeaseKeeper {
     // renewals: it is answered as that was. After so long renewing is tried again. A row that
     // others have locked is an answer.
     std::chrono::milliseconds silence{1'000};
+    // After a renewal that has passed over a row that somebody wrote: its lease should not be
+    // shorter than the others' by a whole round.
+    std::chrono::milliseconds again{200};
     SteadyNow clock = AwakeOrNotNow;
   };
   // A session is held no longer: its streams end (SESSION_MOVED), its memory is free. Called once
@@ -62,9 +65,9 @@ class LeaseKeeper {
 
   int CountHeld() { return static_cast<int>(held_.Sessions().size()); }
 
-  // What the thread does every `renew_every`. Errors: why nothing was renewed; what ran out
-  // meanwhile is lost all the same.
-  absl::Status Renew();
+  // What the thread does, and after how long it does so again. Errors: why nothing was renewed;
+  // what ran out meanwhile is lost all the same.
+  absl::StatusOr<std::chrono::milliseconds> Renew();
 
  private:
   void Loop();

@@ -67,49 +67,61 @@ void SessionEndings::DeleteHeld(const std::string& id, const SessionHoldPtr& hol
   } else if (known->session == nullptr) {
     Forget(id, hold, done);
   } else {
-    End(known->session, hold, done);
+    End(known->session, [this, id, hold, done] { Forget(id, hold, done); });
   }
 }
 
 void SessionEndings::EndUnwanted(const std::shared_ptr<Session>& session) {
-  End(session, session->hold(), WarnIfLeftBehind);
+  const SessionHoldPtr hold = session->hold();
+  // Also where this server could not have its lease, or has it no longer: the database may just be
+  // there again, and whoever has asked for the session may have made and deleted it elsewhere
+  // meanwhile. Of one that another server has taken since the store keeps the record.
+  End(session, [this, id = session->id(), hold] { Erase(id, hold, WarnIfLeftBehind); });
 }
 
-void SessionEndings::End(const std::shared_ptr<Session>& session, const SessionHoldPtr& hold,
-                         const StatusCallback& done) {
-  session->strand().Post(Lane::kSolves, [this, session, hold, done] {
+void SessionEndings::End(const std::shared_ptr<Session>& session,
+                         const std::function<void()>& then) {
+  session->strand().Post(Lane::kSolves, [session, then] {
     session->Close(Session::CloseReason::kDeleted);
     // What is being made for it holds memory until that ends.
-    const auto forget = [this, id = session->id(), hold, done] { Forget(id, hold, done); };
     if (session->making()) {
-      session->making_strand().Post(Lane::kBatch, forget);
+      session->making_strand().Post(Lane::kBatch, then);
     } else {
-      forget();
+      then();
     }
   });
 }
 
 void SessionEndings::Forget(const std::string& id, const SessionHoldPtr& hold,
                             const StatusCallback& done) {
-  const auto forgotten = [this, id, hold, done](const absl::Status& outcome) {
-    const absl::Status status = hold == nullptr ? outcome : MovedIfFenced(outcome);
-    // Only now: who comes to watch after it shall not find the record any longer. One of a store
-    // that is shared, whose record is still there, is found by whoever asks for it next.
-    const bool is_kept = hold != nullptr && !status.ok() && !absl::IsNotFound(status);
-    observer_(id, is_kept ? SessionEvent::kMoved : SessionEvent::kDeleted);
-    // Before its id is free: the lease of this one says nothing of the next.
-    if (hold != nullptr && !is_kept) holds_->Forget(id);
-    {
-      MutexLock lock(sessions_->mutex);
-      sessions_->table.Ended(id);
-    }
-    done(status);
-  };
-  if (const absl::Status held = CheckHold(hold); !held.ok()) {
-    forgotten(held);
+  if (const absl::Status held = CheckHold(hold); held.ok()) {
+    Erase(id, hold, done);
   } else {
-    store_->Delete(id, "", EpochUnder(hold), forgotten);
+    Erased(id, hold, held, done);
   }
+}
+
+void SessionEndings::Erase(const std::string& id, const SessionHoldPtr& hold,
+                           const StatusCallback& done) {
+  store_->Delete(id, "", EpochUnder(hold), [this, id, hold, done](const absl::Status& outcome) {
+    Erased(id, hold, outcome, done);
+  });
+}
+
+void SessionEndings::Erased(const std::string& id, const SessionHoldPtr& hold,
+                            const absl::Status& outcome, const StatusCallback& done) {
+  const absl::Status status = hold == nullptr ? outcome : MovedIfFenced(outcome);
+  // Only now: who comes to watch after it shall not find the record any longer. One of a store
+  // that is shared, whose record is still there, is found by whoever asks for it next.
+  const bool is_kept = hold != nullptr && !status.ok() && !absl::IsNotFound(status);
+  observer_(id, is_kept ? SessionEvent::kMoved : SessionEvent::kDeleted);
+  // Before its id is free: the lease of this one says nothing of the next.
+  if (hold != nullptr && !is_kept) holds_->Forget(id);
+  {
+    MutexLock lock(sessions_->mutex);
+    sessions_->table.Ended(id);
+  }
+  done(status);
 }
 
 void SessionEndings::Lost(const std::string& id) {

@@ -73,10 +73,14 @@ class SessionEndings {
 
   void DeleteHeld(const std::string& id, const SessionHoldPtr& hold, const StatusCallback& done)
       ABSL_LOCKS_EXCLUDED(sessions_->mutex);
-  void End(const std::shared_ptr<Session>& session, const SessionHoldPtr& hold,
-           const StatusCallback& done);
+  // Frees its memory, which may have to wait; then the rest.
+  void End(const std::shared_ptr<Session>& session, const std::function<void()>& then);
   // Takes the record of a session that has ended out of the store; then its id is free again.
+  // Forget, where this server still holds it; Erase, where no other server has taken it since.
   void Forget(const std::string& id, const SessionHoldPtr& hold, const StatusCallback& done);
+  void Erase(const std::string& id, const SessionHoldPtr& hold, const StatusCallback& done);
+  void Erased(const std::string& id, const SessionHoldPtr& hold, const absl::Status& outcome,
+              const StatusCallback& done);
   // What nobody used since then, of these; of a store that is shared what can be taken.
   std::vector<Removed> TakeUnused(
       const std::vector<std::string>& ids,

@@ -50,11 +50,11 @@ absl::StatusOr<SessionHoldPtr> SessionHolds::TakeAndWait(const std::string& id) 
   return hold;
 }
 
-SessionHoldPtr SessionHolds::NotHeld(const std::string& id) {
+SessionHoldPtr SessionHolds::NotHeld(const std::string& id, int64_t epoch) {
   auto state = std::make_shared<State>();
   state->given_up = true;
   state->holds = 1;
-  return std::make_shared<const SessionHold>(shared_from_this(), std::move(state), id, kSoleEpoch);
+  return std::make_shared<const SessionHold>(shared_from_this(), std::move(state), id, epoch);
 }
 
 bool SessionHolds::Holds(const std::string& id) const {

@@ -87,8 +87,9 @@ class SessionHolds : public std::enable_shared_from_this<SessionHolds> {
   void Take(const std::string& id, const TakenCallback& done);
   // The same; blocks.
   absl::StatusOr<SessionHoldPtr> TakeAndWait(const std::string& id);
-  // Of a session that is not held, though its record is kept: Check says so. REQUIRES: shared.
-  SessionHoldPtr NotHeld(const std::string& id);
+  // Of a session that is not held, though its record is kept since this epoch: Check says so.
+  // REQUIRES: shared.
+  SessionHoldPtr NotHeld(const std::string& id, int64_t epoch);
   // Whether it may be answered and written under some epoch.
   bool Holds(const std::string& id) const;
 

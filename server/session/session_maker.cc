@@ -56,7 +56,7 @@ void SessionMaker::Create(SessionRecord record, std::shared_ptr<const StoredMesh
                    [this, session = std::move(made->session),
                     done = std::move(done)](const absl::StatusOr<SessionRecord>& stored) mutable {
                      if (stored.ok()) {
-                       TakeNew(std::move(session), done);
+                       TakeNew(std::move(session), stored->epoch, done);
                      } else {
                        // Its memory is free before anybody hears of the failure and tries again.
                        session.reset();
@@ -67,13 +67,13 @@ void SessionMaker::Create(SessionRecord record, std::shared_ptr<const StoredMesh
   Make(std::move(record), std::move(mesh), std::move(caller), std::move(keep));
 }
 
-void SessionMaker::TakeNew(std::shared_ptr<Session> session, const Callback& done) {
+void SessionMaker::TakeNew(std::shared_ptr<Session> session, int64_t epoch, const Callback& done) {
   const std::string id = session->id();
-  holds_->Take(id,
-               [this, id, session = std::move(session), done](absl::StatusOr<SessionHoldPtr> hold) {
-                 session->SetHold(hold.ok() ? *std::move(hold) : holds_->NotHeld(id));
-                 done(session);
-               });
+  holds_->Take(id, [this, id, epoch, session = std::move(session),
+                    done](absl::StatusOr<SessionHoldPtr> hold) {
+    session->SetHold(hold.ok() ? *std::move(hold) : holds_->NotHeld(id, epoch));
+    done(session);
+  });
 }
 
 void SessionMaker::Restore(const std::string& id, SessionCaller caller, Callback done) {

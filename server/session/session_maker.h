@@ -83,7 +83,7 @@ class SessionMaker {
 
  private:
   // A session whose record has just been kept.
-  void TakeNew(std::shared_ptr<Session> session, const Callback& done);
+  void TakeNew(std::shared_ptr<Session> session, int64_t epoch, const Callback& done);
   void Read(const std::string& id, Change change, SessionCaller caller, MadeCallback done);
   // `done` with sessions that have this hold; where there is none it is given back before.
   MadeCallback WithHold(SessionHoldPtr hold, MadeCallback done);

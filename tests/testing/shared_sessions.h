@@ -83,12 +83,15 @@ class FakeOwnership final : public SessionOwnership {
   bool is_shared() const override { return true; }
 
   absl::StatusOr<int64_t> Acquire(const std::string& id) override {
-    const absl::StatusOr<int64_t> epoch = TakeLease(id);
     std::function<void()> acquired;
+    bool is_silent = false;
     {
       MutexLock lock(shared_.mutex_);
       acquired = acquired_;
+      is_silent = is_silent_;
     }
+    const absl::StatusOr<int64_t> epoch =
+        is_silent ? absl::UnavailableError("the store does not answer") : TakeLease(id);
     if (acquired) acquired();
     return epoch;
   }
@@ -160,6 +163,11 @@ class FakeOwnership final : public SessionOwnership {
     MutexLock lock(shared_.mutex_);
     stopped_ = stopped;
   }
+  // Nothing can be acquired.
+  void set_silent(bool silent) {
+    MutexLock lock(shared_.mutex_);
+    is_silent_ = silent;
+  }
   // Called at the end of each Acquire, without a lock.
   void set_acquired(std::function<void()> acquired) {
     MutexLock lock(shared_.mutex_);
@@ -207,6 +215,7 @@ class FakeOwnership final : public SessionOwnership {
   std::function<void()> ended_;
   int answers_left_ = -1;  // without end
   bool stopped_ = false;
+  bool is_silent_ = false;
   int releases_ = 0;
 };
 

@@ -150,6 +150,42 @@ TEST_F(LeaseKeeperTest, WhileTheStoreIsSilentNobodyWaitsForItAgain) {
   EXPECT_THAT(keeper.Acquire("u"), StatusIs(absl::StatusCode::kNotFound)) << "it answers again";
 }
 
+TEST_F(LeaseKeeperTest, WhatWasPassedOverIsRenewedSoon) {
+  class Writing final : public SessionLeases {
+   public:
+    explicit Writing(SessionLeases* leases) : leases_(*leases) {}
+    absl::StatusOr<LeaseAnswer> Acquire(const std::string& session) override {
+      return leases_.Acquire(session);
+    }
+    absl::StatusOr<std::vector<SessionLease>> Renew() override {
+      if (written.empty()) return leases_.Renew();
+      return std::vector<SessionLease>{{.session = written, .epoch = 3}};
+    }
+    absl::Status Release(const std::string& session, int64_t epoch) override {
+      return leases_.Release(session, epoch);
+    }
+
+    std::string written;  // at this moment
+
+   private:
+    SessionLeases& leases_;
+  } leases(&leases_);
+  const LeaseKeeper::Options options = {.clock = [this] { return store_.now; }};
+  LeaseKeeper keeper(&leases, options, [](const SessionLease&) {});
+  ASSERT_THAT(keeper.Acquire("s"), IsOk());
+  store_.now += seconds(3);
+  EXPECT_EQ(keeper.Renew().value(), options.renew_every);
+  store_.now += seconds(3);
+  leases.written = "s";
+  EXPECT_EQ(keeper.Renew().value(), options.again);
+  store_.now += seconds(5);
+  EXPECT_EQ(keeper.EpochOf("s"), 3) << "the lease from before";
+  leases.written.clear();
+  EXPECT_EQ(keeper.Renew().value(), options.renew_every);
+  store_.now += seconds(8);
+  EXPECT_EQ(keeper.EpochOf("s"), 3);
+}
+
 TEST_F(LeaseKeeperTest, WhatIsReleasedIsAnothersAtOnce) {
   ASSERT_THAT(keeper_.Acquire("s"), IsOk());
   ASSERT_THAT(keeper_.Acquire("t"), IsOk());

@@ -131,7 +131,7 @@ std::string LeaseServers::TakeOne(const LeaseStep& step) {
 
 std::string LeaseServers::Renew(size_t server) {
   const auto asked = world_->Now();
-  const absl::Status status = keepers_[server]->Renew();
+  const absl::Status status = keepers_[server]->Renew().status();
   if (until_[server].has_value()) {
     until_[server] = asked + LeaseOptions().duration - LeaseOptions().margin;
   }

@@ -200,6 +200,31 @@ TEST_F(HeldSessionsTest, WhoWaitsForASessionThatIsLostMeanwhileDoesNotWaitForThe
   EXPECT_EQ(a_.registry.size(), 0) << "what nobody waits for is not kept";
 }
 
+// As when the database comes back: whoever asked may have made it elsewhere, and deleted it again.
+TEST_F(HeldSessionsTest, WhatIsMadeForNobodyIsTakenBackThoughItsLeaseIsNotToBeHad) {
+  a_.ownership.set_silent(true);
+  a_.ownership.set_acquired([this] { a_.Cancel(); });
+  EXPECT_THAT(a_.Create("s"), StatusIs(absl::StatusCode::kCancelled));
+  a_.Settle();
+  a_.Settle();
+  EXPECT_FALSE(shared_.Find("s").has_value());
+  EXPECT_THAT(b_.Open("s"), StatusIs(absl::StatusCode::kNotFound));
+}
+
+TEST_F(HeldSessionsTest, WhatIsMadeForNobodyStaysWhereAnotherServerHasTakenIt) {
+  a_.ownership.set_silent(true);
+  a_.ownership.set_acquired([this] {
+    EXPECT_THAT(b_.Open("s"), IsOk());
+    a_.Cancel();
+  });
+  EXPECT_THAT(a_.Create("s"), StatusIs(absl::StatusCode::kCancelled));
+  a_.Settle();
+  a_.Settle();
+  EXPECT_THAT(b_.Open("s"), IsOk());
+  EXPECT_THAT(b_.Look("s"), IsOk());
+  EXPECT_EQ(shared_.stale_writes(), 0);
+}
+
 TEST_F(HeldSessionsTest, AnEvictedSessionIsOthersUnlessSomebodyHasIt) {
   for (const bool is_dragged : {false, true}) {
     SCOPED_TRACE(is_dragged);

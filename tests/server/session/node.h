@@ -49,6 +49,8 @@ class Node {
     record.request_id = request_id;
     return Wait<Opened>([&](const auto& done) { registry.Create(record, bar_, flag_, done); });
   }
+  // Whoever waits for an answer does so no longer.
+  void Cancel() { registry.CancelWait(flag_); }
   Opened Open(const std::string& id) {
     return Wait<Opened>([&](const auto& done) { registry.Open(id, flag_, done); });
   }
