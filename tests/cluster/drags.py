@@ -97,7 +97,8 @@ class Stream:
         self.node, self.started = "", False
         self.first_frame_at = None
         self.sent_at = {}
-        self.outgoing = queue.SimpleQueue()
+        # No SimpleQueue: in Python 3.11 its get waits without end where the time is over just as it looks for an item again.
+        self.outgoing = queue.Queue()
         self.over = threading.Event()
         self.heard_at = time.monotonic()
         self.begun_at = self.heard_at
