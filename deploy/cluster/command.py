@@ -127,7 +127,7 @@ def status(cluster):
 def main():
     options = parse(sys.argv[1:])
     folder = pathlib.Path(options.state)
-    folder.parent.mkdir(parents=True, exist_ok=True)
+    stack.make_folder(folder.parent, "--state")
     # One command at a time.
     lock = os.open(folder.parent, os.O_RDONLY)
     fcntl.flock(lock, fcntl.LOCK_EX)

@@ -16,6 +16,7 @@ import database
 import processes
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))
+from folders import make_folder
 from free_ports import free_ports
 
 DATABASE, HAPROXY = "postgresql", "haproxy"
@@ -100,7 +101,7 @@ class Cluster:
 
     def make(self, **settings):
         """The folder, the ports and the files of the database."""
-        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        make_folder(self.folder, "--state", mode=0o700)
         self.folder.chmod(0o700)
         self.state = {"settings": SETTINGS | settings, "processes": {}, "ports": {}}
         listening = [*self.names, *self.places[len(self.nodes):], "workstations", "browsers"]

@@ -21,6 +21,7 @@ import time
 
 import head_series
 import stack
+from folders import make_folder
 
 HERE = pathlib.Path(__file__).resolve().parent
 
@@ -134,8 +135,9 @@ def main():
     # Whoever ends this ends what it has started: also by SIGTERM, and where a shell has it pass over Ctrl-C.
     signal.signal(signal.SIGTERM, end_once)
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    folder = words.folder or tempfile.mkdtemp(prefix="tissueform-pacs-")
-    with stack.Stack(pathlib.Path(words.programs).resolve(), pathlib.Path(folder).resolve(), HERE / "recipe.json") as programs:
+    folder = pathlib.Path(words.folder or tempfile.mkdtemp(prefix="tissueform-pacs-"))
+    make_folder(folder, "--folder")
+    with stack.Stack(pathlib.Path(words.programs).resolve(), folder.resolve(), HERE / "recipe.json") as programs:
         run(programs, pathlib.Path(words.web).resolve())
         print(f"everything lies in {folder}; delete it when you have looked")
         if not words.serve:
