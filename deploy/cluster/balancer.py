@@ -9,10 +9,10 @@ import socket
 import time
 
 import processes
-import stack
 
+NAME = "haproxy"
 PATIENCE_S = 60
-CONFIGURATION = stack.ROOT / "deploy/haproxy/cluster.cfg"
+CONFIGURATION = processes.ROOT / "deploy/haproxy/cluster.cfg"
 LONGEST_SOCKET = 107
 
 
@@ -34,7 +34,7 @@ def environment(cluster):
 
 
 def start(cluster):
-    return processes.start([shutil.which("haproxy", path=stack.SYSTEM_PATH), "-db", "-f", CONFIGURATION], cluster.log(stack.HAPROXY),
+    return processes.start([shutil.which("haproxy", path=processes.SYSTEM_PATH), "-db", "-f", CONFIGURATION], cluster.log(NAME),
                            environment=environment(cluster))
 
 
@@ -72,4 +72,4 @@ def wait_until_routing(cluster, patience_s=PATIENCE_S, needed=None):
         if len(up) >= (len(wanted) if needed is None else needed):
             return
         time.sleep(0.05)
-    raise SystemExit(f"HAProxy does not find all servers: {view(cluster)}; see {cluster.log(stack.HAPROXY)}")
+    raise SystemExit(f"HAProxy does not find all servers: {view(cluster)}; see {cluster.log(NAME)}")

@@ -14,6 +14,8 @@ import subprocess
 import time
 
 HOST = "127.0.0.1"
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+SYSTEM_PATH = "/usr/sbin:/usr/bin:/sbin:/bin:/usr/local/bin"
 PATIENCE_S = 60
 
 

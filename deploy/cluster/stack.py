@@ -12,6 +12,7 @@ import shutil
 import signal
 import sys
 
+import balancer
 import database
 import processes
 
@@ -19,9 +20,8 @@ sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))
 from folders import make_folder
 from free_ports import free_ports
 
-DATABASE, HAPROXY = "postgresql", "haproxy"
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-SYSTEM_PATH = "/usr/sbin:/usr/bin:/sbin:/bin:/usr/local/bin"
+DATABASE, HAPROXY = "postgresql", balancer.NAME
+ROOT = processes.ROOT
 # Servers that there may be. HAProxy and the gateways know them all from the start, so that one is added by being started. As many
 # as a database of PostgreSQL's default of 100 connections takes.
 MOST_NODES = 5
@@ -31,7 +31,7 @@ SETTINGS = {"nodes": 3, "gateways": 2, "cpus": [], "server_options": [], "server
 def missing_programs():
     """Lines, one for each program of others that is not installed: what it is and its package."""
     lines = []
-    if shutil.which("haproxy", path=SYSTEM_PATH) is None:
+    if shutil.which("haproxy", path=processes.SYSTEM_PATH) is None:
         lines.append("haproxy is missing; install it: apt-get install haproxy")
     if database.program("initdb") is None or shutil.which("psql") is None:
         lines.append("PostgreSQL is missing; install it: apt-get install postgresql")
@@ -151,7 +151,6 @@ class Cluster:
         if name == DATABASE:
             process = self._start_database()
         elif name == HAPROXY:
-            import balancer
             process = balancer.start(self)
         elif name in self.nodes:
             process = processes.start(self.server_command(name), self.log(name), cpus=self.cpus_of(name),
@@ -182,7 +181,6 @@ class Cluster:
             self.start(name)
         for name in (*self.nodes, *self.gateways):
             self.wait_until_ready(name)
-        import balancer
         balancer.wait_until_routing(self)
 
     def add(self):
@@ -191,7 +189,6 @@ class Cluster:
         name = self.nodes[-1]
         self.start(name)
         self.wait_until_ready(name)
-        import balancer
         balancer.wait_until_routing(self)
         return name
 

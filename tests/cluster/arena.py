@@ -78,7 +78,7 @@ class Arena:
         file = self.cluster.folder / f"link_{node}.cfg"
         file.write_text(f"defaults\n  mode tcp\n  timeout connect 5s\n  timeout client 1h\n  timeout server 1h\nlisten {node}\n"
                         f"  bind {processes.HOST}:{port}\n  server database {self.cluster.address(stack.DATABASE)}\n")
-        self.links[node] = processes.start([shutil.which("haproxy", path=stack.SYSTEM_PATH), "-db", "-f", file], self.cluster.log(f"link_{node}"))
+        self.links[node] = processes.start([shutil.which("haproxy", path=processes.SYSTEM_PATH), "-db", "-f", file], self.cluster.log(f"link_{node}"))
 
     def down(self):
         if self.twin is not None:

@@ -8,10 +8,11 @@
 Errors: an edge between folders that the table does not allow; a library outside its fence or unknown; an
 include that is relative, not written from the repository root, in angle brackets although it is ours, of
 a .cc file or of a file that does not exist; a folder that the table does not name; a folder of the table that
-does not exist; a circle among folders or files. Exit code 0 when there is none, 1 otherwise, 2 for wrong use.
+does not exist; a circle among folders, files or Python scripts (imports inside functions count, too). Exit code 0 when there is none, 1 otherwise, 2 for wrong use.
 """
 
 import argparse
+import ast
 import fnmatch
 import graphlib
 import pathlib
@@ -21,6 +22,7 @@ import tomllib
 
 OUR_FOLDERS = ("core", "proto", "server", "client", "tests")
 SOURCE_SUFFIXES = (".h", ".cc")
+SCRIPT_FOLDERS = (".ci", "cmake", "client", "core", "deploy", "server", "tests")
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
 # C headers that come with the C++ standard library; everything else of it has neither slash nor dot.
 C_STANDARD_HEADERS = {"stdint.h", "stddef.h", "string.h", "stdlib.h", "stdio.h", "math.h", "errno.h"}
@@ -110,6 +112,27 @@ def cycle_error(graph, what):
     return []
 
 
+def modules_imported_by(path):
+    """Names of all modules that a script imports, wherever in it."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module
+
+
+def script_graph(root):
+    """Which of our scripts imports which. A name means the script in the same folder, otherwise every script of that name."""
+    scripts = [p for top in SCRIPT_FOLDERS for p in (root / top).rglob("*.py") if "node_modules" not in p.parts]
+    graph = {}
+    for path in scripts:
+        for module in set(modules_imported_by(path)):
+            named = [p for p in scripts if p.stem == module]
+            beside = [p for p in named if p.parent == path.parent]
+            graph.setdefault(path.relative_to(root).as_posix(), set()).update(p.relative_to(root).as_posix() for p in beside or named)
+    return graph
+
+
 def check(root, table):
     """All errors of the tree, in order."""
     errors, file_graph, folder_graph, folders = [], {}, {}, set()
@@ -130,7 +153,7 @@ def check(root, table):
     errors += [f"{f}: the table does not name this folder" for f in sorted(folders) if table.name_of(f) is None]
     errors += [f"{f}: the table names a folder that has no source file"
                for f in table.folders if not f.endswith("/*") and f not in folders]
-    return errors + cycle_error(file_graph, "files") + cycle_error(folder_graph, "folders")
+    return errors + cycle_error(file_graph, "files") + cycle_error(folder_graph, "folders") + cycle_error(script_graph(root), "scripts")
 
 
 def main():

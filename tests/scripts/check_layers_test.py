@@ -104,6 +104,12 @@ class CheckLayersTest(unittest.TestCase):
         self.assert_one_error({"core/base/a.h": '#include "core/base/b.h"\n', "core/base/b.h": '#include "core/base/a.h"\n'},
                               "circle among files")
 
+    def test_refuses_a_circle_of_scripts(self):
+        self.assert_one_error({"deploy/a/one.py": "import two\n", "deploy/a/two.py": "def f():\n    from one import g\n"}, "circle among scripts")
+
+    def test_tells_scripts_of_one_name_apart(self):
+        self.assertEqual(self.errors({"deploy/a/one.py": "import two\n", "deploy/a/two.py": "", "tests/b/one.py": "", "tests/b/two.py": "import one, json\n"}), [])
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -7,7 +7,8 @@
 
 Every source file begins with the two lines of copyright and licence (after a #! line); headers have `#pragma once`;
 no file holds a mark of unfinished work, a tab, a blank at the end of a line or more than 600 lines; processes are made
-in core/process only (tests may make their own).
+in core/process only (tests may make their own). No two headers define a type of the same name in one namespace:
+a program that links both would break the one-definition rule.
 """
 
 import pathlib
@@ -22,6 +23,9 @@ MAX_LINES = 600
 COPYRIGHT = re.compile(r"(//|#) Copyright 20\d\d The Tissueform Authors\.")
 LICENCE = re.compile(r"(//|#) SPDX-License-Identifier: AGPL-3\.0-or-later")
 MAKES_PROCESS = re.compile(r"(?<![\w.>])(v?fork|popen|posix_spawnp?|setitimer)\(|(?<![\w.>])system\([^)]")
+NAMESPACE = re.compile(r"namespace ([\w:]+) \{")
+# A definition at the start of a line, as clang-format lays it out; a mere declaration ends with the name.
+TYPE = re.compile(r"(?:class|struct|union|enum(?: class)?) (?:[A-Z][A-Z_]+(?:\([^)]*\))? )?(\w+)\b(?![^{]*;$)|using (\w+) =")
 UNFINISHED = re.compile(r"\b(TO" r"DO|FIX" r"ME|X" r"XX)\b")
 
 
@@ -46,17 +50,44 @@ def errors_of(name, text):
             yield number, "a tab, or a blank at the end"
 
 
+def types_of(text):
+    """(line, name with its namespace) of the types that a header defines."""
+    namespace = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if opened := NAMESPACE.match(line):
+            namespace = opened[1]
+        elif found := TYPE.match(line):
+            yield number, f"{namespace}::{found[1] or found[2]}"
+
+
+def types_defined_twice(headers):
+    """(header, line, message) for each type whose name an earlier header has defined; `headers`: (name, text)."""
+    first = {}
+    for name, text in headers:
+        for number, type_name in types_of(text):
+            other = first.setdefault(type_name, name)
+            if other != name:
+                yield name, number, f"{other} defines a type {type_name}, too: rename one of them"
+
+
 def main():
     root = pathlib.Path(__file__).resolve().parent.parent.parent
     paths = sorted(p for folder in FOLDERS for p in (root / folder).rglob("*") if p.is_file())
     count = 0
+    headers = []
     for path in paths:
         name = path.relative_to(root).as_posix()
         if name.startswith("tests/data/") or any(part in FOREIGN for part in path.parts) or (path.suffix not in SUFFIXES and name != ".ci/run"):
             continue
-        for number, message in errors_of(name, path.read_text(encoding="utf-8")):
+        text = path.read_text(encoding="utf-8")
+        if path.suffix == ".h":
+            headers.append((name, text))
+        for number, message in errors_of(name, text):
             print(f"{name}:{number}: {message}", file=sys.stderr)
             count += 1
+    for name, number, message in types_defined_twice(headers):
+        print(f"{name}:{number}: {message}", file=sys.stderr)
+        count += 1
     return 1 if count else 0
 
 

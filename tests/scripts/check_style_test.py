@@ -40,6 +40,16 @@ class CheckStyleTest(unittest.TestCase):
                      "// it does not fork()", "pitchfork(2);"):
             self.assertEqual(messages("core/deformation/a.cc", line + "\n"), [], line)
 
+    def test_two_headers_define_no_type_of_one_name(self):
+        def twice(*texts):
+            return list(check_style.types_defined_twice((f"{number}.h", text) for number, text in enumerate(texts)))
+
+        plane = "namespace tissueform {\n\nstruct Plane {\n"
+        for other in ("enum class Plane { kAxial };", "class Plane final : public Shape {", "using Plane = int;", "struct Plane"):
+            self.assertEqual(twice(plane, f"namespace tissueform {{\n{other}\n"), [("1.h", 2, "0.h defines a type tissueform::Plane, too: rename one of them")])
+        for other in ("class Plane;", "enum class Plane : int;", "struct Planes {", "  struct Plane {", "// struct Plane {", "}\nnamespace tissueform::testing {\nclass Plane {"):
+            self.assertEqual(twice(plane, f"namespace tissueform {{\n{other}\n"), [], other)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -33,11 +33,11 @@ Vector3d NormalOf(const InstanceHeader& image) {
   return length > 0 ? Vector3d(normal / length) : Vector3d::UnitZ();
 }
 
-SlicePlane PlaneOf(const Vector3d& normal) {
-  if (std::abs(normal.z()) >= kAxialCosine) return SlicePlane::kAxial;
-  if (std::abs(normal.y()) >= kAxialCosine) return SlicePlane::kCoronal;
-  if (std::abs(normal.x()) >= kAxialCosine) return SlicePlane::kSagittal;
-  return SlicePlane::kOblique;
+SliceOrientation PlaneOf(const Vector3d& normal) {
+  if (std::abs(normal.z()) >= kAxialCosine) return SliceOrientation::kAxial;
+  if (std::abs(normal.y()) >= kAxialCosine) return SliceOrientation::kCoronal;
+  if (std::abs(normal.x()) >= kAxialCosine) return SliceOrientation::kSagittal;
+  return SliceOrientation::kOblique;
 }
 
 // Sorted, of those that have a place; all along the first one's normal.
@@ -90,7 +90,7 @@ bool IsLocaliser(const InstanceHeader& image) {
          absl::StrContains(image.image_type, "SCOUT");
 }
 
-const char* PlaneName(SlicePlane plane) {
+const char* PlaneName(SliceOrientation plane) {
   constexpr std::array<const char*, 5> kNames = {"axial", "coronal", "sagittal", "oblique",
                                                  "placeless"};
   return kNames[static_cast<size_t>(plane)];

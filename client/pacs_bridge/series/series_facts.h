@@ -12,7 +12,7 @@
 
 namespace tissueform {
 
-enum class SlicePlane { kAxial, kCoronal, kSagittal, kOblique, kNone };
+enum class SliceOrientation { kAxial, kCoronal, kSagittal, kOblique, kNone };
 
 // What a series is, by its images' headers: what rules decide by. Numbers are of the slices that
 // lie at different places.
@@ -27,7 +27,7 @@ struct SeriesFacts {
   int missing = 0;     // places between the first and the last that have no image
   int frames_of_reference = 0;
   int orientations = 0;
-  SlicePlane plane = SlicePlane::kNone;
+  SliceOrientation plane = SliceOrientation::kNone;
   double spacing_mm = 0;  // between slices: the median
   double thickness_mm = 0;
   double coverage_mm = 0;  // along the slices' normal

@@ -56,7 +56,7 @@ void CheckSlices(const SeriesFacts& series, const SeriesRule& rule,
     add(absl::StrCat("its images are of ", series.frames_of_reference, " frames of reference"));
   }
   if (series.orientations > 1) add("its images are turned differently");
-  if (rule.axial_only && series.plane != SlicePlane::kAxial) add("its slices are not axial");
+  if (rule.axial_only && series.plane != SliceOrientation::kAxial) add("its slices are not axial");
   if (series.spacing_mm > rule.max_spacing_mm + kSameMm) {
     add(absl::StrFormat("its slices are %.2f mm apart, more than %.2f", series.spacing_mm,
                         rule.max_spacing_mm));

@@ -42,16 +42,16 @@ TEST(WorkerPoolTest, JobsMayPostJobsWhileThePoolEnds) {
 }
 
 TEST(WorkerPoolTest, NoLaneWaitsForAnother) {
-  for (const Lane busy : {Lane::kFrames, Lane::kSolves, Lane::kIterations, Lane::kBatch}) {
+  for (size_t busy = 0; busy < kNumLanes; ++busy) {
     WorkerPool pool(2);
     std::promise<void> end;
     const std::shared_future<void> ended = end.get_future().share();
     // More than the lane has threads for: some wait.
-    for (int i = 0; i < 5; ++i) pool.Post(busy, [ended] { ended.wait(); });
-    for (const Lane lane : {Lane::kFrames, Lane::kSolves, Lane::kIterations, Lane::kBatch}) {
+    for (int i = 0; i < 5; ++i) pool.Post(static_cast<Lane>(busy), [ended] { ended.wait(); });
+    for (size_t lane = 0; lane < kNumLanes; ++lane) {
       if (lane == busy) continue;
       std::promise<void> ran;
-      pool.Post(lane, [&ran] { ran.set_value(); });
+      pool.Post(static_cast<Lane>(lane), [&ran] { ran.set_value(); });
       ran.get_future().wait();
     }
     end.set_value();

@@ -61,7 +61,7 @@ TEST(SeriesFactsTest, MeasuresAHead) {
   EXPECT_EQ(facts.slices, 200);
   EXPECT_NEAR(facts.spacing_mm, 0.8, 1e-9);
   EXPECT_NEAR(facts.coverage_mm, 160, 1e-6);
-  EXPECT_EQ(facts.plane, SlicePlane::kAxial);
+  EXPECT_EQ(facts.plane, SliceOrientation::kAxial);
   EXPECT_EQ(facts.kernel, KernelKind::kSoft);
   EXPECT_EQ(facts.missing, 0);
   EXPECT_EQ(facts.duplicates, 0);
@@ -89,9 +89,9 @@ TEST(SeriesFactsTest, ATiltedGantryIsAxialAndAReformattedSeriesIsNot) {
       }
     });
   };
-  EXPECT_EQ(turn(20).plane, SlicePlane::kAxial);
-  EXPECT_EQ(turn(90).plane, SlicePlane::kCoronal);
-  EXPECT_EQ(turn(45).plane, SlicePlane::kOblique);
+  EXPECT_EQ(turn(20).plane, SliceOrientation::kAxial);
+  EXPECT_EQ(turn(90).plane, SliceOrientation::kCoronal);
+  EXPECT_EQ(turn(45).plane, SliceOrientation::kOblique);
 }
 
 struct Defect {
