@@ -3,12 +3,12 @@
 
 import * as three from "three";
 import { headAxes, toMove } from "../geometry/pose";
-import { type ShownFace, measureFace } from "../measures/face_measures";
-import { landmarkMovement } from "../planning/landmarks";
+import { type ShownFace, landmarkMovements, measureFace } from "../measures/face_measures";
 import type { DrawnSurface } from "../scene/head";
 import { type ShownAnswer, modelShown } from "../workbench/shown_answer";
 import type { StoredPredictions } from "../workbench/stored_predictions";
 import type { Workbench } from "../workbench/workbench";
+import { type PlannedRanges, planOf } from "./case_plan";
 import { type ExportedSurface, NOTICE } from "./files";
 
 /** What is shown, as files have it: bone where it was moved to. `what`: the skin, or all. */
@@ -41,51 +41,48 @@ export function provenanceLines(bench: Workbench): string[] {
 }
 
 /** What is told of a plan. */
-export type ToldPlan = ShownFace & Pick<Workbench, "answer" | "caseName" | "model" | "modelInfo" | "plan" | "skinPoint"> & { stored: Pick<StoredPredictions, "all"> };
+export type ToldPlan = ShownFace & Pick<Workbench, "answer" | "caseName" | "model" | "modelInfo" | "plan"> & { stored: Pick<StoredPredictions, "all"> };
 
-/** Plan, movements and provenance as JSON. Movements and measures are of the plan's face, and left out while another one is shown. */
-export function planDocument(bench: ToldPlan): string {
-  const { manifest } = bench.file;
+/**
+ * A plan that `tissueform plan check` and `deform` take (docs/plan-format.md), with what the planner shows of it. Movements and
+ * measures are of the plan's face, and left out while another one is shown. `ranges`: what plannedRanges gives.
+ */
+export function planDocument(bench: ToldPlan, ranges: PlannedRanges = null): string {
+  const { manifest, materialRanges } = bench.file;
   const poses = bench.plan.poses();
+  const byHandle = new Map(bench.plan.handles.map(({ name }, index) => [name, poses[index]]));
+  const leftOut = [
+    ...(bench.showsPlan ? [] : [`landmarks, measures and answer: ${NOT_THE_PLAN}`]),
+    ...(materialRanges !== null && ranges === null ? ["uncertainty: the stiffness does not tell the tissues of the case apart"] : []),
+  ];
   const document = {
-    format: "tissueform-planner-export",
-    version: 1,
+    ...planOf(bench.file, byHandle, bench.modelInfo(bench.model.value)?.name ?? manifest.model, ranges),
     notice: NOTICE,
     exported: new Date().toISOString(),
     case: bench.caseName,
     title: manifest.title,
     provenance: manifest.provenance,
-    mesh: manifest.mesh.name,
-    model: bench.modelInfo(bench.model.value)?.name ?? null,
-    unit: "mm",
-    coordinate_system: "LPS",
     head_frame: { ...manifest.headFrame, axes: headAxes(manifest.headFrame) },
     segments: bench.plan.handles.map((handle, index) => ({
       handle: handle.name,
       move: bench.plan.moves[index],
       move_about_plan_pivot: toMove(poses[index], handle.pivotMm, manifest.headFrame),
-      pose: {
-        rotation_vector_deg: poses[index].rotationVector.map((part) => (part * 180) / Math.PI),
-        pivot_mm: poses[index].pivotMm,
-        translation_mm: poses[index].translationMm,
-        scale: poses[index].scale,
-      },
     })),
     measurement_landmarks: bench.landmarks.save(),
-    ...(bench.showsPlan ? { landmarks: movements(bench), measures: measures(bench), answer: answerFacts(bench.answer.value) } : { left_out: `landmarks, measures and answer: ${NOT_THE_PLAN}` }),
+    ...(bench.showsPlan ? { landmarks: movements(bench), measures: measures(bench), answer: answerFacts(bench.answer.value) } : {}),
+    ...(leftOut.length === 0 ? {} : { left_out: leftOut.join("; ") }),
     predictions: bench.stored.all.value.map(({ name, title }) => ({ name, title })),
   };
-  return JSON.stringify(document, null, 2);
+  // Thousands of vertices in a line, not in as many lines. No text of JSON has a line break in it.
+  return JSON.stringify(document, null, 2).replace(/\[\n[\s\d.,eE+-]+\]/g, (numbers) => numbers.replace(/\s+/g, ""));
 }
 
 function movements(bench: ToldPlan): object[] {
-  const { landmarks, headFrame } = bench.file.manifest;
-  const skin = bench.file.surfaces.findIndex(({ entry }) => entry.kind === "skin");
-  const band = skin < 0 ? null : bench.bandOf(skin);
-  return landmarks.map((landmark) => ({
-    name: landmark.name,
-    ...landmarkMovement(landmark, bench.shownPoses, bench.skinPoint, headFrame),
-    ...(landmark.skinVertex === null || band === null ? {} : { band_95_mm: band[landmark.skinVertex] }),
+  const { landmarks } = bench.file.manifest;
+  return landmarkMovements(bench).map(({ bandMm, ...movement }, index) => ({
+    name: landmarks[index].name,
+    ...movement,
+    ...(bandMm === null ? {} : { band_95_mm: bandMm }),
   }));
 }
 

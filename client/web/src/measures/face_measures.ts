@@ -5,6 +5,9 @@ import { create } from "@bufbuild/protobuf";
 import type { CaseFile } from "../case/case_file";
 import { type Measure, MeasureSchema } from "../generated/tissueform/v1/export_service_pb";
 import { type Pose, movedPoint } from "../geometry/pose";
+import { pointAt } from "../geometry/rigid_fit";
+import { subtract } from "../geometry/rotation";
+import { type LandmarkMovement, isOnSkin, landmarkMovement } from "../planning/landmarks";
 import { type Anchor, anchorNumber, anchorPoint } from "./anchor";
 import { MEASURES } from "./definitions";
 import { type MeasureResult, evaluate } from "./evaluation";
@@ -34,6 +37,18 @@ export function shownPoint(face: ShownFace, anchor: Anchor) {
   const point = anchorPoint({ positions: face.positionsOf(anchor.surface), triangles }, anchor);
   const pose = entry.handle === "" ? undefined : face.shownPoses.get(entry.handle);
   return pose === undefined ? point : movedPoint(pose, point);
+}
+
+/** How far the case's own landmarks are from rest, in the case's order. `bandMm`: null for bone, and where no band is known. */
+export function landmarkMovements(face: ShownFace): (LandmarkMovement & { bandMm: number | null })[] {
+  const { manifest, surfaces } = face.file;
+  const skin = surfaces.findIndex(({ entry }) => entry.kind === "skin");
+  const band = skin < 0 ? null : face.bandOf(skin);
+  const skinMove = (vertex: number) => subtract(pointAt(face.positionsOf(skin), vertex), pointAt(surfaces[skin].positions, vertex));
+  return manifest.landmarks.map((landmark) => ({
+    ...landmarkMovement(landmark, face.shownPoses, skinMove, manifest.headFrame),
+    bandMm: isOnSkin(landmark) ? (band?.[landmark.skinVertex as number] ?? null) : null,
+  }));
 }
 
 /** All measures with what they are made of, as the face is shown. */

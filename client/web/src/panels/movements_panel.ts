@@ -1,7 +1,8 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { cell, describeMovement, landmarkMovement } from "../planning/landmarks";
+import { landmarkMovements } from "../measures/face_measures";
+import { cell, describeMovement } from "../planning/landmarks";
 import { formatNumber } from "../planning/numbers";
 import { lengthBand } from "../measures/texts";
 import type { Workbench } from "../workbench/workbench";
@@ -24,20 +25,19 @@ export function movementsPanel(bench: Workbench): HTMLElement {
   const rows = landmarks.map((landmark) => {
     const cells = Array.from({ length: 4 }, () => el("td"));
     const row = el("tr", {}, [el("th", { text: landmark.label, attributes: { scope: "row" } }), ...cells]);
-    return { landmark, row, cells };
+    return { row, cells };
   });
-  const skin = bench.file.surfaces.findIndex(({ entry }) => entry.kind === "skin");
   const show = () => {
-    const band = skin < 0 ? null : bench.bandOf(skin);
-    caption.textContent = `${captionOf(headFrame.source)}${band === null ? "" : " Below a number of the skin: by how much more or less it is in 95 of 100 cases if nothing but the material is in doubt; below “in all” from where to where."}`;
-    for (const { landmark, row, cells } of rows) {
-      const movement = landmarkMovement(landmark, bench.shownPoses, bench.skinPoint, headFrame);
-      const bandMm = landmark.skinVertex === null ? null : (band?.[landmark.skinVertex] ?? null);
+    const movements = landmarkMovements(bench);
+    const hasBand = movements.some(({ bandMm }) => bandMm !== null);
+    caption.textContent = `${captionOf(headFrame.source)}${!hasBand ? "" : " Below a number of the skin: by how much more or less it is in 95 of 100 cases if nothing but the material is in doubt; below “in all” from where to where."}`;
+    rows.forEach(({ row, cells }, index) => {
+      const { bandMm, ...movement } = movements[index];
       const plusMinus = bandMm === null ? "" : `± ${formatNumber(bandMm)}`;
-      [movement.forwardMm, movement.leftMm, movement.upMm].forEach((value, index) => fill(cells[index], cell(value), plusMinus));
+      [movement.forwardMm, movement.leftMm, movement.upMm].forEach((value, column) => fill(cells[column], cell(value), plusMinus));
       fill(cells[3], cell(movement.totalMm), bandMm === null ? "" : lengthBand(movement.totalMm, bandMm));
       row.title = `${describeMovement(movement)}${bandMm === null ? "" : `, ${plusMinus} mm in 95 of 100 cases`}`;
-    }
+    });
   };
   bench.shown.watch(onceAPicture(show));
   const heads = ["Landmark", "Forward", "Left", "Up", "In all"].map((text) => el("th", { text, attributes: { scope: "col" } }));

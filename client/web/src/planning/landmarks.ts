@@ -15,22 +15,29 @@ export interface LandmarkMovement {
   totalMm: number;
 }
 
+/** A landmark on a segment moves with the segment, whatever vertex of the skin is near it. */
+export function isOnSkin({ handle, skinVertex }: LandmarkEntry): boolean {
+  return handle === "" && skinVertex !== null;
+}
+
 /**
- * `poses` by handle; `skin`: where a vertex of the skin is now, null where that is not known (then the landmark stays).
+ * The same rule as PredictCase in core/case_file/predicted_case.cc. A landmark of the skin does not lie exactly on its vertex, so
+ * it moves by the vertex's displacement and keeps its offset. `poses` by handle; `skinMove`: displacement of a vertex of the first
+ * skin from rest, LPS, mm.
  */
 export function landmarkMovement(
   landmark: LandmarkEntry,
   poses: ReadonlyMap<string, Pose>,
-  skin: (vertex: number) => Vector | null,
+  skinMove: (vertex: number) => Vector,
   frame: HeadFrame,
 ): LandmarkMovement {
-  const pose = poses.get(landmark.handle);
-  let now = landmark.positionMm;
-  if (pose !== undefined) now = movedPoint(pose, landmark.positionMm);
-  else if (landmark.skinVertex !== null) now = skin(landmark.skinVertex) ?? landmark.positionMm;
-  const moved = subtract(now, landmark.positionMm);
+  const { label, handle, positionMm, skinVertex } = landmark;
+  const pose = poses.get(handle);
+  let moved: Vector = [0, 0, 0];
+  if (pose !== undefined) moved = subtract(movedPoint(pose, positionMm), positionMm);
+  else if (isOnSkin(landmark)) moved = skinMove(skinVertex as number);
   const [left, posterior, up] = apply(headAxes(frame), moved);
-  return { label: landmark.label, forwardMm: -posterior, leftMm: left, upMm: up, totalMm: norm(moved) };
+  return { label, forwardMm: -posterior, leftMm: left, upMm: up, totalMm: norm(moved) };
 }
 
 /** "8.0 mm forward, 1.2 mm up", or "at rest". */

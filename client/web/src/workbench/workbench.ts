@@ -12,7 +12,6 @@ import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
 import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
 import { BoneSolid, type Penetration, PenetrationTest } from "../geometry/penetration";
 import { type Pose, fromLps, toMove } from "../geometry/pose";
-import type { Vector } from "../geometry/rotation";
 import type { Picture } from "../live/drag_session";
 import { type Connection, LiveSession } from "../live/live_session";
 import { LocalAnswers, type LocalState } from "../live/local_answers";
@@ -157,7 +156,7 @@ export class Workbench implements ShownFace {
     this.landmarks.suggest(suggestLandmarks(this.file, this.landmarks));
     this.landmarks.restore(recallLandmarks(this.caseName));
     this.landmarks.onChange(() => rememberLandmarks(this.caseName, this.landmarks.save()));
-    this.view.setPoses(this.posesByHandle(this.plan.poses()));
+    this.setPoses(this.plan.poses());
     this.pacs.start();
     const noList = (thrown: unknown) => (this.notice.value = `The stored predictions cannot be listed: ${sentenceOf(thrown)}`);
     await Promise.all([this.live.start(this.plan.poses()), this.stored.load().catch(noList)]);
@@ -214,12 +213,6 @@ export class Workbench implements ShownFace {
 
   /** How far the skin at a place is from rest by the plan's newest answer, in the head frame. */
   readonly moveAt = (place: WishPlace): Wish["move"] => fromLps(shownMove(place, this.newest.displacements), this.file.manifest.headFrame);
-
-  /** Where a vertex of the first skin is now, LPS. */
-  skinPoint = (vertex: number): Vector | null => {
-    const positions = this.view.head.skins[0]?.shape.positions;
-    return positions === undefined ? null : [positions[3 * vertex], positions[3 * vertex + 1], positions[3 * vertex + 2]];
-  };
 
   positionsOf(surface: number): Float32Array {
     return this.view.head.surfaces[surface].shape.positions;

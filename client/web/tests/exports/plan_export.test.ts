@@ -33,7 +33,6 @@ async function told(changes: Partial<ToldPlan> = {}) {
     stored: { all: new Signal<readonly Prediction[]>([]) },
     shownPoses: new Map([["mandible", plan.poses()[0]]]),
     positionsOf: (surface) => file.surfaces[surface].positions.map((value, i) => value + (i % 3 === 0 ? 1 : 0)),
-    skinPoint: () => [1, 0, 0],
     bandOf: () => new Float32Array(4).fill(0.25),
     showsPlan: true,
     ...changes,

@@ -89,11 +89,12 @@ test("landmarks move with their segment, with the skin, or not at all", async ()
   plan.change(0, { forwardMm: 8, upMm: -1 }, true);
   const poses = new Map([["mandible", plan.poses()[0]]]);
   const [pogonion, soft] = file.manifest.landmarks;
-  const movement = landmarkMovement(pogonion, poses, () => null, file.manifest.headFrame);
+  const movement = landmarkMovement(pogonion, poses, () => [0, 0, 0], file.manifest.headFrame);
   expect(movement.forwardMm).toBeCloseTo(8, 12);
   expect(describeMovement(movement)).toBe("8.0 mm forward, 1.0 mm down");
   expect(landmarkMovement(soft, poses, () => [0, -5, 0], file.manifest.headFrame).forwardMm).toBeCloseTo(5, 12);
-  expect(describeMovement(landmarkMovement(soft, poses, () => null, file.manifest.headFrame))).toBe("at rest");
+  expect(describeMovement(landmarkMovement(soft, poses, () => [0, 0, 0], file.manifest.headFrame))).toBe("at rest");
+  expect(landmarkMovement({ ...pogonion, skinVertex: 0 }, poses, () => [0, 0, 9], file.manifest.headFrame)).toEqual(movement);
 });
 
 test.each<[string, "mm" | "°", number | null]>([

@@ -8,7 +8,7 @@ import { CreateSessionRequestSchema } from "../../src/generated/tissueform/v1/se
 // A small case for tests: a skin of two triangles over a mesh of five vertices, one segment, a fixed bone.
 
 export const MESH_POSITIONS = [0, 0, 0, 10, 0, 0, 0, 10, 0, 0, 0, 10, 10, 10, 10];
-const TETS = [0, 1, 2, 3, 1, 2, 3, 4];
+export const TETS = [0, 1, 2, 3, 1, 2, 3, 4];
 const SKIN = [0, 0, 0, 10, 0, 0, 0, 10, 0, 10, 10, 0];
 const TRIANGLES = [0, 1, 2, 1, 3, 2];
 
