@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Pose } from "../geometry/pose";
-import type { PreparedColumns } from "./answer_bytes";
 import { sizesOf } from "./answer_sizes";
 import type { ColumnKernel } from "./column_kernel";
 import { ColumnMatrix, bandPartOf } from "./column_matrix";
 import { writeElasticFactors } from "./elastic_factors";
 import { Motion } from "./motion";
+import type { PreparedColumns } from "./prepared_columns";
 
 /** Square roots of the 95th percentiles of chi-squared with 1, 2 and 3 degrees of freedom. */
 const OF_ONE = 1.959964;

@@ -1,8 +1,8 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { type AnswerNumbers, AnswerModel, FIXED, FREE, type PackedColumns, type PreparedColumns } from "./answer_bytes";
 import { type AnswerSizes, sizesOf } from "./answer_sizes";
+import { type AnswerNumbers, AnswerModel, FIXED, FREE, type PackedColumns, type PreparedColumns } from "./prepared_columns";
 
 const MOST_OF_ANYTHING = 2 ** 28;
 const MOST_HANDLES = 10_000;

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Pose } from "../geometry/pose";
-import { AnswerModel, type PreparedColumns } from "./answer_bytes";
 import { sizesOf } from "./answer_sizes";
 import { Motion, rowNorm } from "./motion";
+import { AnswerModel, type PreparedColumns } from "./prepared_columns";
 
 // Bounds of docs/prepared-answers.md, "Errors, and what is covered".
 

@@ -3,13 +3,13 @@
 
 import type { Pose } from "../geometry/pose";
 import { AnswerBand } from "./answer_band";
-import { AnswerModel, FIXED, FREE, type PreparedColumns } from "./answer_bytes";
 import { CompressionError, HeldError, areCovered, areLegal, haveBand } from "./answer_errors";
 import { type AnswerSizes, sizesOf } from "./answer_sizes";
 import { type ColumnKernel, javascriptKernel } from "./column_kernel";
 import { ColumnMatrix, partsOf, unpack, wholeOf } from "./column_matrix";
 import { Motion } from "./motion";
 import { type PoseFactors, makePoseFactors } from "./pose_factors";
+import { AnswerModel, FIXED, FREE, type PreparedColumns } from "./prepared_columns";
 
 /** What poses give. */
 export interface Evaluation {

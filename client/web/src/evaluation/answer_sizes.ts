@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { AnswerModel, type PreparedColumns } from "./answer_bytes";
+import { AnswerModel, type PreparedColumns } from "./prepared_columns";
 
 /** How many there are of what is not written down by itself. */
 export interface AnswerSizes {

@@ -1,9 +1,9 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { AnswerModel, type PackedColumns, type PreparedColumns } from "./answer_bytes";
 import { type AnswerSizes, sizesOf } from "./answer_sizes";
 import { type ColumnKernel, paddedColumns, paddedRows } from "./column_kernel";
+import { AnswerModel, type PackedColumns, type PreparedColumns } from "./prepared_columns";
 
 const UPPER = 65536;
 /** For the alignment of a part's arrays. */

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Pose } from "../geometry/pose";
-import { AnswerModel, type PreparedColumns } from "./answer_bytes";
 import { sizesOf } from "./answer_sizes";
 import { Motion } from "./motion";
+import { AnswerModel, type PreparedColumns } from "./prepared_columns";
 
 /** Of `linear_elastic` 12 numbers a handle; of `neo_hookean` also the pairs', and where there is a third order the triples' products. */
 export class ElasticFactors {

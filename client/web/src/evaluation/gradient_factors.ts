@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Pose } from "../geometry/pose";
-import type { PreparedColumns } from "./answer_bytes";
 import { sizesOf } from "./answer_sizes";
 import { Motion, rowNorm, writeTurn } from "./motion";
+import type { PreparedColumns } from "./prepared_columns";
 
 /** Of gains beyond those that are known. */
 const GAIN_ALLOWANCE = 1.5;

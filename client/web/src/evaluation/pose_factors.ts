@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Pose } from "../geometry/pose";
-import { AnswerModel, type PreparedColumns } from "./answer_bytes";
 import { ElasticFactors } from "./elastic_factors";
 import { GradientFactors } from "./gradient_factors";
+import { AnswerModel, type PreparedColumns } from "./prepared_columns";
 
 /** What poses become before the columns: rows of one number, of gradient_field of three. Written in place. */
 export interface PoseFactors {

@@ -3,7 +3,7 @@
 
 import type { Pose } from "../geometry/pose";
 import type { SavedLandmarks } from "../measures/landmark_book";
-import type { Workbench } from "./workbench";
+import type { Plan } from "../planning/plan";
 
 /** What is under the planner's hands, so that it is there again after a login: the poses of one case. */
 interface Work {
@@ -11,12 +11,19 @@ interface Work {
   poses: [string, Pose][];
 }
 
-export function workOf(bench: Pick<Workbench, "caseName" | "plan" | "posesByHandle">): Work {
+/** The plan of one case, as a workbench has it. */
+export interface SavedPlan {
+  readonly caseName: string;
+  readonly plan: Pick<Plan, "poses" | "setPoses">;
+  posesByHandle(poses: readonly Pose[]): Map<string, Pose>;
+}
+
+export function workOf(bench: SavedPlan): Work {
   return { caseName: bench.caseName, poses: Array.from(bench.posesByHandle(bench.plan.poses())) };
 }
 
 /** Nothing where `work` is of another case, or none. */
-export function restoreWork(bench: Pick<Workbench, "caseName" | "plan">, work: unknown): void {
+export function restoreWork(bench: Pick<SavedPlan, "caseName" | "plan">, work: unknown): void {
   const { caseName, poses } = (work ?? {}) as Partial<Work>;
   if (caseName !== bench.caseName || !Array.isArray(poses)) return;
   const known = poses.filter((entry) => Array.isArray(entry) && isPose(entry[1]));

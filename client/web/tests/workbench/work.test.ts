@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { expect, test, vi } from "vitest";
+import type { Pose } from "../../src/geometry/pose";
 import { restoreWork, workOf } from "../../src/workbench/work";
 
-const POSE = { rotationVector: [0, 0.1, 0], pivotMm: [1, 2, 3], translationMm: [4, 5, 6], scale: 1 };
+const POSE: Pose = { rotationVector: [0, 0.1, 0], pivotMm: [1, 2, 3], translationMm: [4, 5, 6], scale: 1 };
 
 function bench(caseName = "cases/a") {
   const setPoses = vi.fn();
@@ -12,9 +13,9 @@ function bench(caseName = "cases/a") {
 }
 
 test("poses come back as they were, over JSON", () => {
-  const work: unknown = JSON.parse(JSON.stringify(workOf(bench() as never)));
+  const work: unknown = JSON.parse(JSON.stringify(workOf(bench())));
   const after = bench();
-  restoreWork(after as never, work);
+  restoreWork(after, work);
   expect(after.setPoses).toHaveBeenCalledWith(new Map([["mandible", POSE]]));
 });
 
@@ -26,6 +27,6 @@ test.each([
   ["no pose", { caseName: "cases/a", poses: [["mandible", null], 4] }],
 ])("%s is left alone", (_, work) => {
   const after = bench();
-  restoreWork(after as never, work);
+  restoreWork(after, work);
   expect(after.setPoses).not.toHaveBeenCalled();
 });
