@@ -18,7 +18,7 @@ import processes
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))
 from folders import make_folder
-from free_ports import free_ports
+from free_ports import check_free, free_ports
 
 DATABASE, HAPROXY = "postgresql", balancer.NAME
 ROOT = processes.ROOT
@@ -88,6 +88,10 @@ class Cluster:
     def port(self, name):
         return self.state["ports"][name]
 
+    def ports_of(self, name):
+        """All on which the program of that name listens."""
+        return [self.port(each) for each in (("workstations", "browsers") if name == HAPROXY else (name,))]
+
     def address(self, name):
         return f"{processes.HOST}:{self.port(name)}"
 
@@ -148,6 +152,8 @@ class Cluster:
         """Starts one of the cluster's programs where it does not run, and does not wait for it (but for the database)."""
         if self.is_running(name):
             return
+        for port in self.ports_of(name):
+            check_free(port, name, "end what listens there, or have other ports: `deploy/cluster.sh down`, then `up`")
         if name == DATABASE:
             process = self._start_database()
         elif name == HAPROXY:
