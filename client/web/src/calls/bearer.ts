@@ -5,8 +5,8 @@
 export class Bearer {
   private current = "";
   private readonly listeners = new Set<(token: string) => void>();
-  /** Finds another token in place of one that the server does not take; false where it cannot. */
-  renewer: (() => Promise<boolean>) | null = null;
+  /** Finds another token in place of one that the server does not take (`why`: its sentence); false where it cannot. */
+  renewer: ((why: string) => Promise<boolean>) | null = null;
 
   get token(): string {
     return this.current;
@@ -27,9 +27,9 @@ export class Bearer {
     return () => this.listeners.delete(listener);
   }
 
-  /** The server does not take `refused`: whether there is another one now, with which the call may be made again. */
-  async replace(refused: string): Promise<boolean> {
+  /** The server does not take `refused` and says `why`: whether there is another one now, with which the call may be made again. */
+  async replace(refused: string, why: string): Promise<boolean> {
     if (this.current !== refused) return this.current !== "";
-    return (await this.renewer?.()) ?? false;
+    return (await this.renewer?.(why)) ?? false;
   }
 }

@@ -79,7 +79,7 @@ export class Gateway {
   }
 
   private async refused(error: CallError, token: string, onEnd: (error: CallError) => void): Promise<void> {
-    const isReplaced = await this.bearer.replace(token);
+    const isReplaced = await this.bearer.replace(token, error.message);
     onEnd(isReplaced ? new CallError(Code.Unavailable, "the login is being renewed") : error);
   }
 
@@ -118,8 +118,9 @@ function withToken(bearer: Bearer): Interceptor {
       return await ask();
     } catch (thrown) {
       // The messages of a stream are gone once they were sent.
-      const isRefused = toCallError(thrown).code === Code.Unauthenticated && !request.stream;
-      if (!isRefused || !(await bearer.replace(token))) throw thrown;
+      const { code, message } = toCallError(thrown);
+      const isRefused = code === Code.Unauthenticated && !request.stream;
+      if (!isRefused || !(await bearer.replace(token, message))) throw thrown;
       return ask();
     }
   };

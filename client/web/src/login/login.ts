@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Bearer } from "../calls/bearer";
+import { sentenceOf } from "../calls/call_error";
 import { type LoginPage, type Redirect, browserPage, isSignedOut, keepRedirect, markSignedOut, redirectUri, takeAnswer, takeRedirect } from "./redirect";
 import { type Provider, type Tokens, type User, isRefusal, loginSentence, needsUser, newSecrets } from "./provider";
 
@@ -53,7 +54,7 @@ export class Login {
     private readonly timer: Timer = browserTimer,
     private readonly now: () => number = () => Date.now(),
   ) {
-    bearer.renewer = () => this.replace();
+    bearer.renewer = (why) => this.replace(why);
   }
 
   get state(): LoginState {
@@ -167,14 +168,10 @@ export class Login {
   }
 
   /** The server does not take the token. Twice in a row is no matter of time. */
-  private async replace(): Promise<boolean> {
+  private async replace(why: string): Promise<boolean> {
     if (this.tokens === null) return false;
-    if (this.isReplacement) {
-      this.end("The server does not accept your login.");
-      return false;
-    }
-    const isRenewed = await this.renew(true);
-    if (!isRenewed && this.tokens !== null) this.end("The server does not accept your login any more.");
+    const isRenewed = !this.isReplacement && (await this.renew(true));
+    if (!isRenewed && this.tokens !== null) this.end(`The server does not accept your login. ${sentenceOf(why)}`);
     return isRenewed;
   }
 

@@ -147,7 +147,40 @@ export function isRefusal(thrown: unknown): boolean {
   return thrown instanceof oauth.ResponseBodyError && thrown.status < 500;
 }
 
-/** Why a login failed, as a sentence. Nothing of what the provider sent stands in it but its own word for the error. */
+/** What oauth4webapi says of an answer that it does not take. */
+interface Cause {
+  expected?: unknown;
+  body?: { issuer?: unknown };
+  claims?: Record<string, unknown>;
+  claim?: string;
+  attribute?: string;
+  now?: number;
+}
+
+/** Which issuer or time in the provider's answer is another one than expected; null where it is something else. */
+function differenceIn({ code, cause }: oauth.OperationProcessingError, issuer: string): string | null {
+  const { expected, body, claims, claim = "", attribute, now = 0 } = (cause ?? {}) as Cause;
+  if (code === oauth.JSON_ATTRIBUTE_COMPARISON && attribute === "issuer") return otherIssuer(body?.issuer, issuer);
+  if (code === oauth.JWT_CLAIM_COMPARISON && claim === "iss") return otherIssuer(claims?.iss, String(expected ?? issuer));
+  if (code !== oauth.JWT_TIMESTAMP_CHECK) return null;
+  const seconds = Math.round(Math.abs(Number(claims?.[claim]) - now));
+  const when = claim === "exp" ? `ended ${seconds} s ago` : `begins in ${seconds} s`;
+  return `By this computer's clock the login that the identity provider gave ${when}. Set the clock of this computer, or of the provider, and sign in again.`;
+}
+
+function otherIssuer(found: unknown, expected: string): string {
+  const advice = String(found).includes("{")
+    ? "A name with {...} stands for every tenant: --oidc-issuer of the gateway must name your own tenant."
+    : "Have --oidc-issuer of the gateway corrected.";
+  return `The identity provider's issuer is ${bounded(found)}, and this page expects ${bounded(expected)}. ${advice}`;
+}
+
+/** Of what somebody else has sent: at most 200 letters, and no others than printable ASCII. */
+function bounded(text: unknown): string {
+  return String(text).slice(0, 200).replace(/[^\x20-\x7e]/g, "?");
+}
+
+/** Why a login failed, as a sentence. Of what the provider sent it holds its own word for the error, its issuer and times, all bounded. */
 export function loginSentence(thrown: unknown, issuer: string): string {
   const host = new URL(issuer).host;
   if (globalThis.crypto?.subtle === undefined) return "This page was not opened by https, without which browsers do not log in.";
@@ -155,6 +188,8 @@ export function loginSentence(thrown: unknown, issuer: string): string {
     const word = /^[a-z_]{1,40}$/.test(thrown.error) ? thrown.error : "for no known reason";
     return `The identity provider (${host}) has refused the login: ${word}.`;
   }
+  const difference = thrown instanceof oauth.OperationProcessingError ? differenceIn(thrown, issuer) : null;
+  if (difference !== null) return difference;
   if (thrown instanceof oauth.OperationProcessingError || thrown instanceof oauth.UnsupportedOperationError) {
     return `The answer of the identity provider (${host}) does not belong to this login, or is not what was asked for.`;
   }

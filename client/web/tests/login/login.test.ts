@@ -266,8 +266,8 @@ test("a token that the server refuses is replaced once, for all who ask", async 
   const { provider, signedIn } = visits();
   const { bearer } = await signedIn();
   provider.answers.push(tokens("two"));
-  expect(await Promise.all([bearer.replace("one"), bearer.replace("one"), bearer.replace("one")])).toEqual([true, true, true]);
-  expect(await bearer.replace("one")).toBe(true);
+  expect(await Promise.all([bearer.replace("one", "the token has a fault"), bearer.replace("one", "the token has a fault"), bearer.replace("one", "the token has a fault")])).toEqual([true, true, true]);
+  expect(await bearer.replace("one", "the token has a fault")).toBe(true);
   expect(bearer.token).toBe("two");
   expect(provider.asked).toEqual(["code c", "renew refresh one"]);
 });
@@ -276,8 +276,15 @@ test("a server that refuses every token ends the login", async () => {
   const { provider, signedIn } = visits();
   const { login, bearer } = await signedIn();
   provider.answers.push(tokens("two"), tokens("three"));
-  await bearer.replace("one");
-  expect(await bearer.replace("two")).toBe(false);
-  expect(login.state.kind).toBe("ended");
+  await bearer.replace("one", "the token has a fault");
+  expect(await bearer.replace("two", "the token's issuer is \"a\"; log in there")).toBe(false);
+  expect(login.state).toMatchObject({ kind: "ended", text: 'The server does not accept your login. The token\'s issuer is "a"; log in there.' });
   expect(provider.asked).toEqual(["code c", "renew refresh one"]);
+});
+
+test("a server that refuses a token which cannot be renewed says why", async () => {
+  const { signedIn } = visits();
+  const { login, bearer } = await signedIn(tokens("one", null));
+  expect(await bearer.replace("one", "the token's audience is \"a\"")).toBe(false);
+  expect(login.state).toMatchObject({ kind: "ended", text: 'The server does not accept your login. The token\'s audience is "a".' });
 });
