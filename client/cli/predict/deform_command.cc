@@ -129,7 +129,7 @@ void AddDeformCommand(CLI::App& app, CommandWork* work) {
       "  tissueform deform plan.json --out after.vtu\n"
       "  tissueform deform plan.json --out after.vtu --model neo_hookean --stats stats.json\n"
       "Open after.vtu in ParaView or 3D Slicer; displacement_mm is how far each vertex moved.\n"
-      "Elastic models add stress, energy and the forces that bone bears (docs/plan-format.md).");
+      "Elastic models add stress, strain energy and reaction forces (docs/plan-format.md).");
   command->callback([options, work] { *work = [options] { return RunDeform(*options); }; });
 }
 

@@ -63,8 +63,7 @@ absl::StatusOr<std::vector<double>> AskMaterialBand(TissueformClient* client,
 std::string WhyNoMaterialBand(const CaseFile& contents, const v1::Prediction& prediction) {
   if (!contents.material_ranges) return "the case gives no ranges of the material";
   if (!TellsOfMaterial(prediction.model())) {
-    return "the model computes no elasticity: the band is of stiffness that only elastic models "
-           "know";
+    return "only predictions of linear_elastic and neo_hookean have a band of uncertainty";
   }
   v1::CreateSessionRequest request;
   if (!request.ParseFromString(contents.session_request)) return "";

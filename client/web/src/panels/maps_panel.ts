@@ -18,10 +18,10 @@ interface ModelText {
 }
 
 const MODELS: Record<string, ModelText> = {
-  gradient_field: { label: "Gradient field", text: "Shape only, at once. Good for a first look while the bone is in the hand." },
-  arap: { label: "As rigid as possible", text: "Keeps small shapes stiff and iterates. Good where segments only shift; slower." },
-  linear_elastic: { label: "Linear elastic", text: "Tissue as springs by its stiffness, at once. Good to about 5 mm; tells its band of uncertainty." },
-  neo_hookean: { label: "Neo-Hookean", text: "Tissue that keeps its volume under large moves. An estimate while you drag, the full answer when the hand rests." },
+  gradient_field: { label: "Gradient field", text: "Geometric, not mechanical: spreads the motion of the bone through the tissue, weighted by its stiffness. Computes no forces. Instant: for a first look while you drag." },
+  arap: { label: "As rigid as possible", text: "Keeps each element as near to a rigid motion as it can, weighted by its stiffness: like a corotational elastic solid without Poisson effect. Iterates, so it is slower. For segments that shift without turning." },
+  linear_elastic: { label: "Linear elastic", text: "Linear finite elements: Hooke’s law, small strains and rotations. Instant. Valid for moves up to about 5 mm and turns of a few degrees. Gives a band of uncertainty." },
+  neo_hookean: { label: "Neo-Hookean", text: "Nonlinear finite elements: hyperelastic tissue, large deformations. Shows an estimate while you drag and the full solution when you stop. Gives a band of uncertainty." },
 };
 
 export function modelText(name: string): ModelText {

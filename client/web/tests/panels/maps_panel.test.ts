@@ -3,7 +3,7 @@
 
 import { expect, test } from "vitest";
 import type { LocalState } from "../../src/live/local_answers";
-import { describeLocal, largestText } from "../../src/panels/maps_panel";
+import { describeLocal, largestText, modelText } from "../../src/panels/maps_panel";
 
 type Ready = Extract<LocalState, { kind: "ready" }>;
 const READY: Ready = { kind: "ready", place: "page", hasWorkers: true, kernel: "webassembly", coverage: "covered" };
@@ -21,4 +21,14 @@ test.each<[string, Partial<Ready>, string]>([
 test("the largest movement is told with its band where that is known", () => {
   expect(largestText({ largestMm: 8.123, band: { lowestMm: 7.5, highestMm: 8.8 } })).toBe("largest 8.12 mm, in 95 of 100 cases 7.50 to 8.80");
   expect(largestText({ largestMm: 8.123, band: null })).toBe("largest 8.12 mm");
+});
+
+test.each([
+  ["gradient_field", /^Geometric, not mechanical: .*no forces/],
+  ["arap", /rigid motion.*corotational elastic solid without Poisson effect/],
+  ["linear_elastic", /^Linear finite elements: Hooke’s law, small strains and rotations/],
+  ["neo_hookean", /^Nonlinear finite elements: hyperelastic tissue, large deformations/],
+])("%s is described by its mechanics", (name, words) => {
+  expect(modelText(name).text).toMatch(words);
+  expect(modelText(name).text).not.toMatch(/spring|keeps its volume/);
 });
