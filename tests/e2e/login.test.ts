@@ -25,11 +25,11 @@ afterAll(async () => {
   await provider.stop();
 });
 
-async function open(context: BrowserContext, path = "/") {
+async function open(context: BrowserContext, path = "/", at = planner) {
   // The provider's page asks for letters that a machine without the internet has not.
   await context.route("https://fonts.googleapis.com/**", (route) => route.abort());
-  const opened = await openPage(context, planner.url + path, [provider.issuer]);
-  await opened.page.waitForURL((url) => url.origin === planner.url);
+  const opened = await openPage(context, at.url + path, [provider.issuer]);
+  await opened.page.waitForURL((url) => url.origin === at.url);
   return opened;
 }
 
@@ -224,4 +224,20 @@ test("a follow link needs no login, shows its end, and is over when its maker en
   const { page: late } = await openPage(stranger, url);
   await late.getByRole("alert").getByText("The link has expired, or was ended.").waitFor();
   expect([...faults, ...theirs]).toEqual([]);
+});
+
+test("a server that takes other tokens says which, and the page shows what was found and what is expected", async () => {
+  const other = "https://another.example.org";
+  const server = provider.serverOptions.map((word) => (word === AUDIENCE ? other : word));
+  const strict = await Planner.start(planner.casePath, { gateway: provider.gatewayOptions, server });
+  provider.admit(strict.url);
+  try {
+    const { page } = await open(await strict.browse(), "/", strict);
+    await page.getByRole("button", { name: "Sign in", exact: true }).click();
+    await enterName(page, "kim");
+    await page.getByRole("alert").getByText(`The cases cannot be listed. The token's audience is "${AUDIENCE}", and this server is "${other}"`).waitFor();
+  } finally {
+    provider.admit(planner.url);
+    await strict.stop();
+  }
 });
