@@ -3,9 +3,10 @@
 
 import { sentenceOf } from "../calls/call_error";
 import { download, toPly, toPng, toStl } from "../exports/files";
+import { CASE_FILE, plannedRanges } from "../exports/case_plan";
 import { exportedSurfaces, planDocument, provenanceLines } from "../exports/plan_export";
 import type { Workbench } from "../workbench/workbench";
-import { button, el, section } from "./dom";
+import { button, el, section, whileBusy } from "./dom";
 import { movingFilePart } from "./moving_file_part";
 
 /** What is shown, as files. Names of files hold nothing of the patient. */
@@ -20,10 +21,14 @@ export function exportPanel(bench: Workbench): HTMLElement {
   const save = (name: string, type: string, content: BlobPart) => download(name, new Blob([content], { type }));
   const remark = () => `Model ${bench.modelInfo(bench.model.value)?.name ?? "unknown"}`;
   const png = async () => {
-    const picture = bench.view.stage.snapshot();
+    const picture = await bench.view.stage.snapshot();
     if (picture === null) throw new Error("this browser draws no 3D pictures");
     const background = getComputedStyle(document.body).backgroundColor;
     download("tissueform.png", await toPng(picture, background, remark()));
+  };
+  const plan = async () => {
+    const ranges = await plannedRanges(bench.file);
+    save("tissueform-plan.json", "application/json", planDocument(bench, ranges));
   };
   return section("Export", [
     el("div", { class: "buttons" }, [
@@ -31,9 +36,18 @@ export function exportPanel(bench: Workbench): HTMLElement {
       button("All STL", tell(() => save("tissueform-all.stl", "model/stl", toStl(exportedSurfaces(bench, "all"), remark())))),
       button("Face PLY", tell(() => save("tissueform-face.ply", "application/octet-stream", toPly(exportedSurfaces(bench, "skin"), provenanceLines(bench))))),
       button("Picture", tell(png)),
-      button("Plan JSON", tell(() => save("tissueform-plan.json", "application/json", planDocument(bench)))),
+      button("Plan JSON", tell(plan)),
+      caseButton(bench),
     ]),
     el("p", { class: "quiet", text: "In mm, LPS, as it is shown. Every file says: not a medical device." }),
     movingFilePart(bench),
   ]);
+}
+
+/** The file that an exported plan names as its mesh. */
+function caseButton(bench: Workbench): HTMLElement {
+  const { source } = bench.file;
+  const run = async () => download(CASE_FILE, new Blob([await source.read(0, source.totalBytes)], { type: "model/gltf-binary" }));
+  const control = button("Case file", () => void whileBusy(control, run, (thrown) => (bench.notice.value = sentenceOf(thrown))));
+  return control;
 }
