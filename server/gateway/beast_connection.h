@@ -155,6 +155,10 @@ class BeastConnection final : public ReplyStream,
     const HttpDecision decision = context_->handler->Decide(request_head_);
     switch (decision.kind) {
       case HttpDecision::kReply:
+        // A page asks by a plain GET why its socket did not open.
+        if (decision.reply.status == 426 && context_->sockets >= context_->limits.sockets) {
+          return Write(context_->handler->ReplyWith(503), parser_->is_done());
+        }
         return Write(decision.reply, parser_->is_done());
       case HttpDecision::kStream:
         return ReadBody();

@@ -163,6 +163,7 @@ class BeastSocket final : public Socket,
       const auto self = weak.lock();
       if (self == nullptr || error || self->gone_) return;
       if (self->IsSilent()) self->user_->OnSilence();
+      if (self->user_ != nullptr) self->user_->OnSecond();
       if (!self->Stalls()) return self->Watch();
       self->context_->counters->Add(GatewayEvent::kStalled);
       self->Gone();

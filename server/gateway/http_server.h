@@ -79,6 +79,8 @@ class SocketUser {
   virtual void OnBadMessage(SocketClose why) = 0;
   // No message has come in time since the socket was opened.
   virtual void OnSilence() = 0;
+  // Once a second while the socket is open.
+  virtual void OnSecond() = 0;
   virtual void OnSent() = 0;
   virtual void OnGone() = 0;
   // The gateway ends.

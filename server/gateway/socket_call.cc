@@ -10,6 +10,12 @@
 #include "server/transport/network_address.h"
 
 namespace tissueform {
+namespace {
+
+// Half of what a page waits for before it says that it waits (calls/silence.ts).
+constexpr int kHeartbeatSeconds = 2;
+
+}  // namespace
 
 void SocketCall::OnOpen() { socket_->Receive(); }
 
@@ -54,17 +60,38 @@ void SocketCall::Start(absl::string_view payload) {
   if (!slot.ok()) return Fail(EventOf(slot.status()), slot.status(), SocketClose::kNormal);
   started_ = true;
   tells_begin_ = start->tells_begin;
+  wants_heartbeat_ = start->wants_heartbeat;
   counters_->Add(GatewayEvent::kSocketCall);
   answer_type_ = AnswerOf(start->method);
   upstream_ = UpstreamCall::Begin(*std::move(slot), *start, socket_, shared_from_this());
+  if (wants_heartbeat_) SendHeartbeat();
   socket_->Receive();
 }
 
 void SocketCall::OnBegun(std::map<std::string, std::string> headers) {
   if (finished_ || upstream_ == nullptr) return;
   if (!tells_begin_ || headers.empty()) return upstream_->Read();
+  Send(BeginFrame(headers));
+}
+
+void SocketCall::OnSecond() {
+  if (finished_ || socket_ == nullptr || sending_ || !wants_heartbeat_) return;
+  if (++quiet_seconds_ > kHeartbeatSeconds) SendHeartbeat();
+}
+
+void SocketCall::SendHeartbeat() {
+  sending_heartbeat_ = true;
+  Send(HeartbeatFrame());
+}
+
+void SocketCall::Send(std::string frame) {
+  quiet_seconds_ = 0;
+  if (sending_) {
+    behind_heartbeat_ = std::move(frame);
+    return;
+  }
   sending_ = true;
-  socket_->Send(BeginFrame(headers));
+  socket_->Send(std::move(frame));
 }
 
 void SocketCall::Forward(std::string payload) {
@@ -93,14 +120,15 @@ void SocketCall::OnAnswer(const grpc::ByteBuffer& message) {
   if (finished_) return;
   absl::StatusOr<std::string> frame = MessageFrame(message, answer_type_);
   if (!frame.ok()) return Finish(EndOf(frame.status()), SocketClose::kNormal);
-  sending_ = true;
-  socket_->Send(*std::move(frame));
+  Send(*std::move(frame));
 }
 
 void SocketCall::OnSent() {
   sending_ = false;
+  const bool was_heartbeat = std::exchange(sending_heartbeat_, false);
+  if (!behind_heartbeat_.empty()) return Send(std::exchange(behind_heartbeat_, {}));
   if (!finished_) {
-    if (upstream_ != nullptr) upstream_->Read();
+    if (!was_heartbeat && upstream_ != nullptr) upstream_->Read();
     return;
   }
   if (end_frame_.empty()) return socket_->Close(close_);

@@ -37,6 +37,7 @@ class SocketCall final : public SocketUser,
   void OnMessage(std::string message) override;
   void OnBadMessage(SocketClose why) override;
   void OnSilence() override;
+  void OnSecond() override;
   void OnSent() override;
   void OnGone() override;
   void OnDrain() override;
@@ -48,6 +49,9 @@ class SocketCall final : public SocketUser,
  private:
   void OnFrame(const SocketFrame& frame, std::string* message);
   void Start(absl::string_view payload);
+  // A frame of the server's to the client, or to wait behind a heartbeat.
+  void Send(std::string frame);
+  void SendHeartbeat();
   // To the server, or to wait until it takes it.
   void Forward(std::string payload);
   // The client has done something wrong.
@@ -69,6 +73,10 @@ class SocketCall final : public SocketUser,
   bool writing_ = false;  // to the server
   std::optional<std::string> waiting_;
   bool sending_ = false;  // to the client
+  bool sending_heartbeat_ = false;
+  std::string behind_heartbeat_;
+  bool wants_heartbeat_ = false;
+  int quiet_seconds_ = 0;  // in which nothing was sent to the client
   bool finished_ = false;
   std::string end_frame_;
   SocketClose close_ = SocketClose::kNormal;

@@ -93,6 +93,7 @@ absl::StatusOr<CallStart> ParseStart(absl::string_view payload) {
   }
   TF_RETURN_IF_ERROR(CheckMetadata(start.metadata));
   start.tells_begin = message.tells_begin();
+  start.wants_heartbeat = message.wants_heartbeat();
   if (message.deadline_ms() < 0) {
     return absl::InvalidArgumentError("start: deadline_ms is below 0");
   }
@@ -130,6 +131,12 @@ std::string BeginFrame(const std::map<std::string, std::string>& headers) {
   v1::GatewayCallBegin message;
   message.mutable_headers()->insert(headers.begin(), headers.end());
   return FrameOf(SocketFrameKind::kBegin, message);
+}
+
+std::string HeartbeatFrame() {
+  std::string frame(kSocketFrameHeadBytes, '\0');
+  PutHead(SocketFrameKind::kHeartbeat, kSocketFrameHeadBytes, 0, &frame);
+  return frame;
 }
 
 std::string EndFrame(const CallEnd& end) {

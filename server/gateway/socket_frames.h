@@ -26,6 +26,7 @@ enum class SocketFrameKind : uint8_t {
   kHalfClose = 3,
   kEnd = 4,
   kBegin = 5,
+  kHeartbeat = 6,
 };
 
 struct SocketFrame {
@@ -48,6 +49,9 @@ absl::StatusOr<std::string> MessageFrame(const grpc::ByteBuffer& message,
 
 // What the server has said before its first message.
 std::string BeginFrame(const std::map<std::string, std::string>& headers);
+
+// No payload: the connection works.
+std::string HeartbeatFrame();
 
 std::string EndFrame(const CallEnd& end);
 

@@ -27,6 +27,7 @@ struct CallStart {
   std::map<std::string, std::string> metadata = {};  // what gRPC takes, names in lower case
   std::optional<std::chrono::nanoseconds> timeout = std::nullopt;
   bool tells_begin = false;  // of a socket: the server's headers go to the client before all else
+  bool wants_heartbeat = false;  // of a socket: the gateway is never silent for long
 
   // Empty where there is none of that name.
   absl::string_view Metadata(const std::string& name) const {

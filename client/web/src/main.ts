@@ -8,7 +8,7 @@ import "./styles/panel.css";
 import "./styles/report.css";
 import { Bearer } from "./calls/bearer";
 import { Code, sentenceOf, toCallError } from "./calls/call_error";
-import { Gateway } from "./calls/gateway";
+import { Gateway, baseOf } from "./calls/gateway";
 import { type CaseFile, openCase } from "./case/case_file";
 import { serverSource } from "./case/case_sources";
 import type { ModelInfo } from "./generated/tissueform/v1/server_info_pb";
@@ -22,6 +22,7 @@ import { plannerPage } from "./pages/planner_page";
 import { signInPage } from "./pages/sign_in_page";
 import { accountBox, loginBanner } from "./panels/account_box";
 import { button, el } from "./panels/dom";
+import { formatProgress } from "./planning/numbers";
 import { restoreWork, workOf } from "./workbench/work";
 import type { Workbench } from "./workbench/workbench";
 
@@ -39,7 +40,9 @@ interface TestHook {
   view?: unknown;
 }
 
-const gateway = new Gateway(location.origin, new Bearer());
+/** The page's own path: a proxy may have it below one of its own. */
+const base = baseOf(location.href);
+const gateway = new Gateway(base, new Bearer());
 /** Null where nobody logs in. */
 let login: Login | null = null;
 let banner: HTMLElement | null = null;
@@ -58,7 +61,7 @@ async function start(): Promise<void> {
 
 /** True when the pages may be shown; else the user is on their way to the provider, or is asked to sign in. */
 async function signIn(): Promise<boolean> {
-  const config = await fetchLoginConfig(location.origin);
+  const config = await fetchLoginConfig(base);
   if (config === null) return true;
   const user = new Login(new OidcProvider(config), config.issuer, gateway.bearer);
   login = user;
@@ -103,7 +106,7 @@ function go(caseId: string): void {
 
 async function openPlanner(name: string): Promise<void> {
   const [file, models, hasLogins] = await Promise.all([fetchCase(name), fetchModels(), knowsCallers()]);
-  const followUrl = (follow: string) => `${location.origin}${location.pathname}#follow=${follow}&case=${name.replace("cases/", "")}`;
+  const followUrl = (follow: string) => `${base}/#follow=${follow}&case=${name.replace("cases/", "")}`;
   const parts = { followUrl, hasLogins, account: account() };
   const { element, bench } = plannerPage(gateway, file, name, models, parts, () => (location.hash = ""));
   hook.bench = bench;
@@ -144,10 +147,15 @@ async function knowsCallers(): Promise<boolean> {
 }
 
 async function fetchCase(name: string): Promise<CaseFile> {
-  const bar = el("progress", { attributes: { max: "1", value: "0", "aria-label": "Progress" } });
-  show(waitingPage("Opening the case", bar));
+  const bar = el("progress", { attributes: { max: "1", "aria-label": "Progress" } });
+  const told = el("p", { class: "told", text: "Asking the server" });
+  show(waitingPage("Opening the case", bar, told));
   const entry = await gateway.cases.getCase({ name }).catch((thrown) => Promise.reject(toCallError(thrown)));
-  return openCase(serverSource(gateway, entry), (share) => (bar.value = share));
+  const onProgress = (done: number, total: number) => {
+    bar.value = done / total;
+    told.textContent = formatProgress(done, total);
+  };
+  return openCase(serverSource(gateway, entry), onProgress);
 }
 
 async function fetchModels(): Promise<readonly ModelInfo[]> {

@@ -79,6 +79,40 @@ TEST_F(GatewaySocketTest, WhoAsksForHeadersThatThereAreNoneOfIsToldTheRest) {
   EXPECT_EQ(socket.ReceiveEnd().code(), 0);
 }
 
+TEST_F(GatewaySocketTest, WhoAsksForHeartbeatsHearsThemWhileTheServerIsSilent) {
+  RawSocket socket(port());
+  v1::GatewayCallStart start;
+  start.set_method(kSilent);
+  start.set_wants_heartbeat(true);
+  socket.SendOurs(SocketFrameKind::kStart, start.SerializeAsString());
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(socket.Receive().payload, HeartbeatFrame()) << i;
+}
+
+// A heartbeat that is being sent holds an answer up, and loses or doubles none.
+TEST_F(GatewaySocketTest, HeartbeatsLeaveTheServersMessagesInOrder) {
+  v1::GatewayCallStart start;
+  start.set_method(kEcho);
+  start.set_wants_heartbeat(true);
+  start.set_tells_begin(true);
+  for (int round = 0; round < 50; ++round) {
+    RawSocket socket(port());
+    socket.SendOurs(SocketFrameKind::kStart, start.SerializeAsString());
+    for (const char* text : {"a", "b", "c"}) socket.SendOurs(SocketFrameKind::kMessage, text);
+    socket.SendOurs(SocketFrameKind::kHalfClose);
+    std::string kinds;
+    std::string received;
+    while (kinds.empty() || kinds.back() != '4') {
+      const std::string frame = socket.Receive().payload;
+      ASSERT_GE(frame.size(), kSocketFrameHeadBytes);
+      kinds += static_cast<char>('0' + frame[1]);
+      if (kinds.back() == '2') received += frame.substr(kSocketFrameHeadBytes);
+    }
+    EXPECT_EQ(received, "abc");
+    std::erase(kinds, '6');
+    EXPECT_EQ(kinds, "52224");
+  }
+}
+
 TEST_F(GatewaySocketTest, ANodeThatIsAnotherEndsTheCallWithItsReason) {
   GatewayOptions options;
   options.servers = {"fake=" + server_.address()};
@@ -324,8 +358,11 @@ TEST_F(GatewaySocketTest, SocketsBeyondTheLimitAreAnsweredWith503) {
   EXPECT_EQ(second.status(), 101);
   EXPECT_EQ(RawSocket(port()).status(), 503);
   EXPECT_EQ(Count(GatewayEvent::kTooManySockets), 1);
+  // A page learns by a plain request whether it is this, or a proxy that lets no socket through.
+  EXPECT_EQ(StatusOf(Ask(port(), "GET /call HTTP/1.1")), 503);
   first.reset();
   EXPECT_TRUE(Becomes([&] { return RawSocket(port()).status() == 101; }));
+  EXPECT_TRUE(Becomes([&] { return StatusOf(Ask(port(), "GET /call HTTP/1.1")) == 426; }));
 }
 
 TEST_F(GatewaySocketTest, CallsBeyondTheChannelsAreRefusedByName) {

@@ -93,11 +93,14 @@ v1::GatewayCallStart Start() {
 TEST(SocketFrames, AStartIsUnderstood) {
   v1::GatewayCallStart message = Start();
   message.set_deadline_ms(1500);
+  message.set_wants_heartbeat(true);
   const auto start = ParseStart(message.SerializeAsString());
   ASSERT_TRUE(start.ok());
   EXPECT_EQ(start->method, message.method());
   EXPECT_EQ(start->metadata.at("x-tissueform-session"), "sessions/1");
   EXPECT_EQ(start->timeout, std::chrono::milliseconds(1500));
+  EXPECT_TRUE(start->wants_heartbeat);
+  EXPECT_FALSE(ParseStart(Start().SerializeAsString())->wants_heartbeat);
   EXPECT_FALSE(ParseStart(Start().SerializeAsString())->timeout.has_value());
 }
 
@@ -154,6 +157,11 @@ TEST(SocketFrames, WithoutATypeNothingIsLookedFor) {
   EXPECT_EQ(frame->substr(32), "abc");
   EXPECT_EQ(NumberAt(*frame, 8), 0U);
   EXPECT_EQ(NumberAt(*frame, 12), 0U);
+}
+
+TEST(SocketFrames, AHeartbeatIsAHead) {
+  const std::string frame = HeartbeatFrame();
+  EXPECT_EQ(frame, std::string("\x01\x06\x20", 3) + std::string(kSocketFrameHeadBytes - 3, '\0'));
 }
 
 TEST(SocketFrames, AnEndSaysAllOfIt) {

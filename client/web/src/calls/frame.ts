@@ -13,6 +13,7 @@ export enum FrameKind {
   HalfClose = 3,
   End = 4,
   Begin = 5,
+  Heartbeat = 6,
 }
 
 /** A frame as it came. All parts are views of one buffer: nothing is copied. */
@@ -49,7 +50,7 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
   const begin = head.getUint16(2, true);
   const length = head.getUint32(4, true);
   if (version !== VERSION) throw new Error(`frames of version ${version} are unknown to this page: load it again`);
-  if (kind < FrameKind.Start || kind > FrameKind.Begin) throw new Error(`a frame of the unknown kind ${kind} came`);
+  if (kind < FrameKind.Start || kind > FrameKind.Heartbeat) throw new Error(`a frame of the unknown kind ${kind} came`);
   if (begin < HEAD_BYTES || begin > HEAD_BYTES + 3 || begin + length !== buffer.byteLength) {
     throw new Error(`a frame of ${buffer.byteLength} bytes says that ${length} bytes follow at ${begin}`);
   }

@@ -15,13 +15,24 @@ import { ServerInfoService } from "../generated/tissueform/v1/server_info_pb";
 import { SessionService } from "../generated/tissueform/v1/session_service_pb";
 import { Bearer } from "./bearer";
 import { CallError, Code, toCallError } from "./call_error";
-import { type CallHandlers, type CallOptions, CallSocket, type Socket, type SocketFactory } from "./call_socket";
+import { type CallHandlers, type CallOptions, CallSocket, NOT_OPENED, type Socket, type SocketFactory } from "./call_socket";
+import type { Frame } from "./frame";
 import { withRoutes } from "./repetition";
 import { NODE_HEADER, SESSION_HEADER, SessionRoutes } from "./session_routes";
+import { Patience } from "./silence";
 
 export { sessionMetadata } from "./session_routes";
 
 const UNARY_DEADLINE_MS = 60_000;
+/** Of the question why a socket did not open. */
+const CHECK_MS = 2000;
+/** What the gateway answers to a request for a socket that is no upgrade. */
+const SOCKETS_ONLY = 426;
+
+/** Where the page of this address lies, without the last slash: at the root of its host, or below a path that a proxy has for it. */
+export function baseOf(url: string): string {
+  return new URL(".", url).href.replace(/\/$/, "");
+}
 
 /**
  * The page's own gateway: services for unary calls and bounded downloads over gRPC-Web, `open` for what lives long, over a
@@ -31,6 +42,8 @@ const UNARY_DEADLINE_MS = 60_000;
 export class Gateway {
   /** Where the sessions of this page's calls are. */
   readonly routes = new SessionRoutes();
+  /** By the name of a method. */
+  private readonly patience = new Map<string, Patience>();
   readonly access: Client<typeof AccessService>;
   readonly cases: Client<typeof CaseService>;
   readonly meshes: Client<typeof MeshService>;
@@ -41,7 +54,7 @@ export class Gateway {
   readonly exports: Client<typeof ExportService>;
   readonly serverInfo: Client<typeof ServerInfoService>;
 
-  /** `base`: where the page comes from, as "http://127.0.0.1:8080". */
+  /** `base`: where the page comes from, as "http://127.0.0.1:8080" or "https://hospital.example.org/planner". */
   constructor(
     readonly base: string,
     readonly bearer: Bearer = new Bearer(),
@@ -72,10 +85,27 @@ export class Gateway {
     const onEnd = (ended: CallError | null) => {
       const error = ended === null ? null : this.routes.failed(session, route[NODE_HEADER] ?? "", ended);
       if (error?.code === Code.Unauthenticated) void this.refused(error, token, (told) => handlers.onEnd(told));
+      else if (error?.reason === NOT_OPENED) void this.explained(error).then((told) => handlers.onEnd(told));
       else handlers.onEnd(error);
     };
     const metadata = { ...this.bearer.headers, ...options?.metadata, ...route };
-    return new CallSocket(this.sockets, method, { onBegin, onMessage: (message, frame) => handlers.onMessage(message, frame), onEnd }, { ...options, metadata });
+    const told = { onBegin, onMessage: (message: MessageShape<M["output"]>, frame: Frame) => handlers.onMessage(message, frame), onQuiet: (isQuiet: boolean) => handlers.onQuiet?.(isQuiet), onEnd };
+    return new CallSocket(this.sockets, method, told, { patience: this.patienceOf(method.name), ...options, metadata });
+  }
+
+  private patienceOf(method: string): Patience {
+    const patience = this.patience.get(method) ?? new Patience();
+    this.patience.set(method, patience);
+    return patience;
+  }
+
+  /** Why a socket did not open: where the gateway answers a plain request for one, something before it keeps sockets back. */
+  private async explained(error: CallError): Promise<CallError> {
+    const options: RequestInit = { cache: "no-store", signal: AbortSignal.timeout(CHECK_MS) };
+    const status = await fetch(`${this.base}/call`, options).then((reply) => reply.status, () => 0);
+    if (status === 503) return new CallError(error.code, "the gateway takes no more connections now", NOT_OPENED);
+    if (status !== SOCKETS_ONLY) return error;
+    return new CallError(error.code, "the proxy in front of the gateway passes no WebSockets on; ask its administrator to set it up as docs/gateway.md shows", NOT_OPENED);
   }
 
   private async refused(error: CallError, token: string, onEnd: (error: CallError) => void): Promise<void> {

@@ -46,8 +46,11 @@ export interface CaseFile {
   source: CaseSource;
 }
 
+/** How many of the bytes that are read have come. */
+export type OpeningProgress = (doneBytes: number, totalBytes: number) => void;
+
 /** Throws a CaseError that says what is wrong with the file; what `source.read` throws passes through. */
-export async function openCase(source: CaseSource, onProgress: (share: number) => void = () => {}): Promise<CaseFile> {
+export async function openCase(source: CaseSource, onProgress: OpeningProgress = () => {}): Promise<CaseFile> {
   const prefix = await source.read(0, Math.min(PREFIX_BYTES, source.totalBytes));
   const json = jsonRange(prefix, source.totalBytes);
   const text = await source.read(json.offset, json.length + 8);
@@ -58,7 +61,8 @@ export async function openCase(source: CaseSource, onProgress: (share: number) =
 
   const bin = json.offset + json.length + 8;
   const end = payload.offset + 24 * manifest.mesh.vertexCount;
-  const bytes = await source.read(bin, end - bin, (count) => onProgress(count / (end - bin)));
+  onProgress(0, end - bin);
+  const bytes = await source.read(bin, end - bin, (count) => onProgress(count, end - bin));
   return build(source, manifest, container, new Views(container.views, bytes, bin), payload);
 }
 

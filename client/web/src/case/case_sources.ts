@@ -1,8 +1,10 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+import { type Timer, browserTimer } from "../calls/backoff";
 import { Code, toCallError } from "../calls/call_error";
 import type { Gateway } from "../calls/gateway";
+import { steady } from "../calls/steady";
 import type { Case } from "../generated/tissueform/v1/case_pb";
 import type { CaseSource } from "./case_file";
 import { subtleCrypto } from "./secure_page";
@@ -22,17 +24,21 @@ export function fileSource(file: Blob): CaseSource {
   };
 }
 
-/** A case that a server keeps. A download that breaks off goes on where it was, three times. */
-export function serverSource(gateway: Gateway, entry: Pick<Case, "name" | "totalBytes">): CaseSource {
+/** How often a download goes on that breaks off without having brought anything. */
+const MOST_TRIES = 3;
+
+/** A case that a server keeps. A download that breaks off, or stands still, goes on where it was. */
+export function serverSource(gateway: { cases: Pick<Gateway["cases"], "readCase"> }, entry: Pick<Case, "name" | "totalBytes">, timer: Timer = browserTimer): CaseSource {
   return {
     totalBytes: Number(entry.totalBytes),
     async read(offset, length, onBytes) {
       const bytes = new Uint8Array(length);
       let done = 0;
-      for (let attempt = 0; done < length; ++attempt) {
+      for (let tries = 0; done < length; ) {
+        const before = done;
         try {
           const request = { name: entry.name, readOffset: BigInt(offset + done), readLimit: BigInt(length - done) };
-          for await (const { data } of gateway.cases.readCase(request, { timeoutMs: 0 })) {
+          for await (const { data } of steady((signal) => gateway.cases.readCase(request, { timeoutMs: 0, signal }), { timer })) {
             if (done + data.length > length) throw new Error("the server sent more of the case than it was asked for");
             bytes.set(data, done);
             done += data.length;
@@ -41,7 +47,8 @@ export function serverSource(gateway: Gateway, entry: Pick<Case, "name" | "total
           if (done < length) throw new Error("the server sent less of the case than it was asked for");
         } catch (thrown) {
           const error = toCallError(thrown);
-          if (attempt >= 3 || error.code !== Code.Unavailable) throw error;
+          tries = done > before ? 0 : tries + 1;
+          if (tries > MOST_TRIES || error.code !== Code.Unavailable) throw error;
         }
       }
       return bytes;

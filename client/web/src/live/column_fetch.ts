@@ -6,6 +6,7 @@ import { CallError, Code, toCallError } from "../calls/call_error";
 import { type Gateway, sessionMetadata } from "../calls/gateway";
 import { type DeformConfiguration, type GetPreparedAnswersRequest, GetPreparedAnswersRequestSchema } from "../generated/tissueform/v1/deform_service_pb";
 import { Backoff } from "../calls/backoff";
+import { steady } from "../calls/steady";
 
 /** More than any head needs; what is larger stays on the server. */
 const MOST_BYTES = 2 ** 26;
@@ -51,6 +52,16 @@ export async function fetchColumns(gateway: Pick<Gateway, "deform">, configurati
   }
 }
 
+/** Aborted with the first of them. */
+function anyOf(signal: AbortSignal, other: AbortSignal): AbortSignal {
+  const both = new AbortController();
+  for (const one of [signal, other]) {
+    if (one.aborted) both.abort(one.reason);
+    one.addEventListener("abort", () => both.abort(one.reason), { signal: both.signal });
+  }
+  return both.signal;
+}
+
 class Download {
   done = 0;
   private bytes = new Uint8Array();
@@ -62,19 +73,12 @@ class Download {
   ) {}
 
   async run(gateway: Pick<Gateway, "deform">, request: GetPreparedAnswersRequest, signal: AbortSignal): Promise<FetchedColumns | null> {
-    const ending = new AbortController();
-    const stop = () => ending.abort(signal.reason);
-    signal.addEventListener("abort", stop);
-    try {
-      const options = { headers: sessionMetadata(request.session), timeoutMs: DEADLINE_MS, signal: ending.signal };
-      for await (const { message } of gateway.deform.getPreparedAnswers(request, options)) {
-        if (message.case === "header") this.begin(Number(message.value.totalBytes), message.value.sha256);
-        if (message.case === "chunk") this.take(Number(message.value.offset), message.value.data);
-        if (this.sha256 === this.known && this.known !== "") return null;
-      }
-    } finally {
-      signal.removeEventListener("abort", stop);
-      ending.abort();
+    const options = { headers: sessionMetadata(request.session), timeoutMs: DEADLINE_MS };
+    const start = (stalled: AbortSignal) => gateway.deform.getPreparedAnswers(request, { ...options, signal: anyOf(signal, stalled) });
+    for await (const { message } of steady(start, { firstMs: DEADLINE_MS })) {
+      if (message.case === "header") this.begin(Number(message.value.totalBytes), message.value.sha256);
+      if (message.case === "chunk") this.take(Number(message.value.offset), message.value.data);
+      if (this.sha256 === this.known && this.known !== "") return null;
     }
     if (this.sha256 === "" || this.done !== this.bytes.length) throw new CallError(Code.Unavailable, "the columns were cut off");
     return { bytes: this.bytes, sha256: this.sha256 };

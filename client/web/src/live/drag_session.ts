@@ -37,18 +37,23 @@ export interface DragListener {
   /** `used` is to be called once the picture was shown: the server waits for it. */
   onPicture(picture: Picture, used: () => void): void;
   onNotice(notice: DeformNotice): void;
+  /** The newest poses or their commit have had no answer for 2 s, or the gateway gives no sign of life; then, that they have. */
+  onWaiting(isWaiting: boolean): void;
   /** The connection broke off; the drag goes on in `delayMs`. */
   onBroken(error: CallError, delayMs: number): void;
   /** The drag is over, for a reason that trying again does not mend. */
   onEnd(error: CallError): void;
 }
 
+/** What the server takes where the configuration does not say. */
+const DEFAULT_MAX_UNACKED = 2;
 /** Answers that were not acknowledged by a picture of this age are no longer waited for. */
 const KEPT_SEND_TIMES = 256;
 
 /**
  * A drag of one session over one socket at a time: the newest poses are sent, frames come back, and where the connection breaks
- * off another one is opened, which is sent the newest poses again. Commits are repeated until the server says that it keeps them.
+ * off, or poses and commits have no answer for too long, another one is opened, which is sent the newest poses again. Commits are
+ * repeated until the server says that it keeps them.
  */
 export class DragSession {
   private readonly unwatch: () => void;
@@ -64,6 +69,13 @@ export class DragSession {
   private poses: HandlePose[] | null = null;
   /** Of the newest pose that is to be kept and of which the server has not said so. */
   private uncommitted: bigint | null = null;
+  /** Of the newest pose that was sent over the open call, and of the newest frame that came over it. */
+  private sent = 0n;
+  private answered = 0n;
+  /** Frames that the page has not shown yet: the server makes no more than `maxUnacked` of them. */
+  private unused = 0;
+  /** The session has left the server's memory; that it comes back may take minutes. */
+  private isAway = false;
   private readonly sendTimes = new Map<bigint, number>();
 
   constructor(
@@ -102,10 +114,15 @@ export class DragSession {
 
   private connect(): void {
     this.isStarted = false;
+    [this.sent, this.answered, this.unused, this.isAway] = [0n, 0n, 0, false];
     this.toldToken = this.gateway.bearer.token;
     const call = this.gateway.open(
       DeformService.method.deform,
-      { onMessage: (message, frame) => this.receive(message, frame), onEnd: (error) => this.broken(error) },
+      {
+        onMessage: (message, frame) => this.receive(message, frame),
+        onQuiet: (isQuiet) => this.isStarted && this.listener.onWaiting(isQuiet),
+        onEnd: (error) => this.broken(error),
+      },
       { metadata: sessionMetadata(this.configuration.session) },
     );
     call.send(create(DeformRequestSchema, { message: { case: "configuration", value: this.configuration } }));
@@ -125,6 +142,14 @@ export class DragSession {
     if (this.sendTimes.size > KEPT_SEND_TIMES) this.sendTimes.delete(this.sendTimes.keys().next().value ?? 0n);
     const value = { $typeName: "tissueform.v1.PoseUpdate" as const, sequence: this.sequence, poses: this.poses, commit };
     this.call?.send(create(DeformRequestSchema, { message: { case: "pose", value } }));
+    this.sent = this.sequence;
+    this.judgeAnswers();
+  }
+
+  private judgeAnswers(): void {
+    const hasRoom = this.unused < (this.configuration.maxUnacked ?? DEFAULT_MAX_UNACKED);
+    const isOwed = this.uncommitted !== null || (hasRoom && this.answered < this.sent);
+    if (this.call !== null) this.call.awaitsAnswer = isOwed && !this.isAway;
   }
 
   private receive(response: DeformResponse, frame: Frame): void {
@@ -132,6 +157,7 @@ export class DragSession {
     if (message.case === "started") this.start(message.value);
     else if (message.case === "frame") this.show(message.value, frame);
     else if (message.case === "notice") this.notice(message.value);
+    this.judgeAnswers();
   }
 
   private start(started: DeformStarted): void {
@@ -152,7 +178,13 @@ export class DragSession {
       posesBehind: Number(this.sequence - frame.sequence),
     };
     const call = this.call;
+    [this.answered, this.isAway] = [frame.sequence, false];
+    this.unused += 1;
     this.listener.onPicture(picture, () => {
+      if (call === this.call) {
+        this.unused = 0; // an acknowledgement stands for those before it
+        this.judgeAnswers();
+      }
       const value = { $typeName: "tissueform.v1.FrameAck" as const, sequence: frame.sequence, refinement: frame.refinement };
       call?.send(create(DeformRequestSchema, { message: { case: "ack", value } }));
     });
@@ -161,6 +193,7 @@ export class DragSession {
   private notice(notice: DeformNotice): void {
     const { notice: what } = notice;
     if (what.case === "committed" && this.uncommitted !== null && what.value.sequence >= this.uncommitted) this.uncommitted = null;
+    if (what.case === "evicted" || what.case === "restored") this.isAway = what.case === "evicted";
     this.listener.onNotice(notice);
   }
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { create } from "@bufbuild/protobuf";
-import { CallError, Code } from "../calls/call_error";
+import { CallError, Code, toCallError } from "../calls/call_error";
 import type { CallSocket } from "../calls/call_socket";
 import { type Frame, asFloats } from "../calls/frame";
 import { type Gateway, sessionMetadata } from "../calls/gateway";
@@ -32,10 +32,14 @@ export interface FollowListener {
   onPicture(picture: FollowedPicture, used: () => void): void;
   onNotice(notice: DeformNotice): void;
   onStarted(): void;
+  /** The gateway gives no sign of life; then, that it does. */
+  onWaiting(isWaiting: boolean): void;
   onBroken(error: CallError, delayMs: number): void;
   onEnd(error: CallError): void;
 }
 
+const ACKNOWLEDGE_MS = 8000;
+const ACKNOWLEDGE_AGAIN_MS = 1000;
 /** For so long after a break a drag that was seen is waited for, before what was last committed is shown. */
 const DRAG_RETURNS_MS = 5000;
 
@@ -81,7 +85,11 @@ export class FollowSession {
   private connect(): void {
     this.call = this.gateway.open(
       DeformService.method.watch,
-      { onMessage: (message, frame) => this.receive(message, frame), onEnd: (error) => this.broken(error) },
+      {
+        onMessage: (message, frame) => this.receive(message, frame),
+        onQuiet: (isQuiet) => this.listener.onWaiting(isQuiet),
+        onEnd: (error) => this.broken(error),
+      },
       { metadata: sessionMetadata(this.session) },
     );
     this.call.send(create(WatchRequestSchema, { session: this.session }));
@@ -124,9 +132,15 @@ export class FollowSession {
     else tell();
   }
 
-  // A watch that has ended meanwhile needs no acknowledgement; its end is told by itself.
+  // A watch that has ended meanwhile needs no acknowledgement; its end is told by itself. The server waits for one that was lost,
+  // so the newest is repeated.
   private acknowledge(watch: string, number: bigint): void {
-    this.gateway.deform.acknowledgeWatch({ watch, number }, { headers: sessionMetadata(this.session) }).catch(() => {});
+    const options = { headers: sessionMetadata(this.session), timeoutMs: ACKNOWLEDGE_MS };
+    this.gateway.deform.acknowledgeWatch({ watch, number }, options).catch((thrown) => {
+      const isNewest = () => !this.isClosed && watch === this.watch && number === this.used;
+      if (!toCallError(thrown).isPassing || !isNewest()) return;
+      this.timer(() => isNewest() && this.acknowledge(watch, number), ACKNOWLEDGE_AGAIN_MS);
+    });
   }
 
   // A watch stands on the token of its newest acknowledgement: said once more where nobody drags.

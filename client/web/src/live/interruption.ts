@@ -8,6 +8,8 @@ import type { SessionRoutes } from "../calls/session_routes";
 export type Connection =
   | { kind: "preparing"; text: string; share: number | null }
   | { kind: "live" }
+  /** Open, and what is waited for does not come: an answer, or any sign of the server. */
+  | { kind: "waiting" }
   /** Another server of the cluster is about to take the session: it goes on by itself within seconds. */
   | { kind: "moving" }
   | { kind: "broken"; text: string }

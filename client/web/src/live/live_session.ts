@@ -165,6 +165,7 @@ export class LiveSession {
       },
       onPicture: (picture, used) => this.listener.onPicture(picture, used),
       onNotice: (notice) => this.tell(notice),
+      onWaiting: (isWaiting) => this.listener.onConnection({ kind: isWaiting ? "waiting" : "live" }),
       onBroken: (error) => this.listener.onConnection(this.interruption.connection(error)),
       onEnd: (error) => this.dragEnded(error),
     });

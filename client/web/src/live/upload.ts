@@ -92,7 +92,7 @@ async function committedBytes(gateway: Gateway, name: string): Promise<number> {
 
 /** The range in chunks whose offsets count from its beginning; stops where the server has answered. */
 async function sendChunks(
-  call: Pick<CallSocket<typeof CaseService.method.uploadCase>, "bufferedBytes" | "halfClose">,
+  call: Pick<CallSocket<typeof CaseService.method.uploadCase>, "bufferedBytes" | "halfClose" | "isOver">,
   source: CaseSource,
   range: Range,
   send: (offset: number, data: Uint8Array, isLast: boolean) => void,
@@ -100,10 +100,11 @@ async function sendChunks(
   onProgress: Progress,
 ): Promise<void> {
   for (let at = 0; at === 0 || at < range.length; at += CHUNK_BYTES) {
-    while (call.bufferedBytes > MOST_BUFFERED_BYTES) await new Promise((resolve) => setTimeout(resolve, BUFFER_POLL_MS));
+    // What a dead connection holds never leaves it.
+    while (call.bufferedBytes > MOST_BUFFERED_BYTES && !call.isOver) await new Promise((resolve) => setTimeout(resolve, BUFFER_POLL_MS));
     const length = Math.min(CHUNK_BYTES, range.length - at);
     const data = await source.read(range.offset + at, length);
-    if (isAnswered()) return;
+    if (isAnswered() || call.isOver) return;
     send(at, data, at + length >= range.length);
     onProgress(range.length === 0 ? 1 : (at + length) / range.length);
   }

@@ -94,7 +94,7 @@ function dropZone(onFile: (file: File) => void): HTMLElement {
 /** A file is read in full before it is sent: the server keeps bytes, it does not look into them. */
 async function bringIn(gateway: Gateway, file: File, tell: (text: string, share: number) => void): Promise<Case> {
   const source = fileSource(file);
-  const opened = await openCase(source, (share) => tell("Reading the file", share));
+  const opened = await openCase(source, (done, total) => tell("Reading the file", done / total));
   const name = `cases/${await sha256Of(file)}`;
   try {
     return await gateway.cases.getCase({ name });

@@ -76,6 +76,7 @@ export class Follower {
         interruption.end();
         listener.onConnection({ kind: "live" });
       },
+      onWaiting: (isWaiting) => listener.onConnection({ kind: isWaiting ? "waiting" : "live" }),
       onPicture: (picture, used) => this.show(picture, used),
       onNotice: ({ notice }) => {
         if (notice.case === "draining" && !gateway.routes.isCluster) listener.onNotice("The server is about to end; the page connects again by itself.");

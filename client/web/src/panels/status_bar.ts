@@ -62,7 +62,7 @@ export function statusBar(title: string, { links, onLeave, onRetry, account }: S
       if (share === null) progress.removeAttribute("value");
       else progress.value = share;
       if (retry !== null) retry.hidden = connection.kind !== "failed";
-      age.hidden = connection.kind !== "live";
+      age.hidden = connection.kind !== "live" && connection.kind !== "waiting";
     },
     answered(roundTripMs) {
       age.textContent = roundTripMs < FRESH_MS ? `answered in ${Math.max(1, Math.round(roundTripMs))} ms` : `answered in ${(roundTripMs / 1000).toFixed(1)} s`;
@@ -80,6 +80,8 @@ function describe(connection: Connection): string {
   switch (connection.kind) {
     case "live":
       return "Live";
+    case "waiting":
+      return "Waiting for the server";
     case "preparing":
       return connection.share === null ? `${connection.text} …` : `${connection.text}, ${Math.round(100 * connection.share)} %`;
     case "moving":

@@ -37,3 +37,8 @@ export function formatBytes(count: number): string {
   if (count < 1e3) return `${count} bytes`;
   return count < 1e6 ? `${(count / 1e3).toFixed(0)} kB` : `${(count / 1e6).toFixed(1)} MB`;
 }
+
+/** "1.2 of 5.0 MB, 24 %" */
+export function formatProgress(doneBytes: number, totalBytes: number): string {
+  return `${(doneBytes / 1e6).toFixed(1)} of ${(totalBytes / 1e6).toFixed(1)} MB, ${Math.floor((100 * doneBytes) / totalBytes)} %`;
+}

@@ -7,9 +7,11 @@ import { expect, test, vi } from "vitest";
 import { type CallError, Code } from "../../src/calls/call_error";
 import { CallSocket } from "../../src/calls/call_socket";
 import { FrameKind, encodeFrame } from "../../src/calls/frame";
+import { Patience } from "../../src/calls/silence";
 import { ErrorInfoSchema } from "../../src/generated/google/rpc/error_details_pb";
 import { StatusSchema } from "../../src/generated/google/rpc/status_pb";
 import { DeformRequestSchema, DeformService } from "../../src/generated/tissueform/v1/deform_service_pb";
+import { FakeClock } from "../testing/fake_clock";
 import { FakeSocket } from "../testing/fake_socket";
 
 function open(metadata: Record<string, string> = {}) {
@@ -121,4 +123,69 @@ test("a cancelled call hears and sends nothing more", () => {
   expect(ends).toHaveLength(0);
   expect(onMessage).not.toHaveBeenCalled();
   expect(socket.sent).toHaveLength(1);
+});
+
+function timed(patience = new Patience()) {
+  const clock = new FakeClock();
+  const socket = new FakeSocket();
+  const told: (string | boolean)[] = [];
+  const handlers = { onMessage: () => told.push("message"), onQuiet: (isQuiet: boolean) => told.push(isQuiet), onEnd: (error: CallError | null) => told.push(error?.message ?? "end") };
+  const call = new CallSocket(() => socket, DeformService.method.deform, handlers, { patience, timer: clock.timer });
+  return { clock, socket, told, call };
+}
+
+test("heartbeats keep a call that says nothing else", () => {
+  const { clock, socket, told } = timed();
+  socket.onopen?.();
+  expect(socket.start().wantsHeartbeat).toBe(true);
+  for (let i = 0; i < 100; ++i) {
+    socket.heartbeat();
+    clock.pass(3);
+  }
+  expect(told).toEqual([]);
+});
+
+test("a gateway that sends none is no dead one", () => {
+  const { clock, socket, told } = timed();
+  socket.onopen?.();
+  clock.pass(1000);
+  expect(told).toEqual([]);
+});
+
+test("a call whose heartbeats stop ends, as one that passes", () => {
+  const { clock, socket, told } = timed();
+  socket.onopen?.();
+  socket.heartbeat();
+  clock.pass(8);
+  expect(told).toEqual([true, "the server has not answered for 8 s"]);
+  expect(socket.closedWith).toBe(1000);
+  clock.pass(100);
+  expect(told).toHaveLength(2);
+});
+
+test("a socket that does not open ends within 8 s", () => {
+  const { clock, told } = timed();
+  clock.pass(8);
+  expect(told[told.length - 1]).toBe("the connection to the gateway does not open");
+});
+
+test("on a line that is slower than the first patience calls get the time that they need, and less again when they last", () => {
+  const patience = new Patience();
+  const { clock, socket, told } = timed(patience);
+  socket.onopen?.();
+  socket.heartbeat();
+  clock.pass(8);
+  expect(told).toContain("the server has not answered for 8 s");
+  const next = timed(patience);
+  next.socket.onopen?.();
+  next.socket.heartbeat();
+  next.clock.pass(12);
+  next.socket.heartbeat();
+  expect(next.told).toEqual([true, false]);
+  expect(patience.seconds).toBe(36);
+  for (let i = 0; i < 40; ++i) {
+    next.clock.pass(1);
+    next.socket.heartbeat();
+  }
+  expect(patience.seconds).toBe(18);
 });

@@ -4,7 +4,7 @@
 import { afterEach, expect, test, vi } from "vitest";
 import { Bearer } from "../../src/calls/bearer";
 import { type CallError, Code } from "../../src/calls/call_error";
-import { Gateway } from "../../src/calls/gateway";
+import { Gateway, baseOf } from "../../src/calls/gateway";
 import { DeformService } from "../../src/generated/tissueform/v1/deform_service_pb";
 import { FakeSocket } from "../testing/fake_socket";
 
@@ -100,3 +100,30 @@ test("other ends of a stream are told at once, as they are", () => {
   socket.end(0);
   expect(ends).toEqual([null]);
 });
+
+test.each([
+  [426, "the proxy in front of the gateway passes no WebSockets on"],
+  [503, "the gateway takes no more connections"],
+  [502, "the connection to the gateway does not open"],
+  [0, "the connection to the gateway does not open"],
+])("why a socket does not open is found out by a plain request (%i)", async (status, text) => {
+  const asked: string[] = [];
+  vi.stubGlobal("fetch", (url: string) => {
+    asked.push(url);
+    return status === 0 ? Promise.reject(new Error("gone")) : Promise.resolve(new Response(null, { status }));
+  });
+  const socket = new FakeSocket();
+  const calls = new Gateway("https://hospital.example.org/planner", new Bearer(), () => socket);
+  const ended = new Promise<CallError | null>((onEnd) => calls.open(DeformService.method.deform, { onMessage: () => {}, onEnd }));
+  socket.onclose?.({ code: 1006, reason: "" });
+  expect((await ended)?.message).toContain(text);
+  expect((await ended)?.isPassing).toBe(true);
+  expect(asked).toEqual(["https://hospital.example.org/planner/call"]);
+});
+
+test.each([
+  ["http://127.0.0.1:8080/", "http://127.0.0.1:8080"],
+  ["http://127.0.0.1:8080/#case=a", "http://127.0.0.1:8080"],
+  ["https://hospital.example.org/planner/?code=1&state=2#follow=a", "https://hospital.example.org/planner"],
+  ["https://hospital.example.org/a/b/index.html", "https://hospital.example.org/a/b"],
+])("a page at %s calls below %s", (url, base) => expect(baseOf(url)).toBe(base));

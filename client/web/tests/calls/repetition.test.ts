@@ -5,7 +5,7 @@ import { create, toBinary } from "@bufbuild/protobuf";
 import { anyPack } from "@bufbuild/protobuf/wkt";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { Bearer } from "../../src/calls/bearer";
-import { CallError, Code } from "../../src/calls/call_error";
+import { CallError, Code, toCallError } from "../../src/calls/call_error";
 import { Gateway, sessionMetadata } from "../../src/calls/gateway";
 import { repeated } from "../../src/calls/repetition";
 import { ErrorInfoSchema } from "../../src/generated/google/rpc/error_details_pb";
@@ -207,4 +207,44 @@ test("a socket that ends with where the session is leads the next one there", ()
   open();
   sockets[1].onopen?.();
   expect(sockets[1].start().metadata["x-tissueform-node"]).toBe("b");
+});
+
+/** A browser whose kept connections are dead: the first `count` requests hang until they are aborted. */
+function hanging(count: number, answer: () => Response) {
+  const waitedMs: number[] = [];
+  vi.stubGlobal("fetch", (_: string, { signal }: { signal: AbortSignal }) => {
+    if (count-- <= 0) return Promise.resolve(answer());
+    const begin = performance.now();
+    return new Promise((_, reject) =>
+      signal.addEventListener("abort", () => {
+        waitedMs.push(performance.now() - begin);
+        reject(signal.reason);
+      }),
+    );
+  });
+  return waitedMs;
+}
+
+test("a look that a dead connection swallows is made again over another one, with more patience", async () => {
+  const { read, codeOf } = gateway(success("a"));
+  const waitedMs = hanging(2, success("a"));
+  expect(await codeOf(read())).toBe(0);
+  expect(waitedMs).toEqual([4000, 8000]);
+});
+
+test("where all are dead the reason is told, and nothing is asked for ever", async () => {
+  const { read } = gateway(success("a"));
+  const waitedMs = hanging(Infinity, success("a"));
+  const error = await read().catch((thrown) => toCallError(thrown));
+  expect(error).toMatchObject({ code: Code.DeadlineExceeded, message: "the server has not answered for 16 s", isPassing: true });
+  expect(waitedMs).toEqual([4000, 8000, 16000]);
+});
+
+test("what does something, or may take long, is not cut short", async () => {
+  const { remove, keep } = gateway(success("a"));
+  for (const call of [remove, keep]) {
+    const waitedMs = hanging(Infinity, success("a"));
+    await expect(Promise.race([call(), new Promise((_, reject) => setTimeout(() => reject(new Error("still waiting")), 30_000))])).rejects.toThrow("still waiting");
+    expect(waitedMs).toEqual([]);
+  }
 });

@@ -13,6 +13,8 @@ import { StatusSchema } from "../../src/generated/google/rpc/status_pb";
 import { DeformConfigurationSchema } from "../../src/generated/tissueform/v1/deform_service_pb";
 import { DragSession, type Picture } from "../../src/live/drag_session";
 import { toMessages } from "../../src/live/pose_messages";
+import { Patience } from "../../src/calls/silence";
+import { FakeClock } from "../testing/fake_clock";
 import { FakeSocket } from "../testing/fake_socket";
 
 const POSES = toMessages(["mandible"], [{ rotationVector: [0, 0, 0], pivotMm: [0, 0, 0], translationMm: [1, 2, 3], scale: 1 }]);
@@ -43,6 +45,7 @@ function drag() {
       onStarted: () => told.push("started"),
       onPicture: (picture, used) => pictures.push({ picture, used }),
       onNotice: ({ notice }) => told.push(notice.case ?? ""),
+      onWaiting: (isWaiting) => told.push(isWaiting ? "waiting" : "answered"),
       onBroken: () => told.push("broken"),
       onEnd: (error) => errors.push(error),
     },
@@ -226,5 +229,158 @@ describe("a drag", () => {
     last().answer(STARTED);
     last().answer({ message: { case: "frame", value: { sequence: 1n, positions: new Uint8Array(5) } } });
     expect(errors[0].message).toContain("no whole numbers");
+  });
+});
+
+/** A live drag on a clock of the test's, over gateways that send heartbeats as long as `isMute` is false. */
+function timedDrag() {
+  const clock = new FakeClock();
+  const sockets: FakeSocket[] = [];
+  const told: string[] = [];
+  const used: (() => void)[] = [];
+  const patience = new Patience();
+  const open = (method: any, handlers: any, options: any) => {
+    const socket = new FakeSocket();
+    sockets.push(socket);
+    const call = new CallSocket(() => socket, method, handlers, { ...options, patience, timer: clock.timer });
+    socket.onopen?.();
+    return call;
+  };
+  const gateway = { bearer: new Bearer(), open } as unknown as Pick<Gateway, "open" | "bearer">;
+  const listener = {
+    onStarted: () => told.push("started"),
+    onPicture: (_: Picture, wasUsed: () => void) => used.push(wasUsed),
+    onNotice: () => {},
+    onWaiting: (isWaiting: boolean) => told.push(isWaiting ? "waiting" : "answered"),
+    onBroken: (error: CallError) => told.push(`broken: ${error.message}`),
+    onEnd: () => told.push("end"),
+  };
+  const session = new DragSession(gateway, create(DeformConfigurationSchema, { session: "sessions/abc", maxUnacked: 3 }), listener, clock.timer, () => clock.nowMs);
+  const last = () => sockets[sockets.length - 1];
+  /** Seconds in which the gateway lives and the server says nothing. */
+  const beat = (seconds: number) => {
+    for (let i = 0; i < seconds; ++i) {
+      clock.pass(1);
+      last().heartbeat();
+    }
+  };
+  last().heartbeat();
+  last().answer(STARTED);
+  return { session, clock, sockets, told, used, last, beat };
+}
+
+const committed = (sequence: bigint) => ({ message: { case: "notice" as const, value: { notice: { case: "committed" as const, value: { sequence } } } } });
+const noticed = (name: "evicted" | "restored") => ({ message: { case: "notice" as const, value: { notice: { case: name, value: {} } } } });
+
+describe("over a connection that is open and dead", () => {
+  test("a pose without an answer is waited for after 2 s, and sent over another connection after 8 s", () => {
+    const { session, clock, sockets, told, last } = timedDrag();
+    session.sendPoses(POSES, true);
+    clock.pass(1.9);
+    expect(told).toEqual(["started"]);
+    clock.pass(0.1);
+    expect(told).toEqual(["started", "waiting"]);
+    clock.pass(5.9);
+    expect(sockets).toHaveLength(1);
+    clock.pass(0.5);
+    expect(told.slice(2)).toEqual(["broken: the server has not answered for 8 s"]);
+    expect(sockets).toHaveLength(2);
+    expect(sockets[0].closedWith).toBe(1000);
+    last().answer(STARTED);
+    expect(last().deformRequests()[1].message).toMatchObject({ case: "pose", value: { sequence: 1n, commit: true } });
+    last().answer(frame(1n));
+    last().answer(committed(1n));
+    expect(told.slice(3)).toEqual(["started"]);
+    expect(session.isCommitted).toBe(true);
+    session.sendPoses(POSES, true);
+    clock.pass(8.5);
+    expect(told.slice(4)).toEqual(["waiting", "broken: the server has not answered for 8 s"]);
+  });
+
+  test.each([false, true])("so is one whose gateway lives (commit: %s)", (commit) => {
+    const { session, sockets, told, beat } = timedDrag();
+    session.sendPoses(POSES, commit);
+    beat(9);
+    expect(told).toEqual(["started", "waiting", "broken: the server has not answered for 8 s"]);
+    expect(sockets).toHaveLength(2);
+  });
+
+  test("so is a commit whose frame has come", () => {
+    const { session, told, last, beat, used } = timedDrag();
+    session.sendPoses(POSES, true);
+    last().answer(frame(1n));
+    used[0]();
+    beat(3);
+    expect(told).toEqual(["started", "waiting"]);
+    last().answer(committed(1n));
+    expect(told).toEqual(["started", "waiting", "answered"]);
+    beat(60);
+    expect(told).toHaveLength(3);
+  });
+
+  test("nothing is waited for while answers come, nor once all have come", () => {
+    const { session, told, last, beat, used } = timedDrag();
+    for (let i = 1; i <= 20; ++i) {
+      session.sendPoses(POSES, false);
+      beat(1);
+      last().answer(frame(BigInt(i)));
+      used[i - 1]();
+    }
+    beat(300);
+    expect(told).toEqual(["started"]);
+  });
+
+  test("the hand rests: the gateway's silence is told after 5 s, and ends the connection after 8 s", () => {
+    const { clock, sockets, told } = timedDrag();
+    clock.pass(4.5);
+    expect(told).toEqual(["started"]);
+    clock.pass(1);
+    expect(told).toEqual(["started", "waiting"]);
+    clock.pass(3);
+    expect(sockets).toHaveLength(2);
+  });
+
+  test("a page that shows no pictures is not owed any", () => {
+    const { session, told, last, beat, used } = timedDrag();
+    for (let i = 1; i <= 3; ++i) {
+      session.sendPoses(POSES, false);
+      last().answer(frame(BigInt(i)));
+    }
+    session.sendPoses(POSES, false);
+    beat(60);
+    expect(told).toEqual(["started"]);
+    used[2]();
+    beat(2);
+    expect(told).toEqual(["started", "waiting"]);
+  });
+
+  test("a session that comes back to memory is waited for as long as the gateway lives", () => {
+    const { session, told, last, beat } = timedDrag();
+    session.sendPoses(POSES, true);
+    last().answer(noticed("evicted"));
+    beat(120);
+    expect(told).toEqual(["started"]);
+    last().answer(noticed("restored"));
+    beat(2);
+    expect(told).toEqual(["started", "waiting"]);
+  });
+
+  test("an answer that takes longer is given twice the time again, and comes", () => {
+    const { session, clock, sockets, told, last } = timedDrag();
+    session.sendPoses(POSES, false);
+    const seconds: number[] = [];
+    for (let from = clock.nowMs; sockets.length < 4; from = clock.nowMs) {
+      const count = sockets.length;
+      while (sockets.length === count) clock.pass(0.25);
+      seconds.push(Math.round((clock.nowMs - from) / 1000));
+      last().answer(STARTED);
+    }
+    expect(seconds).toEqual([8, 16, 32]);
+    clock.pass(30);
+    last().answer(frame(1n));
+    session.sendPoses(POSES, false);
+    clock.pass(40);
+    expect(sockets).toHaveLength(4);
+    expect(told.filter((word) => word === "end")).toEqual([]);
   });
 });

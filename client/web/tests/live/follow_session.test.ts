@@ -4,21 +4,26 @@
 import { create, toBinary } from "@bufbuild/protobuf";
 import { expect, test, vi } from "vitest";
 import { Bearer } from "../../src/calls/bearer";
+import { CallError, Code } from "../../src/calls/call_error";
 import { CallSocket } from "../../src/calls/call_socket";
 import { FrameKind, encodeFrame } from "../../src/calls/frame";
 import { WatchOrigin, WatchResponseSchema } from "../../src/generated/tissueform/v1/deform_service_pb";
 import { PositionEncoding } from "../../src/generated/tissueform/v1/geometry_pb";
 import { FollowSession, type FollowedPicture } from "../../src/live/follow_session";
+import { FakeClock } from "../testing/fake_clock";
 import { FakeSocket } from "../testing/fake_socket";
 import type { MessageInitShape } from "@bufbuild/protobuf";
 
-function follow() {
+const settle = () => new Promise((done) => setImmediate(done));
+
+/** On a clock, or on timers that the test lets run out. */
+function follow(clock?: FakeClock) {
   const sockets: FakeSocket[] = [];
   const told: string[] = [];
   const pictures: { picture: FollowedPicture; used: () => void }[] = [];
   const timers: (() => void)[] = [];
   const stopped: (() => void)[] = [];
-  const acknowledgeWatch = vi.fn(() => Promise.resolve({}));
+  const acknowledgeWatch = vi.fn((): Promise<object> => Promise.resolve({}));
   const bearer = new Bearer();
   const gateway = {
     deform: { acknowledgeWatch },
@@ -26,7 +31,7 @@ function follow() {
     open: (method: any, handlers: any, options: any) => {
       const socket = new FakeSocket();
       sockets.push(socket);
-      const call = new CallSocket(() => socket, method, handlers, options);
+      const call = new CallSocket(() => socket, method, handlers, { ...options, timer: clock?.timer });
       socket.onopen?.();
       return call;
     },
@@ -38,10 +43,11 @@ function follow() {
       onStarted: () => told.push("started"),
       onPicture: (picture, used) => pictures.push({ picture, used }),
       onNotice: () => told.push("notice"),
+      onWaiting: (isWaiting) => told.push(isWaiting ? "waiting" : "goes on"),
       onBroken: () => told.push("broken"),
       onEnd: (error) => told.push(error.message),
     },
-    (action) => (timers.push(action), () => stopped.push(action)),
+    clock?.timer ?? ((action) => (timers.push(action), () => stopped.push(action))),
   );
   const answer = (message: MessageInitShape<typeof WatchResponseSchema>["message"]) => {
     const payload = toBinary(WatchResponseSchema, create(WatchResponseSchema, { message }));
@@ -69,6 +75,44 @@ test("a watch asks once, and acknowledges what was used", () => {
   expect(acknowledgeWatch).not.toHaveBeenCalled();
   pictures[0].used();
   expect(acknowledgeWatch.mock.calls[0]).toMatchObject([{ watch: "watches/1", number: 7n }, {}]);
+});
+
+test("an acknowledgement that was lost is repeated, for the server waits for it", async () => {
+  const { answer, pictures, acknowledgeWatch, timers } = follow();
+  acknowledgeWatch.mockImplementationOnce(() => Promise.reject(new CallError(Code.DeadlineExceeded, "nothing came")));
+  answer(started([4]));
+  answer(frame(7n, [1, 2, 3]));
+  pictures[0].used();
+  await settle();
+  timers[timers.length - 1]();
+  expect(acknowledgeWatch).toHaveBeenCalledTimes(2);
+  expect(acknowledgeWatch.mock.calls[1]).toMatchObject([{ watch: "watches/1", number: 7n }, {}]);
+});
+
+test("one that a newer one stands for is not repeated", async () => {
+  const { answer, pictures, acknowledgeWatch, timers } = follow();
+  acknowledgeWatch.mockImplementationOnce(() => Promise.reject(new CallError(Code.DeadlineExceeded, "nothing came")));
+  answer(started([4]));
+  answer(frame(7n, [1, 2, 3]));
+  answer(frame(8n, [1, 2, 3]));
+  pictures.forEach(({ used }) => used());
+  await settle();
+  expect(timers).toHaveLength(0);
+  expect(acknowledgeWatch).toHaveBeenCalledTimes(2);
+});
+
+test("a gateway that gives no sign of life is told, and its watch opened again", () => {
+  const clock = new FakeClock();
+  const { told, answer, sockets } = follow(clock);
+  sockets[0].heartbeat();
+  answer(started([4]));
+  clock.pass(5.5);
+  expect(told).toEqual(["started", "waiting"]);
+  sockets[0].heartbeat();
+  expect(told).toEqual(["started", "waiting", "goes on"]);
+  clock.pass(9);
+  expect(told.slice(3)).toEqual(["waiting", "broken"]);
+  expect(sockets).toHaveLength(2);
 });
 
 test("a new token is told by acknowledging once more", () => {

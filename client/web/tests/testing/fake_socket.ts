@@ -50,6 +50,10 @@ export class FakeSocket implements Socket {
     this.onmessage?.({ data: encodeFrame(FrameKind.Begin, payload).buffer });
   }
 
+  heartbeat(): void {
+    this.onmessage?.({ data: encodeFrame(FrameKind.Heartbeat, new Uint8Array()).buffer });
+  }
+
   end(code: number, message = "", statusDetails: Uint8Array = new Uint8Array()): void {
     const payload = toBinary(GatewayCallEndSchema, create(GatewayCallEndSchema, { code, message, statusDetails }));
     this.onmessage?.({ data: encodeFrame(FrameKind.End, payload).buffer });
