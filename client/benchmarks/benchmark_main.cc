@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "CLI/CLI.hpp"
+#include "absl/algorithm/container.h"
 #include "absl/status/statusor.h"
 
 #include "client/benchmarks/benchmark_report.h"
@@ -22,6 +23,7 @@
 #include "client/cli/bench/bench_command.h"
 #include "client/cli/shared/exit_code.h"
 #include "core/base/atomic_file.h"
+#include "core/base/instruction_set.h"
 #include "core/base/status_macros.h"
 #include "core/linear_solvers/blas_threads.h"
 
@@ -31,7 +33,8 @@ namespace {
 using FrameBenchmarkList = std::vector<std::unique_ptr<FrameBenchmark>>;
 
 // An elastic factor of the large bar would not fit into memory.
-absl::StatusOr<FrameBenchmarkList> FrameBenchmarks(const TestBar& bar, int threads) {
+absl::StatusOr<FrameBenchmarkList> FrameBenchmarks(const TestBar& bar, int threads,
+                                                   const std::vector<InstructionSet>& sets) {
   std::vector<FrameBenchmark::Kind> kinds = {FrameBenchmark::Kind::kBasis};
   if (bar.number != kLargeBar) {
     kinds.insert(kinds.end(), {FrameBenchmark::Kind::kBasisThreeHandles,
@@ -40,7 +43,7 @@ absl::StatusOr<FrameBenchmarkList> FrameBenchmarks(const TestBar& bar, int threa
   FrameBenchmarkList benchmarks;
   for (const FrameBenchmark::Kind kind : kinds) {
     TF_ASSIGN_OR_RETURN(std::unique_ptr<FrameBenchmark> benchmark,
-                        FrameBenchmark::Create(bar, kind, threads));
+                        FrameBenchmark::Create(bar, kind, threads, sets));
     benchmarks.push_back(std::move(benchmark));
   }
   return benchmarks;
@@ -48,12 +51,13 @@ absl::StatusOr<FrameBenchmarkList> FrameBenchmarks(const TestBar& bar, int threa
 
 // The rows of one bar. What it holds is given back when it returns.
 absl::StatusOr<std::vector<BenchmarkRow>> MeasureTimes(const TestBar& bar,
-                                                       const BenchOptions& options) {
+                                                       const BenchOptions& options,
+                                                       const std::vector<InstructionSet>& sets) {
   TF_ASSIGN_OR_RETURN(const auto solvers,
                       LinearSolverBenchmark::Create(bar, bar.number != kLargeBar));
   TF_ASSIGN_OR_RETURN(const auto deformation,
                       DeformationBenchmark::Create(bar, *solvers, options.threads));
-  TF_ASSIGN_OR_RETURN(const auto frames, FrameBenchmarks(bar, options.threads));
+  TF_ASSIGN_OR_RETURN(const auto frames, FrameBenchmarks(bar, options.threads, sets));
   std::vector<TimedWork> work = deformation->work();
   work.insert(work.end(), solvers->work().begin(), solvers->work().end());
   for (const auto& frame : frames) {
@@ -77,7 +81,8 @@ absl::StatusOr<std::vector<BenchmarkRow>> MeasureTimes(const TestBar& bar,
 
 absl::Status MeasureBar(int number, const BenchOptions& options, BenchmarkReport* report) {
   TF_ASSIGN_OR_RETURN(const TestBar bar, MakeTestBar(number));
-  TF_ASSIGN_OR_RETURN(const std::vector<BenchmarkRow> rows, MeasureTimes(bar, options));
+  TF_ASSIGN_OR_RETURN(const std::vector<BenchmarkRow> rows,
+                      MeasureTimes(bar, options, report->instruction_sets));
   for (const BenchmarkRow& row : rows) {
     std::cout << RowText(row) << "\n";
     report->rows.push_back(row);
@@ -104,6 +109,12 @@ absl::Status Run(const BenchOptions& options) {
   BenchmarkReport report;
   report.threads = options.threads;
   report.repetitions = options.repetitions;
+  for (const InstructionSet set : SupportedInstructionSets()) {
+    if (absl::c_linear_search(options.instruction_sets, InstructionSetName(set))) {
+      report.instruction_sets.push_back(set);
+    }
+  }
+  const ScopedInstructionSet active(report.instruction_sets.front());
   std::cout << CircumstancesText(report) << "\n\n" << RowsHeading() << std::endl;
   for (const int number : options.meshes) {
     TF_RETURN_IF_ERROR(number > kLargeBar ? MeasureProcesses(number, options, &report)

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include "nlohmann/json.hpp"
 
 #include "client/cli/shared/circumstances.h"
@@ -45,6 +46,12 @@ std::string OrDash(const std::optional<double>& value, int digits) {
   return value ? absl::StrFormat("%.*f", digits, *value) : "-";
 }
 
+std::vector<std::string> SetNames(const std::vector<InstructionSet>& sets) {
+  std::vector<std::string> names;
+  for (const InstructionSet set : sets) names.emplace_back(InstructionSetName(set));
+  return names;
+}
+
 double Mib(int64_t bytes) { return static_cast<double>(bytes) / (1024.0 * 1024.0); }
 
 }  // namespace
@@ -53,12 +60,18 @@ std::optional<double> BenchmarkRow::Ratio() const {
   return peer_seconds ? std::optional<double>(*peer_seconds / ours_seconds) : std::nullopt;
 }
 
+std::string WorkOnSet(const std::string& work, InstructionSet set,
+                      const std::vector<InstructionSet>& sets) {
+  return set == sets.front() ? work : absl::StrCat(work, " [", InstructionSetName(set), "]");
+}
+
 std::string ReportJson(const BenchmarkReport& report) {
   const Circumstances circumstances = MeasuringCircumstances();
   Json json = {{"machine", circumstances.machine},
                {"compiler", circumstances.compiler},
                {"commit", circumstances.commit},
                {"threads", report.threads},
+               {"instruction_sets", SetNames(report.instruction_sets)},
                {"blas_threads", 1},
                {"repetitions", report.repetitions},
                {"rows", Json::array()},
@@ -83,14 +96,14 @@ std::string ReportJson(const BenchmarkReport& report) {
 }
 
 std::string RowsHeading() {
-  return absl::StrFormat("%-28s %-10s %8s %9s %11s  %-22s %11s %7s %8s", "work", "mesh", "vertices",
+  return absl::StrFormat("%-33s %-10s %8s %9s %11s  %-22s %11s %7s %8s", "work", "mesh", "vertices",
                          "tets", "ours [s]", "peer", "peer [s]", "ratio", "MiB");
 }
 
 std::string RowText(const BenchmarkRow& row) {
   const std::string solves = row.solves > 0 ? absl::StrCat("  ", row.solves, " solves") : "";
   const std::string mib = row.bytes > 0 ? absl::StrFormat("%.1f", Mib(row.bytes)) : "-";
-  return absl::StrFormat("%-28s %-10s %8d %9d %11.7f  %-22s %11s %7s %8s%s", row.work, row.mesh,
+  return absl::StrFormat("%-33s %-10s %8d %9d %11.7f  %-22s %11s %7s %8s%s", row.work, row.mesh,
                          row.vertices, row.tets, row.ours_seconds, row.peer,
                          OrDash(row.peer_seconds, 6), OrDash(row.Ratio(), 2), mib, solves);
 }
@@ -110,7 +123,7 @@ std::string ClosingText(const BenchmarkReport& report) {
                     "\ngrowth: seconds ~ tets^exponent; frames: vertices of the answer^exponent\n");
   }
   for (const Growth& growth : report.growth) {
-    absl::StrAppend(&text, absl::StrFormat("  %-28s %5.2f\n", growth.work, growth.exponent));
+    absl::StrAppend(&text, absl::StrFormat("  %-33s %5.2f\n", growth.work, growth.exponent));
   }
   if (!report.targets.empty()) {
     absl::StrAppend(&text, "\ntargets\n");
@@ -124,10 +137,10 @@ std::string ClosingText(const BenchmarkReport& report) {
 
 std::string CircumstancesText(const BenchmarkReport& report) {
   const Circumstances circumstances = MeasuringCircumstances();
-  return absl::StrCat(circumstances.machine, "; ", circumstances.compiler, "; commit ",
-                      circumstances.commit, "; ", report.threads,
-                      " threads, 1 BLAS thread; medians of ", report.repetitions,
-                      " interleaved repetitions");
+  return absl::StrCat(
+      circumstances.machine, "; ", circumstances.compiler, "; commit ", circumstances.commit, "; ",
+      absl::StrJoin(SetNames(report.instruction_sets), ", "), "; ", report.threads,
+      " threads, 1 BLAS thread; medians of ", report.repetitions, " interleaved repetitions");
 }
 
 }  // namespace tissueform::benchmarks

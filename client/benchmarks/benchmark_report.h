@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "core/base/instruction_set.h"
+
 namespace tissueform::benchmarks {
 
 // One comparison, as docs/plan-format.md words it for `bench --json`.
@@ -54,12 +56,19 @@ struct Target {
 
 struct BenchmarkReport {
   int threads = 1;
+  // Frames are timed on each of them, everything else on the first, widest one; see WorkOnSet.
+  std::vector<InstructionSet> instruction_sets;
   int repetitions = 1;
   std::vector<BenchmarkRow> rows;
   std::vector<MemoryUse> memory;
   std::vector<Growth> growth;
   std::vector<Target> targets;
 };
+
+// The work of a row that is timed on each instruction set: `work` itself on the first of them,
+// "work [avx2]" on another.
+std::string WorkOnSet(const std::string& work, InstructionSet set,
+                      const std::vector<InstructionSet>& sets);
 
 // With where it was measured: processor, compiler, commit.
 std::string ReportJson(const BenchmarkReport& report);
@@ -70,7 +79,7 @@ std::string RowText(const BenchmarkRow& row);
 std::string MemoryText(const MemoryUse& memory);
 std::string ClosingText(const BenchmarkReport& report);  // growth and targets
 
-// Machine, compiler, commit, threads and repetitions in one line.
+// Machine, compiler, commit, instruction sets, threads and repetitions in one line.
 std::string CircumstancesText(const BenchmarkReport& report);
 
 }  // namespace tissueform::benchmarks

@@ -72,12 +72,12 @@ Eigen::MatrixXd Interleaved(const Positions& displacements) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<FrameBenchmark>> FrameBenchmark::Create(const TestBar& bar,
-                                                                       Kind kind, int threads) {
-  auto benchmark = absl::WrapUnique(new FrameBenchmark(bar, kind));
+absl::StatusOr<std::unique_ptr<FrameBenchmark>> FrameBenchmark::Create(
+    const TestBar& bar, Kind kind, int threads, std::vector<InstructionSet> sets) {
+  auto benchmark = absl::WrapUnique(new FrameBenchmark(bar, kind, std::move(sets)));
   TF_RETURN_IF_ERROR(benchmark->Prepare(threads));
   TF_RETURN_IF_ERROR(benchmark->MakeResponse());
-  TF_RETURN_IF_ERROR(benchmark->CheckAnswer());
+  TF_RETURN_IF_ERROR(benchmark->CheckAnswers());
   benchmark->AddWork();
   return benchmark;
 }
@@ -121,17 +121,21 @@ absl::StatusOr<Positions> FrameBenchmark::DirectAnswer() {
   return std::move(deformation.positions);
 }
 
-absl::Status FrameBenchmark::CheckAnswer() {
+absl::Status FrameBenchmark::CheckAnswers() {
   if (!response_->Covers(poses_))
     return absl::InternalError("the prepared answers do not cover 30 degrees");
   TF_ASSIGN_OR_RETURN(const Positions direct, DirectAnswer());
-  response_->Evaluate(poses_, &frame_);
-  const double off =
-      (frame_.cast<double>() - direct(skin_, Eigen::all)).rowwise().norm().maxCoeff();
   const double allowed =
       kind_ == Kind::kNeoHookean ? response_->ErrorBoundMm(poses_) : 1e-6 * Diagonal(bar_.mesh);
-  if (off > allowed) {
-    return absl::InternalError(absl::StrCat("a prepared answer is off by ", off, " mm"));
+  for (const InstructionSet set : sets_) {
+    const ScopedInstructionSet active(set);
+    response_->Evaluate(poses_, &frame_);
+    const double off =
+        (frame_.cast<double>() - direct(skin_, Eigen::all)).rowwise().norm().maxCoeff();
+    if (off > allowed) {
+      return absl::InternalError(absl::StrCat("a prepared answer on ", InstructionSetName(set),
+                                              " is off by ", off, " mm"));
+    }
   }
   const Positions displacements =
       (direct - bar_.mesh.positions())(preparation_->constraints().constrained(), Eigen::all);
@@ -150,7 +154,8 @@ absl::StatusOr<Eigen::MatrixXd> FrameBenchmark::BackSubstitute() {
   return laplacian->system->Solve(rhs_, values_);
 }
 
-absl::StatusOr<PartSeconds> FrameBenchmark::AnswerFrame() {
+absl::StatusOr<PartSeconds> FrameBenchmark::AnswerFrame(InstructionSet set) {
+  const ScopedInstructionSet active(set);
   // As in a drag no pose comes twice.
   poses_.front().translation_mm.x() = 1 + 1e-3 * (++frames_ % 1000);
   const Stopwatch stopwatch;
@@ -170,7 +175,10 @@ absl::StatusOr<PartSeconds> FrameBenchmark::EncodeFrame() {
 }
 
 void FrameBenchmark::AddWork() {
-  work_.push_back({Name("frame"), kFramesPerRepetition, [this] { return AnswerFrame(); }});
+  for (const InstructionSet set : sets_) {
+    work_.push_back({WorkOnSet(Name("frame"), set, sets_), kFramesPerRepetition,
+                     [this, set] { return AnswerFrame(set); }});
+  }
   work_.push_back({Name("solve"), 3, [this]() -> absl::StatusOr<PartSeconds> {
                      const Stopwatch stopwatch;
                      TF_RETURN_IF_ERROR(BackSubstitute().status());
@@ -202,21 +210,26 @@ std::string FrameBenchmark::Name(const std::string& what) const {
   return absl::StrCat("neo-Hookean ", what);
 }
 
-std::vector<BenchmarkRow> FrameBenchmark::Rows(const PartSeconds& medians) const {
+BenchmarkRow FrameBenchmark::FrameRow(const PartSeconds& medians, InstructionSet set) const {
   BenchmarkRow frame;
-  frame.work = Name("frame");
+  frame.work = WorkOnSet(Name("frame"), set, sets_);
   frame.ours_seconds = medians.at(absl::StrCat(frame.work, "/frame"));
   frame.peer = "back-substitution";
   frame.peer_seconds = medians.at(absl::StrCat(Name("solve"), "/solve"));
   frame.bytes = response_->bytes_held();
   frame.answer_vertices = static_cast<int64_t>(skin_.size());
-  std::vector<BenchmarkRow> rows = {frame};
+  return frame;
+}
+
+std::vector<BenchmarkRow> FrameBenchmark::Rows(const PartSeconds& medians) const {
+  std::vector<BenchmarkRow> rows;
+  for (const InstructionSet set : sets_) rows.push_back(FrameRow(medians, set));
   if (kind_ == Kind::kElastic) {
     BenchmarkRow encoding;
     encoding.work = Name("int16 encoding");
     encoding.ours_seconds = medians.at(absl::StrCat(encoding.work, "/encoding"));
     encoding.bytes = static_cast<int64_t>(encoded_bytes_);
-    encoding.answer_vertices = frame.answer_vertices;
+    encoding.answer_vertices = rows.front().answer_vertices;
     rows.push_back(encoding);
   } else {
     BenchmarkRow preparation;

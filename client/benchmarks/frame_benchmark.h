@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -12,6 +13,7 @@
 #include "client/benchmarks/benchmark_report.h"
 #include "client/benchmarks/interleaved.h"
 #include "client/benchmarks/test_bars.h"
+#include "core/base/instruction_set.h"
 #include "core/constraints/constraint_set.h"
 #include "core/constraints/handle_pose.h"
 #include "core/deformation/mesh_preparation.h"
@@ -30,32 +32,37 @@ class FrameBenchmark {
     kNeoHookean,         // in third order, one handle
   };
 
-  // Makes the answers once and checks that they lie within a millionth of the bar's diagonal of the
-  // direct ones, or, of neo-Hookean, within their own estimate. `bar` outlives the benchmark.
+  // Makes the answers once and checks on each of `sets`, where frames are timed, that they lie
+  // within a millionth of the bar's diagonal of the direct ones, or, of neo-Hookean, within their
+  // own estimate. `bar` outlives the benchmark. REQUIRES: at least one set, all supported.
   static absl::StatusOr<std::unique_ptr<FrameBenchmark>> Create(const TestBar& bar, Kind kind,
-                                                                int threads);
+                                                                int threads,
+                                                                std::vector<InstructionSet> sets);
 
   const std::vector<TimedWork>& work() const { return work_; }
   std::vector<BenchmarkRow> Rows(const PartSeconds& medians) const;
 
  private:
-  FrameBenchmark(const TestBar& bar, Kind kind) : bar_(bar), kind_(kind) {}
+  FrameBenchmark(const TestBar& bar, Kind kind, std::vector<InstructionSet> sets)
+      : bar_(bar), kind_(kind), sets_(std::move(sets)) {}
 
   absl::Status Prepare(int threads);
   bool IsElastic() const { return kind_ == Kind::kElastic || kind_ == Kind::kNeoHookean; }
   absl::Status MakeResponse();
-  absl::Status CheckAnswer();
+  absl::Status CheckAnswers();
   absl::StatusOr<Positions> DirectAnswer();
   absl::StatusOr<Eigen::MatrixXd> BackSubstitute();
   // What a session does for a frame: asks whether the poses are covered, bounds the error, answers.
-  absl::StatusOr<PartSeconds> AnswerFrame();
+  absl::StatusOr<PartSeconds> AnswerFrame(InstructionSet set);
   // What int16 adds to a frame.
   absl::StatusOr<PartSeconds> EncodeFrame();
   void AddWork();
   std::string Name(const std::string& what) const;
+  BenchmarkRow FrameRow(const PartSeconds& medians, InstructionSet set) const;
 
   const TestBar& bar_;
   const Kind kind_;
+  const std::vector<InstructionSet> sets_;
   std::vector<int32_t> skin_;
   std::vector<HandlePose> poses_;
   std::shared_ptr<MeshPreparation> preparation_;

@@ -7,6 +7,7 @@
 
 #include <cmath>
 
+#include "core/base/instruction_set.h"
 #include "core/deformation/closest_rotation.h"
 
 namespace tissueform {
@@ -144,65 +145,35 @@ inline __attribute__((always_inline)) void RotationPowersBody(const double* expo
   }
 }
 
-// The same bodies for three instruction sets. Not target_clones: its resolvers run before the
-// sanitizers' set-up.
-__attribute__((target("avx512f,avx512dq,avx512vl"))) void ClosestRotationsAvx512(
-    RotationBatch* batch) {
+TISSUEFORM_TARGET_AVX512 void ClosestRotationsAvx512(RotationBatch* batch) {
   ClosestRotationsBody(batch);
 }
-__attribute__((target("avx2,fma"))) void ClosestRotationsAvx2(RotationBatch* batch) {
+TISSUEFORM_TARGET_AVX2 void ClosestRotationsAvx2(RotationBatch* batch) {
   ClosestRotationsBody(batch);
 }
 void ClosestRotationsBaseline(RotationBatch* batch) { ClosestRotationsBody(batch); }
 
-__attribute__((target("avx512f,avx512dq,avx512vl"))) void RotationPowersAvx512(
-    const double* exponents, RotationBatch* batch) {
+TISSUEFORM_TARGET_AVX512 void RotationPowersAvx512(const double* exponents, RotationBatch* batch) {
   RotationPowersBody(exponents, batch);
 }
-__attribute__((target("avx2,fma"))) void RotationPowersAvx2(const double* exponents,
-                                                            RotationBatch* batch) {
+TISSUEFORM_TARGET_AVX2 void RotationPowersAvx2(const double* exponents, RotationBatch* batch) {
   RotationPowersBody(exponents, batch);
 }
 void RotationPowersBaseline(const double* exponents, RotationBatch* batch) {
   RotationPowersBody(exponents, batch);
 }
 
-enum class InstructionSet { kBaseline, kAvx2, kAvx512 };
-
-InstructionSet BestInstructionSet() {
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-      __builtin_cpu_supports("avx512vl")) {
-    return InstructionSet::kAvx512;
-  }
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")
-             ? InstructionSet::kAvx2
-             : InstructionSet::kBaseline;
-}
-
-const InstructionSet kInstructionSet = BestInstructionSet();
+constexpr KernelVersions<void(RotationBatch*)> kClosestRotations{
+    ClosestRotationsBaseline, ClosestRotationsAvx2, ClosestRotationsAvx512};
+constexpr KernelVersions<void(const double*, RotationBatch*)> kRotationPowers{
+    RotationPowersBaseline, RotationPowersAvx2, RotationPowersAvx512};
 
 }  // namespace
 
-void ClosestRotations(RotationBatch* batch) {
-  switch (kInstructionSet) {
-    case InstructionSet::kAvx512:
-      return ClosestRotationsAvx512(batch);
-    case InstructionSet::kAvx2:
-      return ClosestRotationsAvx2(batch);
-    case InstructionSet::kBaseline:
-      return ClosestRotationsBaseline(batch);
-  }
-}
+void ClosestRotations(RotationBatch* batch) { kClosestRotations.Active()(batch); }
 
 void RotationPowers(const double* exponents, RotationBatch* batch) {
-  switch (kInstructionSet) {
-    case InstructionSet::kAvx512:
-      return RotationPowersAvx512(exponents, batch);
-    case InstructionSet::kAvx2:
-      return RotationPowersAvx2(exponents, batch);
-    case InstructionSet::kBaseline:
-      return RotationPowersBaseline(exponents, batch);
-  }
+  kRotationPowers.Active()(exponents, batch);
 }
 
 }  // namespace tissueform

@@ -9,6 +9,8 @@
 
 #include <cmath>
 
+#include "core/base/instruction_set.h"
+
 namespace tissueform {
 namespace {
 
@@ -89,38 +91,25 @@ inline __attribute__((always_inline)) void EvaluateBody(double unit_shear, doubl
   }
 }
 
-// The same body for three instruction sets. Not target_clones: its resolvers run before the
-// sanitizers' set-up.
-__attribute__((target("avx512f,avx512dq,avx512vl"))) void EvaluateAvx512(double unit_shear,
-                                                                         double unit_bulk,
-                                                                         NeoHookeanBatch* batch) {
+TISSUEFORM_TARGET_AVX512 void EvaluateAvx512(double unit_shear, double unit_bulk,
+                                             NeoHookeanBatch* batch) {
   EvaluateBody(unit_shear, unit_bulk, batch);
 }
-__attribute__((target("avx2,fma"))) void EvaluateAvx2(double unit_shear, double unit_bulk,
-                                                      NeoHookeanBatch* batch) {
+TISSUEFORM_TARGET_AVX2 void EvaluateAvx2(double unit_shear, double unit_bulk,
+                                         NeoHookeanBatch* batch) {
   EvaluateBody(unit_shear, unit_bulk, batch);
 }
 void EvaluateBaseline(double unit_shear, double unit_bulk, NeoHookeanBatch* batch) {
   EvaluateBody(unit_shear, unit_bulk, batch);
 }
 
-using Evaluate = void (*)(double, double, NeoHookeanBatch*);
-
-Evaluate BestEvaluate() {
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-      __builtin_cpu_supports("avx512vl")) {
-    return EvaluateAvx512;
-  }
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? EvaluateAvx2
-                                                                         : EvaluateBaseline;
-}
-
-const Evaluate kEvaluate = BestEvaluate();
+constexpr KernelVersions<void(double, double, NeoHookeanBatch*)> kEvaluate{
+    EvaluateBaseline, EvaluateAvx2, EvaluateAvx512};
 
 }  // namespace
 
 void EvaluateNeoHookean(double unit_shear, double unit_bulk, NeoHookeanBatch* batch) {
-  kEvaluate(unit_shear, unit_bulk, batch);
+  kEvaluate.Active()(unit_shear, unit_bulk, batch);
 }
 
 }  // namespace tissueform

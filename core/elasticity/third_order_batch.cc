@@ -3,6 +3,7 @@
 
 #include "core/elasticity/third_order_batch.h"
 
+#include "core/base/instruction_set.h"
 #include "core/elasticity/neo_hookean_expansion.h"
 
 namespace tissueform {
@@ -126,32 +127,18 @@ inline __attribute__((always_inline)) void EvaluateDirections(double shear, doub
   }
 }
 
-// The same body for three instruction sets, as in NeoHookeanBatch.
-__attribute__((target("avx512f,avx512dq,avx512vl"))) void ThirdOrderAvx512(double shear,
-                                                                           double bulk,
-                                                                           ThirdOrderBatch* batch) {
+TISSUEFORM_TARGET_AVX512 void ThirdOrderAvx512(double shear, double bulk, ThirdOrderBatch* batch) {
   EvaluateDirections(shear, bulk, batch);
 }
-__attribute__((target("avx2,fma"))) void ThirdOrderAvx2(double shear, double bulk,
-                                                        ThirdOrderBatch* batch) {
+TISSUEFORM_TARGET_AVX2 void ThirdOrderAvx2(double shear, double bulk, ThirdOrderBatch* batch) {
   EvaluateDirections(shear, bulk, batch);
 }
 void ThirdOrderBaseline(double shear, double bulk, ThirdOrderBatch* batch) {
   EvaluateDirections(shear, bulk, batch);
 }
 
-using EvaluateThird = void (*)(double, double, ThirdOrderBatch*);
-
-EvaluateThird BestThirdOrder() {
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-      __builtin_cpu_supports("avx512vl")) {
-    return ThirdOrderAvx512;
-  }
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? ThirdOrderAvx2
-                                                                         : ThirdOrderBaseline;
-}
-
-const EvaluateThird kThirdOrder = BestThirdOrder();
+constexpr KernelVersions<void(double, double, ThirdOrderBatch*)> kThirdOrder{
+    ThirdOrderBaseline, ThirdOrderAvx2, ThirdOrderAvx512};
 
 }  // namespace
 
@@ -165,7 +152,7 @@ ThirdOrderBatch::ThirdOrderBatch(size_t count)
             kThirdOrderMatrix) {}
 
 void EvaluateThirdOrder(double shear, double bulk, ThirdOrderBatch* batch) {
-  kThirdOrder(shear, bulk, batch);
+  kThirdOrder.Active()(shear, bulk, batch);
 }
 
 }  // namespace tissueform

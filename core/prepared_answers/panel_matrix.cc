@@ -7,14 +7,21 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/instruction_set.h"
+
 namespace tissueform {
 namespace {
 
-constexpr int kLanes = PanelMatrix::kPanelRows / 2;
+constexpr int kPairs = PanelMatrix::kPanelRows / 2;
 
-// Under instruction sets with shorter registers the compiler splits them.
-using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
-using WholeLanes = int32_t __attribute__((vector_size(kLanes * sizeof(int32_t)), may_alias));
+// Vector registers of an instruction set.
+template <InstructionSet kSet>
+struct Register {
+  static constexpr int kLanes = RegisterBytes(kSet) / static_cast<int>(sizeof(float));
+  static constexpr int kInPanel = kPairs / kLanes;  // registers of pairs in a column of a panel
+  using Floats [[gnu::vector_size(RegisterBytes(kSet))]] = float;
+  using Pairs [[gnu::vector_size(RegisterBytes(kSet)), gnu::may_alias]] = int32_t;
+};
 
 // What is multiplied: panels, factors with the columns' steps in them.
 struct Operands {
@@ -27,125 +34,132 @@ struct Operands {
   const float* factors;  // #cols by 1 or 3, row-major
 };
 
-// One column of a panel, its first and its second half of the rows.
-struct ColumnLanes {
-  Lanes halves[2];
+// A block of the matrix whose sums stay in registers: all rows of kPanels panels that the registers
+// of pairs number `first_register` and up hold, kRegisters of them in each panel. Several sums at a
+// time, because one would wait for itself; no more than fit beside what is added.
+template <InstructionSet kSet, int kFactors>
+struct Block {
+  static constexpr bool kIsWide = kSet == InstructionSet::kAvx512;  // 32 registers, not 16
+  static constexpr int kPanels = !kIsWide ? 1 : kFactors == 1 ? 4 : 2;
+  static constexpr int kRegisters = kFactors == 1 ? Register<kSet>::kInPanel : 1;
+  using Sums = typename Register<kSet>::Floats[2][kFactors];  // of upper and of lower rows
 };
 
-// Shifts, because conversions from 16 bits work on shorter registers. The upper half of an entry
-// stays where it is in 32 bits: exact as a float. `lower` may be null.
-inline __attribute__((always_inline)) void ReadColumn(const int32_t* upper, const int32_t* lower,
-                                                      ColumnLanes* column) {
-  const auto pairs = *reinterpret_cast<const WholeLanes*>(upper);
-  WholeLanes first = pairs << 16;
-  WholeLanes second = pairs & ~0xffff;
+// Adds one register of pairs of a column. Shifts, because conversions from 16 bits work on shorter
+// registers. The upper half of an entry stays where it is in 32 bits: exact as a float. `lower` may
+// be null.
+template <InstructionSet kSet, int kFactors>
+inline __attribute__((always_inline)) void AddPairs(const int32_t* upper, const int32_t* lower,
+                                                    const float* factors,
+                                                    typename Block<kSet, kFactors>::Sums& sums) {
+  using Pairs = typename Register<kSet>::Pairs;
+  using Floats = typename Register<kSet>::Floats;
+  const auto pairs = *reinterpret_cast<const Pairs*>(upper);
+  Pairs first = pairs << 16;
+  Pairs second = pairs & ~0xffff;
   if (lower != nullptr) {
-    const auto lower_pairs = *reinterpret_cast<const WholeLanes*>(lower);
+    const auto lower_pairs = *reinterpret_cast<const Pairs*>(lower);
     first += (lower_pairs << 16) >> 16;
     second += lower_pairs >> 16;
   }
-  column->halves[0] = __builtin_convertvector(first, Lanes);
-  column->halves[1] = __builtin_convertvector(second, Lanes);
-}
-
-template <int kFactors, int kPanels>
-inline __attribute__((always_inline)) void AddColumn(const ColumnLanes& column,
-                                                     const float* factors, int panel,
-                                                     Lanes (*sums)[kFactors]) {
+  const Floats first_rows = __builtin_convertvector(first, Floats);
+  const Floats second_rows = __builtin_convertvector(second, Floats);
   for (int f = 0; f < kFactors; ++f) {
-    sums[2 * panel][f] += column.halves[0] * factors[f];
-    sums[2 * panel + 1][f] += column.halves[1] * factors[f];
+    sums[0][f] += first_rows * factors[f];
+    sums[1][f] += second_rows * factors[f];
   }
 }
 
-// `rows` rows of kPanels neighbouring panels. Several sums at a time, because one would wait for
-// itself.
-template <int kFactors, int kPanels>
+// Adds columns begin to end of kPanels panels from `panel` on, with all digits where kIsFull.
+template <InstructionSet kSet, int kFactors, int kPanels, bool kIsFull>
+inline __attribute__((always_inline)) void AddColumns(
+    const Operands& of, Eigen::Index panel, int first_register, Eigen::Index begin,
+    Eigen::Index end,
+    typename Block<kSet, kFactors>::Sums (&sums)[kPanels][Block<kSet, kFactors>::kRegisters]) {
+  constexpr int kLanes = Register<kSet>::kLanes;
+  const int32_t* const upper = of.upper + panel * of.cols * kPairs + first_register * kLanes;
+  const int32_t* const lower = of.lower + panel * of.full_cols * kPairs + first_register * kLanes;
+  const Eigen::Index only_upper = of.cols - of.full_cols;
+  // What comes next: the processor's own look ahead ends at every page of 4 KiB.
+  const Eigen::Index ahead = kPanels * of.cols * kPairs;
+  for (Eigen::Index c = begin; c < end; ++c) {
+    for (int p = 0; p < kPanels; ++p) {
+      const int32_t* const at = upper + (p * of.cols + c) * kPairs;
+      __builtin_prefetch(at + ahead);
+      const int32_t* const lower_at =
+          kIsFull ? lower + (p * of.full_cols + c - only_upper) * kPairs : nullptr;
+      for (int r = 0; r < Block<kSet, kFactors>::kRegisters; ++r) {
+        AddPairs<kSet, kFactors>(at + r * kLanes, kIsFull ? lower_at + r * kLanes : nullptr,
+                                 of.factors + kFactors * c, sums[p][r]);
+      }
+    }
+  }
+}
+
+// The first `rows` rows of kPanels neighboring panels.
+template <InstructionSet kSet, int kFactors, int kPanels>
+inline __attribute__((always_inline)) void MultiplyBlock(const Operands& of, Eigen::Index panel,
+                                                         int first_register, Eigen::Index rows,
+                                                         float* product) {
+  constexpr int kRegisters = Block<kSet, kFactors>::kRegisters;
+  constexpr int kLanes = Register<kSet>::kLanes;
+  typename Block<kSet, kFactors>::Sums sums[kPanels][kRegisters] = {};
+  AddColumns<kSet, kFactors, kPanels, false>(of, panel, first_register, of.reading.first,
+                                             of.reading.first_full, sums);
+  AddColumns<kSet, kFactors, kPanels, true>(of, panel, first_register, of.reading.first_full,
+                                            of.cols, sums);
+  for (int half = 0; half < 2 * kPanels; ++half) {
+    for (int lane = 0; lane < kRegisters * kLanes; ++lane) {
+      const Eigen::Index row = half * kPairs + first_register * kLanes + lane;
+      if (row >= rows) break;
+      for (int f = 0; f < kFactors; ++f) {
+        product[kFactors * row + f] = sums[half / 2][lane / kLanes][half % 2][f][lane % kLanes];
+      }
+    }
+  }
+}
+
+template <InstructionSet kSet, int kFactors, int kPanels>
 inline __attribute__((always_inline)) void MultiplyPanels(const Operands& of, Eigen::Index panel,
                                                           Eigen::Index rows, float* product) {
-  Lanes sums[2 * kPanels][kFactors] = {};
-  ColumnLanes column;
-  const int32_t* const upper = of.upper + panel * of.cols * kLanes;
-  // What comes next: the processor's own look ahead ends at every page of 4 KiB.
-  const Eigen::Index ahead = kPanels * of.cols * kLanes;
-  for (Eigen::Index c = of.reading.first; c < of.reading.first_full; ++c) {
-    for (int p = 0; p < kPanels; ++p) {
-      const int32_t* const at = upper + (p * of.cols + c) * kLanes;
-      __builtin_prefetch(at + ahead);
-      ReadColumn(at, nullptr, &column);
-      AddColumn<kFactors, kPanels>(column, of.factors + kFactors * c, p, sums);
-    }
-  }
-  const int32_t* const lower = of.lower + panel * of.full_cols * kLanes;
-  const Eigen::Index only_upper = of.cols - of.full_cols;
-  for (Eigen::Index c = of.reading.first_full; c < of.cols; ++c) {
-    for (int p = 0; p < kPanels; ++p) {
-      const int32_t* const at = upper + (p * of.cols + c) * kLanes;
-      __builtin_prefetch(at + ahead);
-      ReadColumn(at, lower + (p * of.full_cols + c - only_upper) * kLanes, &column);
-      AddColumn<kFactors, kPanels>(column, of.factors + kFactors * c, p, sums);
-    }
-  }
-  for (Eigen::Index row = 0; row < rows; ++row) {
-    for (int f = 0; f < kFactors; ++f) {
-      product[kFactors * row + f] = sums[row / kLanes][f][row % kLanes];
-    }
+  for (int r = 0; r < Register<kSet>::kInPanel; r += Block<kSet, kFactors>::kRegisters) {
+    MultiplyBlock<kSet, kFactors, kPanels>(of, panel, r, rows, product);
   }
 }
 
-template <int kFactors>
+template <InstructionSet kSet, int kFactors>
 inline __attribute__((always_inline)) void MultiplyBody(const Operands& of, float* product) {
-  constexpr int kPanels = kFactors == 1 ? 4 : 2;
+  constexpr int kPanels = Block<kSet, kFactors>::kPanels;
   constexpr Eigen::Index kRows = PanelMatrix::kPanelRows;
   constexpr Eigen::Index kStep = kPanels * kRows;
   Eigen::Index row = 0;
   for (; row + kStep <= of.rows; row += kStep) {
-    MultiplyPanels<kFactors, kPanels>(of, row / kRows, kStep, product + kFactors * row);
+    MultiplyPanels<kSet, kFactors, kPanels>(of, row / kRows, kStep, product + kFactors * row);
   }
   for (; row < of.rows; row += kRows) {
-    MultiplyPanels<kFactors, 1>(of, row / kRows, std::min(kRows, of.rows - row),
-                                product + kFactors * row);
+    MultiplyPanels<kSet, kFactors, 1>(of, row / kRows, std::min(kRows, of.rows - row),
+                                      product + kFactors * row);
   }
 }
-
-using Multiplication = void (*)(const Operands& of, float* product);
 
 template <int kFactors>
 void MultiplyBaseline(const Operands& of, float* product) {
-  MultiplyBody<kFactors>(of, product);
-}
-
-#if defined(__x86_64__)
-template <int kFactors>
-__attribute__((target("avx512f,avx512dq,avx512vl"))) void MultiplyAvx512(const Operands& of,
-                                                                         float* product) {
-  MultiplyBody<kFactors>(of, product);
+  MultiplyBody<InstructionSet::kBaseline, kFactors>(of, product);
 }
 
 template <int kFactors>
-__attribute__((target("avx2,fma"))) void MultiplyAvx2(const Operands& of, float* product) {
-  MultiplyBody<kFactors>(of, product);
+TISSUEFORM_TARGET_AVX2 void MultiplyAvx2(const Operands& of, float* product) {
+  MultiplyBody<InstructionSet::kAvx2, kFactors>(of, product);
 }
 
 template <int kFactors>
-Multiplication Best() {
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-      __builtin_cpu_supports("avx512vl")) {
-    return MultiplyAvx512<kFactors>;
-  }
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")
-             ? MultiplyAvx2<kFactors>
-             : MultiplyBaseline<kFactors>;
+TISSUEFORM_TARGET_AVX512 void MultiplyAvx512(const Operands& of, float* product) {
+  MultiplyBody<InstructionSet::kAvx512, kFactors>(of, product);
 }
-#else
-template <int kFactors>
-Multiplication Best() {
-  return MultiplyBaseline<kFactors>;
-}
-#endif
 
-const Multiplication kMultiply1 = Best<1>();
-const Multiplication kMultiply3 = Best<3>();
+template <int kFactors>
+constexpr KernelVersions<void(const Operands&, float*)> kMultiply{
+    MultiplyBaseline<kFactors>, MultiplyAvx2<kFactors>, MultiplyAvx512<kFactors>};
 
 void PutHalf(int64_t half, bool second, int32_t* pair) {
   const auto bits = static_cast<uint32_t>(half & 0xffff);
@@ -182,8 +196,8 @@ void PanelMatrix::SetColumn(Eigen::Index column, const Eigen::Ref<const Eigen::V
     // To the nearest, so that the lower half has a sign of its own.
     const int64_t upper = (whole + kUpper / 2) >> 16;
     const Eigen::Index panel = row / kPanelRows;
-    const Eigen::Index lane = row % kLanes;
-    const bool second = row % kPanelRows >= kLanes;
+    const Eigen::Index lane = row % kPairs;
+    const bool second = row % kPanelRows >= kPairs;
     PutHalf(upper, second, &upper_[panel * cols_ + column].pairs[lane]);
     if (full_column >= 0) {
       PutHalf(whole - upper * kUpper, second,
@@ -207,7 +221,8 @@ void PanelMatrix::Multiply(const Eigen::MatrixXd& factors, const Reading& readin
   }
   const int32_t* const lower = lower_.empty() ? nullptr : lower_.front().pairs;
   const Operands of{upper_.front().pairs, lower, rows_, cols_, full_cols_, reading, scaled.data()};
-  (factors.cols() == 1 ? kMultiply1 : kMultiply3)(of, product);
+  const auto& multiply = factors.cols() == 1 ? kMultiply<1> : kMultiply<3>;
+  multiply.Active()(of, product);
 }
 
 void PanelMatrix::Describe(PackedColumns* packed) const {
@@ -216,9 +231,9 @@ void PanelMatrix::Describe(PackedColumns* packed) const {
                              std::vector<int16_t>* halves) {
     for (Eigen::Index c = 0; c < cols; ++c) {
       for (Eigen::Index row = 0; row < rows_; ++row) {
-        const int32_t pair = panels[row / kPanelRows * cols + c].pairs[row % kLanes];
+        const int32_t pair = panels[row / kPanelRows * cols + c].pairs[row % kPairs];
         halves->push_back(
-            static_cast<int16_t>(row % kPanelRows < kLanes ? pair & 0xffff : pair >> 16));
+            static_cast<int16_t>(row % kPanelRows < kPairs ? pair & 0xffff : pair >> 16));
       }
     }
   };

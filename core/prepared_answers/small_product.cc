@@ -4,7 +4,8 @@
 #include "core/prepared_answers/small_product.h"
 
 #include <cstring>
-#include <type_traits>
+
+#include "core/base/instruction_set.h"
 
 namespace tissueform {
 namespace {
@@ -19,34 +20,27 @@ struct Operands {
   Scalar* product;  // row-major
 };
 
-// Under instruction sets with shorter registers the compiler splits them.
-constexpr int kBytes = 64;
-template <typename Scalar>
-constexpr int kLanes = kBytes / static_cast<int>(sizeof(Scalar));
-using Doubles = double __attribute__((vector_size(kBytes)));
-using Floats = float __attribute__((vector_size(kBytes)));
-
-// From where no alignment is promised.
-inline __attribute__((always_inline)) void Load(const double* from, Doubles* lanes) {
-  std::memcpy(lanes, from, sizeof(*lanes));
-}
-inline __attribute__((always_inline)) void Load(const float* from, Floats* lanes) {
-  std::memcpy(lanes, from, sizeof(*lanes));
-}
+// A vector register of an instruction set.
+template <typename Scalar, InstructionSet kSet>
+struct Register {
+  static constexpr int kLanes = RegisterBytes(kSet) / static_cast<int>(sizeof(Scalar));
+  using Lanes [[gnu::vector_size(RegisterBytes(kSet))]] = Scalar;
+};
 
 // Rows from `row` on, two registers of them, by kCols columns from `col` on.
-template <typename Scalar, int kCols>
+template <typename Scalar, InstructionSet kSet, int kCols>
 inline __attribute__((always_inline)) void MultiplyBlock(const Operands<Scalar>& of,
                                                          Eigen::Index row, Eigen::Index col) {
-  constexpr int kWide = kLanes<Scalar>;
-  using Lanes = std::conditional_t<std::is_same_v<Scalar, double>, Doubles, Floats>;
+  constexpr int kWide = Register<Scalar, kSet>::kLanes;
+  using Lanes = typename Register<Scalar, kSet>::Lanes;
   Lanes sums[2][kCols] = {};
   Lanes first;
   Lanes second;
   for (Eigen::Index j = 0; j < of.inner; ++j) {
+    // Copied bytewise, because `a` need not be aligned to a register.
     const Scalar* const a = of.a + j * of.rows + row;
-    Load(a, &first);
-    Load(a + kWide, &second);
+    std::memcpy(&first, a, sizeof(first));
+    std::memcpy(&second, a + kWide, sizeof(second));
     const Scalar* const b = of.b + j * of.cols + col;
     for (int f = 0; f < kCols; ++f) {
       sums[0][f] += first * b[f];
@@ -62,68 +56,53 @@ inline __attribute__((always_inline)) void MultiplyBlock(const Operands<Scalar>&
   }
 }
 
-template <typename Scalar, int kCols>
+template <typename Scalar, InstructionSet kSet, int kCols>
 inline __attribute__((always_inline)) void MultiplyColumns(const Operands<Scalar>& of,
                                                            Eigen::Index col) {
-  constexpr Eigen::Index kRows = 2 * kLanes<Scalar>;
+  constexpr Eigen::Index kRows = 2 * Register<Scalar, kSet>::kLanes;
   for (Eigen::Index row = 0; row + kRows <= of.rows; row += kRows) {
-    MultiplyBlock<Scalar, kCols>(of, row, col);
+    MultiplyBlock<Scalar, kSet, kCols>(of, row, col);
   }
   // The last rows once more with those before them: the same numbers.
-  if (of.rows % kRows != 0) MultiplyBlock<Scalar, kCols>(of, of.rows - kRows, col);
+  if (of.rows % kRows != 0) MultiplyBlock<Scalar, kSet, kCols>(of, of.rows - kRows, col);
 }
 
 // REQUIRES: at least two registers of rows.
-template <typename Scalar>
+template <typename Scalar, InstructionSet kSet>
 inline __attribute__((always_inline)) void MultiplyBody(const Operands<Scalar>& of) {
   Eigen::Index col = 0;
-  for (; col + 3 <= of.cols; col += 3) MultiplyColumns<Scalar, 3>(of, col);
-  for (; col < of.cols; ++col) MultiplyColumns<Scalar, 1>(of, col);
+  for (; col + 3 <= of.cols; col += 3) MultiplyColumns<Scalar, kSet, 3>(of, col);
+  for (; col < of.cols; ++col) MultiplyColumns<Scalar, kSet, 1>(of, col);
 }
-
-template <typename Scalar>
-using Multiplication = void (*)(const Operands<Scalar>& of);
 
 template <typename Scalar>
 void MultiplyBaseline(const Operands<Scalar>& of) {
-  MultiplyBody(of);
-}
-
-#if defined(__x86_64__)
-template <typename Scalar>
-__attribute__((target("avx512f,avx512dq,avx512vl"))) void MultiplyAvx512(
-    const Operands<Scalar>& of) {
-  MultiplyBody(of);
+  MultiplyBody<Scalar, InstructionSet::kBaseline>(of);
 }
 
 template <typename Scalar>
-__attribute__((target("avx2,fma"))) void MultiplyAvx2(const Operands<Scalar>& of) {
-  MultiplyBody(of);
+TISSUEFORM_TARGET_AVX2 void MultiplyAvx2(const Operands<Scalar>& of) {
+  MultiplyBody<Scalar, InstructionSet::kAvx2>(of);
 }
 
 template <typename Scalar>
-Multiplication<Scalar> Best() {
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-      __builtin_cpu_supports("avx512vl")) {
-    return MultiplyAvx512<Scalar>;
-  }
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? MultiplyAvx2<Scalar>
-                                                                         : MultiplyBaseline<Scalar>;
+TISSUEFORM_TARGET_AVX512 void MultiplyAvx512(const Operands<Scalar>& of) {
+  MultiplyBody<Scalar, InstructionSet::kAvx512>(of);
 }
-#else
+
 template <typename Scalar>
-Multiplication<Scalar> Best() {
-  return MultiplyBaseline<Scalar>;
-}
-#endif
+constexpr KernelVersions<void(const Operands<Scalar>&)> kMultiply{
+    MultiplyBaseline<Scalar>, MultiplyAvx2<Scalar>, MultiplyAvx512<Scalar>};
 
 template <typename Scalar>
 RowMajorMatrix<Scalar> Multiply(const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& a,
                                 const RowMajorMatrix<Scalar>& b) {
-  if (a.rows() < 2 * kLanes<Scalar>) return a * b;
-  static const Multiplication<Scalar> kMultiply = Best<Scalar>();
+  // Two of the widest registers, so that which path a matrix takes does not depend on the
+  // processor.
+  constexpr int kFewestRows = 2 * Register<Scalar, InstructionSet::kAvx512>::kLanes;
+  if (a.rows() < kFewestRows) return a * b;
   RowMajorMatrix<Scalar> product(a.rows(), b.cols());
-  kMultiply({a.data(), a.rows(), a.cols(), b.data(), b.cols(), product.data()});
+  kMultiply<Scalar>.Active()({a.data(), a.rows(), a.cols(), b.data(), b.cols(), product.data()});
   return product;
 }
 

@@ -8,11 +8,27 @@
 #include "absl/strings/str_cat.h"
 
 #include "client/cli/shared/companion.h"
+#include "core/base/instruction_set.h"
 #include "core/base/parallel_for.h"
 
 namespace tissueform {
 
-BenchOptions::BenchOptions() : meshes{1, 2, 3, 4, 5, 6, 7, 8}, threads(AvailableProcessors()) {}
+namespace {
+
+std::vector<std::string> SupportedNames() {
+  std::vector<std::string> names;
+  for (const InstructionSet set : SupportedInstructionSets()) {
+    names.emplace_back(InstructionSetName(set));
+  }
+  return names;
+}
+
+}  // namespace
+
+BenchOptions::BenchOptions()
+    : meshes{1, 2, 3, 4, 5, 6, 7, 8},
+      threads(AvailableProcessors()),
+      instruction_sets(SupportedNames()) {}
 
 void AddBenchOptions(CLI::App& app, BenchOptions* options) {
   app.add_option(
@@ -29,6 +45,11 @@ void AddBenchOptions(CLI::App& app, BenchOptions* options) {
                  "threads of assembly, rotations and right-hand sides; the BLAS has one")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
+  app.add_option(
+         "--isa", options->instruction_sets,
+         "instruction sets to time frames on (repeatable), the widest one for all other rows; all "
+         "that this processor has unless given")
+      ->check(CLI::IsMember(SupportedNames()));
   app.add_option("--json", options->json, "also write the table to this JSON file");
   app.footer(
       "Columns: ours, a peer on the same work in the same run, ratio (peer / ours: above 1 we are\n"
@@ -39,6 +60,7 @@ void AddBenchOptions(CLI::App& app, BenchOptions* options) {
       "Examples:\n"
       "  tissueform bench --mesh 1 --repetitions 1\n"
       "  tissueform bench --mesh 5 --mesh 6 --json bench.json\n"
+      "  tissueform bench --mesh 5 --isa avx2 --isa baseline\n"
       "docs/performance.md explains every row.");
 }
 
@@ -49,6 +71,9 @@ std::vector<std::string> BenchArguments(const BenchOptions& options) {
   }
   arguments.push_back(absl::StrCat("--repetitions=", options.repetitions));
   arguments.push_back(absl::StrCat("--threads=", options.threads));
+  for (const std::string& set : options.instruction_sets) {
+    arguments.push_back(absl::StrCat("--isa=", set));
+  }
   if (!options.json.empty()) {
     arguments.push_back(absl::StrCat("--json=", options.json));
   }

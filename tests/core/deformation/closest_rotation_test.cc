@@ -11,6 +11,8 @@
 #include "gtest/gtest.h"
 #include <Eigen/Geometry>
 
+#include "tests/testing/every_instruction_set.h"
+
 namespace tissueform {
 namespace {
 
@@ -87,7 +89,12 @@ TEST(RotationPowerTest, ScalesTheAngle) {
   EXPECT_LT((RotationPower(R, -1.0) - R.transpose()).norm(), 1e-14);
 }
 
-TEST(RotationBatchTest, ClosestRotationsAreThoseOfTheSingularValueDecomposition) {
+class RotationBatchTest : public testing::EveryInstructionSet {};
+
+INSTANTIATE_TEST_SUITE_P(On, RotationBatchTest, testing::InstructionSets(),
+                         testing::InstructionSetOf);
+
+TEST_P(RotationBatchTest, ClosestRotationsAreThoseOfTheSingularValueDecomposition) {
   Noise noise;
   int reliable = 0;
   for (int round = 0; round < 50; ++round) {
@@ -110,7 +117,7 @@ TEST(RotationBatchTest, ClosestRotationsAreThoseOfTheSingularValueDecomposition)
   EXPECT_GT(reliable, 25 * kSize);
 }
 
-TEST(RotationBatchTest, VeryFlatAndVeryLargeMatricesAreStillRight) {
+TEST_P(RotationBatchTest, VeryFlatAndVeryLargeMatricesAreStillRight) {
   Noise noise;
   std::vector<Eigen::Matrix3d> matrices(kSize);
   for (int k = 0; k < kSize; ++k) {
@@ -126,7 +133,7 @@ TEST(RotationBatchTest, VeryFlatAndVeryLargeMatricesAreStillRight) {
   }
 }
 
-TEST(RotationBatchTest, PowersAreThoseOfAngleAndAxis) {
+TEST_P(RotationBatchTest, PowersAreThoseOfAngleAndAxis) {
   Noise noise;
   for (const double angle : {0.0, 1e-12, 1e-9, 1e-7, 1e-3, 0.5, 2.0, 3.0}) {
     std::vector<Eigen::Matrix3d> matrices(kSize);
@@ -144,7 +151,7 @@ TEST(RotationBatchTest, PowersAreThoseOfAngleAndAxis) {
   }
 }
 
-TEST(RotationBatchTest, HalfTurnsAreLeftToTheScalarFunction) {
+TEST_P(RotationBatchTest, HalfTurnsAreLeftToTheScalarFunction) {
   Noise noise;
   const std::vector<Eigen::Matrix3d> matrices(kSize, noise.Rotation(std::numbers::pi));
   const std::vector<double> exponents(kSize, 0.5);

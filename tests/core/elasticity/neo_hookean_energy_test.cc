@@ -9,6 +9,7 @@
 #include "gtest/gtest.h"
 
 #include "core/constraints/handle_pose.h"
+#include "tests/testing/every_instruction_set.h"
 #include "tests/testing/meshes.h"
 
 namespace tissueform {
@@ -55,7 +56,12 @@ double Slope(const std::function<double(double)>& function, double at) {
   return (function(at + step) - function(at - step)) / (2 * step);
 }
 
-TEST(NeoHookeanEnergyTest, RigidMotionCostsNothing) {
+class NeoHookeanEnergyTest : public testing::EveryInstructionSet {};
+
+INSTANTIATE_TEST_SUITE_P(On, NeoHookeanEnergyTest, testing::InstructionSets(),
+                         testing::InstructionSetOf);
+
+TEST_P(NeoHookeanEnergyTest, RigidMotionCostsNothing) {
   Body body(testing::Bar({2, 2, 3}, 1.0, 0.2));
   Positions forces;
   const auto value =
@@ -65,7 +71,7 @@ TEST(NeoHookeanEnergyTest, RigidMotionCostsNothing) {
   EXPECT_NEAR(value.smallest_volume_ratio, 1, 1e-13);
 }
 
-TEST(NeoHookeanEnergyTest, RestIsExactlyZero) {
+TEST_P(NeoHookeanEnergyTest, RestIsExactlyZero) {
   Body body(testing::Bar({2, 2, 3}, 1.0, 0.2));
   Positions forces;
   const auto value = body.energy.Evaluate(Positions::Zero(body.mesh.num_vertices(), 3), &forces);
@@ -73,7 +79,7 @@ TEST(NeoHookeanEnergyTest, RestIsExactlyZero) {
   EXPECT_LT(forces.cwiseAbs().maxCoeff(), 1e-12);
 }
 
-TEST(NeoHookeanEnergyTest, HomogeneousStretchHasTheLawsDensity) {
+TEST_P(NeoHookeanEnergyTest, HomogeneousStretchHasTheLawsDensity) {
   Body body(testing::Bar({2, 2, 3}, 1.0, 0.2));
   const Eigen::Matrix3d F = RotationMatrix({0.3, -2, 1}) *
                             Eigen::Vector3d(0.7, 1.6, 1.2).asDiagonal() * RotationMatrix({1, 1, 0});
@@ -83,7 +89,7 @@ TEST(NeoHookeanEnergyTest, HomogeneousStretchHasTheLawsDensity) {
   EXPECT_NEAR(value.smallest_volume_ratio, 0.7 * 1.6 * 1.2, 1e-12);
 }
 
-TEST(NeoHookeanEnergyTest, GradientAgreesWithDifferences) {
+TEST_P(NeoHookeanEnergyTest, GradientAgreesWithDifferences) {
   Body body(testing::Bar({2, 2, 2}, 1.0, 0.15));
   const Eigen::Index num_vertices = body.mesh.num_vertices();
   const Positions bumps = 0.1 * Positions::Random(num_vertices, 3);
@@ -102,7 +108,7 @@ TEST(NeoHookeanEnergyTest, GradientAgreesWithDifferences) {
 
 // A bar stretched along z whose sides are free: the lateral stretch is where the energy is least,
 // inner and side vertices bear no force, the end face bears A dW/d(stretch).
-TEST(NeoHookeanEnergyTest, UniaxialStretchMeetsTheAnalyticAnswer) {
+TEST_P(NeoHookeanEnergyTest, UniaxialStretchMeetsTheAnalyticAnswer) {
   Body body(testing::Bar({3, 2, 4}));
   for (const double stretch : {0.6, 1.3, 2.0}) {
     double low = 0.3, high = 2.0;
@@ -126,7 +132,7 @@ TEST(NeoHookeanEnergyTest, UniaxialStretchMeetsTheAnalyticAnswer) {
   }
 }
 
-TEST(NeoHookeanEnergyTest, SmallDisplacementsKeepTheirDigits) {
+TEST_P(NeoHookeanEnergyTest, SmallDisplacementsKeepTheirDigits) {
   Body body(testing::Bar({2, 2, 3}, 1.0, 0.2));
   const Positions direction = Positions::Random(body.mesh.num_vertices(), 3);
   Positions forces;
@@ -135,7 +141,7 @@ TEST(NeoHookeanEnergyTest, SmallDisplacementsKeepTheirDigits) {
   EXPECT_NEAR(small / large, 1e-8, 1e-11);
 }
 
-TEST(NeoHookeanEnergyTest, InvertedTetsAreCountedAndCostInfinitelyMuch) {
+TEST_P(NeoHookeanEnergyTest, InvertedTetsAreCountedAndCostInfinitelyMuch) {
   Body body(testing::Bar({2, 2, 3}));
   Positions forces;
   const Eigen::Matrix3d mirror = Eigen::Vector3d(1, 1, -1).asDiagonal();
@@ -146,7 +152,7 @@ TEST(NeoHookeanEnergyTest, InvertedTetsAreCountedAndCostInfinitelyMuch) {
   EXPECT_EQ(forces.size(), 0);
 }
 
-TEST(NeoHookeanEnergyTest, DisplacementsThatAreNotFiniteCountAsInverted) {
+TEST_P(NeoHookeanEnergyTest, DisplacementsThatAreNotFiniteCountAsInverted) {
   Body body(testing::Bar({2, 2, 3}));
   Positions displacements = Positions::Zero(body.mesh.num_vertices(), 3);
   displacements(5, 1) = std::numeric_limits<double>::quiet_NaN();
@@ -154,7 +160,7 @@ TEST(NeoHookeanEnergyTest, DisplacementsThatAreNotFiniteCountAsInverted) {
   EXPECT_GT(body.energy.Evaluate(displacements, &forces).inverted_tets, 0);
 }
 
-TEST(NeoHookeanEnergyTest, DoesNotDependOnThreads) {
+TEST_P(NeoHookeanEnergyTest, DoesNotDependOnThreads) {
   Body one(testing::Bar({9, 9, 10}, 1.0, 0.1));
   Body three(one.mesh, 3);
   const Positions displacements = 0.05 * Positions::Random(one.mesh.num_vertices(), 3);

@@ -7,6 +7,7 @@
 
 #include "core/elasticity/elastic_stiffness.h"
 #include "core/elasticity/neo_hookean_energy.h"
+#include "tests/testing/every_instruction_set.h"
 #include "tests/testing/meshes.h"
 
 namespace tissueform {
@@ -64,7 +65,12 @@ struct Body {
   NeoHookeanEnergy energy;
 };
 
-TEST(NeoHookeanExpansionTest, IsTheSecondDifferenceOfTheForces) {
+class NeoHookeanExpansionTest : public testing::EveryInstructionSet {};
+
+INSTANTIATE_TEST_SUITE_P(On, NeoHookeanExpansionTest, testing::InstructionSets(),
+                         testing::InstructionSetOf);
+
+TEST_P(NeoHookeanExpansionTest, IsTheSecondDifferenceOfTheForces) {
   Body body;
   const Eigen::VectorXd field = 0.1 * Eigen::VectorXd::Random(3 * body.mesh.num_vertices());
   const Eigen::VectorXd second = body.SecondOrder(field);
@@ -75,7 +81,7 @@ TEST(NeoHookeanExpansionTest, IsTheSecondDifferenceOfTheForces) {
   EXPECT_NEAR(far / near, 100, 20);
 }
 
-TEST(NeoHookeanExpansionTest, PairsAreTheSymmetricBilinearForm) {
+TEST_P(NeoHookeanExpansionTest, PairsAreTheSymmetricBilinearForm) {
   Body body;
   const Eigen::MatrixXd fields = 0.1 * Eigen::MatrixXd::Random(3 * body.mesh.num_vertices(), 3);
   const Eigen::MatrixXd pairs = body.SecondOrder(fields);
@@ -94,7 +100,7 @@ TEST(NeoHookeanExpansionTest, PairsAreTheSymmetricBilinearForm) {
 
 // Rotating by w is w x v + w x (w x v) / 2 + ...: its linear part alone strains, by second order,
 // and the forces of that are those of linear elasticity for -w x (w x v) / 2.
-TEST(NeoHookeanExpansionTest, RotationsLinearPartIsHeldByForcesOfItsStretch) {
+TEST_P(NeoHookeanExpansionTest, RotationsLinearPartIsHeldByForcesOfItsStretch) {
   Body body;
   const Eigen::Vector3d w(0.3, -0.2, 0.5);
   Eigen::VectorXd linear(3 * body.mesh.num_vertices());
@@ -115,7 +121,7 @@ Eigen::MatrixXd RandomFields(const Body& body, Eigen::Index count) {
   return 0.1 * Eigen::MatrixXd::Random(3 * body.mesh.num_vertices(), count);
 }
 
-TEST(NeoHookeanExpansionTest, ThirdOrderIsTheThirdDifferenceOfTheForces) {
+TEST_P(NeoHookeanExpansionTest, ThirdOrderIsTheThirdDifferenceOfTheForces) {
   Body body;
   const Eigen::VectorXd v = RandomFields(body, 1);
   const Eigen::VectorXd w = RandomFields(body, 1);
@@ -127,7 +133,7 @@ TEST(NeoHookeanExpansionTest, ThirdOrderIsTheThirdDifferenceOfTheForces) {
 }
 
 // The columns by one field alone, made of several.
-TEST(NeoHookeanExpansionTest, TriplesAreTheCubicOfAllNumbers) {
+TEST_P(NeoHookeanExpansionTest, TriplesAreTheCubicOfAllNumbers) {
   Body body;
   const Eigen::MatrixXd first = RandomFields(body, 3);
   const Eigen::MatrixXd second = RandomFields(body, NumFieldPairs(3));
@@ -144,7 +150,7 @@ TEST(NeoHookeanExpansionTest, TriplesAreTheCubicOfAllNumbers) {
 }
 
 // Turning is exact: along sin R's part and (1 - cos) R's part nothing strains to third order.
-TEST(NeoHookeanExpansionTest, RotationsHaveNoThirdOrderForces) {
+TEST_P(NeoHookeanExpansionTest, RotationsHaveNoThirdOrderForces) {
   Body body;
   const Eigen::Vector3d n(0.3, -0.2, 0.5);  // sine times axis
   Eigen::VectorXd v(3 * body.mesh.num_vertices());

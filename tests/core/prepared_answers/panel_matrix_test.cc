@@ -5,6 +5,8 @@
 
 #include "gtest/gtest.h"
 
+#include "tests/testing/every_instruction_set.h"
+
 namespace tissueform {
 namespace {
 
@@ -27,7 +29,12 @@ double LargestError(const Eigen::MatrixXd& dense, const PanelMatrix& panels, Eig
   return (product.cast<double>() - expected).cwiseAbs().maxCoeff();
 }
 
-TEST(PanelMatrixTest, ProductEqualsThatOfADenseMatrix) {
+class PanelMatrixTest : public testing::EveryInstructionSet {};
+
+INSTANTIATE_TEST_SUITE_P(On, PanelMatrixTest, testing::InstructionSets(),
+                         testing::InstructionSetOf);
+
+TEST_P(PanelMatrixTest, ProductEqualsThatOfADenseMatrix) {
   for (const Eigen::Index rows : {1, 15, 16, 17, 31, 32, 33, 96, 97, 333}) {
     for (const Eigen::Index cols : {1, 3, 30}) {
       const Eigen::MatrixXd dense = Eigen::MatrixXd::Random(rows, cols);
@@ -43,7 +50,7 @@ TEST(PanelMatrixTest, ProductEqualsThatOfADenseMatrix) {
   }
 }
 
-TEST(PanelMatrixTest, UpperHalvesAreOffByHalfAStepAtMost) {
+TEST_P(PanelMatrixTest, UpperHalvesAreOffByHalfAStepAtMost) {
   for (const Eigen::Index rows : {1, 17, 33, 333}) {
     // Columns of very different sizes: each has its own step.
     Eigen::MatrixXd dense = Eigen::MatrixXd::Random(rows, 5);
@@ -70,7 +77,7 @@ TEST(PanelMatrixTest, UpperHalvesAreOffByHalfAStepAtMost) {
   }
 }
 
-TEST(PanelMatrixTest, TheLastColumnsAreReadToTheirLastDigit) {
+TEST_P(PanelMatrixTest, TheLastColumnsAreReadToTheirLastDigit) {
   for (const Eigen::Index rows : {1, 33, 333}) {
     Eigen::MatrixXd dense = Eigen::MatrixXd::Random(rows, 7);
     dense.rightCols(3) *= 1e3;
@@ -88,7 +95,7 @@ TEST(PanelMatrixTest, TheLastColumnsAreReadToTheirLastDigit) {
   }
 }
 
-TEST(PanelMatrixTest, AColumnIsReplacedByTheNext) {
+TEST_P(PanelMatrixTest, AColumnIsReplacedByTheNext) {
   Eigen::MatrixXd dense = Eigen::MatrixXd::Random(40, 2);
   PanelMatrix panels = PanelsOf(dense, 2);
   dense.col(1) = 3 * Eigen::VectorXd::Random(40);
@@ -96,7 +103,26 @@ TEST(PanelMatrixTest, AColumnIsReplacedByTheNext) {
   EXPECT_LT(LargestError(dense, panels, 1, {0, 0}), 1e-6);
 }
 
-TEST(PanelMatrixTest, BytesAreThoseOfWholePanels) {
+// Both fuse their multiplications and add columns in the same order.
+TEST_P(PanelMatrixTest, AnswersAreThoseOfTheWidestInstructionSet) {
+  const Eigen::MatrixXd dense = Eigen::MatrixXd::Random(777, 41);
+  const PanelMatrix panels = PanelsOf(dense, 13);
+  for (const Eigen::Index count : {1, 3}) {
+    const Eigen::MatrixXd factors = Eigen::MatrixXd::Random(dense.cols(), count);
+    Eigen::MatrixXf product(count, dense.rows());
+    Eigen::MatrixXf widest(count, dense.rows());
+    panels.Multiply(factors, {5, 30}, product.data());
+    {
+      const ScopedInstructionSet scoped(SupportedInstructionSets().front());
+      panels.Multiply(factors, {5, 30}, widest.data());
+    }
+    // Without fused multiplications each of the 36 products is rounded on its own.
+    const float allowed = GetParam() == InstructionSet::kBaseline ? 36 * 6e-8F * 36 : 0.0F;
+    EXPECT_LE((product - widest).cwiseAbs().maxCoeff(), allowed) << count;
+  }
+}
+
+TEST_P(PanelMatrixTest, BytesAreThoseOfWholePanels) {
   EXPECT_EQ(PanelMatrix(33, 5, 5).bytes_held(), 2 * 32 * 5 * 4);
   EXPECT_EQ(PanelMatrix::BytesNeeded(32, 5, 5), 32 * 5 * 4);
   EXPECT_EQ(PanelMatrix(33, 5, 2).bytes_held(), 2 * 32 * (5 + 2) * 2);

@@ -5,10 +5,17 @@
 
 #include "gtest/gtest.h"
 
+#include "tests/testing/every_instruction_set.h"
+
 namespace tissueform {
 namespace {
 
-TEST(SmallProductTest, EqualsEigensProductOfAnySize) {
+class SmallProductTest : public testing::EveryInstructionSet {};
+
+INSTANTIATE_TEST_SUITE_P(On, SmallProductTest, testing::InstructionSets(),
+                         testing::InstructionSetOf);
+
+TEST_P(SmallProductTest, EqualsEigensProductOfAnySize) {
   for (const Eigen::Index rows : {0, 1, 15, 16, 17, 31, 32, 33, 47, 165}) {
     for (const Eigen::Index inner : {0, 1, 12, 165}) {
       for (const Eigen::Index cols : {1, 2, 3, 4, 9}) {

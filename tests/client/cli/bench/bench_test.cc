@@ -3,8 +3,10 @@
 
 #include <set>
 
+#include "absl/strings/str_cat.h"
 #include "nlohmann/json.hpp"
 
+#include "core/base/instruction_set.h"
 #include "tests/testing/run_tissueform.h"
 
 namespace tissueform::testing {
@@ -13,6 +15,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 using BenchTest = CliTest;
 
@@ -23,7 +26,8 @@ TEST_F(BenchTest, TheSmallestBarGivesEveryRow) {
   EXPECT_THAT(result.out, AllOf(HasSubstr("solve 3"), HasSubstr("targets")));
 
   const auto report = nlohmann::json::parse(Read("bench.json"));
-  for (const char* key : {"machine", "compiler", "commit", "threads", "memory", "targets"}) {
+  for (const char* key :
+       {"machine", "compiler", "commit", "instruction_sets", "threads", "memory", "targets"}) {
     EXPECT_TRUE(report.contains(key)) << key;
   }
   std::set<std::string> works;
@@ -37,19 +41,44 @@ TEST_F(BenchTest, TheSmallestBarGivesEveryRow) {
     EXPECT_EQ(row.at("peer") == "-", row.at("peer_seconds").is_null());
     EXPECT_EQ(row.at("ratio").is_null(), row.at("peer_seconds").is_null());
   }
-  EXPECT_THAT(works, ::testing::UnorderedElementsAre(
-                         "read", "assemble", "local step", "estimated iteration",
-                         "estimated answer", "analyse", "factorise", "analyse + factorise",
-                         "solve 3", "basis frame", "basis preparation", "basis frame, 3 handles",
-                         "basis preparation, 3 handles", "elastic frame", "elastic int16 encoding",
-                         "neo-Hookean frame", "neo-Hookean preparation"));
+  std::set<std::string> expected = {"read",
+                                    "assemble",
+                                    "local step",
+                                    "estimated iteration",
+                                    "estimated answer",
+                                    "analyse",
+                                    "factorise",
+                                    "analyse + factorise",
+                                    "solve 3",
+                                    "basis preparation",
+                                    "basis preparation, 3 handles",
+                                    "elastic int16 encoding",
+                                    "neo-Hookean preparation"};
+  for (const InstructionSet set : SupportedInstructionSets()) {
+    const bool is_widest = set == SupportedInstructionSets().front();
+    const std::string on = is_widest ? "" : absl::StrCat(" [", InstructionSetName(set), "]");
+    for (const char* frame :
+         {"basis frame", "basis frame, 3 handles", "elastic frame", "neo-Hookean frame"}) {
+      expected.insert(absl::StrCat(frame, on));
+    }
+  }
+  EXPECT_EQ(works, expected);
   const auto& memory = report.at("memory").at(0);
   EXPECT_GT(memory.at("peak_bytes"), memory.at("factor_bytes"));
+}
+
+TEST_F(BenchTest, FramesAreTimedOnTheChosenInstructionSetAlone) {
+  const ProcessResult result =
+      Run({"bench", "--mesh", "1", "--repetitions", "1", "--isa", "baseline"});
+  EXPECT_THAT(result, Succeeds());
+  EXPECT_THAT(result.out, AllOf(HasSubstr("; baseline; "), HasSubstr("basis frame "),
+                                Not(HasSubstr("basis frame ["))));
 }
 
 TEST_F(BenchTest, WrongUseIsOneLineAndExitCodeTwo) {
   EXPECT_THAT(Run({"bench", "--mesh", "9"}), FailsWith(2, HasSubstr("--mesh")));
   EXPECT_THAT(Run({"bench", "--repetitions", "0"}), FailsWith(2, HasSubstr("--repetitions")));
+  EXPECT_THAT(Run({"bench", "--isa", "mmx"}), FailsWith(2, HasSubstr("--isa")));
   EXPECT_THAT(Run({"bench", "--fast"}), FailsWith(2, HasSubstr("tissueform bench --help")));
   EXPECT_THAT(Files(), IsEmpty());
 }
