@@ -8,7 +8,7 @@
 #   deploy/demo.sh [options of `tissueform demo`]
 #
 # With --serve the server keeps running afterwards, with what it has predicted, until Ctrl-C, and the planner for browsers
-# in front of it: open the address that is printed.
+# in front of it: open the address that is printed. The planner listens on port 8080, or on a free one where that is taken.
 #
 # TISSUEFORM_BUILD_DIR and JOBS: see deploy/build.sh.
 set -euo pipefail

@@ -3,6 +3,11 @@
 //
 // The companion of `tissueform` that speaks with servers.
 
+#include <cstdlib>
+
+#include "google/protobuf/stubs/logging.h"
+#include "grpc/support/log.h"
+
 #include "client/cli/access/doctor_command.h"
 #include "client/cli/access/follow_link_command.h"
 #include "client/cli/access/login_command.h"
@@ -23,7 +28,19 @@
 #include "client/cli/shared/command_line.h"
 #include "client/cli/shared/companion.h"
 
+namespace {
+
+// gRPC and protobuf write to stderr by themselves what a command then says in its one line. Users
+// who look for a fault in gRPC set GRPC_VERBOSITY and see all of it.
+void SilenceLibraries() {
+  if (std::getenv("GRPC_VERBOSITY") == nullptr) gpr_set_log_function([](gpr_log_func_args*) {});
+  google::protobuf::SetLogHandler(nullptr);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
+  SilenceLibraries();
   return tissueform::RunCommandLine(argc, argv, [](CLI::App& app, tissueform::CommandWork* work) {
     tissueform::AddRunCommand(app, work);
     tissueform::AddLoadCommand(app, work);

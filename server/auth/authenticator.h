@@ -39,7 +39,8 @@ class Authenticator {
  public:
   virtual ~Authenticator() = default;
 
-  // Errors: Unauthenticated, with a sentence that holds nothing of the token.
+  // Errors: Unauthenticated, with a sentence that holds nothing of a token whose signature was not
+  // verified, and of others issuer, audience and times at most.
   virtual absl::StatusOr<Authenticated> Authenticate(const Credentials& credentials) = 0;
 
   // Whether a stream that has begun with this may go on: neither expired nor revoked.

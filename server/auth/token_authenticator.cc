@@ -6,6 +6,7 @@
 #include <atomic>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "spdlog/spdlog.h"
 
 #include "core/base/status_macros.h"
@@ -114,7 +115,9 @@ absl::StatusOr<Authenticated> TokenAuthenticator::Verify(absl::string_view token
   const VerificationKey::Pointer key = trust_.keys()->Find(header.kid, header.algorithm);
   if (key == nullptr) {
     if (fetcher_ != nullptr) fetcher_->Ask();
-    return RefuseToken(TokenFailure::kUnknownKey);
+    return RefuseToken(TokenFailure::kUnknownKey, absl::StrCat("the token's key is not one of ",
+                                                               QuoteForCaller(options_.issuer),
+                                                               ", whose tokens this server takes"));
   }
   if (key->algorithm() != header.algorithm) return RefuseToken(TokenFailure::kAlgorithm);
   if (!key->Verifies(parts.signed_text, parts.signature)) {
@@ -130,7 +133,9 @@ absl::StatusOr<Authenticated> TokenAuthenticator::Verify(absl::string_view token
 }
 
 absl::Status TokenAuthenticator::Check(const Authenticated& authenticated) const {
-  if (authenticated.expires + rules_.leeway <= now_()) return RefuseToken(TokenFailure::kExpired);
+  const auto now = now_();
+  if (authenticated.expires + rules_.leeway <= now)
+    return RefuseExpired(authenticated.expires, now);
   if (trust_.revocations()->Holds(authenticated)) return RefuseToken(TokenFailure::kRevoked);
   return absl::OkStatus();
 }

@@ -11,6 +11,9 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "absl/time/time.h"
 #include "nlohmann/json.hpp"
 
 #include "core/base/status_macros.h"
@@ -79,6 +82,43 @@ absl::StatusOr<std::optional<SystemTime>> TimeOf(const Json& claims, const char*
       std::chrono::duration_cast<SystemTime::duration>(std::chrono::duration<double>(seconds))));
 }
 
+// In whole seconds: "5m3s".
+std::string InWords(SystemTime::duration time) {
+  return absl::FormatDuration(
+      absl::Seconds(std::chrono::duration_cast<std::chrono::seconds>(time).count()));
+}
+
+std::string TextOf(const Json& claim) {
+  if (claim.is_string()) return claim.get<std::string>();
+  if (!claim.is_array()) return claim.dump();
+  return absl::StrJoin(claim, ", ", [](std::string* text, const Json& item) {
+    absl::StrAppend(text, item.is_string() ? item.get<std::string>() : item.dump());
+  });
+}
+
+std::string Quote(const Json* claim) {
+  return claim == nullptr ? "not named" : QuoteForCaller(TextOf(*claim));
+}
+
+absl::Status RefuseIssuer(const Json* found, const std::string& expected) {
+  return RefuseToken(TokenFailure::kIssuer, absl::StrCat("the token's issuer is ", Quote(found),
+                                                         ", and this server takes tokens of ",
+                                                         QuoteForCaller(expected), " only"));
+}
+
+absl::Status RefuseAudience(const Json* found, const std::vector<std::string>& expected) {
+  return RefuseToken(TokenFailure::kAudience,
+                     absl::StrCat("the token's audience is ", Quote(found), ", and this server is ",
+                                  QuoteForCaller(absl::StrJoin(expected, " or "))));
+}
+
+absl::Status RefuseNotYetValid(SystemTime::duration wait, std::chrono::seconds leeway) {
+  return RefuseToken(
+      TokenFailure::kNotYetValid,
+      absl::StrCat("the token begins in ", InWords(wait),
+                   " by the server's clock, which may differ by ", leeway.count(), " s"));
+}
+
 // Of an array of strings; empty where there is none.
 absl::StatusOr<std::set<std::string>> NamesOf(const Json& claims, const char* name) {
   const Json* value = Member(claims, name);
@@ -112,6 +152,12 @@ absl::StatusOr<Principal> PrincipalOf(const Json& claims) {
 
 }  // namespace
 
+absl::Status RefuseExpired(SystemTime expires, SystemTime now) {
+  return RefuseToken(
+      TokenFailure::kExpired,
+      absl::StrCat("the token expired ", InWords(now - expires), " ago by the server's clock"));
+}
+
 absl::StatusOr<TokenHeader> ReadTokenHeader(absl::string_view json) {
   TF_ASSIGN_OR_RETURN(const Json header, ParseObject(json));
   for (const char* key : {"jwk", "jku", "x5u", "x5c"}) {
@@ -138,18 +184,19 @@ absl::StatusOr<TokenHeader> ReadTokenHeader(absl::string_view json) {
 absl::StatusOr<TokenClaims> ReadTokenClaims(absl::string_view json, const TokenRules& rules,
                                             SystemTime now) {
   TF_ASSIGN_OR_RETURN(const Json claims, ParseObject(json));
-  if (!Is(Member(claims, "iss"), rules.issuer)) return RefuseToken(TokenFailure::kIssuer);
+  if (!Is(Member(claims, "iss"), rules.issuer)) {
+    return RefuseIssuer(Member(claims, "iss"), rules.issuer);
+  }
   if (!IsForOneOf(Member(claims, "aud"), rules.audiences)) {
-    return RefuseToken(TokenFailure::kAudience);
+    return RefuseAudience(Member(claims, "aud"), rules.audiences);
   }
   TF_ASSIGN_OR_RETURN(const std::optional<SystemTime> expires, TimeOf(claims, "exp"));
   if (!expires.has_value()) return RefuseToken(TokenFailure::kNoExpiry);
-  if (*expires + rules.leeway <= now) return RefuseToken(TokenFailure::kExpired);
+  if (*expires + rules.leeway <= now) return RefuseExpired(*expires, now);
   TF_ASSIGN_OR_RETURN(const std::optional<SystemTime> begins, TimeOf(claims, "nbf"));
   TF_ASSIGN_OR_RETURN(const std::optional<SystemTime> issued, TimeOf(claims, "iat"));
-  if (begins.value_or(now) > now + rules.leeway || issued.value_or(now) > now + rules.leeway) {
-    return RefuseToken(TokenFailure::kNotYetValid);
-  }
+  const SystemTime valid_from = std::max(begins.value_or(now), issued.value_or(now));
+  if (valid_from > now + rules.leeway) return RefuseNotYetValid(valid_from - now, rules.leeway);
   TokenClaims read{.expires = *expires, .issued = issued};
   TF_ASSIGN_OR_RETURN(read.principal, PrincipalOf(claims));
   if (const Json* id = Member(claims, "jti"); id != nullptr) {

@@ -35,6 +35,10 @@ struct TokenHeader {
 // type, algorithm).
 absl::StatusOr<TokenHeader> ReadTokenHeader(absl::string_view json);
 
+// The refusal of a token that ended at `expires`, with how long ago that was at `now`.
+absl::Status RefuseExpired(std::chrono::system_clock::time_point expires,
+                           std::chrono::system_clock::time_point now);
+
 // What the server takes from a token's claims.
 struct TokenClaims {
   Principal principal = {};
@@ -44,6 +48,8 @@ struct TokenClaims {
   std::string id = {};  // `jti`; empty: the token has none
 };
 
+// REQUIRES: the token's signature was verified, since errors name its issuer, audience and times.
+//
 // Errors: RefuseToken's (malformed, issuer, audience, no_expiry, expired, not_yet_valid, subject,
 // claims).
 absl::StatusOr<TokenClaims> ReadTokenClaims(absl::string_view json, const TokenRules& rules,

@@ -5,19 +5,24 @@
 
 #include <algorithm>
 
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+
 #include "core/base/error_reason.h"
 
 namespace tissueform {
 namespace {
 
 constexpr char kFact[] = "token";
+constexpr size_t kMaxQuotedBytes = 200;
 
 struct Failure {
   absl::string_view name;
   absl::string_view message;
 };
 
-// In the order of the enumeration.
+// In the order of the enumeration. What stands here of issuer, audience, times and an unknown key
+// follows facts.
 constexpr std::array kFailures = {
     Failure{"no_token",
             "no token came; send one in the header `authorization: Bearer TOKEN`, or log in"},
@@ -33,16 +38,17 @@ constexpr std::array kFailures = {
     Failure{"algorithm",
             "the token's algorithm is not that of its key; the server takes RS256 and ES256"},
     Failure{"unknown_key",
-            "the token's key is not known here; if the provider has changed its keys just now, "
-            "try again in a moment"},
+            "log in there, or try again in a moment if that provider has just changed its keys"},
     Failure{"signature", "the token's signature is wrong; log in again"},
-    Failure{"issuer", "the token is another provider's; log in at the one of this server"},
-    Failure{"audience", "the token is not made for this server; have its audience put into it"},
+    Failure{"issuer", "log in there, or have the server's --token-issuer corrected"},
+    Failure{"audience",
+            "have the provider name that one in tokens, or the server's --token-audience "
+            "corrected"},
     Failure{"no_expiry",
             "the token does not say when it ends; have the provider put `exp` into it"},
-    Failure{"expired", "the token has expired; log in again"},
-    Failure{"not_yet_valid",
-            "the token is not valid yet; if it is new, set the clocks of server and provider"},
+    Failure{"expired",
+            "log in again, or set the clocks of server and provider if the token is new"},
+    Failure{"not_yet_valid", "set the clocks of server and provider"},
     Failure{"subject",
             "the token's subject cannot be a name here; it must be 1 to 128 printable ASCII "
             "characters, and not begin with `link:`"},
@@ -57,10 +63,21 @@ absl::string_view TokenFailureName(TokenFailure failure) {
   return kFailures[static_cast<size_t>(failure)].name;
 }
 
-absl::Status RefuseToken(TokenFailure failure) {
+absl::Status RefuseToken(TokenFailure failure) { return RefuseToken(failure, ""); }
+
+absl::Status RefuseToken(TokenFailure failure, absl::string_view facts) {
   const Failure& told = kFailures[static_cast<size_t>(failure)];
-  return WithReason(absl::UnauthenticatedError(told.message), ErrorReason::kUnauthenticated,
-                    {{kFact, std::string(told.name)}});
+  return WithReason(
+      absl::UnauthenticatedError(absl::StrCat(facts, facts.empty() ? "" : "; ", told.message)),
+      ErrorReason::kUnauthenticated, {{kFact, std::string(told.name)}});
+}
+
+std::string QuoteForCaller(absl::string_view text) {
+  std::string printable(text.substr(0, kMaxQuotedBytes));
+  std::replace_if(
+      printable.begin(), printable.end(),
+      [](unsigned char c) { return !absl::ascii_isprint(c) || c == '"'; }, '?');
+  return absl::StrCat("\"", printable, text.size() > kMaxQuotedBytes ? "...\"" : "\"");
 }
 
 void TokenFailures::Count(const absl::Status& refusal) {

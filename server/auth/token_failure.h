@@ -41,8 +41,15 @@ enum class TokenFailure {
 absl::string_view TokenFailureName(TokenFailure failure);
 
 // Unauthenticated, with a sentence that says what to do and holds nothing of the token; the
-// failure's name is the fact "token" beside the reason UNAUTHENTICATED.
+// failure's name is the fact "token" that goes with the reason UNAUTHENTICATED.
 absl::Status RefuseToken(TokenFailure failure);
+// The same with facts before it. Claims may be in them only after the token's signature was
+// verified, and only as QuoteForCaller writes them.
+absl::Status RefuseToken(TokenFailure failure, absl::string_view facts);
+
+// Text for a sentence to somebody who is not known: in double quotes, at most 200 bytes of it, of
+// which "?" replaces all but printable ASCII and quotes.
+std::string QuoteForCaller(absl::string_view text);
 
 // How many tokens were refused, by why. Thread-safe; waits for nobody.
 class TokenFailures {

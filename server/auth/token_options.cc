@@ -41,6 +41,11 @@ absl::Status CheckTokenOptions(const TokenOptions& options) {
   if (options.issuer.empty()) {
     return absl::InvalidArgumentError("tokens need --token-issuer: the `iss` of those to take");
   }
+  if (options.issuer.find('{') != std::string::npos) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--token-issuer ", options.issuer,
+                     " has a placeholder, which no token has; put your tenant's id in its place"));
+  }
   if (options.audiences.empty()) {
     return absl::InvalidArgumentError("tokens need --token-audience: this server's name in `aud`");
   }

@@ -36,12 +36,12 @@ class BeastServer final : public HttpServer {
 
   absl::Status Listen(const Options& options) {
     const int descriptors = std::max(RaiseDescriptorLimit() - kReservedDescriptors, 1);
-    TF_ASSIGN_OR_RETURN(
-        listener_,
-        ConnectionListener::Listen({.host = options.host,
-                                    .port = options.port,
-                                    .most = std::min(options.limits.connections, descriptors),
-                                    .most_of_address = options.limits.connections_per_address}));
+    TF_ASSIGN_OR_RETURN(listener_, ConnectionListener::Listen(
+                                       {.host = options.host,
+                                        .port = options.port,
+                                        .most = std::min(options.limits.connections, descriptors),
+                                        .most_of_address = options.limits.connections_per_address,
+                                        .chosen_by = "--listen"}));
     for (int i = 0; i < options.threads; ++i) {
       threads_.emplace_back([this] { context_.io.run(); });
     }

@@ -54,6 +54,12 @@ absl::Status CheckLoginConfig(const LoginConfig& config) {
         "--oidc-issuer: https://HOST[:PORT][/PATH] is needed, without query (http on loopback "
         "only)");
   }
+  if (config.issuer.find('{') != std::string::npos) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--oidc-issuer ", config.issuer,
+                     " has a placeholder, which no provider has for its name; put your tenant's id "
+                     "in its place"));
+  }
   if (!IsPrintable(config.client_id) || !IsPrintable(config.audience) ||
       !IsPrintable(config.scopes)) {
     return absl::InvalidArgumentError(

@@ -39,7 +39,7 @@ std::string Join(const std::string& host, int port) {
 
 absl::Status CannotListen(const ConnectionListener::Options& options, const std::string& why) {
   return absl::UnavailableError(absl::StrCat("cannot listen on ", Join(options.host, options.port),
-                                             ": ", why, "; choose another --port or --host"));
+                                             ": ", why, "; choose another ", options.chosen_by));
 }
 
 // The port that the socket has; 0 when there is none.

@@ -30,6 +30,8 @@ class ConnectionListener {
     int port = 0;      // 0: any free one
     int most = 1024;   // connections at the same time
     int most_of_address = 512;
+    // The options of the program that choose another address, for the error.
+    std::string chosen_by = "--port or --host";
   };
   // Takes the connection over: a non-blocking socket, and the listener's descriptor.
   using Handle = std::function<void(int fd, int listener_fd)>;

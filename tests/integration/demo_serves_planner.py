@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""Runs `tissueform demo --serve`, opens the address that it prints as a browser would, and ends it by Ctrl-C.
+"""Runs `tissueform demo --serve` while its default port is taken, opens the address that it prints as a browser would, and
+ends it by Ctrl-C.
 
   demo_serves_planner.py TISSUEFORM OUT_FOLDER
 
@@ -10,6 +11,7 @@ Exit code 1 and a sentence when something is not as it should be.
 
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -18,6 +20,15 @@ import urllib.error
 import urllib.request
 
 PATIENCE_S = 120
+DEFAULT_PORT = 8080
+
+
+def take_default_port():
+    """A socket that listens there; None where another program does so already."""
+    try:
+        return socket.create_server(("127.0.0.1", DEFAULT_PORT))
+    except OSError:
+        return None
 
 
 def fetch(url):
@@ -60,8 +71,8 @@ def check_planner(url):
 
 def main():
     program, out = sys.argv[1:]
-    demo = subprocess.Popen([program, "demo", "--serve", "--web-port", "0", "--seconds", "0.3", "--out", out],
-                            stdout=subprocess.PIPE, text=True)
+    listener = take_default_port()
+    demo = subprocess.Popen([program, "demo", "--serve", "--seconds", "0.3", "--out", out], stdout=subprocess.PIPE, text=True)
     patience = threading.Timer(PATIENCE_S, demo.kill)
     patience.start()
     told = ""
@@ -74,11 +85,15 @@ def main():
                 break
         if address is None:
             sys.exit(f"no address: {told}")
+        if f"port {DEFAULT_PORT} is taken; the planner gets a free one" not in told:
+            sys.exit(f"the demo does not say that its port is taken: {told}")
         check_planner(address.group(1))
     finally:
         demo.send_signal(signal.SIGINT)
         demo.communicate()
         patience.cancel()
+        if listener is not None:
+            listener.close()
     if demo.returncode != 0:
         sys.exit(f"the demo ended with {demo.returncode}: {told}")
 

@@ -15,9 +15,11 @@
 #include "nlohmann/json.hpp"
 
 #include "client/cli/access/doctor_command.h"
+#include "client/cli/online/server_process.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"
+#include "tests/testing/test_paths.h"
 #include "tests/testing/test_tokens.h"
 
 // `tissueform doctor` against a good server and broken ones: which line says it, and what to do.
@@ -103,6 +105,7 @@ TEST_F(DoctorTest, AGoodServerWithTlsAndLogins) {
   EXPECT_FALSE(report.failed()) << report.Text();
   EXPECT_THAT(report.Text(),
               AllOf(HasSubstr("TLSv1.3, certificate of localhost"), HasSubstr("days left"),
+                    HasSubstr("issued by CN=Test authority; ALPN selected h2"),
                     HasSubstr("of alice, from "), HasSubstr("lasts 60 min"),
                     HasSubstr("the server knows you as alice"), HasSubstr("clock"),
                     HasSubstr("dragged and deleted")));
@@ -133,7 +136,7 @@ TEST_F(DoctorTest, AnUnknownAuthority) {
   StartServer(TlsServer(own_));
   WriteTestFile(folder_ / "other.pem", TestAuthority("Another").certificate());
   ExpectEndsWith(AskDoctor({.address = name(), .options = {.tls_ca = folder_ / "other.pem"}}),
-                 "encryption", "certificate", "--tls-ca FILE");
+                 "encryption", "certificate, issued by CN=Test authority: ", "--tls-ca FILE");
 }
 
 TEST_F(DoctorTest, AnotherName) {
@@ -167,26 +170,111 @@ TEST_F(DoctorTest, NoCertificateWhereOneIsAskedFor) {
                  "no handshake", "--tls-cert");
 }
 
-TEST_F(DoctorTest, ATokenThatHasEnded) {
-  ExpectEndsWith(AskDoctor({.address = name(),
-                            .options = {.token_file = WriteToken(
-                                            With(GoodClaims(), "exp", SecondsFromNow(-7200)))}}),
-                 "token", "ended 2 h ago", "log in");
+TEST_F(DoctorTest, ATokenThatHasEndedByTheClockHereIsForTheServerToJudge) {
+  const DoctorReport report = AskDoctor(
+      {.address = name(),
+       .options = {.token_file = WriteToken(With(GoodClaims(), "exp", SecondsFromNow(-7200)))}});
+  // This server asks nobody who they are.
+  EXPECT_FALSE(report.failed()) << report.Text();
+  EXPECT_THAT(report.Text(),
+              AllOf(HasSubstr("ended 2 h ago by this machine's clock"), HasSubstr("log in again")));
 }
 
-TEST_F(DoctorTest, ATokenThatTheServerDoesNotTake) {
+// A token that a server does not take, and what the doctor says of it.
+struct RefusedToken {
+  const char* name;
+  const char* claim;
+  nlohmann::json value;
+  std::vector<const char*> found;
+  const char* advice;
+};
+
+std::vector<RefusedToken> RefusedTokens() {
+  return {
+      {"Expired", "exp", SecondsFromNow(-7200), {"expired 2h", "server's clock"}, "log in again"},
+      {"NotYetValid", "nbf", SecondsFromNow(300), {"begins in "}, "another login changes nothing"},
+      {"Issuer",
+       "iss",
+       "https://sts.example/1/",
+       {"\"https://sts.example/1/\"", "\"https://login.example\""},
+       "--token-issuer"},
+      {"Audience",
+       "aud",
+       "another",
+       {"\"another\"", "\"tissueform\""},
+       "the same login again changes nothing"}};
+}
+
+class DoctorRefusedTokenTest : public DoctorTest,
+                               public ::testing::WithParamInterface<RefusedToken> {};
+
+TEST_P(DoctorRefusedTokenTest, SaysWhatWasFoundAndExpectedAndWhatHelps) {
   const TokenFiles tokens;
   ServerOptions options = TestOptions();
   options.tokens = tokens.Options();
   StartServer(options);
-  const std::string bad = WriteToken(With(GoodClaims(), "aud", "another"));
-  const DoctorReport report = AskDoctor({.address = name(), .options = {.token_file = bad}});
-  EXPECT_TRUE(report.failed());
-  EXPECT_THAT(report.Text(), AllOf(HasSubstr("UNAUTHENTICATED"), HasSubstr("log in")));
-  // Nor none at all; and nothing of the token is told.
-  EXPECT_TRUE(AskDoctor({.address = name()}).failed());
+  const RefusedToken& bad = GetParam();
+  const DoctorReport report =
+      AskDoctor({.address = name(),
+                 .options = {.token_file = WriteToken(With(GoodClaims(), bad.claim, bad.value))}});
+  for (const char* found : bad.found) ExpectEndsWith(report, "login", found, bad.advice);
   EXPECT_THAT(report.Text(), Not(HasSubstr("eyJ")));
 }
+
+INSTANTIATE_TEST_SUITE_P(Tokens, DoctorRefusedTokenTest, ::testing::ValuesIn(RefusedTokens()),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST_F(DoctorTest, NoTokenWhereOneIsAskedFor) {
+  const TokenFiles tokens;
+  ServerOptions options = TestOptions();
+  options.tokens = tokens.Options();
+  StartServer(options);
+  ExpectEndsWith(AskDoctor({.address = name()}), "login", "no token came", "tissueform login");
+}
+
+TEST_F(DoctorTest, ATokenOfAnotherProviderNamesTheServersOwn) {
+  const TokenFiles tokens;
+  ServerOptions options = TestOptions();
+  options.tokens = tokens.Options();
+  StartServer(options);
+  const std::filesystem::path path = WriteToken(GoodClaims());
+  WriteTestFile(path, OtherEcKey().MakeToken(With(GoodClaims(), "iss", "https://other.example")));
+  const DoctorReport report = AskDoctor({.address = name(), .options = {.token_file = path}});
+  ExpectEndsWith(report, "login", "not one of \"https://login.example\"", "--token-issuer");
+  // By the token's own words, read here.
+  EXPECT_THAT(report.Text(), HasSubstr("from https://other.example for"));
+}
+
+// A proxy that ends TLS and knows no HTTP/2; what it selects, and how it refuses the rest.
+struct OldProxy {
+  const char* name;
+  std::vector<std::string> words;  // of serve_tls.py: how, and what ALPN may select
+  const char* found;
+};
+
+class DoctorOldProxyTest : public DoctorTest, public ::testing::WithParamInterface<OldProxy> {};
+
+TEST_P(DoctorOldProxyTest, IsNamedWithWhatAlpnSelects) {
+  std::vector<std::string> words = {SourcePath("tests/integration/serve_tls.py"),
+                                    GetParam().words.front(), own_.certificate, own_.key};
+  words.insert(words.end(), GetParam().words.begin() + 1, GetParam().words.end());
+  ASSERT_OK_AND_ASSIGN(const auto proxy,
+                       ServerProcess::Start(TISSUEFORM_PYTHON, words, std::chrono::seconds(60)));
+  const std::string port = proxy->address().substr(proxy->address().rfind(':'));
+  const DoctorReport report =
+      AskDoctor({.address = absl::StrCat("localhost", port), .options = {.tls_ca = own_.roots}});
+  ExpectEndsWith(report, "encryption", GetParam().found, "offer h2 by ALPN");
+  // A client that forgets TLS is told of that.
+  ExpectEndsWith(AskDoctor({.address = absl::StrCat("localhost", port)}), "encryption",
+                 "speaks TLS", "--tls-ca");
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Proxies, DoctorOldProxyTest,
+    ::testing::Values(OldProxy{"WithoutAlpn", {"passing"}, "selects no protocol"},
+                      OldProxy{"OfHttp1", {"passing", "http/1.1"}, "selects http/1.1"},
+                      OldProxy{"OfHttp1Strictly", {"refusing", "http/1.1"}, "selects http/1.1"}),
+    [](const auto& test) { return std::string(test.param.name); });
 
 TEST_F(DoctorTest, AFullServer) {
   ServerOptions options = TestOptions();

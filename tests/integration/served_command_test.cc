@@ -365,6 +365,31 @@ TEST_F(ServedCommandTest, DemoServesWhatItPredictedUntilItIsInterrupted) {
   EXPECT_EQ(WEXITSTATUS(pclose(demo)), 0);
 }
 
+TEST_F(ServedCommandTest, APortThatTheUserChoseAndIsTakenIsOneLineBeforeAnyWork) {
+  ASSERT_OK_AND_ASSIGN(
+      const std::unique_ptr<ServerProcess> other,
+      ServerProcess::Start(ProgramPath("tissueform-server"),
+                           {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
+  const std::string port = other->address().substr(other->address().rfind(':') + 1);
+  for (const std::string option : {"--port", "--serve --web-port"}) {
+    EXPECT_EQ(RunDemo(option + " " + port + " 2>" + PathOf("err")), 1);
+    EXPECT_EQ(Read("out.txt"), "");
+    EXPECT_EQ(Read("err"),
+              "tissueform: " + option.substr(option.rfind("--")) + " " + port +
+                  ": cannot listen on 127.0.0.1:" + port +
+                  ": Address already in use; give another port, or 0 for a free one\n");
+  }
+}
+
+TEST_F(ServedCommandTest, AProgramThatEndsBeforeItListensIsNamed) {
+  for (const char* program : {"tissueform-server", "tissueform-gateway"}) {
+    EXPECT_THAT(
+        ServerProcess::Start(ProgramPath(program), {"--no-such-option"}, kPatience).status(),
+        StatusIs(absl::StatusCode::kUnavailable,
+                 StartsWith(std::string(program) + " ended before it listened")));
+  }
+}
+
 TEST_F(ServedCommandTest, AnInterruptedDemoEndsItsServer) {
   // The shell tells its process number and becomes the demo.
   const std::string command = "echo $$; exec " + ProgramPath("tissueform") + " demo --out " +

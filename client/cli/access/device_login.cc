@@ -23,6 +23,7 @@ using std::chrono::seconds;
 constexpr char kDeviceGrant[] = "urn:ietf:params:oauth:grant-type:device_code";
 constexpr size_t kMaxLoginTokenBytes = size_t{16} << 10;
 constexpr size_t kMaxUserCodeBytes = 64;
+constexpr size_t kMaxIssuerBytes = 200;
 constexpr int64_t kMaxSeconds = 24 * 3600;
 // RFC 8628, 3.2 and 3.5.
 constexpr seconds kInterval{5};
@@ -50,6 +51,23 @@ seconds SecondsOf(const nlohmann::json& json, const char* key, seconds otherwise
 bool IsGraphic(absl::string_view text) {
   return std::all_of(text.begin(), text.end(),
                      [](char letter) { return absl::ascii_isgraph(letter); });
+}
+
+// Why a provider that names itself `found` is not the one of --issuer. Bounded: it is the peer's.
+absl::Status AnotherIssuer(const std::string& found, const std::string& expected) {
+  if (found.empty() || found.size() > kMaxIssuerBytes || !IsGraphic(found)) {
+    return NoAnswer("names no issuer");
+  }
+  if (absl::StrContains(found, '{')) {
+    return absl::DataLossError(
+        absl::StrCat("the identity provider's issuer is ", found,
+                     ", which stands for every tenant; give the address of your own tenant by "
+                     "--issuer, not ",
+                     expected));
+  }
+  return absl::DataLossError(absl::StrCat("the identity provider's issuer is ", found,
+                                          ", and --issuer says ", expected, "; give --issuer ",
+                                          found));
 }
 
 absl::StatusOr<nlohmann::json> ObjectOf(const HttpAnswer& answer) {
@@ -118,7 +136,9 @@ absl::StatusOr<DeviceLogin::Endpoints> DeviceLogin::Discover() {
   TF_ASSIGN_OR_RETURN(const HttpAnswer answer, exchange_(request));
   if (answer.status != 200) return NoAnswer(absl::StrCat("is status ", answer.status));
   TF_ASSIGN_OR_RETURN(const nlohmann::json json, ObjectOf(answer));
-  if (TextOf(json, "issuer") != client_.issuer) return NoAnswer("is that of another issuer");
+  if (const std::string issuer = TextOf(json, "issuer"); issuer != client_.issuer) {
+    return AnotherIssuer(issuer, client_.issuer);
+  }
   Endpoints endpoints = {.token = TextOf(json, "token_endpoint"),
                          .device = TextOf(json, "device_authorization_endpoint")};
   TF_RETURN_IF_ERROR(CheckLoginUrl("the provider's token endpoint", endpoints.token));

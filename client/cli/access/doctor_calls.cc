@@ -21,6 +21,7 @@
 #include "client/cpp/client_call.h"
 #include "client/cpp/mesh_upload.h"
 #include "client/cpp/session_call.h"
+#include "core/base/error_reason.h"
 #include "core/base/software_version.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
@@ -48,11 +49,34 @@ std::chrono::system_clock::time_point Deadline() {
 
 void SetDeadline(grpc::ClientContext* context) { context->set_deadline(Deadline()); }
 
+// By the server's name of what is wrong with a token (docs/security.md). A new login helps only
+// against the first two.
+std::string AdviceForToken(const std::string& failure) {
+  if (failure == "no_token") return "log in (`tissueform login`) or give a token (--token-file)";
+  if (failure == "expired") {
+    return "log in again; where the line `token` says that it lasts, or the token is new, set the "
+           "clocks of server and provider by NTP instead";
+  }
+  if (failure == "not_yet_valid") {
+    return "set the clocks of server and provider by NTP; another login changes nothing";
+  }
+  if (failure == "issuer" || failure == "unknown_key" || failure == "signature") {
+    return "compare the issuer of the line `token` with the server's --token-issuer: log in at "
+           "that "
+           "one (`tissueform login --issuer URL`), or have the option corrected "
+           "(docs/operations.md, logins)";
+  }
+  if (failure == "audience") {
+    return "log in for the server's audience (`tissueform login --audience NAME`), or have the "
+           "server's --token-audience corrected; the same login again changes nothing";
+  }
+  return "the token cannot be used as it is; docs/security.md says what each reason needs";
+}
+
 std::string AdviceFor(const absl::Status& status) {
   switch (status.code()) {
     case absl::StatusCode::kUnauthenticated:
-      return "log in (`tissueform login`) or give another token (--token-file); the server's clock "
-             "counts";
+      return AdviceForToken(ErrorInfoOf(status).metadata["token"]);
     case absl::StatusCode::kPermissionDenied:
       return "ask whoever runs the server for the right to do this";
     case absl::StatusCode::kResourceExhausted:
@@ -150,7 +174,7 @@ DoctorLine DoctorCalls::CheckHealth() const {
   return {.check = "health", .text = "gRPC over HTTP/2, SERVING"};
 }
 
-void DoctorCalls::CheckCaller(DoctorReport* report) const {
+bool DoctorCalls::CheckCaller(DoctorReport* report) const {
   grpc::ClientContext context;
   SetDeadline(&context);
   v1::Caller caller;
@@ -158,11 +182,15 @@ void DoctorCalls::CheckCaller(DoctorReport* report) const {
   const absl::Status status =
       FromGrpcStatus(v1::AccessService::NewStub(channel_)->WhoAmI(&context, {}, &caller));
   if (absl::IsUnimplemented(status)) {
-    return report->Add({.check = "login",
-                        .finding = Finding::kSkipped,
-                        .text = "the server does not tell whom it takes callers for"});
+    report->Add({.check = "login",
+                 .finding = Finding::kSkipped,
+                 .text = "the server does not tell whom it takes callers for"});
+    return true;
   }
-  if (!status.ok()) return report->Add(FailedCall("login", "", status));
+  if (!status.ok()) {
+    report->Add(FailedCall("login", "", status));
+    return !absl::IsUnauthenticated(status);
+  }
   std::vector<std::string> roles(caller.roles().begin(), caller.roles().end());
   report->Add(
       {.check = "login",
@@ -170,7 +198,7 @@ void DoctorCalls::CheckCaller(DoctorReport* report) const {
                    ? "the server asks nobody who they are"
                    : absl::StrCat("the server knows you as ", caller.principal(), ", roles: ",
                                   roles.empty() ? "none" : absl::StrJoin(roles, ", "))});
-  if (!caller.has_server_time()) return;
+  if (!caller.has_server_time()) return true;
   const auto half = (std::chrono::system_clock::now() - asked) / 2;
   const double here = std::chrono::duration<double>((asked + half).time_since_epoch()).count();
   const double skew = static_cast<double>(caller.server_time().seconds()) +
@@ -183,6 +211,7 @@ void DoctorCalls::CheckCaller(DoctorReport* report) const {
     line.advice = "set both clocks by NTP: tokens begin and end by the server's";
   }
   report->Add(std::move(line));
+  return true;
 }
 
 void DoctorCalls::CheckServer(DoctorReport* report) {

@@ -22,8 +22,9 @@ class DoctorCalls {
 
   // Whether the health service says SERVING.
   DoctorLine CheckHealth() const;
-  // Whom the server takes the caller for, and how far the clocks are apart: two lines.
-  void CheckCaller(DoctorReport* report) const;
+  // Whom the server takes the caller for, and how far the clocks are apart: two lines. False: it
+  // knows the caller by nothing, and all other calls would fail the same way.
+  bool CheckCaller(DoctorReport* report) const;
   // Versions of both sides, and what the server takes: two lines.
   void CheckServer(DoctorReport* report);
   // A mesh of two tets is uploaded, made a session, dragged, and deleted; in a cluster (CheckServer

@@ -79,7 +79,7 @@ DoctorReport AskDoctor(const ServerConnection& server) {
   DoctorCalls calls(*channel);
   report.Add(calls.CheckHealth());
   if (report.last_failed()) return report;
-  calls.CheckCaller(&report);
+  if (!calls.CheckCaller(&report)) return report;
   calls.CheckServer(&report);
   if (!report.failed()) report.Add(calls.CheckWork());
   return report;

@@ -17,6 +17,8 @@
 
 #include "client/cli/access/device_login.h"
 #include "client/cli/access/token_file.h"
+#include "client/cli/access/token_times.h"
+#include "client/cli/access/token_work.h"
 #include "client/cli/online/server_connection.h"
 #include "client/cli/shared/companion.h"
 #include "core/base/status_macros.h"
@@ -53,6 +55,20 @@ DeviceLogin LoginOf(LoginClient client) {
                      [](std::chrono::seconds time) { std::this_thread::sleep_for(time); });
 }
 
+// A token that is new and not in date by the clock here: one of the clocks is wrong, and no later
+// login helps.
+void PrintClockFault(const std::string& token) {
+  const auto now = std::chrono::system_clock::now();
+  const absl::StatusOr<nlohmann::json> shown = ShowToken(token, now);
+  if (!shown.ok()) return;
+  const TokenState state = TokenStateAt((*shown)["claims"], now);
+  if (state.date != TokenDate::kNotYetValid && state.date != TokenDate::kEnded) return;
+  absl::PrintF(
+      "the new token %s by this machine's clock: this clock, or the provider's, is wrong; set both "
+      "by NTP\n",
+      state.words);
+}
+
 absl::Status Keep(const std::string& path, const LoginClient& client, const LoginTokens& tokens) {
   TF_RETURN_IF_ERROR(KeepLogin(path, client, tokens));
   const absl::Time end = absl::Now() + absl::FromChrono(tokens.lifetime);
@@ -61,6 +77,7 @@ absl::Status Keep(const std::string& path, const LoginClient& client, const Logi
           ? ""
           : absl::StrCat(" until ", absl::FormatTime("%Y-%m-%d %H:%M", end, absl::LocalTimeZone()));
   absl::PrintF("logged in%s; the token is in %s\n", until, path);
+  PrintClockFault(tokens.access_token);
   if (tokens.refresh_token.empty()) {
     absl::PrintF(
         "it cannot be renewed: the identity provider gave no refresh token; see --scope\n");

@@ -28,6 +28,9 @@ using SteadyClock = std::chrono::steady_clock;
 
 // Fewer, and whoever runs the server should know.
 constexpr int kFewDays = 14;
+// As ALPN names them.
+constexpr char kHttp2[] = "h2";
+constexpr char kHttp1[] = "http/1.1";
 // After the handshake: for the server's settings, or its word that it wants a certificate.
 constexpr std::chrono::seconds kFirstWords{2};
 
@@ -75,11 +78,15 @@ absl::StatusOr<Context> MakeContext(const ConnectionOptions& options) {
   return context;
 }
 
-Session MakeSession(SSL_CTX* context, const ProbeSocket& socket, const std::string& host) {
-  static constexpr std::array<unsigned char, 3> kHttp2 = {2, 'h', '2'};
+// Offers one protocol by ALPN, as gRPC does: a server that has several picks by its own order.
+Session MakeSession(SSL_CTX* context, const ProbeSocket& socket, const std::string& host,
+                    const std::string& protocol) {
+  const std::string offer =
+      absl::StrCat(std::string(1, static_cast<char>(protocol.size())), protocol);
   Session session(SSL_new(context), SSL_free);
   SSL_set_fd(session.get(), socket.fd());
-  SSL_set_alpn_protos(session.get(), kHttp2.data(), kHttp2.size());
+  SSL_set_alpn_protos(session.get(), reinterpret_cast<const unsigned char*>(offer.data()),
+                      static_cast<unsigned int>(offer.size()));
   X509_VERIFY_PARAM* const wanted = SSL_get0_param(session.get());
   // An address is one when OpenSSL takes it for one.
   if (X509_VERIFY_PARAM_set1_ip_asc(wanted, host.c_str()) != 1) {
@@ -103,19 +110,63 @@ int DaysLeft(SSL* ssl) {
   return least;
 }
 
-std::string NamesOf(SSL* ssl) {
+// What `print` writes of the server's certificate; empty where there is none.
+template <typename Print>
+std::string TextOfCertificate(SSL* ssl, const Print& print) {
   const std::unique_ptr<X509, decltype(&X509_free)> leaf(SSL_get1_peer_certificate(ssl), X509_free);
-  const std::unique_ptr<BIO, decltype(&BIO_free)> pem(BIO_new(BIO_s_mem()), BIO_free);
-  if (leaf == nullptr || PEM_write_bio_X509(pem.get(), leaf.get()) != 1) return {};
+  const std::unique_ptr<BIO, decltype(&BIO_free)> text(BIO_new(BIO_s_mem()), BIO_free);
+  if (leaf == nullptr || print(text.get(), leaf.get()) < 0) return {};
   char* data = nullptr;
-  const auto size = static_cast<size_t>(BIO_get_mem_data(pem.get(), &data));
-  const auto facts = ReadCertificate({data, size});
+  const auto size = static_cast<size_t>(BIO_get_mem_data(text.get(), &data));
+  return {data, size};
+}
+
+std::string NamesOf(SSL* ssl) {
+  const auto facts = ReadCertificate(TextOfCertificate(
+      ssl, [](BIO* text, X509* leaf) { return PEM_write_bio_X509(text, leaf) == 1 ? 1 : -1; }));
   return facts.ok() ? absl::StrJoin(facts->names, ", ") : std::string();
 }
 
+// ", issued by CN=...": where a box on the way inspects TLS, its authority stands here. Bounded:
+// the name is the peer's.
+std::string IssuerOf(SSL* ssl) {
+  constexpr size_t kMostBytes = 160;
+  const std::string issuer = TextOfCertificate(ssl, [](BIO* text, X509* leaf) {
+    return X509_NAME_print_ex(text, X509_get_issuer_name(leaf), 0, XN_FLAG_RFC2253);
+  });
+  return issuer.empty() ? "" : absl::StrCat(", issued by ", issuer.substr(0, kMostBytes));
+}
+
+// What the peer picked of the protocol that was offered; empty: nothing.
+std::string ChosenProtocol(SSL* ssl) {
+  const unsigned char* data = nullptr;
+  unsigned int size = 0;
+  SSL_get0_alpn_selected(ssl, &data, &size);
+  return {reinterpret_cast<const char*>(data), size};
+}
+
+// Whether the peer speaks HTTP/1.1 and not HTTP/2, asked after it has not picked the latter.
+bool PicksHttp1(SSL_CTX* context, const ServerEndpoint& endpoint) {
+  const absl::StatusOr<ProbeSocket> socket = ConnectProbe(endpoint);
+  if (!socket.ok()) return false;
+  const Session session = MakeSession(context, *socket, endpoint.host, kHttp1);
+  const bool shook = Repeat(*socket, session.get(), SteadyClock::now() + kProbeDeadline,
+                            [&] { return SSL_connect(session.get()); });
+  ERR_clear_error();
+  return shook && ChosenProtocol(session.get()) == kHttp1;
+}
+
+DoctorLine WithoutHttp2(SSL_CTX* context, const ServerEndpoint& endpoint, const std::string& what) {
+  return Failed(
+      absl::StrCat(what, "ALPN did not select HTTP/2 (h2), which gRPC needs; the peer ",
+                   PicksHttp1(context, endpoint) ? "selects http/1.1" : "selects no protocol"),
+      "a proxy on the way ends TLS: have it offer h2 by ALPN (HAProxy: alpn h2; nginx: http2 and "
+      "grpc_pass), or pass TCP through to the server");
+}
+
 DoctorLine BadCertificate(SSL* ssl, int64_t why, const ServerEndpoint& endpoint) {
-  const std::string text =
-      absl::StrCat("the server's certificate: ", X509_verify_cert_error_string(why));
+  const std::string text = absl::StrCat("the server's certificate", IssuerOf(ssl), ": ",
+                                        X509_verify_cert_error_string(why));
   switch (why) {
     case X509_V_ERR_CERT_HAS_EXPIRED:
       return Failed(
@@ -127,7 +178,7 @@ DoctorLine BadCertificate(SSL* ssl, int64_t why, const ServerEndpoint& endpoint)
     case X509_V_ERR_HOSTNAME_MISMATCH:
     case X509_V_ERR_IP_ADDRESS_MISMATCH:
       return Failed(absl::StrCat("the server's certificate is for ", NamesOf(ssl), " and not for ",
-                                 endpoint.host),
+                                 endpoint.host, IssuerOf(ssl)),
                     "connect by a name that it has, or have one made for this name");
     case X509_V_ERR_DEPTH_ZERO_SELF_SIGNED_CERT:
     case X509_V_ERR_SELF_SIGNED_CERT_IN_CHAIN:
@@ -162,13 +213,17 @@ DoctorLine CheckTls(const ServerEndpoint& endpoint, const ConnectionOptions& opt
   if (!context.ok()) return Failed(std::string(context.status().message()), "give another file");
   const absl::StatusOr<ProbeSocket> socket = ConnectProbe(endpoint);
   if (!socket.ok()) return Failed(std::string(socket.status().message()), "");
-  const Session session = MakeSession(context->get(), *socket, endpoint.host);
+  const Session session = MakeSession(context->get(), *socket, endpoint.host, kHttp2);
   SSL* const ssl = session.get();
   ERR_clear_error();
   if (!Repeat(*socket, ssl, SteadyClock::now() + kProbeDeadline,
               [&] { return SSL_connect(ssl); })) {
     const int64_t why = SSL_get_verify_result(ssl);
-    return why == X509_V_OK ? Refused(LastError(), options) : BadCertificate(ssl, why, endpoint);
+    if (why != X509_V_OK) return BadCertificate(ssl, why, endpoint);
+    const std::string error = LastError();
+    return absl::StrContains(error, "no application protocol")
+               ? WithoutHttp2(context->get(), endpoint, "")
+               : Refused(error, options);
   }
   if (const int64_t why = SSL_get_verify_result(ssl); why != X509_V_OK) {
     return BadCertificate(ssl, why, endpoint);
@@ -179,9 +234,12 @@ DoctorLine CheckTls(const ServerEndpoint& endpoint, const ConnectionOptions& opt
                             [&] { return SSL_read(ssl, settings.data(), settings.size()); });
   if (!spoke && ERR_peek_last_error() != 0) return Refused(LastError(), options);
   const int days = DaysLeft(ssl);
-  DoctorLine line = {.check = "encryption",
-                     .text = absl::StrCat(SSL_get_version(ssl), ", certificate of ", NamesOf(ssl),
-                                          ", ", days, " days left")};
+  const std::string what = absl::StrCat(SSL_get_version(ssl), ", certificate of ", NamesOf(ssl),
+                                        ", ", days, " days left", IssuerOf(ssl));
+  if (ChosenProtocol(ssl) != kHttp2) {
+    return WithoutHttp2(context->get(), endpoint, absl::StrCat(what, "; "));
+  }
+  DoctorLine line = {.check = "encryption", .text = absl::StrCat(what, "; ALPN selected h2")};
   if (days < kFewDays) {
     line.finding = Finding::kWarning;
     line.advice = "whoever runs the server should renew the certificate (--tls-cert)";
@@ -195,8 +253,13 @@ DoctorLine CheckPlain(const ServerEndpoint& endpoint) {
   if (answer.ok() && answer->size() > 3 && (*answer)[3] == '\4') {
     return {.check = "encryption", .text = "none: the port speaks HTTP/2 in plain text"};
   }
+  if (answer.ok() && absl::StartsWith(*answer, "HTTP/1.")) {
+    return Failed("the port speaks HTTP/1.1 in plain text, and gRPC needs HTTP/2",
+                  "is it the port of a gateway or a proxy? The server has another one");
+  }
   const DoctorLine encrypted = CheckTls(endpoint, {.tls = true});
-  if (encrypted.finding != Finding::kFailed || absl::StrContains(encrypted.text, "certificate")) {
+  if (encrypted.finding != Finding::kFailed || absl::StrContains(encrypted.text, "certificate") ||
+      absl::StrContains(encrypted.text, "ALPN")) {
     return Failed("the port speaks TLS, and this client does not",
                   "give --tls-ca FILE with the authority of the server's certificate, or --tls");
   }

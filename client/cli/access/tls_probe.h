@@ -12,8 +12,8 @@
 namespace tissueform {
 
 // Whether a TLS handshake with the endpoint succeeds and its certificate is one to trust, by the
-// options' files: version, names, days left, or what is wrong. By OpenSSL itself: gRPC says only
-// that it did not.
+// options' files, and ALPN selects HTTP/2: version, names, days left and issuer, or what is wrong.
+// By OpenSSL itself: gRPC says only that it did not.
 DoctorLine CheckTls(const ServerEndpoint& endpoint, const ConnectionOptions& options);
 
 // Whether a peer that should speak HTTP/2 without encryption does.

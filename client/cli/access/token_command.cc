@@ -3,6 +3,7 @@
 
 #include "client/cli/access/token_command.h"
 
+#include <chrono>
 #include <iostream>
 #include <iterator>
 #include <memory>
@@ -92,21 +93,36 @@ void AddMake(CLI::App* token, CommandWork* work) {
   });
 }
 
+// Of a file, or of standard input where `path` is empty.
+absl::StatusOr<nlohmann::json> Show(const std::string& path) {
+  const auto now = std::chrono::system_clock::now();
+  if (!path.empty()) return ShowTokenFile(path, now);
+  std::string text(kMaxShownBytes, '\0');
+  std::cin.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<size_t>(std::cin.gcount()));
+  return ShowToken(absl::StripAsciiWhitespace(text), now);
+}
+
 void AddShow(CLI::App* token, CommandWork* work) {
-  CLI::App* command = token->add_subcommand(
-      "show", "what a token on standard input says, as JSON, without verifying it");
+  auto file = std::make_shared<std::string>();
+  CLI::App* command =
+      token->add_subcommand("show", "print what a token says, as JSON, without verifying it");
+  command
+      ->add_option("FILE", *file,
+                   "file that holds the token, as `tissueform login` and `token make > FILE` write "
+                   "it; without FILE the token is read from standard input")
+      ->type_name("");
   command->footer(
-      "A token is read from standard input, so that it stands in no list of processes. Nothing is\n"
-      "verified: anybody can write what is shown. \"token_digest\" is what the token is called in\n"
-      "a revocation list.\n"
-      "Example:\n"
+      "Shows header and claims, times in words, whether the token is in date, and never its\n"
+      "signature. Nothing is verified: anybody can write what is shown. \"token_digest\" is what\n"
+      "the token is called in a revocation list. A token itself is not an argument, since other\n"
+      "users of a machine see those.\n"
+      "Examples:\n"
+      "  tissueform token show ~/.config/tissueform/token\n"
       "  tissueform token show < token");
-  command->callback([work] {
-    *work = []() -> absl::Status {
-      std::string text(kMaxShownBytes, '\0');
-      std::cin.read(text.data(), static_cast<std::streamsize>(text.size()));
-      text.resize(static_cast<size_t>(std::cin.gcount()));
-      TF_ASSIGN_OR_RETURN(const nlohmann::json shown, ShowToken(absl::StripAsciiWhitespace(text)));
+  command->callback([file, work] {
+    *work = [file]() -> absl::Status {
+      TF_ASSIGN_OR_RETURN(const nlohmann::json shown, Show(*file));
       std::cout << shown.dump(2, ' ', true) << "\n";
       std::cerr << "not verified: anybody can write this\n";
       return absl::OkStatus();
@@ -125,7 +141,7 @@ void AddTokenCommand(CLI::App& app, CommandWork* work) {
       "  tissueform token keygen --out keys\n"
       "  tissueform token make --key keys/private.pem --issuer https://keys.example \\\n"
       "    --audience tissueform --subject alice --lifetime 3600\n"
-      "  tissueform token show < token");
+      "  tissueform token show token");
   AddKeygen(token, work);
   AddMake(token, work);
   AddShow(token, work);

@@ -12,6 +12,7 @@
 #include <unistd.h>
 #include <utility>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
@@ -20,6 +21,7 @@
 #include <openssl/sha.h>
 
 #include "client/cli/access/signing_key.h"
+#include "client/cli/access/token_times.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -27,12 +29,16 @@ namespace {
 
 constexpr mode_t kOwnerOnly = 0600;
 constexpr mode_t kEverybodyReads = 0644;
-constexpr size_t kMaxKeyFileBytes = 65536;
+constexpr size_t kMaxFileBytes = 65536;
 constexpr size_t kIdBytes = 16;
 
 absl::Status WriteNewFile(const std::filesystem::path& path, mode_t mode,
                           const std::string& content) {
   const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+  if (file < 0 && errno == EEXIST) {
+    return absl::AlreadyExistsError(absl::StrCat(
+        path.string(), " is there already and stays as it is; delete it or name another folder"));
+  }
   if (file < 0) return absl::ErrnoToStatus(errno, absl::StrCat("cannot make ", path.string()));
   const ssize_t written = write(file, content.data(), content.size());
   const bool whole = close(file) == 0 && written == static_cast<ssize_t>(content.size());
@@ -40,14 +46,12 @@ absl::Status WriteNewFile(const std::filesystem::path& path, mode_t mode,
                : absl::ErrnoToStatus(errno, absl::StrCat("cannot write ", path.string()));
 }
 
-absl::StatusOr<std::string> ReadKeyFile(const std::string& path) {
+absl::StatusOr<std::string> ReadSmallFile(const std::string& path, const char* advice) {
   std::ifstream file(path, std::ios::binary);
-  std::string text(kMaxKeyFileBytes, '\0');
+  std::string text(kMaxFileBytes, '\0');
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (file.gcount() <= 0) {
-    return absl::NotFoundError(absl::StrCat("cannot read ", path,
-                                            "; make keys with `tissueform "
-                                            "token keygen --out DIR`"));
+    return absl::NotFoundError(absl::StrCat("cannot read ", path, "; ", advice));
   }
   text.resize(static_cast<size_t>(file.gcount()));
   return text;
@@ -101,7 +105,9 @@ absl::Status MakeKeyFiles(const std::string& folder, int rsa_bits) {
 }
 
 absl::StatusOr<std::string> MakeTokenWith(const std::string& key_file, const TokenWords& words) {
-  TF_ASSIGN_OR_RETURN(const std::string pem, ReadKeyFile(key_file));
+  TF_ASSIGN_OR_RETURN(
+      const std::string pem,
+      ReadSmallFile(key_file, "make keys with `tissueform token keygen --out DIR`"));
   const absl::StatusOr<SigningKey> key = SigningKey::FromPem(pem);
   if (!key.ok()) {
     return absl::InvalidArgumentError(absl::StrCat(key_file, ": ", key.status().message()));
@@ -109,20 +115,30 @@ absl::StatusOr<std::string> MakeTokenWith(const std::string& key_file, const Tok
   return key->MakeToken(ClaimsOf(words, std::chrono::system_clock::now()));
 }
 
-absl::StatusOr<nlohmann::json> ShowToken(absl::string_view token) {
+absl::StatusOr<nlohmann::json> ShowTokenFile(const std::string& path,
+                                             std::chrono::system_clock::time_point now) {
+  TF_ASSIGN_OR_RETURN(
+      const std::string text,
+      ReadSmallFile(path, "give the file of a token, as `tissueform login` leaves it"));
+  absl::StatusOr<nlohmann::json> shown = ShowToken(absl::StripAsciiWhitespace(text), now);
+  if (shown.ok()) return shown;
+  return absl::InvalidArgumentError(absl::StrCat(path, ": ", shown.status().message()));
+}
+
+absl::StatusOr<nlohmann::json> ShowToken(absl::string_view token,
+                                         std::chrono::system_clock::time_point now) {
   const std::vector<absl::string_view> parts = absl::StrSplit(token, '.');
   if (parts.size() != 3) {
-    return absl::InvalidArgumentError("this is no JSON Web Token: it has not three parts");
+    return absl::InvalidArgumentError("this is no JSON Web Token: it does not have three parts");
   }
   nlohmann::json shown;
   TF_ASSIGN_OR_RETURN(shown["header"], ReadPart(parts[0], "header"));
   TF_ASSIGN_OR_RETURN(shown["claims"], ReadPart(parts[1], "claims"));
-  for (const char* name : {"iat", "nbf", "exp"}) {
-    const auto time = shown["claims"].find(name);
-    if (time == shown["claims"].end() || !time->is_number_integer()) continue;
-    shown["times"][name] = absl::FormatTime(
-        absl::RFC3339_sec, absl::FromUnixSeconds(time->get<int64_t>()), absl::UTCTimeZone());
-  }
+  const TokenState state = TokenStateAt(shown["claims"], now);
+  shown["state"] =
+      absl::StrCat(state.date == TokenDate::kInDate ? "in date: " : "not in date: ", state.words,
+                   " by this machine's clock");
+  shown["times"] = TokenTimesAt(shown["claims"], now);
   const absl::string_view signed_text = token.substr(0, parts[0].size() + 1 + parts[1].size());
   std::array<unsigned char, SHA256_DIGEST_LENGTH> digest{};
   SHA256(reinterpret_cast<const unsigned char*>(signed_text.data()), signed_text.size(),

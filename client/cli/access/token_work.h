@@ -40,8 +40,15 @@ absl::Status MakeKeyFiles(const std::string& folder, int rsa_bits);
 // A token signed with the private key in that file. Errors: naming the file.
 absl::StatusOr<std::string> MakeTokenWith(const std::string& key_file, const TokenWords& words);
 
-// What a token says, unverified, as JSON: "header", "claims", "token_digest" (its name in a
-// revocation list) and times that people read. Errors: InvalidArgument.
-absl::StatusOr<nlohmann::json> ShowToken(absl::string_view token);
+// What a token says, unverified and without its signature, as JSON: "header", "claims", "state"
+// (whether it is in date by the clock `now`), "times" for people, and "token_digest" (its name in a
+// revocation list). Errors: InvalidArgument.
+absl::StatusOr<nlohmann::json> ShowToken(absl::string_view token,
+                                         std::chrono::system_clock::time_point now);
+
+// The same of the token in a file, white space around it aside. Errors: those of ShowToken, and
+// NotFound, naming the file.
+absl::StatusOr<nlohmann::json> ShowTokenFile(const std::string& path,
+                                             std::chrono::system_clock::time_point now);
 
 }  // namespace tissueform

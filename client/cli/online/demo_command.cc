@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <signal.h>
 #include <string>
 #include <system_error>
@@ -22,6 +23,7 @@
 #include "client/cli/online/drag.h"
 #include "client/cli/online/face_movement.h"
 #include "client/cli/online/handle_words.h"
+#include "client/cli/online/loopback_port.h"
 #include "client/cli/online/prediction_export.h"
 #include "client/cli/online/prediction_pictures.h"
 #include "client/cli/online/server_process.h"
@@ -50,6 +52,11 @@ constexpr std::chrono::seconds kServerStartDeadline{30};
 // shows that at a glance, and no tet is inverted yet (tests/integration/served_command_test.cc).
 constexpr double kHeadReach = 4.0 / 3.0;
 
+// Where the planner is by default. Many programs of developers listen there, too.
+constexpr int kWebPort = 8080;
+constexpr char kPortOption[] = "--port";
+constexpr char kWebPortOption[] = "--web-port";
+
 struct DemoOptions {
   std::string out = "out/demo";
   std::string plan;
@@ -57,7 +64,7 @@ struct DemoOptions {
   std::string encoding = "float32";
   bool no_browser = false;
   bool serve = false;
-  int web_port = 8080;
+  std::optional<int> web_port;  // unset: kWebPort, or a free one where that is taken
   OpenPlanner open_planner;
   DragOptions drag;
 
@@ -81,6 +88,20 @@ void CatchInterrupts() {
 
 absl::Status CheckNotInterrupted() {
   return demo_interrupted ? absl::CancelledError("interrupted") : absl::OkStatus();
+}
+
+// Of ports that the user chose: at once, and not when all else is done.
+absl::Status CheckPorts(const DemoOptions& options) {
+  TF_RETURN_IF_ERROR(CheckLoopbackPort(options.port, kPortOption));
+  if (!options.serve || !options.web_port.has_value()) return absl::OkStatus();
+  return CheckLoopbackPort(*options.web_port, kWebPortOption);
+}
+
+int WebPort(const DemoOptions& options) {
+  if (options.web_port.has_value()) return *options.web_port;
+  if (CheckLoopbackPort(kWebPort, kWebPortOption).ok()) return kWebPort;
+  absl::PrintF("\nport %d is taken; the planner gets a free one\n", kWebPort);
+  return 0;
 }
 
 absl::Status MakeOutFolder(const DemoOptions& options) {
@@ -203,7 +224,7 @@ constexpr std::chrono::milliseconds kServeStep{200};
 // has not, the server is served all the same.
 absl::Status Serve(const DemoOptions& options, const DemoCase& demo, ServerProcess* server) {
   const absl::StatusOr<OpenedPlanner> planner =
-      options.open_planner(server->address(), demo.path, options.web_port);
+      options.open_planner(server->address(), demo.path, WebPort(options));
   if (planner.ok()) {
     absl::PrintF("\nthe planner, in a browser: %s\n", planner->url);
   } else {
@@ -251,6 +272,7 @@ absl::Status DragAndPredict(const DemoOptions& options, const DemoCase& demo, Se
 absl::Status RunDemo(const DemoOptions& options) {
   CatchInterrupts();
   std::setvbuf(stdout, nullptr, _IOLBF, 0);  // progress is seen at once, also through a pipe
+  TF_RETURN_IF_ERROR(CheckPorts(options));
   TF_RETURN_IF_ERROR(MakeOutFolder(options));
   TF_ASSIGN_OR_RETURN(const DemoCase demo, ReadCase(options));
 
@@ -286,7 +308,7 @@ void AddDemoCommand(CLI::App& app, OpenPlanner open_planner, CommandWork* work) 
                    "first")
       ->check(CLI::Range(0.1, 60.0))
       ->capture_default_str();
-  command->add_option("--port", options->port, "port of the server; 0 takes a free one")
+  command->add_option(kPortOption, options->port, "port of the server; 0 takes a free one")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
   command->add_option("--encoding", options->encoding, "how the frames of the skin are sent")
@@ -298,10 +320,10 @@ void AddDemoCommand(CLI::App& app, OpenPlanner open_planner, CommandWork* work) 
                     "keep the server running at the end, until Ctrl-C, with the planner for "
                     "browsers in front of it, and tell their addresses");
   command
-      ->add_option("--web-port", options->web_port,
-                   "of --serve: port of the planner; 0 takes a free one")
-      ->check(CLI::Range(0, 65535))
-      ->capture_default_str();
+      ->add_option(kWebPortOption, options->web_port,
+                   absl::StrCat("of --serve: port of the planner; 0 takes a free one (default: ",
+                                kWebPort, ", or a free one where that is taken)"))
+      ->check(CLI::Range(0, 65535));
   command->footer(
       "Starts the tissueform-server that lies beside this program on loopback and ends it again.\n"
       "It keeps the prediction at the end of the drag, and one that neo_hookean has refined.\n"

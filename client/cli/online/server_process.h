@@ -16,13 +16,14 @@
 
 namespace tissueform {
 
-// A tissueform-server that this process has started. Ends with this object, and with this process
-// whatever ends it: SIGTERM, and SIGKILL when it has not ended in 30 s.
+// A tissueform-server or tissueform-gateway that this process has started. Ends with this object,
+// and with this process whatever ends it: SIGTERM, and SIGKILL when it has not ended in 30 s.
 class ServerProcess {
  public:
   // Starts `binary` with `arguments` and waits until it listens.
   //
-  // Errors: NotFound (no such program), Unavailable (it ended, or did not listen in time).
+  // Errors, naming the program: NotFound (there is none), Unavailable (it ended, or did not listen
+  // in time).
   static absl::StatusOr<std::unique_ptr<ServerProcess>> Start(
       const std::string& binary, const std::vector<std::string>& arguments,
       std::chrono::milliseconds deadline);
@@ -39,10 +40,12 @@ class ServerProcess {
   std::optional<int> WaitForExit(std::chrono::milliseconds deadline);
 
  private:
-  explicit ServerProcess(std::unique_ptr<GuardedProgram> program) : program_(std::move(program)) {}
+  ServerProcess(std::string name, std::unique_ptr<GuardedProgram> program)
+      : name_(std::move(name)), program_(std::move(program)) {}
 
   absl::Status WaitUntilListening(std::chrono::milliseconds deadline);
 
+  const std::string name_;  // the program's, for errors
   const std::unique_ptr<GuardedProgram> program_;
   std::string address_;
 };

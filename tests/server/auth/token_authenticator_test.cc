@@ -4,6 +4,7 @@
 #include "server/auth/token_authenticator.h"
 
 #include <array>
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <set>
@@ -192,6 +193,62 @@ TEST_P(BadTokenTest, IsRefusedWithItsReasonAndNothingOfItself) {
 
 INSTANTIATE_TEST_SUITE_P(Tokens, BadTokenTest, ::testing::ValuesIn(BadTokens()),
                          [](const auto& test) { return std::string(test.param.name); });
+
+// The sentence of a refusal of a token with this claim.
+std::string SentenceOf(const std::string& name, const Json& value) {
+  const TokenFiles files;
+  const auto authenticator = StartWith(files.Options());
+  return std::string(
+      Ask(authenticator.get(), WithClaims(With(GoodClaims(), name, value))).status().message());
+}
+
+TEST(RefusedTokenTest, ATokenWithAGoodSignatureIsToldWhatIsExpectedOfIt) {
+  EXPECT_THAT(SentenceOf("iss", "https://sts.example/1/"),
+              HasSubstr("issuer is \"https://sts.example/1/\", and this server takes tokens of "
+                        "\"https://login.example\" only"));
+  EXPECT_THAT(SentenceOf("iss", nullptr), HasSubstr("issuer is \"null\""));
+  EXPECT_THAT(SentenceOf("aud", "another"),
+              HasSubstr("audience is \"another\", and this server is \"tissueform\""));
+  EXPECT_THAT(SentenceOf("aud", Json::array({"a", 1})), HasSubstr("audience is \"a, 1\", and"));
+}
+
+TEST(RefusedTokenTest, ATokenIsToldByHowMuchTheClocksDiffer) {
+  const TokenFiles files;
+  const auto now = std::chrono::system_clock::now();
+  const auto at = [&](std::chrono::seconds later) {
+    return *TokenAuthenticator::Start(files.Options(), [=] { return now + later; });
+  };
+  const int64_t second =
+      std::chrono::duration_cast<std::chrono::seconds>(now.time_since_epoch()).count();
+  Json claims = With(With(GoodClaims(), "iat", second), "exp", second + 600);
+  const std::string token = WithClaims(claims);
+  EXPECT_THAT(std::string(Ask(at(std::chrono::seconds(-301)).get(), token).status().message()),
+              HasSubstr("begins in 5m"));
+  EXPECT_THAT(std::string(Ask(at(std::chrono::seconds(901)).get(), token).status().message()),
+              HasSubstr("expired 5m"));
+}
+
+TEST(RefusedTokenTest, WhatIsSaidOfAClaimIsBoundedAndPrintable) {
+  const std::string sentence =
+      SentenceOf("iss", absl::StrCat("https://e\x1b[31m\"\n\u00e9", std::string(5000, 'a')));
+  EXPECT_THAT(sentence, HasSubstr("\"https://e?[31m????aaa"));
+  EXPECT_LT(sentence.size(), 450);
+  EXPECT_THAT(SentenceOf("aud", Json::array({std::string(5000, 'a')})).size(), ::testing::Lt(450));
+}
+
+TEST(RefusedTokenTest, NothingIsSaidOfATokenWhoseSignatureIsNotVerified) {
+  const TokenFiles files;
+  const auto authenticator = StartWith(files.Options());
+  const Json claims = With(GoodClaims(), "iss", "https://unverified.example");
+  for (const std::string& token :
+       {OtherEcKey().MakeToken(Header(EcKey()), claims), OtherEcKey().MakeToken(claims)}) {
+    const std::string sentence(Ask(authenticator.get(), token).status().message());
+    EXPECT_THAT(sentence, Not(HasSubstr("unverified"))) << sentence;
+  }
+  EXPECT_THAT(
+      std::string(Ask(authenticator.get(), OtherEcKey().MakeToken(claims)).status().message()),
+      HasSubstr("not one of \"https://login.example\""));
+}
 
 struct GoodToken {
   const char* name;

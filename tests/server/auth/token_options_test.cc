@@ -34,6 +34,15 @@ TEST(TokenOptionsTest, AudiencesMayBeSeveral) {
   EXPECT_EQ(Parsed({"--token-audience=b", "--token-audience=a"}).audiences.size(), 2U);
 }
 
+TEST(TokenOptionsTest, AnIssuerForEveryTenantIsRefused) {
+  TokenOptions options{.issuer = "https://login.example/{tenantid}/v2.0", .audiences = {"a"}};
+  options.keys_file = "keys.pem";
+  EXPECT_THAT(CheckTokenOptions(options),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       HasSubstr("--token-issuer https://login.example/{tenantid}/v2.0 has a "
+                                 "placeholder")));
+}
+
 TEST(TokenOptionsTest, WhatIsMissingIsNamed) {
   EXPECT_THAT(CheckTokenOptions({}),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("--token-issuer")));

@@ -9,6 +9,7 @@
 #include "nlohmann/json.hpp"
 
 #include "tests/server/gateway/gateway_test.h"
+#include "tests/testing/status_matchers.h"
 
 namespace tissueform::testing {
 namespace {
@@ -30,6 +31,12 @@ TEST(LoginConfig, IssuersAreHttpsOrOnLoopback) {
               absl::StatusCode::kInvalidArgument)
         << issuer;
   }
+}
+
+TEST(LoginConfig, AnIssuerForEveryTenantIsRefusedByItsName) {
+  EXPECT_THAT(
+      CheckLoginConfig({.issuer = "https://login.example.org/{tenantid}/v2.0", .client_id = "a"}),
+      StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("put your tenant's id in its place")));
 }
 
 TEST(LoginConfig, IssuerAndClientIdBelongTogether) {

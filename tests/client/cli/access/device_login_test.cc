@@ -109,6 +109,18 @@ TEST_F(DeviceLoginTest, ARefusedRenewalIsARefusal) {
   EXPECT_EQ(login_.Renew("old").status().code(), absl::StatusCode::kPermissionDenied);
 }
 
+TEST_F(DeviceLoginTest, AProviderOfAnotherNameIsNamedWithTheExpectedOne) {
+  answers_ = {HttpAnswer{200, R"({"issuer": "https://b/", "token_endpoint": "https://b/token"})"}};
+  EXPECT_THAT(
+      std::string(Run().status().message()),
+      HasSubstr("issuer is https://b/, and --issuer says https://a; give --issuer https://b/"));
+  answers_ = {HttpAnswer{200, R"({"issuer": "https://a/{tenantid}/v2.0"})"}};
+  EXPECT_THAT(std::string(Run().status().message()),
+              HasSubstr("https://a/{tenantid}/v2.0, which stands for every tenant"));
+  answers_ = {HttpAnswer{200, R"({"issuer": "https://\u001b[2J"})"}};
+  EXPECT_THAT(std::string(Run().status().message()), HasSubstr("names no issuer"));
+}
+
 struct BadAnswer {
   const char* name;
   std::deque<absl::StatusOr<HttpAnswer>> answers;
