@@ -153,7 +153,7 @@ async function pullForward(page: Page, pixels: number): Promise<void> {
   const at = await page.evaluate(async () => {
     const { view, bench } = (globalThis as unknown as Hook).tissueform;
     await new Promise<void>((done) => view.stage.invalidate(done));
-    const box = view.stage.canvas.getBoundingClientRect();
+    const box = view.stage.surface.getBoundingClientRect();
     const point = view.head.toWorld(bench.wishes.wishes.value[0].place.drawnMm).project(view.stage.camera);
     return { x: box.left + ((point.x + 1) / 2) * box.width, y: box.top + ((1 - point.y) / 2) * box.height };
   });

@@ -221,7 +221,7 @@ test("frames of an animation: the lower jaw 8 mm forward and back", async () => 
 });
 
 test("a file that moves, opened from disk", async () => {
-  const { page } = await openPage(await planner.browse(), pathToFileURL(planner.exportWholeHead()).href);
+  const { page } = await openPage(await planner.browse(), pathToFileURL(planner.exportHead(true)).href);
   await page.emulateMedia({ colorScheme: "dark" });
   await page.waitForFunction(() => (globalThis as any).tissueform.moving?.answered > 0);
   await page.getByRole("checkbox").check();

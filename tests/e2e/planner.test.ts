@@ -67,7 +67,7 @@ describe("a planner", () => {
       const pose = bench.plan.poses()[2];
       const at = view.head.toWorld([0, 1, 2].map((k: number) => pose.pivotMm[k] + pose.translationMm[k]));
       const scale = view.stage.millimetresPerPixel;
-      const box = view.stage.canvas.getBoundingClientRect();
+      const box = view.stage.surface.getBoundingClientRect();
       at.project(view.stage.camera);
       return { x: box.left + ((at.x + 1) / 2) * box.width, y: box.top + ((1 - at.y) / 2) * box.height, scale };
     });

@@ -7,7 +7,7 @@ import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
-import { type Browser, type BrowserContext, type Page, chromium } from "playwright-core";
+import { type Browser, type BrowserContext, type BrowserContextOptions, type Page, chromium } from "playwright-core";
 
 // Everything as a user has it: server, gateway and planner as they were built, Debian's Chromium, loopback.
 
@@ -113,10 +113,10 @@ export class Planner {
     return path;
   }
 
-  /** The same as a file that moves. */
-  exportWholeHead(): string {
-    const path = join(this.folder, "moves.html");
-    execFileSync(join(BIN, "tissueform"), ["export", this.writePlan(true), "--html", path, "--model", "linear_elastic"]);
+  /** The same as a file that moves; or without what surrounds the segments. */
+  exportHead(isWhole: boolean): string {
+    const path = join(this.folder, isWhole ? "moves.html" : "segments-move.html");
+    execFileSync(join(BIN, "tissueform"), ["export", this.writePlan(isWhole), "--html", path, "--model", "linear_elastic"]);
     return path;
   }
 
@@ -158,12 +158,12 @@ export class Planner {
     return this.gateway?.address ?? "";
   }
 
-  /** A browser of its own: what it keeps is its own, too. */
-  async browse(flags: string[] = []): Promise<BrowserContext> {
+  /** A browser of its own: what it keeps is its own, too. `device`: what it looks like to the page. */
+  async browse(flags: string[] = [], device: BrowserContextOptions = {}): Promise<BrowserContext> {
     const args = ["--no-sandbox", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", ...flags];
     const browser = await chromium.launch({ executablePath: CHROMIUM, args });
     this.browsers.push(browser);
-    const context = await browser.newContext({ viewport: { width: 1280, height: 720 }, acceptDownloads: true });
+    const context = await browser.newContext({ viewport: { width: 1280, height: 720 }, acceptDownloads: true, ...device });
     context.setDefaultTimeout(60_000);
     return context;
   }
@@ -266,6 +266,15 @@ export async function typeMove(page: Page, label: string, value: string): Promis
 
 export async function takeSegment(page: Page, label: string): Promise<void> {
   await page.locator(".segments button", { hasText: label }).click();
+}
+
+/** Clicks the export, and resolves with where its file was saved. */
+export async function saveExport({ folder }: Pick<Planner, "folder">, page: Page, button: string, file: string): Promise<string> {
+  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: button }).click()]);
+  if (download.suggestedFilename() !== file) throw new Error(`the file is called ${download.suggestedFilename()}, not ${file}`);
+  const path = join(folder, file);
+  await download.saveAs(path);
+  return path;
 }
 
 const AXE = readFileSync(process.env.TISSUEFORM_AXE ?? createRequire(join(process.cwd(), "package.json")).resolve("axe-core/axe.min.js"), "utf8");

@@ -4,7 +4,8 @@
 import { VIRIDIS } from "../geometry/color_map";
 import type { MoveKey } from "../geometry/pose";
 import { button, el, newId, onceAPicture, section, slider } from "../panels/dom";
-import { pictureMarks, viewBar } from "../panels/view_bar";
+import { PictureBox } from "../panels/picture_box";
+import { viewBar } from "../panels/view_bar";
 import { formatNumber, formatWithUnit } from "../planning/numbers";
 import { MOVE_KEYS } from "../planning/plan";
 import { cssColor, segmentColor } from "../scene/materials";
@@ -36,17 +37,10 @@ const STEP = 0.1;
 
 /** What is seen once the data are open. */
 export async function movingPage(data: MovingData, engine: Engine): Promise<{ element: HTMLElement; head: MovingHead }> {
-  const picture = el("div", { class: "picture", attributes: { role: "region", "aria-label": "Picture of the head" } });
-  let update = () => {};
-  const head = await MovingHead.make(picture, data, engine, { onDrawn: () => update(), onContext: () => {} });
-  const marks = pictureMarks(head.view);
-  update = onceAPicture(marks.update);
+  const picture = new PictureBox(() => {});
+  const head = await MovingHead.make(picture.element, data, engine, picture.listener);
+  picture.dress(head.view, "Head in three dimensions: drag to turn it, turn the wheel or spread two fingers to come nearer");
   const legend = legendBox();
-  picture.append(marks.element, legend.element);
-  head.view.stage.canvas.setAttribute("aria-label", "Head in three dimensions: drag to turn it, turn the wheel to come nearer");
-  if (!head.view.stage.hasRenderer) {
-    picture.append(el("p", { class: "no-picture", text: "This browser shows no 3D pictures (WebGL is off or missing). The numbers work all the same.", attributes: { role: "alert" } }));
-  }
   const numbers = numbersPanel(data, head);
   head.onShown = (shown) => {
     numbers.show(shown);
@@ -55,7 +49,7 @@ export async function movingPage(data: MovingData, engine: Engine): Promise<{ el
   const segments = data.handles.flatMap((handle, index) => (handle.isFree ? [segmentSection(head, index)] : []));
   const panel = el("aside", { attributes: { "aria-label": "Movements" } }, [beforeAfter(head), numbers.element, ...segments]);
   const title = data.title === "" ? null : el("h1", { text: data.title });
-  return { element: el("div", { class: "moving" }, [title, el("main", {}, [picture, viewBar(head.view)]), panel]), head };
+  return { element: el("div", { class: "moving" }, [title, el("main", {}, [picture.element, legend.element, viewBar(head.view)]), panel]), head };
 }
 
 /** From the face of today to the planned one. */

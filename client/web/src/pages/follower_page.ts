@@ -30,7 +30,7 @@ export function followerPage(gateway: Gateway, file: CaseFile, session: string, 
     onEnd: (text) => status.connection({ kind: "failed", text }),
     onNotice: notice.show,
   });
-  view.stage.canvas.addEventListener("keydown", (event) => {
+  view.stage.surface.addEventListener("keydown", (event) => {
     if (lookByKey(view, event)) event.preventDefault();
   });
   picture.append(notice.element);

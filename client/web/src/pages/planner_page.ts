@@ -12,36 +12,24 @@ import { legendBox, mapPanel, modelPanel } from "../panels/maps_panel";
 import { measuresPanel } from "../panels/measures_panel";
 import { movementsPanel } from "../panels/movements_panel";
 import { bindPicking, pickingBox } from "../panels/picking";
+import { PictureBox } from "../panels/picture_box";
 import { predictionsPanel } from "../panels/predictions_panel";
 import { profilePanel } from "../panels/profile_panel";
 import { reportPanel } from "../panels/report_panel";
 import { segmentsPanel } from "../panels/segments_panel";
 import { noticeBox, statusBar } from "../panels/status_bar";
-import { pictureMarks, viewBar } from "../panels/view_bar";
+import { viewBar } from "../panels/view_bar";
 import { wishPanel } from "../panels/wish_panel";
 import { HeadView } from "../scene/head_view";
 import { Workbench } from "../workbench/workbench";
 import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
 
-/** Where a head is drawn, with what lies over the picture; both pages with a head have it. */
+/** Where a head is drawn; both pages with a head have it. */
 export function pictureBox(file: CaseFile, onNotice: (text: string) => void): { element: HTMLElement; view: HeadView } {
-  const element = el("div", { class: "picture", attributes: { role: "region", "aria-label": "Picture of the head" } });
-  let update = () => {};
-  const view = new HeadView(element, file, {
-    onDrawn: () => update(),
-    onContext: (isLost) => onNotice(isLost ? "The browser took the graphics card away; the picture comes back by itself." : "The picture is back."),
-  });
-  view.stage.canvas.setAttribute("aria-label", "Head in three dimensions. Press the question mark for keys.");
-  view.stage.canvas.setAttribute("role", "application");
-  const marks = pictureMarks(view);
-  update = onceAPicture(marks.update);
-  element.append(marks.element);
-  if (!view.stage.hasRenderer) {
-    const text = "This browser shows no 3D pictures (WebGL is off or missing). Numbers, predictions and export work all the same.";
-    element.append(el("p", { class: "no-picture", text, attributes: { role: "alert" } }));
-  }
-  marks.update();
-  return { element, view };
+  const box = new PictureBox((isLost) => !isLost && onNotice("The picture is back."));
+  const view = new HeadView(box.element, file, box.listener);
+  box.dress(view, "Head in three dimensions. Press the question mark for keys.");
+  return { element: box.element, view };
 }
 
 /** An answer that takes longer than this is waited for in words. */
@@ -85,7 +73,7 @@ export function plannerPage(
   const help = helpDialog();
   bindKeys(bench, help);
   bindPicking(bench);
-  picture.append(legendBox(bench), gizmoModes(bench, help), pickingBox(bench), notice.element);
+  picture.append(gizmoModes(bench, help), pickingBox(bench), notice.element);
   const panel = el("aside", { attributes: { "aria-label": "Plan" } }, [
     segmentsPanel(bench),
     movementsPanel(bench),
@@ -99,7 +87,7 @@ export function plannerPage(
     exportPanel(bench),
     reportPanel(bench),
   ]);
-  const element = el("div", { class: "planner" }, [status.element, el("main", {}, [picture, viewBar(view)]), panel, help]);
+  const element = el("div", { class: "planner" }, [status.element, el("main", {}, [picture, legendBox(bench), viewBar(view)]), panel, help]);
   return { element, bench };
 }
 

@@ -57,7 +57,7 @@ export function lookByKey(view: HeadView, event: KeyboardEvent): boolean {
 
 /** All keys of the planner: those of the picture while it has the focus, undo and redo everywhere but in fields of text. */
 export function bindKeys(bench: Workbench, help: HTMLDialogElement): void {
-  const { canvas } = bench.view.stage;
+  const { surface } = bench.view.stage;
   let mode: GizmoMode = "translate";
   let isMoving = false;
   const move = (event: KeyboardEvent): boolean => {
@@ -77,15 +77,15 @@ export function bindKeys(bench: Workbench, help: HTMLDialogElement): void {
     else return false;
     return true;
   };
-  canvas.addEventListener("keydown", (event) => {
+  surface.addEventListener("keydown", (event) => {
     if (move(event) || other(event) || lookByKey(bench.view, event)) event.preventDefault();
   });
   const finish = () => {
     if (isMoving) bench.plan.change(bench.selected.value, {}, true);
     isMoving = false;
   };
-  canvas.addEventListener("keyup", finish);
-  canvas.addEventListener("blur", finish);
+  surface.addEventListener("keyup", finish);
+  surface.addEventListener("blur", finish);
   document.addEventListener("keydown", (event) => {
     const isText = event.target instanceof HTMLInputElement && event.target.type === "text" && event.target.classList.contains("editing");
     if (!(event.ctrlKey || event.metaKey) || isText) return;

@@ -5,28 +5,32 @@ import type { Workbench } from "../workbench/workbench";
 import { button, el } from "./dom";
 
 const CLICK_PX = 4;
+/** A finger rolls a little while it taps. */
+const TAP_PX = 10;
 
 /**
- * A click, not a turn of the picture, goes to who asked for a point (`Workbench.picking`); where nobody has, it takes the segment
+ * A click or tap, not a turn of the picture, goes to who asked for a point (`Workbench.picking`); where nobody has, it takes the segment
  * in the hand. By keys: Enter takes what is in the picture's middle, Escape leaves it.
  */
 export function bindPicking(bench: Workbench): void {
-  const { canvas } = bench.view.stage;
+  const { surface } = bench.view.stage;
   const take = (x: number, y: number) => {
     const picking = bench.picking.value;
     picking?.take(bench.view.anchorAt(x, y, picking.kinds));
   };
   let from: [number, number] | null = null;
-  canvas.addEventListener("pointerdown", (event) => (from = bench.gizmo.isTouched ? null : [event.offsetX, event.offsetY]));
-  canvas.addEventListener("pointerup", (event) => {
-    if (from === null || Math.hypot(event.offsetX - from[0], event.offsetY - from[1]) > CLICK_PX) return;
+  // With a second finger it is a zoom, whichever finger rests.
+  surface.addEventListener("pointerdown", (event) => (from = bench.gizmo.isTouched || !event.isPrimary ? null : [event.offsetX, event.offsetY]));
+  surface.addEventListener("pointerup", (event) => {
+    const reach = event.pointerType === "touch" ? TAP_PX : CLICK_PX;
+    if (from === null || Math.hypot(event.offsetX - from[0], event.offsetY - from[1]) > reach) return;
     if (bench.picking.value !== null) return take(event.offsetX, event.offsetY);
     const handle = bench.view.segmentAt(event.offsetX, event.offsetY);
     const index = bench.plan.handles.findIndex(({ name }) => name === handle);
     if (index >= 0) bench.selected.value = index;
   });
-  canvas.addEventListener("keydown", (event) => {
-    if (event.key === "Enter") take(canvas.clientWidth / 2, canvas.clientHeight / 2);
+  surface.addEventListener("keydown", (event) => {
+    if (event.key === "Enter") take(surface.clientWidth / 2, surface.clientHeight / 2);
   });
   document.addEventListener("keydown", (event) => {
     if (event.key === "Escape") bench.picking.value = null;
@@ -43,7 +47,7 @@ export function pickingBox(bench: Workbench): HTMLElement {
   bench.picking.watch((picking) => {
     box.hidden = picking === null;
     text.textContent = picking?.prompt ?? "";
-    if (picking !== null) bench.view.stage.canvas.focus();
+    if (picking !== null) bench.view.stage.surface.focus();
   });
   return box;
 }

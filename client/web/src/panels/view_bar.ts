@@ -4,6 +4,7 @@
 import { formatNumber } from "../planning/numbers";
 import type { Cut } from "../scene/head";
 import type { HeadView } from "../scene/head_view";
+import type { Stage } from "../scene/stage";
 import { VIEWS, type ViewName, edgeLetters, scaleBar } from "../scene/views";
 import { button, el, select, slider } from "./dom";
 
@@ -52,7 +53,7 @@ function cutField(view: HeadView): HTMLElement {
 }
 
 /** Letters at the edges of the picture and a bar of so many mm; call `update` when the camera has moved. */
-export function pictureMarks(view: HeadView): { element: HTMLElement; update(): void } {
+export function pictureMarks(stage: Stage): { element: HTMLElement; update(): void } {
   const letters = {
     left: el("span", { class: "letter at-left" }),
     right: el("span", { class: "letter at-right" }),
@@ -64,9 +65,9 @@ export function pictureMarks(view: HeadView): { element: HTMLElement; update(): 
   const scale = el("div", { class: "scale" }, [length, bar]);
   const element = el("div", { class: "marks", attributes: { "aria-hidden": "true" } }, [...Object.values(letters), scale]);
   const update = () => {
-    const names = edgeLetters(view.stage.camera);
+    const names = edgeLetters(stage.camera);
     for (const edge of ["left", "right", "top", "bottom"] as const) letters[edge].textContent = names[edge];
-    const { mm, px } = scaleBar(view.stage.millimetresPerPixel);
+    const { mm, px } = scaleBar(stage.millimetresPerPixel);
     bar.style.width = `${px}px`;
     length.textContent = `${mm} mm`;
   };

@@ -10,6 +10,12 @@ import type { Stage } from "./stage";
 
 export type GizmoMode = "translate" | "rotate";
 
+// TransformControls of size 1 has a unit of this part of the picture's height. Its arms are taken 0.6 units from the middle, where they
+// are 0.4 units wide: at least 44 pixels, for a finger.
+const UNIT_OF_HEIGHT = 1.9 / 8;
+const LEAST_UNIT_PX = 110;
+const SIZE = 0.8;
+
 /** The handle at a segment's pivot, by which it is taken in the hand. */
 export class Gizmo {
   private readonly controls: TransformControls;
@@ -17,6 +23,10 @@ export class Gizmo {
   private pivot: Vector = [0, 0, 0];
   private scale = 1;
   private readonly hiddenBy = new Set<string>();
+  private readonly listening = new AbortController();
+  private readonly sizes = new ResizeObserver(() => this.fitPicture());
+  /** The pointer that went down upon the picture first. */
+  private pointer: number | null = null;
 
   /** `onPose`: the segment is pulled there; `isFinal` when the hand lets go. */
   constructor(
@@ -24,8 +34,10 @@ export class Gizmo {
     private readonly head: Head,
     onPose: (pose: Pose, isFinal: boolean) => void,
   ) {
-    this.controls = new TransformControls(stage.camera, stage.canvas);
-    this.controls.setSize(0.8);
+    this.controls = new TransformControls(stage.camera, stage.surface);
+    this.controls.disconnect();
+    this.sizes.observe(stage.surface);
+    this.listen(stage.surface);
     this.controls.setColors(0xe0705f, 0x62b97c, 0x5b9be0, 0xffd34d);
     this.controls.attach(this.proxy);
     stage.scene.add(this.proxy, this.controls.getHelper());
@@ -73,9 +85,48 @@ export class Gizmo {
   }
 
   dispose(): void {
+    this.listening.abort();
+    this.sizes.disconnect();
     this.stage.scene.remove(this.proxy, this.controls.getHelper());
     this.controls.detach();
     this.controls.dispose();
+  }
+
+  // TransformControls by itself takes every finger for the same one: a second finger would pull, and a zoom that ends on an arm would
+  // move bone. Only the first pointer reaches it here, and a gesture that the system takes over lets go.
+  private listen(surface: HTMLElement): void {
+    const { signal } = this.listening;
+    const release = ({ pointerId }: PointerEvent) => {
+      if (pointerId !== this.pointer) return;
+      this.pointer = null;
+      this.controls.pointerUp(null);
+    };
+    surface.addEventListener("pointerdown", (event) => {
+      if (!this.controls.enabled || !event.isPrimary) return;
+      this.pointer = event.pointerId;
+      this.controls.pointerHover(this.at(event, event.button));
+      this.controls.pointerDown(this.at(event, event.button));
+      if (this.isDragging) surface.setPointerCapture(event.pointerId);
+    }, { signal });
+    surface.addEventListener("pointermove", (event) => {
+      if (!this.controls.enabled) return;
+      if (this.isDragging && event.pointerId === this.pointer) this.controls.pointerMove(this.at(event, -1));
+      else if (!this.isDragging && event.pointerType !== "touch") this.controls.pointerHover(this.at(event, -1));
+    }, { signal });
+    surface.addEventListener("pointerup", release, { signal });
+    surface.addEventListener("pointercancel", release, { signal });
+  }
+
+  /** What TransformControls reads of a pointer: where in the picture, from -1 to 1, and its button. */
+  private at(event: PointerEvent, button: number): PointerEvent {
+    const { left, top, width, height } = this.stage.surface.getBoundingClientRect();
+    const place = { x: (2 * (event.clientX - left)) / width - 1, y: 1 - (2 * (event.clientY - top)) / height, button };
+    return place as PointerEvent;
+  }
+
+  private fitPicture(): void {
+    this.controls.setSize(Math.max(SIZE, LEAST_UNIT_PX / (UNIT_OF_HEIGHT * Math.max(1, this.stage.surface.clientHeight))));
+    this.stage.invalidate();
   }
 
   private pose(): Pose {

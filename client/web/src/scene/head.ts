@@ -6,8 +6,9 @@ import type { CaseSurface } from "../case/case_file";
 import type { Manifest } from "../case/manifest";
 import { FollowingSurface, vertexNormals } from "../geometry/following_surface";
 import { type Pose, headAxes } from "../geometry/pose";
-import { type Matrix, type Vector, apply, fromRotationVector, subtract } from "../geometry/rotation";
+import { type Matrix, type Vector, apply, fromRotationVector, subtract, transpose } from "../geometry/rotation";
 import { SKIN_COLOR, boneMaterial, depthMaterial, ghostMaterial, segmentMaterial, skinMaterial, teethMaterial } from "./materials";
+import { type Reach, TANGENT } from "./stage";
 
 const WHITE = new three.Color(0xffffff);
 
@@ -159,6 +160,22 @@ export class Head {
     return new three.Vector3(...apply(this.worldAxes, subtract(point, this.middle)));
   }
 
+  /** Of all that is drawn, seen from `direction` of the stage. */
+  reach(direction: three.Vector3): Reach {
+    const toward = direction.clone().normalize();
+    const right = new three.Vector3(0, 1, 0).cross(toward).normalize();
+    const axes = [right, toward.clone().cross(right), toward].map((axis) => apply(transpose(this.worldAxes), axis.toArray()));
+    const reach = { height: 1, width: 1 };
+    for (const { shape } of this.surfaces) {
+      for (let i = 0; i < shape.positions.length; i += 3) {
+        const [x, y, z] = axes.map((axis) => this.along(axis, shape.positions, i));
+        reach.width = Math.max(reach.width, z + Math.abs(x) / TANGENT);
+        reach.height = Math.max(reach.height, z + Math.abs(y) / TANGENT);
+      }
+    }
+    return reach;
+  }
+
   /** The middle of a segment's surfaces at rest, LPS; null where it has none. */
   segmentMiddle(handle: string): Vector | null {
     const known = this.middles.get(handle);
@@ -178,6 +195,11 @@ export class Head {
         (object.material as three.Material).dispose();
       }
     });
+  }
+
+  /** How far a position lies from the middle along an axis of LPS. */
+  private along(axis: Vector, positions: Float32Array, i: number): number {
+    return axis[0] * (positions[i] - this.middle[0]) + axis[1] * (positions[i + 1] - this.middle[1]) + axis[2] * (positions[i + 2] - this.middle[2]);
   }
 
   private worldMatrix(): three.Matrix4 {

@@ -8,7 +8,7 @@ import type { Vector } from "../geometry/rotation";
 import { type Anchor, corners, nearestWeights } from "../measures/anchor";
 import { type Cut, type DrawnCase, type DrawnSurface, Head } from "./head";
 import { SEGMENT_COLORS } from "./materials";
-import { Stage, type StageListener } from "./stage";
+import { type PictureSize, Stage, type StageListener } from "./stage";
 import { type ViewName, viewDirection } from "./views";
 
 /** Points that are drawn over all else, by what they are. */
@@ -29,7 +29,8 @@ export class HeadView {
   }
 
   look(view: ViewName): void {
-    this.stage.look(viewDirection(view), this.head.radius);
+    const direction = viewDirection(view);
+    this.stage.look(direction, this.head.reach(direction));
   }
 
   setPoses(poses: ReadonlyMap<string, Pose>): void {
@@ -72,13 +73,13 @@ export class HeadView {
     this.stage.invalidate();
   }
 
-  /** The handle of the segment below a point of the canvas, in its pixels; "" for none. */
+  /** The handle of the segment below a point of the picture, in the page's pixels; "" for none. */
   segmentAt(x: number, y: number): string {
     const hit = this.hitAt(x, y, ({ source }) => source.entry.handle !== "");
     return hit === undefined ? "" : String(hit.object.userData.handle);
   }
 
-  /** The point of a surface of these kinds that is seen at a point of the canvas, in its pixels; null for none. What lies before it is looked through. */
+  /** The point of a surface of these kinds that is seen at a point of the picture, in the page's pixels; null for none. What lies before it is looked through. */
   anchorAt(x: number, y: number, kinds: readonly SurfaceKind[]): Anchor | null {
     const hit = this.hitAt(x, y, ({ source }) => kinds.includes(source.entry.kind));
     if (hit?.faceIndex == null) return null;
@@ -90,25 +91,20 @@ export class HeadView {
     return { surface, triangle, weights };
   }
 
-  /** The head from there, without points and arrows; null where nothing can be drawn. The camera is where it was afterwards; the picture is good until the next one. */
-  portrait(from: ViewName): HTMLCanvasElement | null {
-    const { scene, camera, controls } = this.stage;
-    const [position, target] = [camera.position.clone(), controls.target.clone()];
-    const marks = [...scene.children.filter((object) => object !== this.head.group && !(object instanceof three.Light)), ...this.points.values()];
-    const hidden = marks.filter(({ visible }) => visible);
-    hidden.forEach((object) => (object.visible = false));
-    this.look(from);
-    const picture = this.stage.snapshot();
-    hidden.forEach((object) => (object.visible = true));
-    camera.position.copy(position);
-    controls.target.copy(target);
-    controls.update();
-    this.stage.invalidate();
-    return picture;
+  /** The head from there, without points and arrows, as Stage.snapshot gives it. */
+  portrait(from: ViewName, size: PictureSize): Promise<HTMLCanvasElement | null> {
+    return this.stage.snapshot(size, () => {
+      const { children } = this.stage.scene;
+      const marks = [...children.filter((object) => object !== this.head.group && !(object instanceof three.Light)), ...this.points.values()];
+      const hidden = marks.filter(({ visible }) => visible);
+      hidden.forEach((object) => (object.visible = false));
+      this.look(from);
+      return () => hidden.forEach((object) => (object.visible = true));
+    });
   }
 
   private hitAt(x: number, y: number, wanted: (surface: DrawnSurface) => boolean): three.Intersection | undefined {
-    const { clientWidth, clientHeight } = this.stage.canvas;
+    const { clientWidth, clientHeight } = this.stage.surface;
     const ray = new three.Raycaster();
     ray.setFromCamera(new three.Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.stage.camera);
     const meshes = this.head.surfaces.filter(wanted).map(({ mesh }) => mesh);

@@ -3,9 +3,17 @@
 
 import * as three from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { Graphics } from "./graphics";
 
 const FIELD_OF_VIEW_DEG = 22;
+/** Of half the field of view. */
+export const TANGENT = Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360);
+/** Around what is looked at stays a little room. */
+const MARGIN = 1.08;
 const MOST_PIXEL_RATIO = 2;
+/** A graphics card that is taken away again and again is not waited for without end. */
+const MOST_ATTEMPTS = 3;
+const LOST_AGAIN = "The browser takes the graphics card away again and again, so no picture was made: close other pages with 3D pictures and try again";
 
 /** What a stage tells its owner. */
 export interface StageListener {
@@ -13,6 +21,18 @@ export interface StageListener {
   onDrawn(): void;
   /** The browser took the graphics card away, or gave it back. */
   onContext(isLost: boolean): void;
+}
+
+/** From how far away a square picture has all of the height, and all of the width, of what is looked at, in mm. */
+export interface Reach {
+  height: number;
+  width: number;
+}
+
+/** In pixels. */
+export interface PictureSize {
+  width: number;
+  height: number;
 }
 
 /**
@@ -24,42 +44,54 @@ export interface StageListener {
 export class Stage {
   readonly scene = new three.Scene();
   readonly camera = new three.PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 1, 5000);
-  readonly canvas: HTMLCanvasElement;
+  /** Takes pointers and keys; the picture fills it. */
+  readonly surface: HTMLElement;
   readonly controls: OrbitControls;
-  readonly renderer: three.WebGLRenderer | null;
   /** How often was drawn. */
   drawnCount = 0;
 
   private isWaiting = false;
   private isDrawing = true;
   private afterDrawing: (() => void)[] = [];
+  /** Of what is looked at: width by height. */
+  private span = 1;
+  private readonly graphics: Graphics;
   private readonly keyLight = new three.DirectionalLight(0xfff6ee, 2.0);
 
   constructor(
     private readonly container: HTMLElement,
     private readonly listener: StageListener,
   ) {
-    this.canvas = document.createElement("canvas");
-    this.canvas.tabIndex = 0;
-    container.append(this.canvas);
-    this.renderer = createRenderer(this.canvas);
-    this.controls = new OrbitControls(this.camera, this.canvas);
+    this.surface = document.createElement("div");
+    this.surface.className = "surface";
+    this.surface.tabIndex = 0;
+    container.append(this.surface);
+    this.graphics = new Graphics(this.surface, (isLost) => {
+      this.listener.onContext(isLost);
+      this.invalidate();
+    });
+    this.controls = new OrbitControls(this.camera, this.surface);
     this.controls.enableDamping = false;
     this.controls.minDistance = 60;
     this.controls.maxDistance = 3000;
     this.controls.addEventListener("change", () => this.invalidate());
     this.addLights();
     new ResizeObserver(() => this.resize()).observe(container);
-    this.canvas.addEventListener("webglcontextlost", () => this.listener.onContext(true));
-    this.canvas.addEventListener("webglcontextrestored", () => {
-      this.listener.onContext(false);
-      this.invalidate();
-    });
     this.resize();
+  }
+
+  /** Null where the browser has no WebGL. */
+  get renderer(): three.WebGLRenderer | null {
+    return this.graphics.renderer;
   }
 
   get hasRenderer(): boolean {
     return this.renderer !== null;
+  }
+
+  /** Brings a lost picture back; rejects with an Error where the browser gives no graphics card. */
+  restore(): Promise<void> {
+    return this.graphics.restore();
   }
 
   /** Draws before the browser's next picture; then tells `then`. */
@@ -82,16 +114,15 @@ export class Stage {
 
   /** Millimetres that a pixel shows in the plane of the orbit's middle. */
   get millimetresPerPixel(): number {
-    const height = 2 * this.camera.position.distanceTo(this.controls.target) * Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360);
+    const height = 2 * this.camera.position.distanceTo(this.controls.target) * TANGENT;
     return height / Math.max(1, this.container.clientHeight);
   }
 
-  /** Looks from `direction` at the whole of what has this radius about the middle. */
-  look(direction: three.Vector3, radius: number): void {
-    const fit = Math.min(1, this.camera.aspect);
-    const distance = radius / Math.sin((FIELD_OF_VIEW_DEG * Math.PI) / 360) / fit;
+  /** Looks from `direction` at the middle, from where all of this reach is within the picture. */
+  look(direction: three.Vector3, { height, width }: Reach): void {
+    this.span = width / height;
     this.controls.target.set(0, 0, 0);
-    this.camera.position.copy(direction).setLength(distance);
+    this.camera.position.copy(direction).setLength((MARGIN * height) / this.fit);
     this.controls.update();
     this.invalidate();
   }
@@ -115,21 +146,50 @@ export class Stage {
     this.invalidate();
   }
 
-  /** The picture as it is now, or null where nothing can be drawn. */
-  snapshot(): HTMLCanvasElement | null {
-    if (this.renderer === null) return null;
-    this.renderer.render(this.scene, this.camera);
-    return this.canvas;
+  /**
+   * The picture as it is now, of this size in pixels or as large as on the page; null where the browser has no WebGL. `arrange` sets
+   * up what this picture alone has, but the camera, and returns what takes that back. Waits for a graphics card that was taken away;
+   * rejects with an Error where it does not come back.
+   */
+  async snapshot(size: PictureSize | null = null, arrange: () => () => void = () => () => {}): Promise<HTMLCanvasElement | null> {
+    if (!this.hasRenderer) return null;
+    for (let attempt = 0; attempt < MOST_ATTEMPTS; ++attempt) {
+      await this.restore();
+      const picture = this.drawApart(size ?? this.graphics.canvas, arrange);
+      if (picture !== null) return picture;
+    }
+    throw new Error(LOST_AGAIN);
+  }
+
+  /** The camera is where it was afterwards. */
+  private drawApart({ width, height }: PictureSize, arrange: () => () => void): HTMLCanvasElement | null {
+    const [position, target, { aspect }, span] = [this.camera.position.clone(), this.controls.target.clone(), this.camera, this.span];
+    this.setAspect(width / height);
+    const takeBack = arrange();
+    this.light();
+    const picture = this.graphics.draw(this.scene, this.camera, width, height);
+    takeBack();
+    this.span = span;
+    this.setAspect(aspect);
+    this.camera.position.copy(position);
+    this.controls.target.copy(target);
+    this.controls.update();
+    this.invalidate();
+    return picture;
   }
 
   private draw(): void {
     this.isWaiting = false;
-    if (!this.isDrawing || this.renderer === null) return this.tellDrawn();
-    // The key light comes from above the viewer's left shoulder, wherever the viewer is.
-    this.keyLight.position.set(-0.55, 0.75, 1).applyQuaternion(this.camera.quaternion);
-    this.renderer.render(this.scene, this.camera);
-    this.drawnCount += 1;
+    if (this.isDrawing) {
+      this.light();
+      if (this.graphics.render(this.scene, this.camera)) this.drawnCount += 1;
+    }
     this.tellDrawn();
+  }
+
+  /** The key light comes from above the viewer's left shoulder, wherever the viewer is. */
+  private light(): void {
+    this.keyLight.position.set(-0.55, 0.75, 1).applyQuaternion(this.camera.quaternion);
   }
 
   private tellDrawn(): void {
@@ -147,24 +207,25 @@ export class Stage {
     this.scene.add(new three.HemisphereLight(0xf9fafc, 0x8a766c, 1.25), this.keyLight, fill, rim);
   }
 
-  private resize(): void {
-    const width = Math.max(1, this.container.clientWidth);
-    const height = Math.max(1, this.container.clientHeight);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
-    this.renderer?.setPixelRatio(Math.min(MOST_PIXEL_RATIO, devicePixelRatio));
-    this.renderer?.setSize(width, height);
-    this.invalidate();
+  /** Below 1 where the picture is narrower than what is looked at: which part of the width it would have from the distance for the height. */
+  private get fit(): number {
+    return Math.min(1, this.camera.aspect / this.span);
   }
-}
 
-function createRenderer(canvas: HTMLCanvasElement): three.WebGLRenderer | null {
-  try {
-    const renderer = new three.WebGLRenderer({ canvas, antialias: true, alpha: true });
-    renderer.localClippingEnabled = true;
-    renderer.toneMapping = three.NeutralToneMapping;
-    return renderer;
-  } catch {
-    return null;
+  /** A picture that is too narrow is looked at from further away, so that it shows what a wider one does. */
+  private setAspect(aspect: number): void {
+    const before = this.fit;
+    this.camera.aspect = aspect;
+    this.camera.updateProjectionMatrix();
+    if (this.fit !== before) this.zoom(before / this.fit);
+  }
+
+  private resize(): void {
+    const { clientWidth, clientHeight } = this.container;
+    // While another page lies over this one it has no size, and keeps the one that it had.
+    if (clientWidth === 0 || clientHeight === 0) return;
+    this.setAspect(clientWidth / clientHeight);
+    this.graphics.setFrame(clientWidth, clientHeight, Math.min(MOST_PIXEL_RATIO, devicePixelRatio));
+    this.invalidate();
   }
 }

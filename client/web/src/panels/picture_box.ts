@@ -1,0 +1,60 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { sentenceOf } from "../calls/call_error";
+import type { HeadView } from "../scene/head_view";
+import type { Stage, StageListener } from "../scene/stage";
+import { button, el, onceAPicture, whileBusy } from "./dom";
+import { pictureMarks } from "./view_bar";
+
+const LOST = "The browser took the graphics card away, so the picture is not drawn. Numbers and sliders still work.";
+
+/**
+ * Where a head is drawn, with what lies over every picture: letters, scale, and a word where there is no picture. Make the view in
+ * `element` with `listener`, then call `dress`.
+ */
+export class PictureBox {
+  readonly element = el("div", { class: "picture", attributes: { role: "region", "aria-label": "Picture of the head" } });
+  readonly listener: StageListener = {
+    onDrawn: () => this.update(),
+    onContext: (isLost) => {
+      this.showLost(isLost);
+      this.onContext(isLost);
+    },
+  };
+  private update = () => {};
+  private showLost: (isLost: boolean) => void = () => {};
+
+  constructor(private readonly onContext: (isLost: boolean) => void) {}
+
+  /** `label`: what the picture is and how it is turned, for those who do not see it. */
+  dress({ stage }: HeadView, label: string): void {
+    stage.surface.setAttribute("aria-label", label);
+    stage.surface.setAttribute("role", "application");
+    const marks = pictureMarks(stage);
+    this.update = onceAPicture(marks.update);
+    const lost = lostBox(stage);
+    this.showLost = lost.show;
+    this.element.append(marks.element, lost.element);
+    if (!stage.hasRenderer) {
+      const text = "This browser shows no 3D pictures (WebGL is off or missing). Everything else works.";
+      this.element.append(el("p", { class: "no-picture", text, attributes: { role: "alert" } }));
+    }
+    marks.update();
+  }
+}
+
+/** Over a picture that the browser has stopped: why, and the way to go on. */
+function lostBox(stage: Stage): { element: HTMLElement; show(isLost: boolean): void } {
+  const text = el("span");
+  const restore = button("Restore picture", () => void whileBusy(restore, () => stage.restore(), (thrown) => (text.textContent = sentenceOf(thrown))));
+  const element = el("div", { class: "no-picture", attributes: { role: "alert" } }, [el("p", {}, [text]), restore]);
+  element.hidden = true;
+  return {
+    element,
+    show(isLost) {
+      element.hidden = !isLost;
+      text.textContent = LOST;
+    },
+  };
+}
