@@ -39,7 +39,7 @@ export function exportPanel(bench: Workbench): HTMLElement {
       button("Plan JSON", tell(plan)),
       caseButton(bench),
     ]),
-    el("p", { class: "quiet", text: "In mm, LPS, as it is shown. Every file says: not a medical device." }),
+    el("p", { class: "quiet", text: "In mm, LPS, as it is shown. Plan JSON names Case file as its mesh: save both into one folder. Every file says: not a medical device." }),
     movingFilePart(bench),
   ]);
 }
