@@ -55,6 +55,12 @@ TEST_F(OtherClientsTest, PythonFindsTheReasonOfEveryRpcsError) {
                     HasSubstr("DeformService/Deform INVALID_ARGUMENT INVALID_REQUEST")));
 }
 
+// As docs/service-api.md says, so that whoever sets a keepalive need not find it out.
+TEST_F(OtherClientsTest, WhoPingsTooOftenIsCutOff) {
+  EXPECT_EQ(RunPython("ping_too_often.py"), 0) << Read("out.txt");
+  EXPECT_EQ(Read("out.txt"), "answered\nanswered\nanswered\nENHANCE_YOUR_CALM too_many_pings\n");
+}
+
 TEST_F(OtherClientsTest, PythonGoesOnWithAnUploadAndPreparesASession) {
   const int exit_code = RunPython("send_and_prepare.py");
   const std::string out = Read("out.txt");

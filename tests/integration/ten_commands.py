@@ -6,7 +6,8 @@
     tests/integration/ten_commands.py FOLDER_OF_PROGRAMS
 
 Each of them succeeds; the server speaks TLS to openssl; nobody else may read what is secret, and no log, no metric and
-no printed configuration holds it.
+no printed configuration holds it. Where a port is taken they end with the reason; run again in the same folder they succeed,
+also while the server of the run before still runs.
 """
 
 import contextlib
@@ -14,6 +15,7 @@ import os
 import pathlib
 import re
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -44,13 +46,45 @@ def check(condition, what):
 
 def secrets(folder):
     """What must be nowhere else: lines of keys, the token, the key of the audit log."""
-    found = [(folder / "token").read_text().strip(), (folder / "audit.key").read_text().strip()]
+    return [(folder / "token").read_text().strip(), *kept_secrets(folder)]
+
+
+def kept_secrets(folder):
+    found = [(folder / "audit.key").read_text().strip()]
     for name in ("ca.key", "server.key", "keys/private.pem"):
         found += [line for line in (folder / name).read_text().splitlines() if line and not line.startswith("-----")]
     return found
 
 
-def look(folder, programs, port, metrics_port):
+def run(folder, programs, port, metrics_port, options=("-euo", "pipefail")):
+    """The commands, in a session of their own; the server that they leave running is of that, too."""
+    environment = {"PATH": f"{programs}:/usr/sbin:/usr/bin:/sbin:/bin", "HOME": str(folder), "PORT": str(port), "METRICS": str(metrics_port), "LANG": "C.UTF-8"}
+    with open(folder / "told", "w+") as told:
+        shell = subprocess.Popen(["bash", *options, "-c", block()], cwd=folder, env=environment, stdout=told, stderr=subprocess.STDOUT, start_new_session=True)
+        try:
+            code = shell.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            os.killpg(shell.pid, signal.SIGKILL)
+            raise
+        told.seek(0)
+        return code, told.read()
+
+
+def stop(folder):
+    with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+        os.kill(int((folder / "server.pid").read_text()), signal.SIGTERM)
+
+
+def look_at_taken_ports(folder, programs, port, metrics_port):
+    """As a script, and as somebody pastes them, where what follows goes on after an error."""
+    for taken, options in ((port, ("-euo", "pipefail")), (port, ()), (metrics_port, ("-euo", "pipefail"))):
+        with socket.create_server(("127.0.0.1", taken)):
+            code, told = run(folder, programs, port, metrics_port, options)
+        check(code != 0 or not options, f"a taken port ends them ({' '.join(options) or 'pasted'})")
+        check(re.search(rf"cannot listen on 127.0.0.1:{taken}: .*--port|port {taken} .*cannot be listened on.*--metrics-port", told), f"they name the port {'PORT' if taken == port else 'METRICS'} and its option")
+
+
+def look(folder, programs, port, metrics_port, runs):
     printed = subprocess.run([programs / "tissueform-server", "--config", "server.ini", "--print-config"], cwd=folder, capture_output=True, text=True, check=True).stdout
     check("token-keys = keys/jwks.json\n" in printed, "the configuration prints as it was given")
     metrics = urllib.request.urlopen(f"http://127.0.0.1:{metrics_port}/metrics", timeout=PATIENCE_S).read().decode()
@@ -63,26 +97,25 @@ def look(folder, programs, port, metrics_port):
                          cwd=folder, input="", capture_output=True, text=True, errors="replace", timeout=PATIENCE_S)  # HTTP/2 may come, too
     check("Verify return code: 0 (ok)" in tls.stdout, "openssl finds the server's certificate right")
     backups = list(folder.glob("backup-*"))
-    check(len(backups) == 1 and subprocess.run(["sha256sum", "--check", "--quiet", "SHA256SUMS"], cwd=backups[0], check=False).returncode == 0, "sha256sum finds the backup whole")
+    check(len(backups) == runs and subprocess.run(["sha256sum", "--check", "--quiet", "SHA256SUMS"], cwd=max(backups), check=False).returncode == 0, "sha256sum finds the backup whole")
 
 
 def main(programs):
-    commands = block()
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        port, metrics_port = map(str, free_ports(2))
-        environment = {"PATH": f"{programs}:/usr/sbin:/usr/bin:/sbin:/bin", "HOME": name, "PORT": port, "METRICS": metrics_port, "LANG": "C.UTF-8"}
-        # A group of its own, so that the server that they leave running can be ended with it.
-        shell = subprocess.Popen(["bash", "-euo", "pipefail", "-c", commands], cwd=folder, env=environment, start_new_session=True)
+        port, metrics_port = free_ports(2)
         try:
-            code = shell.wait(PATIENCE_S)
-            if code != 0:
-                print((folder / "server.log").read_text() if (folder / "server.log").exists() else "no server", file=sys.stderr)
-            check(code == 0, "ten commands succeed")
-            look(folder, programs, port, metrics_port)
+            look_at_taken_ports(folder, programs, port, metrics_port)
+            backups = len(list(folder.glob("backup-*")))
+            keys = None
+            for again in range(2):
+                code, told = run(folder, programs, port, metrics_port)
+                check(code == 0, f"ten commands succeed{' again' if again else ''}" if code == 0 else told)
+                look(folder, programs, port, metrics_port, backups + again + 1)
+                check(keys in (None, kept_secrets(folder)), "keys are as they were")
+                keys = kept_secrets(folder)
         finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(shell.pid, signal.SIGTERM)
+            stop(folder)
 
 
 if __name__ == "__main__":
