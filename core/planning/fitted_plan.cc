@@ -19,6 +19,10 @@ absl::StatusOr<std::string> PlanWithPoses(std::string_view plan, const std::stri
                                           const std::vector<bool>& changed) {
   TF_ASSIGN_OR_RETURN(Json json, ParseJsonStrictly(std::string(plan)));
   json["mesh"] = mesh;
+  // What a planner wrote into the plan is of its old poses.
+  for (const auto& [key, schema] : PlanSchema().at("properties").items()) {
+    if (schema.value("from_planner", false)) json.erase(key);
+  }
   for (size_t h = 0; h < poses.size(); ++h) {
     if (changed[h]) json["handles"][h]["pose"] = ToJson(poses[h]);
   }

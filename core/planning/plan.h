@@ -74,7 +74,8 @@ struct PlannedHandle {
 
 struct Plan {
   CoordinateSystem coordinate_system = CoordinateSystem::kLps;
-  std::string mesh_path;  // joined with the folder of the plan
+  std::string mesh_path;    // joined with the folder of the plan
+  std::string mesh_sha256;  // of the mesh that the plan was made for; empty: of any
   StiffnessChoice stiffness;
   double poisson_ratio = 0.45;
   VertexSelector fixed;

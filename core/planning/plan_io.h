@@ -41,7 +41,8 @@ absl::StatusOr<Plan> ParsePlan(std::string_view json, const std::string& folder,
 //
 // Errors: those of ReadTetMesh, CheckUsable and ConstraintSet::Create; InvalidArgument for a
 // missing array, a value without stiffness, stiffness <= 0, an empty selection (the message names
-// the handle or "fixed").
+// the handle or "fixed"), a mesh that is not the one of plan.mesh_sha256. A mesh that ends with
+// ".tfcase" is that of a case; then also the errors of ReadCase.
 absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan);
 
 // The same upon a mesh that is in memory, in the plan's own coordinate system: no file is read, and

@@ -88,6 +88,7 @@ absl::StatusOr<Plan> ToPlan(const Json& json, const std::string& folder) {
   plan.mesh_path = (std::filesystem::path(folder) / json.at("mesh").get<std::string>())
                        .lexically_normal()
                        .string();
+  plan.mesh_sha256 = json.value("mesh_sha256", "");
   TF_ASSIGN_OR_RETURN(plan.stiffness, ToStiffness(json.at("stiffness")));
   plan.poisson_ratio = json.value("poisson_ratio", 0.45);
   plan.fixed = SelectorFromJson(json.at("fixed"));

@@ -4,11 +4,13 @@
 #include <optional>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
 #include "core/mesh/validation.h"
 #include "core/mesh_io/tet_mesh_io.h"
+#include "core/planning/case_mesh.h"
 #include "core/planning/plan_io.h"
 #include "core/planning/selector.h"
 #include "core/planning/stiffness.h"
@@ -68,8 +70,12 @@ absl::StatusOr<std::shared_ptr<const TetMesh>> ToLps(CoordinateSystem system, co
 }  // namespace
 
 absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan) {
-  TF_ASSIGN_OR_RETURN(TetMeshFile file, ReadTetMesh(plan.mesh_path));
-  return ResolvePlan(plan, std::move(file));
+  const bool is_case = absl::EndsWithIgnoreCase(plan.mesh_path, kCaseEnding);
+  TF_ASSIGN_OR_RETURN(TetMeshFile file,
+                      is_case ? ReadMeshOfCase(plan.mesh_path) : ReadTetMesh(plan.mesh_path));
+  TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan, std::move(file)));
+  TF_RETURN_IF_ERROR(CheckMeshDigest(plan, problem));
+  return problem;
 }
 
 absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, TetMeshFile file) {

@@ -6,7 +6,7 @@ import { join } from "node:path";
 import type { Page } from "playwright-core";
 import { handMadeCase } from "../../client/web/tests/testing/hand_made_case";
 import { ITS_MEASURES } from "../../client/web/tests/testing/hand_made_face";
-import { type Hook, Planner, live, moved, openCase, seriousFindings, state, takeSegment, typeMove } from "./planner";
+import { type Hook, Planner, live, moved, openCase, saveExport, seriousFindings, state, takeSegment, typeMove } from "./planner";
 
 let planner: Planner;
 beforeAll(async () => (planner = await Planner.start()));
@@ -101,13 +101,7 @@ describe("the hand-made face", () => {
 
   test("is exported as plan, profile and report, which name nobody and load nothing", async () => {
     const { page } = opened;
-    const save = async (button: string, file: string) => {
-      const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: button }).click()]);
-      expect(download.suggestedFilename()).toBe(file);
-      const path = join(planner.folder, file);
-      await download.saveAs(path);
-      return readFileSync(path);
-    };
+    const save = async (button: string, file: string) => readFileSync(await saveExport(planner, page, button, file));
     const plan = JSON.parse((await save("Plan JSON", "tissueform-plan.json")).toString());
     expect(plan.measures.find(({ name }: { name: string }) => name === "overjet")).toMatchObject({ unit: "mm", before: 3, after: 1 });
     expect(plan.measurement_landmarks.placed.length).toBe(17);

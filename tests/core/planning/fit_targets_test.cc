@@ -190,5 +190,18 @@ TEST(FitTargetsTest, PlanWithPosesKeepsAllElse) {
   EXPECT_EQ(written, plan);
 }
 
+TEST(FitTargetsTest, PlanWithPosesDropsWhatThePlannerSaysOfTheOldPoses) {
+  const Json plan = testing::GoodPlan();
+  Json exported = plan;
+  exported["version"] = 3;
+  exported["landmarks"] = Json::array({{{"name", "pogonion"}, {"totalMm", 8}}});
+  exported["measures"] = Json::array();
+  exported["answer"] = nullptr;
+  const std::vector<HandlePose> poses(plan["handles"].size());
+  ASSERT_OK_AND_ASSIGN(const std::string text,
+                       PlanWithPoses(exported.dump(), "mesh.vtu", poses, {false}));
+  EXPECT_EQ(Json::parse(text), plan);
+}
+
 }  // namespace
 }  // namespace tissueform

@@ -2,16 +2,21 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <numeric>
 #include <string>
 #include <vector>
 
 #include "core/base/status_macros.h"
+#include "core/case_file/case_writer.h"
+#include "core/case_file/predicted_case.h"
 #include "core/deformation/create_deformer.h"
 #include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh_payload/mesh_payload.h"
 #include "core/planning/plan_io.h"
 #include "core/planning/selector.h"
+#include "tests/core/case_file/sample_case.h"
 #include "tests/core/planning/plan_text.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
@@ -81,6 +86,38 @@ TEST_F(PlanResolverTest, BoxesSelectTheEndsOfABar) {
   EXPECT_THAT(std::vector<double>(problem.stiffness.begin(), problem.stiffness.end()), Each(15000));
   EXPECT_THAT(problem.point_data, SizeIs(2));
   EXPECT_THAT(problem.cell_data, SizeIs(2));
+}
+
+TEST_F(PlanResolverTest, MeshOfACaseIsReadAndHeldToItsDigest) {
+  const CaseFile contents = SampleCase();
+  ASSERT_OK_AND_ASSIGN(const std::string bytes, SerializeCase(contents));
+  std::ofstream(folder_ / "head.tfcase", std::ios::binary) << bytes;
+  nlohmann::json plan = GoodPlan();
+  plan["version"] = 3;
+  plan["mesh"] = "head.tfcase";
+  plan["mesh_sha256"] = contents.mesh.name.substr(std::string("meshes/").size());
+  plan["stiffness"] = {{"cell_data", "stiffness"}};
+  plan["fixed"] = {{"vertices", {0, 1}}};
+  plan["handles"][0]["region"] = {{"vertices", {44}}};
+  ASSERT_OK_AND_ASSIGN(const PlanProblem problem, Resolve(plan));
+  EXPECT_EQ(problem.mesh->positions(), RestPositions(contents.mesh));
+  EXPECT_EQ(problem.mesh->num_tets(), contents.mesh.tet_count);
+  EXPECT_THAT(std::vector<double>(problem.stiffness.begin(), problem.stiffness.end()), Each(1));
+
+  plan["mesh_sha256"] = std::string(64, 'a');
+  EXPECT_THAT(Resolve(plan), IsRefused("head.tfcase: not the mesh that the plan was made for"));
+  std::filesystem::resize_file(folder_ / "head.tfcase", bytes.size() / 2);
+  EXPECT_THAT(Resolve(plan), IsRefused("head.tfcase"));
+}
+
+TEST_F(PlanResolverTest, MeshFileIsHeldToTheDigestThatServersNameItBy) {
+  nlohmann::json plan = PlanWith("/stiffness", {{"cell_data", "pa"}});
+  plan["version"] = 3;
+  const CellArray stiffness = {"pa", Eigen::VectorXd::Constant(bar_.num_tets(), 2000)};
+  plan["mesh_sha256"] = ViewMeshPayload(bar_.positions(), bar_.tets(), {stiffness}).Sha256();
+  EXPECT_THAT(Resolve(plan).status(), IsOk());
+  plan["mesh_sha256"] = std::string(64, '0');
+  EXPECT_THAT(Resolve(plan), IsRefused("mesh.vtu: not the mesh that the plan was made for"));
 }
 
 TEST_F(PlanResolverTest, BoxIsClosed) {

@@ -1,0 +1,53 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/planning/case_mesh.h"
+
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "core/case_file/case_file.h"
+#include "core/case_file/case_reader.h"
+#include "core/mesh_payload/mesh_payload.h"
+
+namespace tissueform {
+
+absl::StatusOr<TetMeshFile> ReadMeshOfCase(const std::string& path) {
+  TF_ASSIGN_OR_RETURN(const CaseFile contents, ReadCase(path));
+  const CaseMesh& mesh = contents.mesh;
+  MeshPayload payload({mesh.vertex_count, mesh.tet_count, mesh.cell_arrays});
+  payload.Write(0, mesh.payload);
+  std::vector<Attribute> cell_data;
+  for (const CellArray& array : payload.cell_arrays()) {
+    cell_data.push_back(
+        {array.name, 1, std::vector<double>(array.values.begin(), array.values.end())});
+  }
+  absl::StatusOr<TetMesh> tets =
+      TetMesh::Create(std::move(payload.positions()), std::move(payload.tets()));
+  if (!tets.ok()) {
+    return absl::InvalidArgumentError(absl::StrCat("mesh ", path, ": ", tets.status().message()));
+  }
+  return TetMeshFile{.mesh = *std::move(tets), .point_data = {}, .cell_data = std::move(cell_data)};
+}
+
+// A server names a mesh by its vertices, its tets and the array that holds their stiffness.
+absl::Status CheckMeshDigest(const Plan& plan, const PlanProblem& problem) {
+  if (plan.mesh_sha256.empty()) return absl::OkStatus();
+  std::vector<CellArray> arrays;
+  if (const auto* chosen = std::get_if<StiffnessFromCellData>(&plan.stiffness)) {
+    arrays.push_back({chosen->name, problem.stiffness});
+  }
+  const MeshPayloadView view =
+      ViewMeshPayload(problem.mesh->positions(), problem.mesh->tets(), arrays);
+  if (view.Sha256() == plan.mesh_sha256) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("mesh ", plan.mesh_path,
+                   ": not the mesh that the plan was made for (mesh_sha256); save the case that "
+                   "the plan was exported from under that name"));
+}
+
+}  // namespace tissueform
