@@ -97,3 +97,32 @@ test("stored predictions are listed though the browser's kept connections are de
   await page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.stored.load());
   expect(line.opened).toBeGreaterThan(before);
 });
+
+test("a case that comes over 1.5 Mbit/s says all the time how far it is", async () => {
+  const narrow = await SlowLine.open(planner.url, 0, 1.5e6 / 8);
+  const context = await planner.browse();
+  // What the page shows below the bar, as it changes.
+  await context.addInitScript(() => {
+    const told: string[] = ((globalThis as any).told = []);
+    const look = () => {
+      const text = document.querySelector(".sheet .told")?.textContent ?? "";
+      if (text !== told[told.length - 1]) told.push(text);
+    };
+    new MutationObserver(look).observe(document, { subtree: true, childList: true, characterData: true });
+  });
+  const { hash } = new URL(opened.page.url());
+  const { page, faults } = await openPage(context, `${narrow.url}/${hash}`);
+  await page.locator(".planner header").waitFor();
+  const told: string[] = await page.evaluate(() => (globalThis as any).told);
+  const steps = told.flatMap((text) => /^(\d+\.\d) of (\d+\.\d) MB, (\d+) %$/.exec(text)?.slice(1).map(Number) ?? []);
+  const [megabytes, totals, percents] = [0, 1, 2].map((k) => steps.filter((_, i) => i % 3 === k));
+  expect(new Set(totals).size).toBe(1);
+  // In steps of 128 KiB, some of which come together.
+  expect(percents.length).toBeGreaterThan(totals[0] / 0.3);
+  expect(percents[0]).toBe(0);
+  expect(percents[percents.length - 1]).toBe(100);
+  expect(percents).toEqual([...percents].sort((a, b) => a - b));
+  expect(megabytes[megabytes.length - 1]).toBe(totals[0]);
+  expect(faults).toEqual([]);
+  narrow.close();
+});

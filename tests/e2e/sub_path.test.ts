@@ -71,14 +71,14 @@ describe.skipIf(!hasNginx)("a planner below a path", () => {
     expect([...faults, ...follower.faults]).toEqual([]);
   });
 
-  test("says at once that a proxy passes no WebSockets on", async () => {
+  test("says at once that a proxy blocks WebSockets", async () => {
     const { page } = await open(SOCKET_LINES);
     await page.getByRole("button", { name: "Sign in", exact: true }).click();
     await enterName(page, "ada");
     await page.getByText("Dr. ada").waitFor();
     await page.locator(".cases button").first().click();
     await page.locator(".planner header").waitFor();
-    await page.getByText("The proxy in front of the gateway passes no WebSockets on").waitFor({ timeout: 10_000 });
+    await page.getByText("A proxy blocks WebSockets").waitFor({ timeout: 10_000 });
   });
 
   test("is not a white page where scripts are refused", async () => {

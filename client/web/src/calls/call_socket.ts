@@ -44,8 +44,9 @@ export interface CallOptions {
   timer?: Timer;
 }
 
-/** Reason of the error of a socket that never opened; no server says it. */
+/** Reasons of the error of a socket that never opened, and why; no server says them. */
 export const NOT_OPENED = "SOCKET_NOT_OPENED";
+export const BLOCKED = "SOCKETS_BLOCKED";
 
 /** With which a socket is closed that was sent too much. */
 const TOO_LARGE = 1009;

@@ -15,7 +15,7 @@ import { ServerInfoService } from "../generated/tissueform/v1/server_info_pb";
 import { SessionService } from "../generated/tissueform/v1/session_service_pb";
 import { Bearer } from "./bearer";
 import { CallError, Code, toCallError } from "./call_error";
-import { type CallHandlers, type CallOptions, CallSocket, NOT_OPENED, type Socket, type SocketFactory } from "./call_socket";
+import { type CallHandlers, type CallOptions, BLOCKED, CallSocket, NOT_OPENED, type Socket, type SocketFactory } from "./call_socket";
 import type { Frame } from "./frame";
 import { withRoutes } from "./repetition";
 import { NODE_HEADER, SESSION_HEADER, SessionRoutes } from "./session_routes";
@@ -105,7 +105,7 @@ export class Gateway {
     const status = await fetch(`${this.base}/call`, options).then((reply) => reply.status, () => 0);
     if (status === 503) return new CallError(error.code, "the gateway takes no more connections now", NOT_OPENED);
     if (status !== SOCKETS_ONLY) return error;
-    return new CallError(error.code, "the proxy in front of the gateway passes no WebSockets on; ask its administrator to set it up as docs/gateway.md shows", NOT_OPENED);
+    return new CallError(error.code, "a proxy blocks WebSockets: tell the administrator (docs/gateway.md)", BLOCKED);
   }
 
   private async refused(error: CallError, token: string, onEnd: (error: CallError) => void): Promise<void> {

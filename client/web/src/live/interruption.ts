@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { type CallError, sentenceOf } from "../calls/call_error";
+import { BLOCKED } from "../calls/call_socket";
 import type { SessionRoutes } from "../calls/session_routes";
 
 /** How the page and the server stand to each other, for who draws it in words. */
@@ -36,7 +37,7 @@ export class Interruption {
   connection(error: CallError): Connection {
     this.since ??= this.now();
     const isLong = this.now() - this.since > MOVING_MS;
-    if (!isLong && (error.isElsewhere || this.routes.isCluster)) return { kind: "moving" };
+    if (!isLong && error.reason !== BLOCKED && (error.isElsewhere || this.routes.isCluster)) return { kind: "moving" };
     return { kind: "broken", text: sentenceOf(error) };
   }
 }

@@ -56,13 +56,14 @@ export function statusBar(title: string, { links, onLeave, onRetry, account }: S
     element,
     connection(connection) {
       dot.dataset.kind = connection.kind;
-      state.textContent = describe(connection);
+      // A narrow bar cuts it.
+      state.title = state.textContent = describe(connection);
       const share = connection.kind === "preparing" ? connection.share : null;
       progress.hidden = connection.kind !== "preparing";
       if (share === null) progress.removeAttribute("value");
       else progress.value = share;
       if (retry !== null) retry.hidden = connection.kind !== "failed";
-      age.hidden = connection.kind !== "live" && connection.kind !== "waiting";
+      age.hidden = connection.kind !== "live";
     },
     answered(roundTripMs) {
       age.textContent = roundTripMs < FRESH_MS ? `answered in ${Math.max(1, Math.round(roundTripMs))} ms` : `answered in ${(roundTripMs / 1000).toFixed(1)} s`;

@@ -102,7 +102,7 @@ test("other ends of a stream are told at once, as they are", () => {
 });
 
 test.each([
-  [426, "the proxy in front of the gateway passes no WebSockets on"],
+  [426, "a proxy blocks WebSockets"],
   [503, "the gateway takes no more connections"],
   [502, "the connection to the gateway does not open"],
   [0, "the connection to the gateway does not open"],

@@ -3,6 +3,7 @@
 
 import { expect, test } from "vitest";
 import { CallError, Code } from "../../src/calls/call_error";
+import { BLOCKED } from "../../src/calls/call_socket";
 import { Interruption } from "../../src/live/interruption";
 
 const GONE = new CallError(Code.Unavailable, "the server is gone");
@@ -15,6 +16,11 @@ test("one server that is away is told by its error", () => {
 test("in a cluster the session moves, as a short word", () => {
   expect(new Interruption({ isCluster: true }).connection(GONE)).toEqual({ kind: "moving" });
   expect(new Interruption({ isCluster: false }).connection(MOVED)).toEqual({ kind: "moving" });
+});
+
+test("what no server can mend is told at once", () => {
+  const blocked = new CallError(Code.Unavailable, "a proxy blocks WebSockets", BLOCKED);
+  expect(new Interruption({ isCluster: true }).connection(blocked)).toEqual({ kind: "broken", text: "A proxy blocks WebSockets." });
 });
 
 test("what lasts longer than any move is told by its error, until it goes on", () => {
