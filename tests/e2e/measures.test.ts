@@ -63,7 +63,7 @@ describe("the hand-made face", () => {
     await page.getByText("needs Nose tip").first().waitFor();
     await page.getByRole("button", { name: "Front", exact: true }).click();
     await page.getByRole("button", { name: "Place Nose tip" }).click();
-    const canvas = page.locator(".picture canvas").first();
+    const canvas = page.locator(".picture .surface");
     await canvas.click({ position: { x: 20, y: 300 } });
     await page.getByText("Nose tip: there is no skin there; choose a point on it.").waitFor();
     // The middle of the picture lies upon the strip.
