@@ -4,15 +4,12 @@
 #include "client/pacs_bridge/dicom/dicom_text.h"
 
 #include <algorithm>
-#include <cstdint>
-#include <iconv.h>
 #include <optional>
+#include <utility>
 
 #include "absl/strings/ascii.h"
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include <dcmtk/config/osconfig.h>
-#include <dcmtk/dcmdata/dcspchrs.h>
 #include <dcmtk/dcmdata/dctk.h>
 
 namespace tissueform {
@@ -50,33 +47,6 @@ std::string Tidy(std::string text) {
   return std::string(absl::StripAsciiWhitespace(text));
 }
 
-// DCMTK with the GNU C library knows no Japanese sets of ISO 2022, but the library does as a whole:
-// with half-width katakana written as escapes, DICOM's use of them is ISO-2022-JP-3, or -2 for
-// JIS X 0212.
-std::optional<std::string> JapaneseToUtf8(absl::string_view raw, bool supplementary) {
-  std::string escaped;
-  for (const char c : raw) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte < 0x80) {
-      escaped.push_back(c);
-    } else {
-      absl::StrAppend(&escaped, "\x1B(I", std::string(1, static_cast<char>(byte & 0x7F)), "\x1B(J");
-    }
-  }
-  const iconv_t converter = iconv_open("UTF-8", supplementary ? "ISO-2022-JP-2" : "ISO-2022-JP-3");
-  if (converter == reinterpret_cast<iconv_t>(-1)) return {};
-  std::string text(4 * escaped.size(), '\0');
-  char* from = escaped.data();
-  size_t from_left = escaped.size();
-  char* to = text.data();
-  size_t to_left = text.size();
-  const bool good = iconv(converter, &from, &from_left, &to, &to_left) != static_cast<size_t>(-1);
-  iconv_close(converter);
-  if (!good) return {};
-  text.resize(text.size() - to_left);
-  return text;
-}
-
 // Of any text: what is longer than 64 KiB is written without its kind, as bytes.
 std::string RawText(DcmElement* element) {
   Uint8* bytes = nullptr;
@@ -89,24 +59,16 @@ std::string RawText(DcmElement* element) {
   return {value.c_str(), value.size()};
 }
 
-}  // namespace
-
-struct DicomTexts::Converter {
-  DcmSpecificCharacterSet set;
-  bool selected = false;
-  std::string names = {};  // of the sets
-};
-
-DicomTexts::DicomTexts(DcmItem* dataset)
-    : dataset_(dataset), converter_(std::make_unique<Converter>()) {
+// Of the character sets.
+std::string NamesOf(DcmItem* dataset) {
   OFString names;
-  if (dataset->findAndGetOFStringArray(DCM_SpecificCharacterSet, names).good()) {
-    converter_->names = names.c_str();
-  }
-  converter_->selected = converter_->set.selectCharacterSet(*dataset).good();
+  if (dataset->findAndGetOFStringArray(DCM_SpecificCharacterSet, names).bad()) return {};
+  return {names.c_str(), names.size()};
 }
 
-DicomTexts::~DicomTexts() = default;
+}  // namespace
+
+DicomTexts::DicomTexts(DcmItem* dataset) : dataset_(dataset), set_(NamesOf(dataset)) {}
 
 void DicomTexts::Tell(absl::string_view what) {
   if (problem_.empty()) problem_ = std::string(what);
@@ -114,17 +76,7 @@ void DicomTexts::Tell(absl::string_view what) {
 
 std::string DicomTexts::ToUtf8(const DcmTagKey& tag, const std::string& raw, bool is_name) {
   if (IsAscii(raw)) return raw;
-  OFString converted;
-  if (converter_->selected &&
-      converter_->set.convertString(raw.c_str(), raw.size(), converted, is_name ? "\\^=" : "\\")
-          .good()) {
-    return converted.c_str();
-  }
-  const bool supplementary = absl::StrContains(converter_->names, "ISO 2022 IR 159");
-  if (supplementary || absl::StrContains(converter_->names, "ISO 2022 IR 87") ||
-      absl::StrContains(converter_->names, "ISO 2022 IR 13")) {
-    if (const auto japanese = JapaneseToUtf8(raw, supplementary)) return *japanese;
-  }
+  if (std::optional<std::string> text = set_.ToUtf8(raw, is_name)) return *std::move(text);
   Tell(absl::StrCat("the attribute ", tag.toString().c_str(), " is not in the character set that ",
                     "SpecificCharacterSet (0008,0005) names, or that is not known"));
   return OnlyAscii(raw);

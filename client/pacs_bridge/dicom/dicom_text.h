@@ -3,17 +3,18 @@
 
 #pragma once
 
-#include <memory>
 #include <string>
 
 #include "absl/strings/string_view.h"
+
+#include "client/pacs_bridge/dicom/character_set.h"
 
 class DcmItem;
 class DcmTagKey;
 
 namespace tissueform {
 
-// The texts of one data set as UTF-8, whatever character set it is written in (ISO 2022 too).
+// The texts of one data set as UTF-8, in whatever character set of the standard it is written.
 //
 // The data set outlives it. One thread.
 class DicomTexts {
@@ -22,7 +23,6 @@ class DicomTexts {
   static constexpr size_t kMostBytes = 1024;
 
   explicit DicomTexts(DcmItem* dataset);
-  ~DicomTexts();
   DicomTexts(const DicomTexts&) = delete;
   DicomTexts& operator=(const DicomTexts&) = delete;
 
@@ -35,13 +35,11 @@ class DicomTexts {
   const std::string& problem() const { return problem_; }
 
  private:
-  struct Converter;
-
   std::string ToUtf8(const DcmTagKey& tag, const std::string& raw, bool is_name);
   void Tell(absl::string_view what);
 
   DcmItem* const dataset_;
-  const std::unique_ptr<Converter> converter_;
+  const CharacterSet set_;
   std::string problem_;
 };
 

@@ -62,44 +62,6 @@ TEST(InstanceHeader, SaysWhatTheSliceSays) {
   EXPECT_EQ(header->text_problem, "");
 }
 
-struct NamedSet {
-  std::string called;
-  std::string set;
-  std::string raw;
-  std::string utf8;
-};
-
-class CharacterSetTest : public ::testing::TestWithParam<NamedSet> {};
-
-TEST_P(CharacterSetTest, NamesComeAsUtf8) {
-  CtSeriesOptions options;
-  options.slices = 1;
-  options.character_set = GetParam().set;
-  options.patient_name = GetParam().raw;
-  const InstanceHeader header = HeaderOf(GetParam().called, options);
-  EXPECT_EQ(header.patient_name, GetParam().utf8);
-  EXPECT_EQ(header.text_problem, "");
-}
-
-// The examples of PS3.5 H.3 and I.2.
-INSTANTIATE_TEST_SUITE_P(
-    All, CharacterSetTest,
-    ::testing::Values(
-        NamedSet{"Latin1", "ISO_IR 100", "M\xFCller^J\xF6rg", "Müller^Jörg"},
-        NamedSet{"Utf8", "ISO_IR 192", "Müller^Jörg", "Müller^Jörg"},
-        NamedSet{
-            "Japanese", "\\ISO 2022 IR 87",
-            "Yamada^Tarou=\x1B$B;3ED\x1B(B^\x1B$BB@O:\x1B(B=\x1B$B$d$^$@\x1B(B^\x1B$B$?$m$&\x1B(B",
-            "Yamada^Tarou=山田^太郎=やまだ^たろう"},
-        NamedSet{"HalfWidthKatakana", "ISO 2022 IR 13\\ISO 2022 IR 87",
-                 "\xD4\xCF\xC0\xDE^\xC0\xDB\xB3=\x1B$B;3ED\x1B(J^\x1B$BB@O:\x1B(J",
-                 "ﾔﾏﾀﾞ^ﾀﾛｳ=山田^太郎"},
-        NamedSet{"Korean", "\\ISO 2022 IR 149",
-                 "Hong^Gildong=\x1B$)C\xFB\xF3^\x1B$)C\xD1\xCE\xD4\xD7=\x1B$)C\xC8\xAB^\x1B$)"
-                 "C\xB1\xE6\xB5\xBF",
-                 "Hong^Gildong=洪^吉洞=홍^길동"}),
-    [](const auto& example) { return example.param.called; });
-
 TEST(InstanceHeader, ACharacterSetThatNobodyKnowsIsToldAndNotGuessed) {
   CtSeriesOptions options;
   options.slices = 1;
