@@ -91,7 +91,10 @@ DicomKind KindOf(const gdcm::File& file, const std::string& modality) {
       sop_class == kLegacyEnhancedCtImageStorage) {
     return IsLocaliser(data) ? DicomKind::kLocaliser : DicomKind::kMultiFrame;
   }
-  if (ShortOf(data, kRows) == 0 || ShortOf(data, kColumns) == 0) return DicomKind::kNoImage;
+  if (ShortOf(data, kRows) == 0 || ShortOf(data, kColumns) == 0) {
+    // A header that ends between two elements: only what is missing shows that it is cut off.
+    return sop_class == kCtImageStorage ? DicomKind::kDamaged : DicomKind::kNoImage;
+  }
   if (ShortOf(data, kSamplesPerPixel) > 1 ||
       !absl::StartsWith(TextOf(data, kPhotometricInterpretation), "MONOCHROME")) {
     return DicomKind::kColour;

@@ -4,6 +4,8 @@
 #include "core/ct/dicom_series.h"
 
 #include <algorithm>
+#include <iterator>
+#include <map>
 #include <set>
 #include <string>
 #include <utility>
@@ -129,6 +131,11 @@ std::vector<SliceGroup> GroupsOf(const std::vector<Candidate>& candidates) {
 }
 
 absl::Status NoneWanted(const std::vector<SliceGroup>& all, const SeriesChoice& choice) {
+  if (all.empty()) {
+    return absl::InvalidArgumentError(
+        "the folder holds no DICOM images, only a directory of them (DICOMDIR); name the folder "
+        "that holds the CT series");
+  }
   if (choice.series_number) {
     return absl::InvalidArgumentError(absl::StrCat(
         "the folder has no series ", *choice.series_number, "; it holds ", DescribeAll(all)));
@@ -181,14 +188,47 @@ absl::Status SeveralWanted(const std::vector<Candidate>& candidates) {
           : ""));
 }
 
+absl::Status NoCtSlice(const DicomHeader& file) {
+  return absl::InvalidArgumentError(
+      absl::StrCat(NameOf(file), " is not a CT slice but ", DescribeKind(file)));
+}
+
 absl::Status CheckKinds(const std::vector<DicomHeader>& slices) {
-  for (const DicomHeader& slice : slices) {
-    if (!IsCt(slice)) {
-      return absl::InvalidArgumentError(
-          absl::StrCat(NameOf(slice), " is not a CT slice but ", DescribeKind(slice)));
-    }
-  }
-  return absl::OkStatus();
+  const auto other = std::find_if_not(slices.begin(), slices.end(), IsCt);
+  return other == slices.end() ? absl::OkStatus() : NoCtSlice(*other);
+}
+
+// That the file which stands for its series is one of the series' slices.
+absl::Status CheckNamedFile(const std::vector<DicomHeader>& files, int file_number) {
+  std::vector<DicomHeader> named;
+  std::copy_if(files.begin(), files.end(), std::back_inserter(named),
+               [file_number](const DicomHeader& file) { return file.file_number == file_number; });
+  if (named.empty() || std::any_of(named.begin(), named.end(), IsCt)) return absl::OkStatus();
+  return NoCtSlice(named.front());
+}
+
+// Takes out of a series of CT slices what is none: captures, reports or scouts that came in it.
+// What may be slices that are not read stays, and CheckKinds refuses it.
+std::vector<DicomHeader> TakeStrangers(SliceGroup* series) {
+  if (!HasCt(*series)) return {};
+  const auto first = std::stable_partition(
+      series->slices.begin(), series->slices.end(), [](const DicomHeader& object) {
+        return IsCt(object) || object.kind == DicomKind::kMultiFrame ||
+               object.kind == DicomKind::kDamaged;
+      });
+  std::vector<DicomHeader> strangers(first, series->slices.end());
+  series->slices.erase(first, series->slices.end());
+  return strangers;
+}
+
+std::string DescribeStrangers(const std::string& series,
+                              const std::vector<DicomHeader>& strangers) {
+  std::map<std::string, std::vector<DicomHeader>> by_kind;
+  for (const DicomHeader& stranger : strangers) by_kind[DescribeKind(stranger)].push_back(stranger);
+  return absl::StrCat("left aside in ", series, ", as not CT slices: ",
+                      absl::StrJoin(by_kind, ", ", [](std::string* out, const auto& kind) {
+                        absl::StrAppend(out, FilesOf(kind.second), " (", kind.first, ")");
+                      }));
 }
 
 // The candidates that are meant, and of those that are whole the others are left aside.
@@ -225,15 +265,19 @@ void AddNotes(const Candidate& chosen, const std::vector<SliceGroup>& aside, Dic
 
 absl::StatusOr<DicomStack> ChooseSeries(const std::vector<DicomHeader>& files,
                                         const SeriesChoice& choice) {
+  TF_RETURN_IF_ERROR(CheckNamedFile(files, choice.file_number));
   const std::vector<SliceGroup> all = GroupBySeries(files);
   std::vector<SliceGroup> asked;
   std::vector<SliceGroup> aside;
+  DicomStack stack;
   for (const SliceGroup& group : all) {
-    const bool is_asked =
-        choice.series_number      ? group.slices.front().series_number == choice.series_number
-        : choice.file_number != 0 ? HasCt(group) || HoldsFile({group, {}}, choice.file_number)
-                                  : HasCt(group);
+    const bool is_asked = choice.series_number
+                              ? group.slices.front().series_number == choice.series_number
+                              : HasCt(group);
     (is_asked ? asked : aside).push_back(group);
+    if (!is_asked) continue;
+    const std::vector<DicomHeader> strangers = TakeStrangers(&asked.back());
+    if (!strangers.empty()) stack.notes.push_back(DescribeStrangers(NumberOf(group), strangers));
   }
   if (asked.empty()) return NoneWanted(all, choice);
   const std::vector<Candidate> candidates =
@@ -250,7 +294,6 @@ absl::StatusOr<DicomStack> ChooseSeries(const std::vector<DicomHeader>& files,
       aside.push_back(candidate.group);
     }
   }
-  DicomStack stack;
   stack.slices = chosen.scans.front().slices;
   TF_RETURN_IF_ERROR(CheckKinds(stack.slices));
   AddNotes(chosen, aside, &stack);

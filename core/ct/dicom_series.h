@@ -24,11 +24,12 @@ struct SeriesChoice {
 // Finds the one CT among all DICOM files of a folder: joins series that belong together
 // (slice_groups.h) and parts scans that lie among each other (slice_acquisitions.h), each with a
 // note. What is left aside (localiser, dose report, other modalities, series too short for a
-// volume, the smaller of two scans) is noted, too.
+// volume, the smaller of two scans) is noted, too, and so is what lies in the series itself and is
+// no CT slice.
 //
 // Errors: InvalidArgument when there is none, with what there is instead; when there are several,
-// with the largest of them and how to choose; when what was asked for is not there or holds
-// anything but CT slices.
+// with the largest of them and how to choose; when what was asked for is not there, holds no CT
+// slice, or holds what may be slices that are not read (multi-frame, cut off).
 absl::StatusOr<DicomStack> ChooseSeries(const std::vector<DicomHeader>& files,
                                         const SeriesChoice& choice);
 

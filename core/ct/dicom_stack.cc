@@ -37,24 +37,25 @@ const char* MissingTag(const DicomHeader& slice) {
   return nullptr;
 }
 
-absl::Status CheckRescale(const DicomHeader& slice, bool has_offset) {
-  const bool stated = slice.rescale_slope || slice.rescale_intercept;
-  if (stated && slice.rescale_intercept && slice.rescale_slope.value_or(1) != 0) {
-    return absl::OkStatus();
-  }
-  if (!stated && has_offset) return absl::OkStatus();
+bool HasRescale(const DicomHeader& slice) { return slice.rescale_slope || slice.rescale_intercept; }
+
+// `any_states`: some slice of the stack says how. Then an offset for all others would be a guess.
+absl::Status CheckRescale(const DicomHeader& slice, bool any_states, bool has_offset) {
+  const bool usable = slice.rescale_intercept && slice.rescale_slope.value_or(1) != 0;
+  if (usable || (!any_states && has_offset)) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
       NameOf(slice), " does not say how its values become HU (RescaleSlope, RescaleIntercept)",
-      stated ? "; export the series again" : "; state \"hu_offset\" in the recipe"));
+      any_states ? "; export the series again" : "; state \"hu_offset\" in the recipe"));
 }
 
 absl::Status CheckTags(const std::vector<DicomHeader>& slices, bool has_offset) {
+  const bool any_states = std::any_of(slices.begin(), slices.end(), HasRescale);
   for (const DicomHeader& slice : slices) {
     if (const char* const missing = MissingTag(slice)) {
       return absl::InvalidArgumentError(
           absl::StrCat(NameOf(slice), " has no usable ", missing, ": it cannot be placed"));
     }
-    TF_RETURN_IF_ERROR(CheckRescale(slice, has_offset));
+    TF_RETURN_IF_ERROR(CheckRescale(slice, any_states, has_offset));
   }
   return absl::OkStatus();
 }

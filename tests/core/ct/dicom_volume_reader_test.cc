@@ -191,24 +191,79 @@ TEST_F(DicomVolumeTest, FolderWithoutCtSlicesIsRefusedWithWhatItHolds) {
   Expect(Read({}, "readme.txt"), "the file is no DICOM file");
 }
 
-TEST_F(DicomVolumeTest, SliceThatIsNoCtSliceIsRefused) {
-  const std::vector<BadValue> values = {
+TEST_F(DicomVolumeTest, FolderWithADirectoryAndNoImageIsRefused) {
+  DicomFile directory;
+  Write("DICOMDIR", directory.Text(DicomFile::kSopClass, "UI", "1.2.840.10008.1.3.10").Bytes());
+  Write("readme.txt", "not a slice");
+  CtReadOptions fifth;
+  fifth.series_number = 5;
+  for (const CtReadOptions& options : {CtReadOptions(), fifth}) {
+    Expect(Read(options), "holds no DICOM images, only a directory of them (DICOMDIR)");
+  }
+  WriteSeries(PhantomSeries());
+  ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
+  EXPECT_EQ(volume.size[2], 9);
+  Expect(Read({}, "DICOMDIR"), "file 1 of the folder is not a CT slice but a directory (DICOMDIR)");
+}
+
+// What makes something else of a slice.
+std::vector<BadValue> OtherKinds() {
+  return {
       {DicomFile::kModality, "CS", "MR", "of modality MR"},
       {DicomFile::kSopClass, "UI", "1.2.840.10008.5.1.4.1.1.7", "a photograph or copy of a screen"},
       {DicomFile::kSopClass, "UI", "1.2.840.10008.5.1.4.1.1.77.1.4", "a photograph"},
       {DicomFile::kImageType, "CS", "ORIGINAL\\PRIMARY\\LOCALIZER", "a localiser"},
-      {DicomFile::kNumberOfFrames, "IS", "4", "multi-frame"},
       {DicomFile::kPhotometric, "CS", "RGB", "a colour image"},
       {DicomFile::kSamplesPerPixel, "US", std::string("\3\0", 2), "a colour image"},
+      {DicomFile::kSopClass, "UI", "1.2.840.10008.5.1.4.1.1.88.67", "no plain CT image"},
   };
-  for (const BadValue& bad : values) {
-    ExpectFifthSliceIsRefused(bad);
+}
+
+TEST_F(DicomVolumeTest, FolderOfAnotherKindIsRefused) {
+  std::vector<BadValue> kinds = OtherKinds();
+  kinds.push_back({DicomFile::kNumberOfFrames, "IS", "4", "multi-frame"});
+  for (const BadValue& kind : kinds) {
     std::vector<DicomFile> series = PhantomSeries();
-    for (DicomFile& file : series) file.Text(bad.tag, bad.vr, bad.value);
+    for (DicomFile& file : series) file.Text(kind.tag, kind.vr, kind.value);
     WriteSeries(series);
-    EXPECT_THAT(Read(),
-                StatusIs(kInvalid, AllOf(HasSubstr("holds no CT slices"), HasSubstr(bad.message))));
+    EXPECT_THAT(Read(), StatusIs(kInvalid,
+                                 AllOf(HasSubstr("holds no CT slices"), HasSubstr(kind.message))));
   }
+  // They may be slices that are not read.
+  ExpectFifthSliceIsRefused(kinds.back());
+  ExpectFifthSliceIsRefused({DicomFile::kRows, "US", std::string("\0\0", 2), "cut off or damaged"});
+}
+
+TEST_F(DicomVolumeTest, OtherObjectsOfTheSeriesAreLeftAsideWithANote) {
+  for (const BadValue& kind : OtherKinds()) {
+    std::vector<DicomFile> series = PhantomSeries();
+    DicomFile other = series[4];
+    series.push_back(other.Text(kind.tag, kind.vr, kind.value)
+                         .Text(DicomFile::kInstanceNumber, "IS", "10")
+                         .Text(DicomFile::kFrameOfReference, "UI", "1.2.9")
+                         .Erase(DicomFile::kPosition)
+                         .Erase(DicomFile::kRescaleIntercept)
+                         .Erase(DicomFile::kRescaleSlope));
+    WriteSeries(series);
+    ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
+    EXPECT_EQ(volume.size[2], 9);
+    EXPECT_EQ(WorstPhantomError(volume), 0);
+    EXPECT_THAT(volume.provenance.notes,
+                ElementsAre(AllOf(HasSubstr("left aside in series 2, as not CT slices: file 1 of"),
+                                  HasSubstr(kind.message))));
+    Expect(Read({}, "slice000"), "file 1 of the folder (instance number 10) is not a CT slice but");
+  }
+}
+
+TEST_F(DicomVolumeTest, OtherObjectInThePlaceOfASliceIsNotedAsAGap) {
+  std::vector<DicomFile> series = PhantomSeries();
+  series[4].Text(DicomFile::kPhotometric, "CS", "RGB");
+  WriteSeries(series);
+  ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
+  EXPECT_EQ(WorstPhantomError(volume), 0);
+  EXPECT_THAT(volume.provenance.notes,
+              ElementsAre(HasSubstr("file 5 of the folder (a colour image)"),
+                          HasSubstr("1 slice is missing between")));
 }
 
 TEST_F(DicomVolumeTest, MissingSliceIsNotedWithItsPlace) {
@@ -368,6 +423,17 @@ TEST_F(DicomVolumeTest, OffsetTakesThePlaceOfMissingRescaleTagsOnly) {
   Expect(Read(), "state \"hu_offset\" in the recipe");
   ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read(options));
   EXPECT_EQ(WorstPhantomError(volume), 0);
+}
+
+TEST_F(DicomVolumeTest, NoOffsetIsAdvisedWhereOtherSlicesStateARescale) {
+  std::vector<DicomFile> series = PhantomSeries();
+  series[4].Erase(DicomFile::kRescaleIntercept).Erase(DicomFile::kRescaleSlope);
+  WriteSeries(series);
+  CtReadOptions with_offset;
+  with_offset.hu_offset = -1024;
+  for (const CtReadOptions& options : {CtReadOptions(), with_offset}) {
+    Expect(Read(options), "become HU (RescaleSlope, RescaleIntercept); export the series again");
+  }
 }
 
 // Old scanners: values HU + 1024, and a rescale that says they were HU already. What one message
