@@ -137,7 +137,8 @@ CtSeries WriteCtSeries(const std::filesystem::path& folder, const CtSeriesOption
     DcmFileFormat file;
     DcmDataset* slice = file.getDataset();
     series.instance_uids.push_back(NewDicomUid());
-    Put(slice, DCM_SOPClassUID, std::string(kCtImageClass));
+    Put(slice, DCM_SOPClassUID,
+        options.class_uid.empty() ? std::string(kCtImageClass) : options.class_uid);
     Put(slice, DCM_SOPInstanceUID, series.instance_uids.back());
     PutPatientAndStudy(options, series, slice);
     PutSeries(options, series, slice);

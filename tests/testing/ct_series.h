@@ -30,7 +30,8 @@ struct CtSeriesOptions {
   std::string study_date = "20260102";
   std::string study_description = "Head";
 
-  std::string modality = "CT";  // the SOP class is CT Image whatever this says
+  std::string modality = "CT";
+  std::string class_uid = {};  // SOP class; empty: CT Image
   std::string series_description = "Bone 1.0";
   std::string kernel = "H60s";
   std::string image_type = "ORIGINAL\\PRIMARY\\AXIAL";

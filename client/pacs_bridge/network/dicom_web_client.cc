@@ -30,6 +30,7 @@ using Json = nlohmann::json;
 
 constexpr size_t kMostJsonBytes = 32 << 20;
 constexpr int64_t kMostSentBytes = int64_t{1} << 30;
+constexpr int kBadRequest = 400;
 // Answers of STOW-RS that say what became of the object.
 constexpr std::array<int, 3> kStowAnswers = {200, 202, 409};
 
@@ -81,8 +82,7 @@ class DicomWebClient : public PacsClient {
     TF_RETURN_IF_ERROR(CheckDicomUids({study_uid, series_uid}));
     const std::string instances =
         absl::StrCat("/studies/", study_uid, "/series/", series_uid, "/instances");
-    TF_ASSIGN_OR_RETURN(const Json answer, Query(absl::StrCat(instances, "?limit=1")));
-    const std::string instance = answer.empty() ? "" : JsonValueOf(answer[0], "00080018");
+    TF_ASSIGN_OR_RETURN(const std::string instance, SourceInstance(instances));
     if (!IsDicomUid(instance)) return Missing("series");
     return KeepOneHeader(path, [&](const InstanceFolder& folder, InstanceSink* sink) {
       return Retrieve(absl::StrCat(instances, "/", instance), folder, sink).status();
@@ -139,6 +139,17 @@ class DicomWebClient : public PacsClient {
     return parsed;
   }
 
+  // A CT image where the PACS tells of one, otherwise any; empty: it has none.
+  absl::StatusOr<std::string> SourceInstance(const std::string& instances) {
+    for (const std::string& wanted :
+         {absl::StrCat("SOPClassUID=", kCtImageClass, "&"), std::string()}) {
+      const auto answer = Query(absl::StrCat(instances, "?", wanted, "limit=1"));
+      if (!answer.ok() && wanted.empty()) return answer.status();
+      if (answer.ok() && !answer->empty()) return JsonValueOf((*answer)[0], "00080018");
+    }
+    return "";
+  }
+
   absl::StatusOr<std::vector<std::string>> FindStudies(const std::string& accession_number) {
     // What is not plain would need escapes, and wild cards match other patients.
     for (const char c : accession_number) {
@@ -186,24 +197,32 @@ class DicomWebClient : public PacsClient {
     body.append(std::istreambuf_iterator<char>(file), {});
     absl::StrAppend(&body, "\r\n--", boundary, "--\r\n");
     std::string text;
-    TF_ASSIGN_OR_RETURN(PacsHttpAnswer answer,
-                        Exchange(peer_,
-                                 {.path = "/studies",
-                                  .headers = {absl::StrCat("Content-Type: multipart/related; "
-                                                           "type=\"application/dicom\"; boundary=",
-                                                           boundary),
-                                              "Accept: application/dicom+json", "Expect:"},
-                                  .body = &body},
-                                 [&](const std::string& /*type*/, absl::string_view piece) {
-                                   if (text.size() < kMostJsonBytes)
-                                     text.append(piece.data(), piece.size());
-                                   return absl::OkStatus();
-                                 }));
+    PacsHttpAnswer answer;
+    // Both are right (RFC 2046), but some servers know only the one or the other.
+    for (const char* quote : {"\"", ""}) {
+      TF_ASSIGN_OR_RETURN(answer, PostObject(body, absl::StrCat(quote, boundary, quote), &text));
+      if (answer.status != kBadRequest) break;
+    }
     if (std::find(kStowAnswers.begin(), kStowAnswers.end(), answer.status) == kStowAnswers.end()) {
       return HttpFailed(answer, "an object (STOW-RS)");
     }
     if (text.empty()) text = std::move(answer.body);
     return Confirmed(StatusOfStow(peer_.name, text, header.instance_uid, answer.status), header);
+  }
+
+  absl::StatusOr<PacsHttpAnswer> PostObject(const std::string& body, const std::string& boundary,
+                                            std::string* text) {
+    return Exchange(peer_,
+                    {.path = "/studies",
+                     .headers = {absl::StrCat("Content-Type: multipart/related; "
+                                              "type=\"application/dicom\"; boundary=",
+                                              boundary),
+                                 "Accept: application/dicom+json", "Expect:"},
+                     .body = &body},
+                    [text](const std::string& /*type*/, absl::string_view piece) {
+                      if (text->size() < kMostJsonBytes) text->append(piece.data(), piece.size());
+                      return absl::OkStatus();
+                    });
   }
 
   // Answers of STOW-RS differ from PACS to PACS, and our copy is deleted by what they say: so what

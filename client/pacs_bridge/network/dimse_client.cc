@@ -152,7 +152,7 @@ class DimseClient : public PacsClient {
   absl::Status FetchHeader(const std::string& study_uid, const std::string& series_uid,
                            const std::string& path) override {
     TF_RETURN_IF_ERROR(CheckDicomUids({study_uid, series_uid}));
-    TF_ASSIGN_OR_RETURN(const std::string instance, AnyInstance(study_uid, series_uid));
+    TF_ASSIGN_OR_RETURN(const std::string instance, SourceInstance(study_uid, series_uid));
     const StudyRootQuery wanted = {"IMAGE",
                                    {{DCM_StudyInstanceUID, study_uid},
                                     {DCM_SeriesInstanceUID, series_uid},
@@ -233,17 +233,24 @@ class DimseClient : public PacsClient {
     return GetByDimse(peer_.name, association.get(), query, seconds_, announced, folder, sink);
   }
 
-  absl::StatusOr<std::string> AnyInstance(const std::string& study_uid,
-                                          const std::string& series_uid) {
+  // A CT image where the PACS tells of one, otherwise any.
+  absl::StatusOr<std::string> SourceInstance(const std::string& study_uid,
+                                             const std::string& series_uid) {
     TF_ASSIGN_OR_RETURN(const auto association, Associate(FindContexts()));
     std::string instance;
-    TF_RETURN_IF_ERROR(
-        Find(association.get(),
-             {"IMAGE",
-              {{DCM_StudyInstanceUID, study_uid},
-               {DCM_SeriesInstanceUID, series_uid},
-               {DCM_SOPInstanceUID, ""}}},
-             [&](DcmDataset* answer) { instance = DicomTexts(answer).Get(DCM_SOPInstanceUID); }));
+    bool is_ct = false;
+    TF_RETURN_IF_ERROR(Find(association.get(),
+                            {"IMAGE",
+                             {{DCM_StudyInstanceUID, study_uid},
+                              {DCM_SeriesInstanceUID, series_uid},
+                              {DCM_SOPClassUID, ""},
+                              {DCM_SOPInstanceUID, ""}}},
+                            [&](DcmDataset* answer) {
+                              if (is_ct) return;
+                              DicomTexts texts(answer);
+                              instance = texts.Get(DCM_SOPInstanceUID);
+                              is_ct = IsCtClass(texts.Get(DCM_SOPClassUID));
+                            }));
     if (!IsDicomUid(instance)) return NotThere("series");
     return instance;
   }

@@ -102,8 +102,8 @@ class PacsClient {
                                                   const std::string& series_uid,
                                                   InstanceFolder* folder, InstanceSink* sink) = 0;
 
-  // The header of any one object of a series, without pixels, as a new file (0600).
-  // Errors: also NotFound.
+  // The header of one object of a series, of a CT image where the PACS tells of one, without
+  // pixels, as a new file (0600). Errors: also NotFound.
   virtual absl::Status FetchHeader(const std::string& study_uid, const std::string& series_uid,
                                    const std::string& path) = 0;
 

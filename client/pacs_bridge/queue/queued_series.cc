@@ -3,8 +3,11 @@
 
 #include "client/pacs_bridge/queue/queued_series.h"
 
+#include <algorithm>
 #include <array>
+#include <iterator>
 
+#include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "client/pacs_bridge/queue/bridge_queue.h"
 #include "core/base/status_macros.h"
 
@@ -25,6 +28,13 @@ absl::StatusOr<SeriesState> StateOf(absl::string_view name) {
 }  // namespace
 
 const char* SeriesStateName(SeriesState state) { return kSeriesStates[static_cast<size_t>(state)]; }
+
+std::vector<QueuedImage> SourcesAmong(const std::vector<QueuedImage>& images) {
+  std::vector<QueuedImage> sources;
+  std::copy_if(images.begin(), images.end(), std::back_inserter(sources),
+               [](const QueuedImage& image) { return IsCtClass(image.class_uid); });
+  return sources.empty() ? images : sources;
+}
 
 absl::StatusOr<QueuedSeries> SeriesOf(const Database::Query& row) {
   QueuedSeries series;

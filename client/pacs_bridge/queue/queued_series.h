@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 
@@ -59,6 +60,10 @@ struct QueuedImage {
   std::string class_uid = {};
   std::string file = {};
 };
+
+// Those that a plan is built of: the images of CT classes; all where there are none. What else came
+// in a series (captures, reports) is no source of a plan and may lie in no frame of reference.
+std::vector<QueuedImage> SourcesAmong(const std::vector<QueuedImage>& images);
 
 // Of a row with the columns that ReceivedRows selects. Errors: DataLoss: a state that is none.
 absl::StatusOr<QueuedSeries> SeriesOf(const Database::Query& row);

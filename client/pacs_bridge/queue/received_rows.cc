@@ -154,8 +154,11 @@ absl::Status ReceivedRows::Update(const QueuedSeries& series) {
     const int64_t before = database.total_changes();
     TF_RETURN_IF_ERROR(
         database
-            .Prepare("UPDATE series SET state = ?, reason = ?, recipe = ?, case_name = ?, attempts "
-                     "= ?, last_error = ?, done_s = ?, has_files = ?, has_header = ? WHERE key = ?")
+            .Prepare(
+                "UPDATE series SET modality = ?, state = ?, reason = ?, recipe = ?, case_name = ?, "
+                "attempts = ?, last_error = ?, done_s = ?, has_files = ?, has_header = ? "
+                "WHERE key = ?")
+            .Bind(series.modality)
             .Bind(SeriesStateName(series.state))
             .Bind(series.reason)
             .Bind(series.recipe)

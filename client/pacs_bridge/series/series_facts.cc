@@ -6,11 +6,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+#include <map>
 #include <set>
+#include <utility>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_format.h"
 #include <Eigen/Geometry>
+
+#include "client/pacs_bridge/dicom/dicom_uid.h"
 
 namespace tissueform {
 namespace {
@@ -90,6 +95,26 @@ bool IsLocaliser(const InstanceHeader& image) {
          absl::StrContains(image.image_type, "SCOUT");
 }
 
+// SOP class, and whether it is a scout.
+using ObjectKind = std::pair<std::string, bool>;
+
+ObjectKind KindOf(const InstanceHeader& image) { return {image.class_uid, IsLocaliser(image)}; }
+
+ObjectKind KindOfSlices(const std::vector<InstanceHeader>& objects) {
+  const ObjectKind ct_slice = {std::string(kCtImageClass), false};
+  std::map<ObjectKind, int> counts;
+  for (const InstanceHeader& object : objects) ++counts[KindOf(object)];
+  if (counts.contains(ct_slice)) return ct_slice;
+  return std::max_element(counts.begin(), counts.end(),
+                          [](const auto& a, const auto& b) { return a.second < b.second; })
+      ->first;
+}
+
+bool StatesHounsfield(const InstanceHeader& image) {
+  return image.rescale_slope.has_value() && image.rescale_intercept.has_value() &&
+         (image.rescale_type.empty() || image.rescale_type == "HU");
+}
+
 const char* PlaneName(SliceOrientation plane) {
   constexpr std::array<const char*, 5> kNames = {"axial", "coronal", "sagittal", "oblique",
                                                  "placeless"};
@@ -98,24 +123,29 @@ const char* PlaneName(SliceOrientation plane) {
 
 }  // namespace
 
-SeriesFacts FactsOfSeries(const std::string& key, const std::vector<InstanceHeader>& images) {
+SeriesFacts FactsOfSeries(const std::string& key, const std::vector<InstanceHeader>& objects) {
+  const ObjectKind kind = KindOfSlices(objects);
+  std::vector<InstanceHeader> images;
+  std::copy_if(objects.begin(), objects.end(), std::back_inserter(images),
+               [&kind](const InstanceHeader& object) { return KindOf(object) == kind; });
   const InstanceHeader& first = images.front();
   SeriesFacts facts = {.key = key,
                        .study_uid = first.study_uid,
                        .modality = first.modality,
                        .description = first.series_description,
                        .number = first.series_number,
+                       .images = static_cast<int>(images.size()),
+                       .set_aside = static_cast<int>(objects.size() - images.size()),
                        .thickness_mm = first.slice_thickness_mm.value_or(0),
-                       .kernel = KernelKindOf(first.convolution_kernel)};
+                       .kernel = KernelKindOf(first.convolution_kernel),
+                       .localiser = kind.second,
+                       .multi_frame = IsCtClass(kind.first) && kind.first != kCtImageClass};
   std::set<std::string> frames;
   for (const InstanceHeader& image : images) {
     frames.insert(image.frame_uid);
     facts.contrast = facts.contrast || !image.contrast.empty();
-    facts.localiser = facts.localiser || IsLocaliser(image);
     facts.derived = facts.derived || absl::StartsWith(image.image_type, "DERIVED");
-    facts.hounsfield = facts.hounsfield && image.rescale_slope.has_value() &&
-                       image.rescale_intercept.has_value() &&
-                       (image.rescale_type.empty() || image.rescale_type == "HU");
+    facts.without_hounsfield += StatesHounsfield(image) ? 0 : 1;
   }
   facts.frames_of_reference = static_cast<int>(frames.size());
   MeasurePlaces(PlacesOf(images, &facts), &facts);
@@ -125,10 +155,17 @@ SeriesFacts FactsOfSeries(const std::string& key, const std::vector<InstanceHead
 std::string DescribeFacts(const SeriesFacts& facts) {
   constexpr std::array<const char*, 3> kKernels = {"soft kernel", "sharp kernel",
                                                    "kernel of unknown kind"};
-  return absl::StrFormat("%d %s slices, %.2f mm apart, over %.0f mm, %s%s", facts.slices,
+  const std::string aside = facts.set_aside > 0
+                                ? absl::StrFormat("; left aside: %d other object%s",
+                                                  facts.set_aside, facts.set_aside > 1 ? "s" : "")
+                                : "";
+  if (facts.multi_frame) {
+    return absl::StrFormat("%d multi-frame images (Enhanced CT)%s", facts.images, aside);
+  }
+  return absl::StrFormat("%d %s slices, %.2f mm apart, over %.0f mm, %s%s%s", facts.slices,
                          PlaneName(facts.plane), facts.spacing_mm, facts.coverage_mm,
                          kKernels[static_cast<size_t>(facts.kernel)],
-                         facts.contrast ? ", contrast medium" : "");
+                         facts.contrast ? ", contrast medium" : "", aside);
 }
 
 }  // namespace tissueform

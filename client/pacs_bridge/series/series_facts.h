@@ -14,14 +14,18 @@ namespace tissueform {
 
 enum class SliceOrientation { kAxial, kCoronal, kSagittal, kOblique, kNone };
 
-// What a series is, by its images' headers: what rules decide by. Numbers are of the slices that
-// lie at different places.
+// What a series is, by its images' headers: what rules decide by. The images are its CT slices or,
+// where it has none, its objects of the most frequent kind: what else came in the series (a capture
+// of a screen, a report, a scout) says nothing of the scan. Numbers are of the slices that lie at
+// different places.
 struct SeriesFacts {
   std::string key = {};  // of the queue
   std::string study_uid = {};
   std::string modality = {};
   std::string description = {};  // for rules only, never in a text: it may hold anything
   int number = 0;
+  int images = 0;
+  int set_aside = 0;  // objects of the series that are none of its images
   int slices = 0;
   int duplicates = 0;  // images at a place that another image has
   int missing = 0;     // places between the first and the last that have no image
@@ -35,11 +39,12 @@ struct SeriesFacts {
   bool contrast = false;
   bool localiser = false;
   bool derived = false;
-  bool hounsfield = true;  // all say how their values become Hounsfield units
+  bool multi_frame = false;    // Enhanced CT: nothing above is known of its frames
+  int without_hounsfield = 0;  // images that do not say how their values become Hounsfield units
 };
 
 // REQUIRES: headers of one series, at least one.
-SeriesFacts FactsOfSeries(const std::string& key, const std::vector<InstanceHeader>& images);
+SeriesFacts FactsOfSeries(const std::string& key, const std::vector<InstanceHeader>& objects);
 
 // "231 axial slices, 0.60 mm apart, over 138 mm, soft kernel", for people; nothing of a patient.
 std::string DescribeFacts(const SeriesFacts& facts);

@@ -71,17 +71,30 @@ void CheckSlices(const SeriesFacts& series, const SeriesRule& rule,
   }
 }
 
+// Advice to state an offset is for a series of which no image says how: where some do, the values
+// of the others are not known.
+void CheckHounsfield(const SeriesFacts& series, std::vector<std::string>* against) {
+  if (series.without_hounsfield == 0) return;
+  against->push_back(
+      series.without_hounsfield < series.images
+          ? absl::StrCat(series.without_hounsfield, " of its ", series.images,
+                         " images do not say how their values become Hounsfield units, the others "
+                         "do; have the scanner send the series again")
+          : "it does not say how its values become Hounsfield units, as a cone-beam CT may not; a "
+            "rule with \"hounsfield\": false and a recipe with hu_offset take it");
+}
+
 }  // namespace
 
 std::string WhatIsAgainst(const SeriesFacts& series, const SeriesRule& rule) {
   if (series.modality != rule.modality) return OtherModality(series.modality);
   if (series.localiser) return "it is a localiser (scout)";
-  std::vector<std::string> against;
-  if (rule.hounsfield && !series.hounsfield) {
-    against.emplace_back(
-        "it does not say how its values become Hounsfield units, as a cone-beam CT may not; a "
-        "rule with \"hounsfield\": false and a recipe with hu_offset take it");
+  if (series.multi_frame) {
+    return "its images have several frames each (Enhanced CT), which rules do not measure; choose "
+           "it by tissueform-pacs build, or have single-frame CT images sent";
   }
+  std::vector<std::string> against;
+  if (rule.hounsfield) CheckHounsfield(series, &against);
   CheckSlices(series, rule, &against);
   if (series.derived && !rule.derived) against.emplace_back("it is derived from another series");
   if (series.contrast && !rule.contrast) against.emplace_back("it has contrast medium");

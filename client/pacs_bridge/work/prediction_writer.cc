@@ -40,7 +40,7 @@ PredictionObjectsInput InputOf(const ExportMaterial& material) {
   PredictionObjectsInput input;
   input.source_header = material.header;
   input.source_series_uid = material.series_uid;
-  for (const QueuedImage& image : material.sources) {
+  for (const QueuedImage& image : SourcesAmong(material.sources)) {
     input.source_images.push_back({image.class_uid, image.uid});
   }
   input.contents = material.case_file;

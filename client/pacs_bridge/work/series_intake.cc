@@ -23,11 +23,12 @@ namespace {
 namespace fs = std::filesystem;
 
 // Goes to logs and tables, so it must be what it should be.
-bool IsModality(const std::string& text) {
-  return !text.empty() && text.size() <= 16 &&
-         std::all_of(text.begin(), text.end(), [](unsigned char c) {
-           return absl::ascii_isupper(c) || absl::ascii_isdigit(c);
-         });
+std::string ModalityOf(const std::string& text) {
+  const bool is_modality = !text.empty() && text.size() <= 16 &&
+                           std::all_of(text.begin(), text.end(), [](unsigned char c) {
+                             return absl::ascii_isupper(c) || absl::ascii_isdigit(c);
+                           });
+  return is_modality ? text : "?";
 }
 
 constexpr char kCameLate[] = "images came after its plan was built, which lacks them";
@@ -102,7 +103,7 @@ absl::StatusOr<std::vector<std::string>> SeriesIntake::PutSeries(
   series.study_uid = first.study_uid;
   series.uid = first.series_uid;
   series.frame_uid = first.frame_uid;
-  series.modality = IsModality(first.modality) ? first.modality : "?";
+  series.modality = ModalityOf(first.modality);
   series.first_s = std::time(nullptr);
   bool one_patient = true;
   std::vector<QueuedImage> images;
@@ -313,6 +314,8 @@ absl::StatusOr<std::vector<std::string>> SeriesIntake::ChooseOfStudy(const std::
       continue;
     }
     candidates.push_back(series);
+    // When the series was new, that of whichever of its objects came first.
+    candidates.back().modality = ModalityOf(read->modality);
     facts.push_back(*read);
   }
   const std::vector<SeriesVerdict> verdicts = PickSeries(facts, options_.rules);
@@ -332,7 +335,8 @@ absl::Status SeriesIntake::KeepHeader(QueuedSeries* series) {
   if (images.empty() || images.front().file.empty()) {
     return absl::FailedPreconditionError("the images of the series are deleted");
   }
-  TF_RETURN_IF_ERROR(CopyHeaderOnly(images.front().file, queue_->header_path(series->key)));
+  const std::string source = SourcesAmong(images).front().file;
+  TF_RETURN_IF_ERROR(CopyHeaderOnly(source, queue_->header_path(series->key)));
   series->has_header = true;
   return absl::OkStatus();
 }

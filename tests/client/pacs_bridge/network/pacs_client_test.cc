@@ -24,6 +24,7 @@
 #include "tests/testing/ct_series.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"
+#include "tests/testing/test_paths.h"
 
 namespace tissueform {
 namespace {
@@ -41,6 +42,7 @@ using testing::IsOk;
 using ::testing::Not;
 using testing::RecordingSink;
 using ::testing::SizeIs;
+using testing::SourcePath;
 using testing::StatusIs;
 using testing::TestAuthority;
 using testing::TestFiles;
@@ -269,6 +271,21 @@ TEST_P(PacsHeaderTest, AHeaderComesWithoutPixels) {
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("no such series")));
 }
 
+TEST_P(PacsHeaderTest, OfASeriesWithCapturesTheHeaderOfASliceComes) {
+  CtSeriesOptions options{.study_uid = NewDicomUid(), .series_uid = NewDicomUid()};
+  options.slices = 1;
+  const CtSeries slice = WriteCtSeries(home_ / "sent", options);
+  fs::create_directories(home_ / "captures");
+  options.class_uid = std::string(kColourCaptureClass);
+  options.slices = 5;
+  const CtSeries captures = WriteCtSeries(home_ / "captures", options);
+  for (const auto& files : {captures.files, slice.files, captures.files}) {
+    ASSERT_THAT(client_->Store(files).status(), IsOk());
+  }
+  ASSERT_THAT(client_->FetchHeader(slice.study_uid, slice.series_uid, home_ / "header"), IsOk());
+  EXPECT_EQ(ReadInstanceHeader(home_ / "header")->class_uid, kCtImageClass);
+}
+
 TEST_P(TlsPacsClientTest, WithoutACertificateOfTheAuthorityNobodyIsServed) {
   const TestAuthority stranger("Another authority");
   TestFiles foreign = stranger.IssueFiles(home_ / "keys", "foreign");
@@ -380,6 +397,33 @@ TEST(PacsClient, AnObjectThatIsRefusedIsToldByItsUid) {
   const auto again = (*MakePacsClient(peer))->Store(series.files);
   ASSERT_THAT(again.status(), IsOk());
   EXPECT_THAT((*again)[0].status, IsOk()) << "a duplicate of our own UID is what was sent before";
+}
+
+// What a STOW-RS server that takes one spelling of the boundary says of one object.
+absl::Status StoreToStrictServer(const std::string& spelling) {
+  const fs::path home = EmptyTestFolder("strict_stow_" + spelling);
+  const int port = FreePort();
+  ChildOptions options;
+  options.program = "python3";
+  options.arguments = {SourcePath("tests/client/pacs_bridge/network/strict_stow.py"),
+                       absl::StrCat(port), spelling};
+  options.output = ChildStream::File(home / "log");
+  options.errors = ChildStream::File(home / "log");
+  const auto server = GuardedProgram::Start(options, std::chrono::milliseconds(200));
+  EXPECT_THAT(server.status(), IsOk());
+  EXPECT_TRUE(WaitForPort(port)) << BytesOfFile(home / "log");
+  PacsPeer peer{.name = "strict", .kind = PacsPeer::Kind::kDicomWeb};
+  peer.url = absl::StrCat("http://127.0.0.1:", port);
+  const CtSeries series = WriteCtSeries(home, {.slices = 1});
+  const auto stored = (*MakePacsClient(peer))->Store(series.files);
+  return stored.ok() ? stored->at(0).status : stored.status();
+}
+
+TEST(PacsClient, ServersThatTakeOneSpellingOfTheBoundaryGetIt) {
+  EXPECT_THAT(StoreToStrictServer("quoted"), IsOk());
+  EXPECT_THAT(StoreToStrictServer("bare"), IsOk());
+  EXPECT_THAT(StoreToStrictServer("neither"),
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("HTTP status 400")));
 }
 
 TEST(PacsClient, PeersThatCannotBeAreTold) {

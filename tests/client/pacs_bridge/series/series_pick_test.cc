@@ -9,6 +9,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "client/pacs_bridge/series/series_objections.h"
 #include "tests/testing/status_matchers.h"
 
@@ -24,6 +25,7 @@ std::vector<InstanceHeader> Head(int slices = 200, double spacing_mm = 0.8) {
   std::vector<InstanceHeader> images;
   for (int i = 0; i < slices; ++i) {
     InstanceHeader image;
+    image.class_uid = std::string(kCtImageClass);
     image.study_uid = "1.2.3";
     image.series_uid = "1.2.3.4";
     image.frame_uid = "1.2.3.5";
@@ -127,8 +129,22 @@ INSTANTIATE_TEST_SUITE_P(
                "turned differently"},
         Defect{"Few", [](Images* i) { i->resize(20); }, "it has 20 slices, fewer than 60"},
         Defect{"Thick", [](Images* i) { i->front().slice_thickness_mm = 5; }, "5.00 mm thick"},
-        Defect{"Scout", [](Images* i) { i->front().image_type = "ORIGINAL\\PRIMARY\\LOCALIZER"; },
+        Defect{"Scout",
+               [](Images* i) {
+                 for (InstanceHeader& image : *i) image.image_type = "ORIGINAL\\PRIMARY\\LOCALIZER";
+               },
                "localiser"},
+        Defect{"SomeWithoutHounsfield", [](Images* i) { (*i)[7].rescale_slope.reset(); },
+               "1 of its 200 images do not say how their values become Hounsfield units"},
+        Defect{"MultiFrame",
+               [](Images* i) {
+                 for (InstanceHeader& image : *i) {
+                   image.class_uid = std::string(kEnhancedCtImageClass);
+                   image.rescale_slope.reset();
+                   image.position.reset();
+                 }
+               },
+               "several frames each (Enhanced CT)"},
         Defect{"Derived", [](Images* i) { i->front().image_type = "DERIVED\\SECONDARY"; },
                "derived"},
         Defect{"Magnetic", [](Images* i) { i->front().modality = "MR"; }, "no Hounsfield units"},
@@ -145,6 +161,69 @@ INSTANTIATE_TEST_SUITE_P(
                },
                "it has 0 slices"}),
     [](const auto& defect) { return std::string(defect.param.name); });
+
+struct Stranger {
+  const char* name;
+  std::function<void(InstanceHeader*)> change;
+};
+
+class StrangerTest : public ::testing::TestWithParam<Stranger> {};
+
+TEST_P(StrangerTest, InASeriesOfCtSlicesIsLeftAsideWithANote) {
+  for (const bool comes_first : {false, true}) {
+    const SeriesFacts facts = FactsAfter([comes_first](Images* images) {
+      InstanceHeader stranger = images->front();
+      GetParam().change(&stranger);
+      images->insert(comes_first ? images->begin() : images->end(), stranger);
+    });
+    EXPECT_EQ(facts.set_aside, 1);
+    EXPECT_EQ(facts.modality, "CT");
+    EXPECT_EQ(WhatIsAgainst(facts, SomeRule()), "");
+    const SeriesVerdict verdict = PickSeries({facts}, {SomeRule()}).front();
+    EXPECT_TRUE(verdict.chosen);
+    EXPECT_THAT(verdict.reason, HasSubstr("200 axial slices"));
+    EXPECT_THAT(verdict.reason, HasSubstr("left aside: 1 other object"));
+  }
+}
+
+void MakeCapture(InstanceHeader* object) {
+  *object = {.study_uid = object->study_uid,
+             .series_uid = object->series_uid,
+             .class_uid = "1.2.840.10008.5.1.4.1.1.7",
+             .modality = "OT",
+             .image_type = "DERIVED\\SECONDARY"};
+}
+
+INSTANTIATE_TEST_SUITE_P(All, StrangerTest,
+                         ::testing::Values(Stranger{"Capture", MakeCapture},
+                                           Stranger{"Report",
+                                                    [](InstanceHeader* object) {
+                                                      MakeCapture(object);
+                                                      object->class_uid =
+                                                          "1.2.840.10008.5.1.4.1.1.88.67";
+                                                      object->modality = "SR";
+                                                    }},
+                                           Stranger{"Scout",
+                                                    [](InstanceHeader* object) {
+                                                      object->image_type =
+                                                          "ORIGINAL\\PRIMARY\\LOCALIZER";
+                                                      object->frame_uid = "9";
+                                                      object->axes->col(1) =
+                                                          Eigen::Vector3d::UnitZ();
+                                                    }}),
+                         [](const auto& stranger) { return std::string(stranger.param.name); });
+
+TEST(SeriesFactsTest, WithoutCtSlicesTheMostFrequentKindCounts) {
+  const SeriesFacts facts = FactsAfter([](Images* images) {
+    for (InstanceHeader& image : *images) {
+      image.class_uid = "1.2.840.10008.5.1.4.1.1.4";
+      image.modality = "MR";
+    }
+    MakeCapture(&images->front());
+  });
+  EXPECT_EQ(facts.set_aside, 1);
+  EXPECT_THAT(WhatIsAgainst(facts, SomeRule()), HasSubstr("modality MR"));
+}
 
 TEST(PickSeriesTest, TheSofterKernelWinsAndTheOtherIsToldWhy) {
   SeriesFacts sharp = FactsAfter([](Images* images) {

@@ -11,6 +11,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "tests/client/pacs_bridge/work/bridge_work.h"
 
 namespace tissueform {
@@ -68,6 +69,27 @@ TEST_F(SeriesIntakeTest, AMissingSliceIsSeenWhereNobodyCounts) {
   WaitQuietly();
   Settle();
   EXPECT_EQ(StateOf(series), SeriesState::kIncomplete);
+}
+
+TEST_F(SeriesIntakeTest, CapturesInASeriesHideNoneOfItsSlicesAndGiveNoHeader) {
+  testing::CtSeriesOptions options;
+  options.study_uid = "1.2.840.1";
+  options.series_uid = "1.2.840.3";
+  testing::CtSeriesOptions captures = options;
+  captures.modality = "OT";
+  captures.class_uid = std::string(kColourCaptureClass);
+  captures.slices = 20;
+  Receive("captures", captures);
+  Settle();
+  const testing::CtSeries series = Receive("a", options);
+  WaitQuietly();
+  Settle();
+  ASSERT_EQ(StateOf(series), SeriesState::kChosen);
+  const QueuedSeries chosen = *rows_.GetByUid(series.series_uid);
+  EXPECT_EQ(chosen.modality, "CT");
+  EXPECT_THAT(chosen.reason, AllOf(HasSubstr("8 axial slices"), HasSubstr("left aside: 20 other")));
+  EXPECT_EQ(ReadInstanceHeader(queue_->header_path(chosen.key))->class_uid, kCtImageClass);
+  EXPECT_EQ(SourcesAmong(*rows_.ListImages(chosen.key)).size(), 8);
 }
 
 TEST_F(SeriesIntakeTest, AnAbortedAssociationLeavesNothingHalf) {
