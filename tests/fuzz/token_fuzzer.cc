@@ -1,11 +1,13 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <string>
 #include <vector>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
@@ -25,9 +27,12 @@ void Demand(bool promise) {
   if (!promise) std::abort();
 }
 
-// A refusal is one sentence and has nothing of what came.
+// A refusal is one bounded, printable sentence, whatever came.
 void CheckRefusal(const absl::Status& status) {
-  Demand(absl::IsUnauthenticated(status) && !absl::StrContains(status.message(), "\n"));
+  const absl::string_view message = status.message();
+  Demand(absl::IsUnauthenticated(status) && message.size() < 600);
+  Demand(std::all_of(message.begin(), message.end(),
+                     [](unsigned char c) { return absl::ascii_isprint(c); }));
 }
 
 void CheckHeader(absl::string_view json) {

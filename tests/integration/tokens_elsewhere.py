@@ -71,9 +71,9 @@ def check_their_tokens(channel, keys):
         good = sign(claims())
         for forged, told in (
             (sign(claims(exp=int(time.time()) - 100)), "expired"),
-            (sign(claims(aud="other")), "not made for this server"),
-            (sign(claims(iss="https://evil.example")), "another provider's"),
-            (sign(claims(), kid="unknown"), "not known here"),
+            (sign(claims(aud="other")), 'audience is "other", and this server is'),
+            (sign(claims(iss="https://evil.example")), 'issuer is "https://evil.example", and this server takes'),
+            (sign(claims(), kid="unknown"), "key is not one of"),
             (sign(claims(), jku="https://evil.example/keys"), "a key of its own"),
             (jwt.encode(claims(), None, "none", headers={"kid": key["kid"]}), "algorithm"),
             (jwt.encode(claims(), "secret" * 6, "HS256", headers={"kid": key["kid"]}), "algorithm"),
