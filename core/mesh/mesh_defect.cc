@@ -4,11 +4,39 @@
 #include "core/mesh/mesh_defect.h"
 
 #include <algorithm>
+#include <array>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 
 namespace tissueform {
+namespace {
+
+struct Unit {
+  const char* name;
+  double mm;
+};
+// In which meshes are saved by mistake; the likeliest first.
+constexpr std::array<Unit, 3> kOtherUnits = {
+    {{"meters", 1000}, {"centimeters", 10}, {"micrometers", 0.001}}};
+
+bool MayBeOfHead(double diagonal_mm) {
+  return diagonal_mm >= kLeastHeadDiagonalMm && diagonal_mm <= kMostHeadDiagonalMm;
+}
+
+// For the unit that makes a head of it.
+std::string UnitAdvice(double diagonal) {
+  for (const Unit& unit : kOtherUnits) {
+    if (!MayBeOfHead(diagonal * unit.mm)) continue;
+    return absl::StrFormat("; if the file is in %s, multiply its coordinates by %g", unit.name,
+                           unit.mm);
+  }
+  return "; check the unit of the file";
+}
+
+}  // namespace
 
 void AddDefect(const DefectWords& words, const std::vector<Eigen::Index>& found,
                std::vector<MeshDefect>* defects) {
@@ -23,6 +51,26 @@ void AddDefect(const DefectWords& words, const std::vector<Eigen::Index>& found,
                                     absl::StrJoin(defect.examples, ", "),
                                     found.size() > shown ? ", ..." : "", "): ", words.advice);
   defects->push_back(std::move(defect));
+}
+
+std::optional<MeshDefect> FindImplausibleSize(const Positions& positions) {
+  if (positions.rows() == 0 || !positions.allFinite()) return std::nullopt;
+  const double diagonal_mm =
+      (positions.colwise().maxCoeff() - positions.colwise().minCoeff()).norm();
+  if (MayBeOfHead(diagonal_mm)) return std::nullopt;
+  MeshDefect defect{"implausible_size", Severity::kWarning, 1, {}, ""};
+  const bool is_small = diagonal_mm < kLeastHeadDiagonalMm;
+  defect.explanation = absl::StrFormat(
+      "the diagonal of the bounding box is %.4g mm, %s than %.4g mm%s", diagonal_mm,
+      is_small ? "less" : "more", is_small ? kLeastHeadDiagonalMm : kMostHeadDiagonalMm,
+      UnitAdvice(diagonal_mm));
+  return defect;
+}
+
+void AddImplausibleSize(const Positions& positions, std::vector<MeshDefect>* defects) {
+  if (std::optional<MeshDefect> size = FindImplausibleSize(positions)) {
+    defects->push_back(*std::move(size));
+  }
 }
 
 bool AreUsable(const std::vector<MeshDefect>& defects) {

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -43,6 +44,17 @@ struct DefectWords {
 // Adds "<count> <what> (<noun> <examples>): <advice>" when `found`, in rising order, is not empty.
 void AddDefect(const DefectWords& words, const std::vector<Eigen::Index>& found,
                std::vector<MeshDefect>* defects);
+
+// The diagonals of bounding boxes, in mm, that a head or a part of it may have. What has another
+// one was probably saved in another unit.
+inline constexpr double kLeastHeadDiagonalMm = 10;
+inline constexpr double kMostHeadDiagonalMm = 2000;
+
+// The warning implausible_size for places, in mm, whose bounding box is none of a head; nothing
+// where it may be one, or where a coordinate is not finite.
+std::optional<MeshDefect> FindImplausibleSize(const Positions& positions);
+// Adds it where there is one.
+void AddImplausibleSize(const Positions& positions, std::vector<MeshDefect>* defects);
 
 // Whether no defect is of Severity::kError.
 bool AreUsable(const std::vector<MeshDefect>& defects);

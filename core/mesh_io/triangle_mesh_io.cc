@@ -20,13 +20,15 @@
 namespace tissueform {
 namespace {
 
-absl::StatusOr<TriangleMeshFile> ToTriangleMeshFile(RawMesh raw) {
+absl::StatusOr<TriangleMeshFile> ToTriangleMeshFile(RawMesh raw, FileSpace space) {
   TF_RETURN_IF_ERROR(CheckRawMesh(raw));
+  if (space == FileSpace::kRas) TurnRasToLps(&raw);
   TF_ASSIGN_OR_RETURN(TriangleMesh mesh, TriangleMesh::Create(std::move(raw.positions), raw.cells));
   return TriangleMeshFile{.mesh = std::move(mesh),
                           .point_data = std::move(raw.point_data),
                           .cell_data = std::move(raw.cell_data),
-                          .split_polygons = raw.split_polygons};
+                          .split_polygons = raw.split_polygons,
+                          .space = space};
 }
 
 absl::StatusOr<std::string> Serialize(MeshFormat format, const TriangleMeshFile& file) {
@@ -48,7 +50,7 @@ absl::StatusOr<TriangleMeshFile> ReadTriangleMesh(const std::string& path,
   try {
     absl::StatusOr<RawMesh> raw = ReadIsolated(file, limits);
     if (!raw.ok()) return WithMeshName(path, raw.status());
-    absl::StatusOr<TriangleMeshFile> mesh = ToTriangleMeshFile(*std::move(raw));
+    absl::StatusOr<TriangleMeshFile> mesh = ToTriangleMeshFile(*std::move(raw), SpaceOf(file));
     if (!mesh.ok()) return WithMeshName(path, mesh.status());
     return mesh;
   } catch (const std::bad_alloc&) {

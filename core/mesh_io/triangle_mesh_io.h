@@ -11,6 +11,7 @@
 
 #include "core/mesh/attribute.h"
 #include "core/mesh/triangle_mesh.h"
+#include "core/mesh_io/file_space.h"
 #include "core/mesh_io/tet_mesh_io.h"
 
 namespace tissueform {
@@ -22,6 +23,8 @@ struct TriangleMeshFile {
   std::vector<Attribute> cell_data;   // #F tuples each
   // Faces of the file with more than three corners, each split into a fan. Not written.
   int64_t split_polygons = 0;
+  // What the file states; the mesh is in LPS by then. Not written.
+  FileSpace space = FileSpace::kUnstated;
 };
 
 // Whether the ending of `path` is that of a surface format, in any case.
@@ -29,7 +32,8 @@ bool NamesSurface(const std::string& path);
 
 // Reads .vtp (with all arrays), .ply (with normals, colours, texture coordinates), .stl (corners at
 // exactly one place become one vertex), .obj or .off (places and faces); the ending, in any case,
-// chooses the format. Each is read by a helper program.
+// chooses the format. Each is read by a helper program. What states RAS coordinates (FileSpace) is
+// turned to LPS.
 //
 // Errors: as ReadTetMesh (core/mesh_io/tet_mesh_io.h). Never throws.
 absl::StatusOr<TriangleMeshFile> ReadTriangleMesh(const std::string& path,

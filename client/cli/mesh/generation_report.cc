@@ -8,6 +8,7 @@
 #include "absl/strings/str_join.h"
 
 #include "client/cli/mesh/mesh_report.h"
+#include "client/cli/mesh/surface_report.h"
 #include "client/cli/shared/report_parts.h"
 
 namespace tissueform {
@@ -28,9 +29,11 @@ std::string SurfaceText(const GenerationReport& report) {
       "  components         %10d\n"
       "  intersecting pairs %10s\n"
       "  enclosed volume    %10.4g mm^3 (0 where it is not closed)\n"
+      "  coordinates        %s\n"
       "%s",
       report.surface, surface.num_vertices, surface.num_triangles, surface.num_components,
-      PairsText(report.defects), surface.enclosed_volume_mm3, DefectsText(report.defects.defects));
+      PairsText(report.defects), surface.enclosed_volume_mm3, WordsOf(report.space).text,
+      DefectsText(report.defects.defects));
 }
 
 std::string RemeshingText(const GenerationReport& report) {
@@ -52,6 +55,7 @@ OrderedJson SurfaceJson(const GenerationReport& report) {
           {"triangles", surface.num_triangles},
           {"components", surface.num_components},
           {"enclosed_volume_mm3", surface.enclosed_volume_mm3},
+          {"stated_space", WordsOf(report.space).json},
           {"intersecting_pairs", report.defects.num_intersecting_pairs},
           {"all_intersecting_pairs_found", report.defects.found_all_pairs},
           {"defects", DefectsJson(report.defects.defects)}};
@@ -73,8 +77,7 @@ std::string GenerationReportText(const GenerationReport& report) {
     absl::StrAppend(&text, "triangles by defect  ", report.defect_file, "\n");
   }
   if (!report.made) return absl::StrCat(text, "verdict: not filled\n");
-  return absl::StrCat(
-      text, MeshReportText(report.mesh, *report.made, ValidateTetMesh(report.made->mesh)));
+  return absl::StrCat(text, MeshReportText(report.mesh, *report.made, ReportOfTets(*report.made)));
 }
 
 OrderedJson GenerationReportJson(const GenerationReport& report) {
@@ -85,7 +88,7 @@ OrderedJson GenerationReportJson(const GenerationReport& report) {
                       {"mesh", nullptr}};
   if (!report.defect_file.empty()) json["defect_file"] = report.defect_file;
   if (report.made) {
-    json["mesh"] = MeshReportJson(report.mesh, *report.made, ValidateTetMesh(report.made->mesh));
+    json["mesh"] = MeshReportJson(report.mesh, *report.made, ReportOfTets(*report.made));
   }
   return json;
 }

@@ -11,6 +11,7 @@
 #include "core/mesh/validation.h"
 #include "core/mesh_generation/surface_defects.h"
 #include "core/mesh_generation/surface_remeshing.h"
+#include "core/mesh_io/file_space.h"
 #include "core/mesh_io/tet_mesh_io.h"
 
 namespace tissueform {
@@ -18,6 +19,7 @@ namespace tissueform {
 // What `mesh generate` has done with a surface, as far as it came.
 struct GenerationReport {
   std::string surface;
+  FileSpace space = FileSpace::kUnstated;
   SurfaceDefects defects;
   std::string defect_file;  // empty: none was written
   double remesh_mm = 0;     // 0: the triangles were kept

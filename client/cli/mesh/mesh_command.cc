@@ -34,7 +34,7 @@ absl::Status NameMesh(const std::string& path, const absl::Status& usable) {
 
 absl::Status CheckTets(const MeshCheckOptions& options) {
   TF_ASSIGN_OR_RETURN(const TetMeshFile file, ReadTetMesh(options.mesh));
-  const MeshReport report = ValidateTetMesh(file.mesh, file.reoriented_tets, file.left_out_cells);
+  const MeshReport report = ReportOfTets(file);
   PrintReport(options.json, MeshReportText(options.mesh, file, report),
               MeshReportJson(options.mesh, file, report));
   return NameMesh(options.mesh, CheckUsable(report));
@@ -42,7 +42,8 @@ absl::Status CheckTets(const MeshCheckOptions& options) {
 
 absl::Status CheckSurface(const MeshCheckOptions& options) {
   TF_ASSIGN_OR_RETURN(const TriangleMeshFile file, ReadTriangleMesh(options.mesh));
-  const SurfaceReport report = ValidateTriangleMesh(file.mesh, file.split_polygons);
+  SurfaceReport report = ValidateTriangleMesh(file.mesh, file.split_polygons);
+  AddImplausibleSize(file.mesh.positions(), &report.defects);
   PrintReport(options.json, SurfaceReportText(options.mesh, file, report),
               SurfaceReportJson(options.mesh, file, report));
   return NameMesh(options.mesh, CheckDefects(report.defects));

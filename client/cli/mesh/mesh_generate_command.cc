@@ -138,6 +138,7 @@ SurfaceDefects LookForDefects(const TriangleMesh& surface) {
 absl::Status RunMeshGenerate(const MeshGenerateOptions& options) {
   TF_ASSIGN_OR_RETURN(const TriangleMeshFile file, ReadTriangleMesh(options.surface));
   GenerationReport report{.surface = options.surface,
+                          .space = file.space,
                           .defects = LookForDefects(file.mesh),
                           .defect_file = "",
                           .remesh_mm = 0,

@@ -50,6 +50,12 @@ OrderedJson QualityJson(const TetQualitySummary& quality) {
 
 }  // namespace
 
+MeshReport ReportOfTets(const TetMeshFile& file) {
+  MeshReport report = ValidateTetMesh(file.mesh, file.reoriented_tets, file.left_out_cells);
+  AddImplausibleSize(file.mesh.positions(), &report.defects);
+  return report;
+}
+
 std::string MeshReportText(const std::string& path, const TetMeshFile& file,
                            const MeshReport& report) {
   const bool is_finite = file.mesh.positions().allFinite();

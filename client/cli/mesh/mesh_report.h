@@ -12,6 +12,9 @@
 
 namespace tissueform {
 
+// What ValidateTetMesh finds in what was read, and whether its size may be that of a head.
+MeshReport ReportOfTets(const TetMeshFile& file);
+
 // A report on a mesh of tets for people: counts, quality, arrays, defects with their explanation,
 // verdict.
 std::string MeshReportText(const std::string& path, const TetMeshFile& file,

@@ -23,6 +23,18 @@ const char* Verdict(const SurfaceReport& report) {
 
 }  // namespace
 
+SpaceWords WordsOf(FileSpace space) {
+  switch (space) {
+    case FileSpace::kLps:
+      return {"LPS, as the file states", "LPS"};
+    case FileSpace::kRas:
+      return {"LPS; the file states RAS: x and y were negated", "RAS"};
+    case FileSpace::kUnstated:
+      break;
+  }
+  return {"taken as LPS; the file does not state them", ""};
+}
+
 std::string SurfaceReportText(const std::string& path, const TriangleMeshFile& file,
                               const SurfaceReport& report) {
   return absl::StrFormat(
@@ -34,14 +46,15 @@ std::string SurfaceReportText(const std::string& path, const TriangleMeshFile& f
       "  Euler number       %10d\n"
       "  area               %10.4g mm^2\n"
       "  enclosed volume    %10.4g mm^3 (0 where it is not closed)\n"
+      "  coordinates        %s\n"
       "  point arrays       %s\n"
       "  cell arrays        %s\n"
       "%sverdict: %s\n",
       path, report.num_vertices, report.num_triangles, report.num_edges,
       CountOf(report, "open_edges"), CountOf(report, "non_manifold_edges"), report.num_components,
       report.euler_characteristic, report.area_mm2, report.enclosed_volume_mm3,
-      ArraysText(file.point_data), ArraysText(file.cell_data), DefectsText(report.defects),
-      Verdict(report));
+      WordsOf(file.space).text, ArraysText(file.point_data), ArraysText(file.cell_data),
+      DefectsText(report.defects), Verdict(report));
 }
 
 nlohmann::ordered_json SurfaceReportJson(const std::string& path, const TriangleMeshFile& file,
@@ -59,6 +72,7 @@ nlohmann::ordered_json SurfaceReportJson(const std::string& path, const Triangle
           {"euler_characteristic", report.euler_characteristic},
           {"area_mm2", report.area_mm2},
           {"enclosed_volume_mm3", report.enclosed_volume_mm3},
+          {"stated_space", WordsOf(file.space).json},
           {"point_data", ArraysJson(file.point_data)},
           {"cell_data", ArraysJson(file.cell_data)},
           {"defects", DefectsJson(report.defects)}};

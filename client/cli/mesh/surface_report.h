@@ -12,6 +12,13 @@
 
 namespace tissueform {
 
+// Which coordinates a surface has, for people; which its file states, for programs ("": none).
+struct SpaceWords {
+  const char* text;
+  const char* json;
+};
+SpaceWords WordsOf(FileSpace space);
+
 // A report on a surface for people: counts, size, arrays, defects with their explanation, verdict.
 std::string SurfaceReportText(const std::string& path, const TriangleMeshFile& file,
                               const SurfaceReport& report);

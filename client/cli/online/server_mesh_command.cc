@@ -17,6 +17,7 @@
 #include "client/cpp/tissueform_client.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
+#include "core/mesh/mesh_defect.h"
 #include "core/mesh_io/tet_mesh_io.h"
 #include "proto/conversion/mesh_conversion.h"
 
@@ -57,6 +58,9 @@ void PrintHead() {
 
 absl::Status Upload(const ServerMeshOptions& options) {
   TF_ASSIGN_OR_RETURN(const TetMeshFile file, ReadTetMesh(options.mesh));
+  if (const auto size = FindImplausibleSize(file.mesh.positions())) {
+    absl::FPrintF(stderr, "warning: mesh %s: %s\n", options.mesh, size->explanation);
+  }
   TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   const Stopwatch stopwatch;
   UploadLines lines([](const std::string& line) { absl::FPrintF(stderr, "%s\n", line); },

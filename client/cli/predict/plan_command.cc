@@ -12,6 +12,7 @@
 
 #include "client/cli/shared/option_checks.h"
 #include "core/base/status_macros.h"
+#include "core/mesh/mesh_defect.h"
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
 
@@ -40,6 +41,9 @@ void PrintPlan(const std::string& path, const Plan& plan, const PlanProblem& pro
   absl::PrintF("  mesh       %s: %d vertices, %d tets, %s\n", plan.mesh_path,
                problem.mesh->num_vertices(), problem.mesh->num_tets(),
                plan.coordinate_system == CoordinateSystem::kRas ? "RAS" : "LPS");
+  if (const auto size = FindImplausibleSize(problem.mesh->positions())) {
+    absl::PrintF("  warning    %s\n", size->explanation);
+  }
   absl::PrintF("  stiffness  %.6g to %.6g Pa\n", problem.stiffness.minCoeff(),
                problem.stiffness.maxCoeff());
   if (problem.uncertainty) PrintUncertainty(*problem.uncertainty);

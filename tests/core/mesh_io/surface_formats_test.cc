@@ -3,6 +3,7 @@
 
 #include <cstring>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "core/mesh_io/triangle_mesh_io.h"
@@ -208,6 +209,62 @@ TEST_F(SurfaceFormatsTest, BinaryStlIsReadAndItsLengthChecked) {
   stl[80] = 2;
   EXPECT_THAT(ReadSurface("a.stl", stl),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("truncated or no STL file")));
+}
+
+// One triangle as each format writes it, with a line of comment or a header.
+struct Commented {
+  std::string name;
+  std::string before;
+  std::string after;
+};
+
+std::vector<Commented> CommentedFiles() {
+  std::string binary(84 + 50 - 34, '\0');
+  binary[80 - 34] = 1;
+  const std::vector<float> numbers = {0, 0, 1, 1, 2, 3, 2, 2, 3, 1, 3, 3};
+  std::memcpy(binary.data() + 84 - 34, numbers.data(), numbers.size() * sizeof(float));
+  return {
+      {"ascii.stl", "solid 3D Slicer output. ",
+       "\nfacet normal 0 0 1\nouter loop\nvertex 1 2 3\nvertex 2 2 3\nvertex 1 3 3\nendloop\n"
+       "endfacet\nendsolid\n"},
+      {"binary.stl", "Visualization output now ", binary},
+      {"a.ply", "ply\nformat ascii 1.0\ncomment 3D Slicer output. ",
+       "\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float "
+       "nx\nproperty float ny\nproperty float nz\nelement face 1\nproperty list uchar int "
+       "vertex_indices\nend_header\n1 2 3 0.5 0.25 1\n2 2 3 0 0 1\n1 3 3 0 0 1\n3 0 1 2\n"},
+      {"a.obj", "# 3D Slicer output. ", "\nv 1 2 3\nv 2 2 3\nv 1 3 3\nf 1 2 3\n"},
+  };
+}
+
+TEST_F(SurfaceFormatsTest, WhatStatesRasIsTurnedToLps) {
+  for (const Commented& file : CommentedFiles()) {
+    for (const auto& [words, space, sign] : {std::tuple("SPACE=RAS", FileSpace::kRas, -1.0),
+                                             std::tuple("SPACE=LPS", FileSpace::kLps, 1.0),
+                                             std::tuple("SPACE=any", FileSpace::kUnstated, 1.0)}) {
+      ASSERT_OK_AND_ASSIGN(const TriangleMeshFile read,
+                           ReadSurface(file.name, file.before + words + file.after));
+      EXPECT_EQ(read.space, space) << file.name;
+      Positions expected(3, 3);
+      expected << sign, sign * 2, 3, sign * 2, sign * 2, 3, sign, sign * 3, 3;
+      EXPECT_EQ(CornersOf(read.mesh, 0), expected) << file.name << words;
+      const Attribute* const normals = FindAttribute(read.point_data, "Normals");
+      ASSERT_EQ(normals != nullptr, file.name == "a.ply");
+      if (normals == nullptr) continue;
+      EXPECT_EQ(ToDoubles(*normals)[0], sign * 0.5);
+      EXPECT_EQ(ToDoubles(*normals)[1], sign * 0.25);
+      EXPECT_EQ(ToDoubles(*normals)[2], 1);
+    }
+  }
+}
+
+TEST_F(SurfaceFormatsTest, OnlyAHeaderStatesTheSpace) {
+  for (const char* name : {"o SPACE=RAS", "g SPACE=RAS"}) {
+    ASSERT_OK_AND_ASSIGN(
+        const TriangleMeshFile file,
+        ReadSurface("a.obj", std::string(name) + "\nv 1 2 3\nv 2 2 3\nv 1 3 3\nf 1 2 3\n"));
+    EXPECT_EQ(file.space, FileSpace::kUnstated);
+    EXPECT_EQ(file.mesh.positions()(0, 0), 1);
+  }
 }
 
 TEST_F(SurfaceFormatsTest, FaceWithoutItsVertexIsRefused) {

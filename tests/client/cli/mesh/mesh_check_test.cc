@@ -110,6 +110,50 @@ TEST_F(MeshCheckTest, NonManifoldSurfaceIsReportedAsSuch) {
   EXPECT_EQ(json["euler_characteristic"], 1);
 }
 
+TEST_F(MeshCheckTest, AMeshThatIsProbablyNotInMillimetersIsUsableWithAWarning) {
+  const auto size_defect = [this](const std::string& name, double scale_mm) {
+    TetMeshFile bar = BarMeshOfPlan();
+    bar.mesh = *TetMesh::Create(bar.mesh.positions() * (scale_mm / bar.mesh.BoundingBoxDiagonal()),
+                                bar.mesh.tets());
+    EXPECT_THAT(WriteTetMesh(Path(name), bar), IsOk());
+    const ProcessResult result = Run({"mesh", "check", name, "--json"});
+    EXPECT_THAT(result, Succeeds());
+    const nlohmann::json json = nlohmann::json::parse(result.out);
+    EXPECT_EQ(json["usable"], true);
+    return json["defects"].empty() ? nlohmann::json() : json["defects"][0];
+  };
+  EXPECT_TRUE(size_defect("head.vtu", 250).is_null());
+  EXPECT_TRUE(size_defect("tooth.vtu", 10.01).is_null());
+  EXPECT_TRUE(size_defect("crowd.vtu", 1999).is_null());
+  const nlohmann::json meters = size_defect("meters.vtu", 0.1158);
+  EXPECT_EQ(meters["kind"], "implausible_size");
+  EXPECT_EQ(meters["severity"], "warning");
+  EXPECT_THAT(std::string(meters["explanation"]),
+              AllOf(HasSubstr("0.1158 mm, less than 10 mm"), HasSubstr("in meters, multiply")));
+  EXPECT_THAT(std::string(size_defect("centimeters.vtu", 5)["explanation"]),
+              HasSubstr("in centimeters, multiply its coordinates by 10"));
+  EXPECT_THAT(
+      std::string(size_defect("micrometers.vtu", 250'000)["explanation"]),
+      AllOf(HasSubstr("more than 2000 mm"), HasSubstr("in micrometers, multiply its coordinates")));
+  EXPECT_THAT(std::string(size_defect("unknown.vtu", 5000)["explanation"]),
+              HasSubstr("check the unit"));
+}
+
+TEST_F(MeshCheckTest, ASurfaceSaysInWhichSpaceItsFileStatesToBe) {
+  const std::string facets =
+      "\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 30 0 0\nvertex 0 40 0\nendloop\n"
+      "endfacet\nendsolid\n";
+  Write("ras.stl", "solid 3D Slicer output. SPACE=RAS" + facets);
+  Write("lps.stl", "solid 3D Slicer output. SPACE=LPS" + facets);
+  Write("unstated.stl", "solid a" + facets);
+  EXPECT_THAT(Run({"mesh", "check", "ras.stl"}).out,
+              HasSubstr("LPS; the file states RAS: x and y were negated"));
+  EXPECT_THAT(Run({"mesh", "check", "lps.stl"}).out, HasSubstr("LPS, as the file states"));
+  EXPECT_THAT(Run({"mesh", "check", "unstated.stl"}).out, HasSubstr("taken as LPS"));
+  EXPECT_THAT(Run({"mesh", "check", "ras.stl", "--json"}).out,
+              HasSubstr("\"stated_space\": \"RAS\""));
+}
+
 TEST_F(MeshCheckTest, SurfaceWithoutAreaIsNotUsable) {
   Write("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
   const ProcessResult result = Run({"mesh", "check", "flat.obj"});

@@ -361,6 +361,18 @@ TEST_F(DeformTest, PlanCheckSaysWhatIsAskedFor) {
   const ProcessResult result = Run({"plan", "check", TestDataPath("plans/bar/plan.json")});
   EXPECT_THAT(result, Succeeds());
   EXPECT_THAT(result.out, HasSubstr("top: 25 vertices, moves 6 mm, turns 45 degrees"));
+  EXPECT_THAT(result.out, ::testing::Not(HasSubstr("warning")));
+}
+
+TEST_F(DeformTest, PlanCheckWarnsOfAMeshThatIsProbablyNotInMillimeters) {
+  WriteBar();
+  ASSERT_OK_AND_ASSIGN(TetMeshFile bar, ReadTetMesh(Path("bar.vtu")));
+  bar.mesh = *TetMesh::Create(bar.mesh.positions() / 1000, bar.mesh.tets());
+  ASSERT_THAT(WriteTetMesh(Path("bar.vtu"), bar), IsOk());
+  Write("plan.json", BarPlan().dump());
+  const ProcessResult result = Run({"plan", "check", "plan.json"});
+  EXPECT_THAT(result, Succeeds());
+  EXPECT_THAT(result.out, HasSubstr("warning    the diagonal of the bounding box is 0.0"));
 }
 
 }  // namespace
