@@ -72,4 +72,4 @@ def wait_until_routing(cluster, patience_s=PATIENCE_S, needed=None):
         if len(up) >= (len(wanted) if needed is None else needed):
             return
         time.sleep(0.05)
-    raise SystemExit(f"HAProxy does not find all servers: {view(cluster)}; see {cluster.log(NAME)}")
+    raise SystemExit(f"HAProxy does not find all servers: {view(cluster) or 'it does not answer'}; see {cluster.log(NAME)}")
