@@ -225,7 +225,7 @@ std::string DescribeStrangers(const std::string& series,
                               const std::vector<DicomHeader>& strangers) {
   std::map<std::string, std::vector<DicomHeader>> by_kind;
   for (const DicomHeader& stranger : strangers) by_kind[DescribeKind(stranger)].push_back(stranger);
-  return absl::StrCat("left aside in ", series, ", as not CT slices: ",
+  return absl::StrCat("left aside in ", series, ", not CT slices: ",
                       absl::StrJoin(by_kind, ", ", [](std::string* out, const auto& kind) {
                         absl::StrAppend(out, FilesOf(kind.second), " (", kind.first, ")");
                       }));

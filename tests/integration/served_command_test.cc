@@ -12,6 +12,7 @@
 #include <signal.h>
 #include <string>
 
+#include "absl/strings/match.h"
 #include "gmock/gmock.h"
 #include "grpcpp/create_channel.h"
 #include "gtest/gtest.h"
@@ -220,6 +221,29 @@ TEST_F(ServedCommandTest, AnUploadThatWasBrokenOffGoesOnAndSaysSo) {
   EXPECT_THAT(Read("lines"),
               ContainsRegex("the upload goes on: the server has 0.0 of [0-9.]+ MB already"));
   EXPECT_THAT(Read("upload"), HasSubstr(payload.Sha256()));
+}
+
+TEST_F(ServedCommandTest, UploadWarnsOfAMeshThatIsProbablyNotInMillimeters) {
+  ASSERT_OK_AND_ASSIGN(
+      const std::unique_ptr<ServerProcess> server,
+      ServerProcess::Start(ProgramPath("tissueform-server"),
+                           {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
+  ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(kTonguePlan));
+  ASSERT_OK_AND_ASSIGN(const PlanProblem problem, ResolvePlan(plan));
+  for (const double size_mm : {100.0, 0.1}) {
+    const double scale = size_mm / problem.mesh->BoundingBoxDiagonal();
+    const TetMeshFile file{
+        .mesh = *TetMesh::Create(problem.mesh->positions() * scale, problem.mesh->tets()),
+        .point_data = {},
+        .cell_data = {}};
+    ASSERT_THAT(WriteTetMesh(PathOf("mesh.vtu"), file), IsOk());
+    EXPECT_EQ(
+        ExitCodeOf(ProgramPath("tissueform") + " mesh upload " + PathOf("mesh.vtu") + " --server " +
+                   server->address() + " > " + PathOf("upload") + " 2> " + PathOf("lines")),
+        0);
+    EXPECT_EQ(absl::StrContains(Read("lines"), "mesh.vtu: the diagonal of the bounding box is"),
+              size_mm < 1);
+  }
 }
 
 TEST_F(ServedCommandTest, WatchTellsOfASessionThatNobodyDrags) {

@@ -249,7 +249,7 @@ TEST_F(DicomVolumeTest, OtherObjectsOfTheSeriesAreLeftAsideWithANote) {
     EXPECT_EQ(volume.size[2], 9);
     EXPECT_EQ(WorstPhantomError(volume), 0);
     EXPECT_THAT(volume.provenance.notes,
-                ElementsAre(AllOf(HasSubstr("left aside in series 2, as not CT slices: file 1 of"),
+                ElementsAre(AllOf(HasSubstr("left aside in series 2, not CT slices: file 1 of"),
                                   HasSubstr(kind.message))));
     Expect(Read({}, "slice000"), "file 1 of the folder (instance number 10) is not a CT slice but");
   }
