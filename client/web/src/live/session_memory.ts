@@ -6,11 +6,14 @@ import { randomId } from "./session_opening";
 // Which sessions this browser has made, so that a reload or a second visit finds its own again, and those whose tab is gone are
 // deleted. A tab holds a lock of its session's name for as long as it lives, also through a crash of the tab.
 
-const STORAGE_KEY = "tissueform-sessions";
-const TAB_KEY = "tissueform-session";
 const MOST_REMEMBERED = 64;
 /** How long a page that is being reloaded may hold on to its session: on a busy machine it goes slowly. A tab that was duplicated waits as long. */
 const RELOAD_MS = 4000;
+
+/** Of this planner alone: a host may have several, each below a path of its own and with servers of its own. */
+const key = (name: string) => name + new URL(".", location.href).pathname.replace(/\/$/, "");
+const storageKey = () => key("tissueform-sessions");
+const tabKey = () => key("tissueform-session");
 
 interface Remembered {
   session: string;
@@ -26,12 +29,12 @@ export interface Claim {
 
 /** The session of this tab for `caseName`: its own from before a reload, else one of this case whose tab is gone, else a new one. */
 export async function claimSession(caseName: string): Promise<Claim> {
-  const own = sessionStorage.getItem(TAB_KEY);
+  const own = sessionStorage.getItem(tabKey());
   const known = read().filter((entry) => entry.case === caseName);
   // The tab's own first, then the newest.
   for (const { session } of known.reverse().sort((a, b) => Number(b.session === own) - Number(a.session === own))) {
     if (await lock(session, session === own ? RELOAD_MS : 0)) {
-      sessionStorage.setItem(TAB_KEY, session);
+      sessionStorage.setItem(tabKey(), session);
       return { session, isOld: true };
     }
   }
@@ -42,7 +45,7 @@ export async function claimSession(caseName: string): Promise<Claim> {
 export async function newSession(caseName: string): Promise<string> {
   const session = `sessions/${randomId()}`;
   await lock(session, 0);
-  sessionStorage.setItem(TAB_KEY, session);
+  sessionStorage.setItem(tabKey(), session);
   write([...read(), { session, case: caseName }].slice(-MOST_REMEMBERED));
   return session;
 }
@@ -59,12 +62,12 @@ export async function forgetAbandoned(except: string): Promise<string[]> {
 
 export function forgetSession(session: string): void {
   write(read().filter((entry) => entry.session !== session));
-  if (sessionStorage.getItem(TAB_KEY) === session) sessionStorage.removeItem(TAB_KEY);
+  if (sessionStorage.getItem(tabKey()) === session) sessionStorage.removeItem(tabKey());
 }
 
 /** False where another tab holds it for longer than `patienceMs`. Without locks (a page that is not secure) a tab knows its own session only. */
 function lock(session: string, patienceMs: number): Promise<boolean> {
-  if (navigator.locks === undefined) return Promise.resolve(sessionStorage.getItem(TAB_KEY) === session);
+  if (navigator.locks === undefined) return Promise.resolve(sessionStorage.getItem(tabKey()) === session);
   return new Promise((resolve) => {
     const options = patienceMs > 0 ? { signal: AbortSignal.timeout(patienceMs) } : { ifAvailable: true };
     const hold = (held: Lock | null) => {
@@ -77,7 +80,7 @@ function lock(session: string, patienceMs: number): Promise<boolean> {
 
 function read(): Remembered[] {
   try {
-    const entries: unknown = JSON.parse(localStorage.getItem(STORAGE_KEY) ?? "[]");
+    const entries: unknown = JSON.parse(localStorage.getItem(storageKey()) ?? "[]");
     if (!Array.isArray(entries)) return [];
     return entries.filter((entry): entry is Remembered => typeof entry?.session === "string" && typeof entry?.case === "string");
   } catch {
@@ -86,5 +89,5 @@ function read(): Remembered[] {
 }
 
 function write(entries: Remembered[]): void {
-  localStorage.setItem(STORAGE_KEY, JSON.stringify(entries));
+  localStorage.setItem(storageKey(), JSON.stringify(entries));
 }

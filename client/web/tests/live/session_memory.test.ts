@@ -26,8 +26,9 @@ const lockManager = {
   query: () => Promise.resolve({ held: Array.from(locks, (name) => ({ name })) }),
 };
 
-/** What follows runs in this tab, which remembers `own` from before. */
-function tab(own: Map<string, string> = new Map()): Map<string, string> {
+/** What follows runs in this tab, which remembers `own` from before, on the page of this path. */
+function tab(own: Map<string, string> = new Map(), path = "/"): Map<string, string> {
+  vi.stubGlobal("location", new URL(path, "https://hospital.example.org"));
   vi.stubGlobal("sessionStorage", storage(own));
   vi.stubGlobal("localStorage", storage(shared));
   vi.stubGlobal("navigator", { locks: lockManager });
@@ -98,4 +99,15 @@ test.each(["", "no JSON", "{}", "[1, null, {\"session\": 4}]"])("a memory of %j 
   tab();
   shared.set("tissueform-sessions", text);
   expect((await claimSession("cases/a")).isOld).toBe(false);
+});
+
+test("a planner below another path of the same host leaves its neighbor's sessions alone", async () => {
+  tab(new Map(), "/a/");
+  const { session } = await claimSession("cases/a");
+  locks.delete(session);
+  tab(new Map(), "/b/");
+  expect(await forgetAbandoned("")).toEqual([]);
+  expect((await claimSession("cases/a")).isOld).toBe(false);
+  tab(new Map(), "/a/#case=a");
+  expect(await claimSession("cases/a")).toEqual({ session, isOld: true });
 });
