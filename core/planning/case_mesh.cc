@@ -17,8 +17,13 @@
 namespace tissueform {
 
 absl::StatusOr<TetMeshFile> ReadMeshOfCase(const std::string& path) {
-  TF_ASSIGN_OR_RETURN(const CaseFile contents, ReadCase(path));
-  const CaseMesh& mesh = contents.mesh;
+  const absl::StatusOr<CaseFile> contents = ReadCase(path);
+  if (absl::IsNotFound(contents.status())) {
+    return absl::NotFoundError(absl::StrCat(
+        contents.status().message(), "; save it there from the planner (Case file), or copy it"));
+  }
+  TF_RETURN_IF_ERROR(contents.status());
+  const CaseMesh& mesh = contents->mesh;
   MeshPayload payload({mesh.vertex_count, mesh.tet_count, mesh.cell_arrays});
   payload.Write(0, mesh.payload);
   std::vector<Attribute> cell_data;

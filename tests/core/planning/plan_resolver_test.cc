@@ -108,6 +108,9 @@ TEST_F(PlanResolverTest, MeshOfACaseIsReadAndHeldToItsDigest) {
   EXPECT_THAT(Resolve(plan), IsRefused("head.tfcase: not the mesh that the plan was made for"));
   std::filesystem::resize_file(folder_ / "head.tfcase", bytes.size() / 2);
   EXPECT_THAT(Resolve(plan), IsRefused("head.tfcase"));
+  std::filesystem::remove(folder_ / "head.tfcase");
+  EXPECT_THAT(Resolve(plan), StatusIs(absl::StatusCode::kNotFound,
+                                      HasSubstr("head.tfcase does not exist; save it there")));
 }
 
 TEST_F(PlanResolverTest, MeshFileIsHeldToTheDigestThatServersNameItBy) {
