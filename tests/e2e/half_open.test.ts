@@ -6,7 +6,7 @@ import { Gateway } from "../../client/web/src/calls/gateway";
 import { Planner, type Hook, live, openCase, openPage, state, takeSegment, typeMove } from "./planner";
 import { SlowLine } from "./slow_line";
 
-// Connections that are open and dead: what lies between page and gateway forgets them, and tells nobody.
+// Connections that are open and dead: a router or a proxy between page and gateway has forgotten them without closing them.
 
 let planner: Planner;
 let line: SlowLine;

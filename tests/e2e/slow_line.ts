@@ -3,7 +3,7 @@
 
 import { type AddressInfo, type Socket, connect, createServer } from "node:net";
 
-/** A line to a server on which every byte is late, both ways; where told so also narrow, or dead without a word. */
+/** A line to a server on which every byte is late, both ways. It can also be narrow, or go dead without closing. */
 export class SlowLine {
   private readonly sockets = new Set<Socket>();
   private readonly muted = new Set<Socket>();

@@ -55,7 +55,7 @@ TEST_F(OtherClientsTest, PythonFindsTheReasonOfEveryRpcsError) {
                     HasSubstr("DeformService/Deform INVALID_ARGUMENT INVALID_REQUEST")));
 }
 
-// As docs/service-api.md says, so that whoever sets a keepalive need not find it out.
+// docs/service-api.md documents this limit.
 TEST_F(OtherClientsTest, WhoPingsTooOftenIsCutOff) {
   EXPECT_EQ(RunPython("ping_too_often.py"), 0) << Read("out.txt");
   EXPECT_EQ(Read("out.txt"), "answered\nanswered\nanswered\nENHANCE_YOUR_CALM too_many_pings\n");

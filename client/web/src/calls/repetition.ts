@@ -30,7 +30,7 @@ const BROWSER_CLOCK: RepetitionClock = {
  * calls again: at once where the answer says who holds it, after a while where a server is gone. What was refused before
  * anything was done is repeated whatever it is, all else only where nothing is done twice.
  * A quick call that has no answer is made again over another connection: browsers keep connections, and one may be dead though
- * nobody has closed it.
+ * neither side has closed it.
  */
 export function withRoutes(routes: SessionRoutes, clock: RepetitionClock = BROWSER_CLOCK): Interceptor {
   return (next) => async (request) => {

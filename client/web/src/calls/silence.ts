@@ -7,9 +7,10 @@ const FIRST_S = 8;
 const LONGEST_S = 64;
 
 /**
- * For how long calls of one kind hear nothing before the page gives them up: 8 s at first. On a slow line, or where an answer takes
- * long, that is too short, and a call that is made again would never end: so every call that is given up doubles the time, and a
- * silence that ended leaves half as much again. An answer, or a call that lasts longer than that, shows that the time suffices.
+ * How long calls of one kind may hear nothing before the page gives them up: 8 s at first. On a slow line, or where an answer takes
+ * long, that is too short, and the page would open connections without end. So every call that is given up doubles the time, and
+ * the time stays above 1.5 times the longest silence that ended. An answer shows that the time suffices, and so does a call that
+ * lasts longer than it.
  */
 export class Patience {
   private givenUp = 0;
@@ -44,7 +45,7 @@ export class SilenceClock {
   private ageS = 0;
   private stopTimer: (() => void) | null = null;
 
-  /** `onSecond` is told how long it has been silent; `isListening`: else no silence is counted. */
+  /** `onSecond` receives the length of the silence. No silence is counted while `isListening` is false. */
   constructor(
     private readonly patience: Patience,
     private readonly timer: Timer,

@@ -8,8 +8,8 @@ import { CallError, Code } from "./call_error";
 const PATIENCE_MS = 30_000;
 
 /**
- * The messages of a download, in their order. Where none comes for 30 s (the first: for `firstMs`) the call is aborted, and ends
- * with a CallError that passes: the connection may be dead though nobody has closed it.
+ * The messages of a download, in their order. Aborts the call when no message comes for 30 s (the first one: for `firstMs`), and
+ * throws a CallError that passes: the connection may be dead though neither side has closed it.
  */
 export async function* steady<T>(start: (signal: AbortSignal) => AsyncIterable<T>, { firstMs = PATIENCE_MS, timer = browserTimer }: { firstMs?: number; timer?: Timer } = {}): AsyncGenerator<T> {
   const ending = new AbortController();

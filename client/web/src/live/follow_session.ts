@@ -132,8 +132,8 @@ export class FollowSession {
     else tell();
   }
 
-  // A watch that has ended meanwhile needs no acknowledgement; its end is told by itself. The server waits for one that was lost,
-  // so the newest is repeated.
+  // A watch that has ended meanwhile needs no acknowledgement; its end arrives by itself. The server waits for one that was lost,
+  // so the newest one is repeated.
   private acknowledge(watch: string, number: bigint): void {
     const options = { headers: sessionMetadata(this.session), timeoutMs: ACKNOWLEDGE_MS };
     this.gateway.deform.acknowledgeWatch({ watch, number }, options).catch((thrown) => {
