@@ -19,6 +19,7 @@ namespace {
 constexpr Uint32 kMostRawBytes = 1 << 20;
 // Converted, of a name of 100,000 characters, before it is cut.
 constexpr size_t kConvertedBytes = 8192;
+constexpr size_t kMostCharacterBytes = 4;  // of any set, and of an escape sequence
 
 bool IsAscii(absl::string_view text) {
   return std::all_of(text.begin(), text.end(),
@@ -82,6 +83,16 @@ std::string DicomTexts::ToUtf8(const DcmTagKey& tag, const std::string& raw, boo
   return OnlyAscii(raw);
 }
 
+// A character or escape sequence that would end beyond the cut is left out whole.
+void DicomTexts::CutRaw(bool is_name, std::string* raw) const {
+  raw->resize(kConvertedBytes);
+  for (size_t cut = 0; cut < kMostCharacterBytes; ++cut) {
+    const absl::string_view shorter = absl::string_view(*raw).substr(0, raw->size() - cut);
+    if (!set_.ToUtf8(shorter, is_name).has_value()) continue;
+    return raw->resize(shorter.size());
+  }
+}
+
 std::string DicomTexts::Get(const DcmTagKey& tag) {
   DcmElement* element = nullptr;
   if (dataset_->findAndGetElement(tag, element).bad() || element == nullptr) return {};
@@ -91,9 +102,10 @@ std::string DicomTexts::Get(const DcmTagKey& tag) {
     return {};
   }
   std::string raw = RawText(element);
+  const bool is_name = DcmTag(tag).getEVR() == EVR_PN;
   const bool long_before = raw.size() > kConvertedBytes;
-  if (long_before) raw.resize(kConvertedBytes);
-  std::string text = Tidy(ToUtf8(tag, raw, DcmTag(tag).getEVR() == EVR_PN));
+  if (long_before) CutRaw(is_name, &raw);
+  std::string text = Tidy(ToUtf8(tag, raw, is_name));
   if (text.size() > kMostBytes) CutUtf8(kMostBytes, &text);
   if (long_before || text.size() + 3 >= kMostBytes) {
     Tell(absl::StrCat("the attribute ", tag.toString().c_str(), " is longer than ", kMostBytes,

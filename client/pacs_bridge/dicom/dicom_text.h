@@ -35,6 +35,7 @@ class DicomTexts {
   const std::string& problem() const { return problem_; }
 
  private:
+  void CutRaw(bool is_name, std::string* raw) const;
   std::string ToUtf8(const DcmTagKey& tag, const std::string& raw, bool is_name);
   void Tell(absl::string_view what);
 
