@@ -6,6 +6,7 @@ import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import type { Page } from "playwright-core";
+import { touchDevice } from "./fingers";
 import { IdentityProvider, enterName } from "./identity_provider";
 import { type Hook, Planner, live, moved, openCase, openPage, state, takeSegment, typeMove } from "./planner";
 import { SlowLine } from "./slow_line";
@@ -227,6 +228,21 @@ test("a file that moves, opened from disk", async () => {
   await page.getByRole("checkbox").check();
   await page.waitForTimeout(1500);
   await page.screenshot({ path: join(FOLDER, "file-that-moves.jpg"), type: "jpeg", quality: 90 });
+});
+
+test.each([["phone", 390, 844], ["tablet", 820, 1180]])("on a %s, the planner and a file that moves", async (name, width, height) => {
+  const device = { ...touchDevice(width, height), deviceScaleFactor: 1 };
+  const { page } = await openCase(await planner.browse([], device), planner);
+  await takeSegment(page, "Lower jaw");
+  await typeMove(page, "Forward", "8");
+  await moved(page, 6, 12);
+  await page.getByLabel("Colours show").selectOption({ label: "Movement of the skin" });
+  await page.locator("aside").evaluate((panel) => (panel.scrollTop = 0));
+  await picture(page, name);
+  const { page: moving } = await openPage(await planner.browse([], device), pathToFileURL(planner.exportHead(true)).href);
+  await moving.waitForFunction(() => (globalThis as any).tissueform.moving?.answered > 0);
+  await moving.waitForTimeout(1500);
+  await moving.screenshot({ path: join(FOLDER, `file-that-moves-${name}.jpg`), type: "jpeg", quality: 90 });
 });
 
 test("the page's own answer while the server's is 150 ms away", async () => {

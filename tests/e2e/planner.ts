@@ -116,7 +116,7 @@ export class Planner {
   /** The same as a file that moves; or without what surrounds the segments. */
   exportHead(isWhole: boolean): string {
     const path = join(this.folder, isWhole ? "moves.html" : "segments-move.html");
-    execFileSync(join(BIN, "tissueform"), ["export", this.writePlan(isWhole), "--html", path, "--model", "linear_elastic"]);
+    execFileSync(join(BIN, "tissueform"), ["export", this.writePlan(isWhole), "--html", path, "--model", "linear_elastic", "--overwrite"]);
     return path;
   }
 
