@@ -12,7 +12,7 @@ export async function reportFile(sheet: HTMLElement): Promise<string> {
   const policy = `default-src 'none'; style-src 'sha256-${hash}'; img-src data:; base-uri 'none'; form-action 'none'`;
   return [
     "<!doctype html>",
-    `<html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="${policy}">`,
+    `<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1"><meta http-equiv="Content-Security-Policy" content="${policy}">`,
     `<title>Tissueform report, ${NOTICE}</title><style>${style}</style></head>`,
     `<body>${sheet.outerHTML}</body></html>`,
     "",

@@ -3,7 +3,7 @@
 
 import * as three from "three";
 
-/** The browser gives a context back within some frames, or not at all. */
+/** The browser restores a context within some frames, or not at all. */
 const RESTORE_MS = 1500;
 const NOT_BACK = "The browser does not give the graphics card back, so there is no picture: reload the page";
 
@@ -17,8 +17,8 @@ export class Graphics {
   canvas: HTMLCanvasElement;
 
   private lossExtension: WEBGL_lose_context | null = null;
-  /** The browser has told of the loss: only then it takes a context back. */
-  private isTold = false;
+  /** The browser has reported the loss; it restores no context before that. */
+  private isReported = false;
   private restoring: Promise<void> | null = null;
   private whenBack: (() => void)[] = [];
   private frame = { width: 1, height: 1, pixelRatio: 1 };
@@ -79,7 +79,7 @@ export class Graphics {
       this.whenBack.push(() => resolve(true));
       setTimeout(() => resolve(false), RESTORE_MS);
     });
-    if (this.isTold) this.endLoss();
+    if (this.isReported) this.endLoss();
     if (!(await isBack) && this.isLost) this.replace();
   }
 
@@ -101,20 +101,20 @@ export class Graphics {
 
   private take(canvas: HTMLCanvasElement): void {
     this.canvas = canvas;
-    this.isTold = false;
+    this.isReported = false;
     this.surface.replaceChildren(canvas);
     // The context gives out its extensions only while it is not lost.
     this.lossExtension = this.renderer?.getContext().getExtension("WEBGL_lose_context") ?? null;
     canvas.addEventListener("webglcontextlost", () => {
       if (canvas !== this.canvas) return;
-      this.isTold = true;
-      // It takes the context back only after all have heard of the loss.
+      this.isReported = true;
+      // The browser restores a context only after every listener has heard of the loss.
       if (this.restoring !== null) setTimeout(() => this.endLoss());
       this.onContext(true);
     });
     canvas.addEventListener("webglcontextrestored", () => {
       if (canvas !== this.canvas) return;
-      this.isTold = false;
+      this.isReported = false;
       this.whenBack.splice(0).forEach((tell) => tell());
       this.onContext(false);
     });
