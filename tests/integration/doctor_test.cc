@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <ostream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -184,25 +186,34 @@ TEST_F(DoctorTest, ATokenThatHasEndedByTheClockHereIsForTheServerToJudge) {
 struct RefusedToken {
   const char* name;
   const char* claim;
-  nlohmann::json value;
+  std::function<nlohmann::json()> value;  // made in the test, whose clock has gone on
   std::vector<const char*> found;
   const char* advice;
 };
 
+void PrintTo(const RefusedToken& token, std::ostream* out) { *out << token.name; }
+
 std::vector<RefusedToken> RefusedTokens() {
-  return {
-      {"Expired", "exp", SecondsFromNow(-7200), {"expired 2h", "server's clock"}, "log in again"},
-      {"NotYetValid", "nbf", SecondsFromNow(300), {"begins in "}, "another login changes nothing"},
-      {"Issuer",
-       "iss",
-       "https://sts.example/1/",
-       {"\"https://sts.example/1/\"", "\"https://login.example\""},
-       "--token-issuer"},
-      {"Audience",
-       "aud",
-       "another",
-       {"\"another\"", "\"tissueform\""},
-       "the same login again changes nothing"}};
+  return {{"Expired",
+           "exp",
+           [] { return SecondsFromNow(-7200); },
+           {"expired 2h", "server's clock"},
+           "log in again"},
+          {"NotYetValid",
+           "nbf",
+           [] { return SecondsFromNow(300); },
+           {"begins in "},
+           "another login changes nothing"},
+          {"Issuer",
+           "iss",
+           [] { return "https://sts.example/1/"; },
+           {"\"https://sts.example/1/\"", "\"https://login.example\""},
+           "--token-issuer"},
+          {"Audience",
+           "aud",
+           [] { return "another"; },
+           {"\"another\"", "\"tissueform\""},
+           "the same login again changes nothing"}};
 }
 
 class DoctorRefusedTokenTest : public DoctorTest,
@@ -214,9 +225,9 @@ TEST_P(DoctorRefusedTokenTest, SaysWhatWasFoundAndExpectedAndWhatHelps) {
   options.tokens = tokens.Options();
   StartServer(options);
   const RefusedToken& bad = GetParam();
-  const DoctorReport report =
-      AskDoctor({.address = name(),
-                 .options = {.token_file = WriteToken(With(GoodClaims(), bad.claim, bad.value))}});
+  const DoctorReport report = AskDoctor(
+      {.address = name(),
+       .options = {.token_file = WriteToken(With(GoodClaims(), bad.claim, bad.value()))}});
   for (const char* found : bad.found) ExpectEndsWith(report, "login", found, bad.advice);
   EXPECT_THAT(report.Text(), Not(HasSubstr("eyJ")));
 }
@@ -251,6 +262,8 @@ struct OldProxy {
   std::vector<std::string> words;  // of serve_tls.py: how, and what ALPN may select
   const char* found;
 };
+
+void PrintTo(const OldProxy& proxy, std::ostream* out) { *out << proxy.name; }
 
 class DoctorOldProxyTest : public DoctorTest, public ::testing::WithParamInterface<OldProxy> {};
 
