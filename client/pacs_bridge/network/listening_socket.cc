@@ -6,6 +6,7 @@
 #include <array>
 #include <cerrno>
 #include <cstdint>
+#include <cstring>
 #include <poll.h>
 #include <unistd.h>
 #include <utility>
@@ -25,8 +26,7 @@ constexpr int kPauseMilliseconds = 100;
 
 absl::Status SystemSaysOf(absl::string_view what, const std::string& address, int port) {
   return absl::UnavailableError(absl::StrCat("cannot ", what, " at ", address, ":", port, ": ",
-                                             absl::ErrnoToStatus(errno, "").message(),
-                                             "; choose another address or port"));
+                                             std::strerror(errno), "; choose another --listen"));
 }
 
 }  // namespace
