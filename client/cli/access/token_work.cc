@@ -39,10 +39,6 @@ absl::Status WriteNewFile(const std::filesystem::path& path, mode_t mode,
     return absl::AlreadyExistsError(absl::StrCat(
         path.string(), " is there already and stays as it is; delete it or name another folder"));
   }
-  if (file < 0 && errno == EEXIST) {
-    return absl::AlreadyExistsError(absl::StrCat(
-        path.string(), " is there already and stays as it is; delete it or name another folder"));
-  }
   if (file < 0) return absl::ErrnoToStatus(errno, absl::StrCat("cannot make ", path.string()));
   const ssize_t written = write(file, content.data(), content.size());
   const bool whole = close(file) == 0 && written == static_cast<ssize_t>(content.size());
