@@ -46,12 +46,6 @@ std::string OrDash(const std::optional<double>& value, int digits) {
   return value ? absl::StrFormat("%.*f", digits, *value) : "-";
 }
 
-std::vector<std::string> SetNames(const std::vector<InstructionSet>& sets) {
-  std::vector<std::string> names;
-  for (const InstructionSet set : sets) names.emplace_back(InstructionSetName(set));
-  return names;
-}
-
 double Mib(int64_t bytes) { return static_cast<double>(bytes) / (1024.0 * 1024.0); }
 
 }  // namespace
@@ -71,7 +65,7 @@ std::string ReportJson(const BenchmarkReport& report) {
                {"compiler", circumstances.compiler},
                {"commit", circumstances.commit},
                {"threads", report.threads},
-               {"instruction_sets", SetNames(report.instruction_sets)},
+               {"instruction_sets", InstructionSetNames(report.instruction_sets)},
                {"blas_threads", 1},
                {"repetitions", report.repetitions},
                {"rows", Json::array()},
@@ -139,7 +133,7 @@ std::string CircumstancesText(const BenchmarkReport& report) {
   const Circumstances circumstances = MeasuringCircumstances();
   return absl::StrCat(
       circumstances.machine, "; ", circumstances.compiler, "; commit ", circumstances.commit, "; ",
-      absl::StrJoin(SetNames(report.instruction_sets), ", "), "; ", report.threads,
+      absl::StrJoin(InstructionSetNames(report.instruction_sets), ", "), "; ", report.threads,
       " threads, 1 BLAS thread; medians of ", report.repetitions, " interleaved repetitions");
 }
 

@@ -21,6 +21,13 @@ absl::string_view InstructionSetName(InstructionSet set) {
   return set == InstructionSet::kAvx2 ? "avx2" : "baseline";
 }
 
+std::vector<std::string> InstructionSetNames(const std::vector<InstructionSet>& sets) {
+  std::vector<std::string> names;
+  names.reserve(sets.size());
+  for (const InstructionSet set : sets) names.emplace_back(InstructionSetName(set));
+  return names;
+}
+
 std::vector<InstructionSet> SupportedInstructionSets() {
   std::vector<InstructionSet> sets;
 #if defined(__x86_64__)

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "absl/strings/string_view.h"
@@ -39,6 +40,7 @@ constexpr int RegisterBytes(InstructionSet set) {
 
 // "baseline", "avx2" or "avx512".
 absl::string_view InstructionSetName(InstructionSet set);
+std::vector<std::string> InstructionSetNames(const std::vector<InstructionSet>& sets);
 
 // Those that this processor has, the widest first. The last one is always kBaseline.
 std::vector<InstructionSet> SupportedInstructionSets();

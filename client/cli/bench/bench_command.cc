@@ -13,22 +13,10 @@
 
 namespace tissueform {
 
-namespace {
-
-std::vector<std::string> SupportedNames() {
-  std::vector<std::string> names;
-  for (const InstructionSet set : SupportedInstructionSets()) {
-    names.emplace_back(InstructionSetName(set));
-  }
-  return names;
-}
-
-}  // namespace
-
 BenchOptions::BenchOptions()
     : meshes{1, 2, 3, 4, 5, 6, 7, 8},
       threads(AvailableProcessors()),
-      instruction_sets(SupportedNames()) {}
+      instruction_sets(InstructionSetNames(SupportedInstructionSets())) {}
 
 void AddBenchOptions(CLI::App& app, BenchOptions* options) {
   app.add_option(
@@ -49,7 +37,7 @@ void AddBenchOptions(CLI::App& app, BenchOptions* options) {
          "--isa", options->instruction_sets,
          "instruction sets to time frames on (repeatable), the widest one for all other rows; all "
          "that this processor has unless given")
-      ->check(CLI::IsMember(SupportedNames()));
+      ->check(CLI::IsMember(InstructionSetNames(SupportedInstructionSets())));
   app.add_option("--json", options->json, "also write the table to this JSON file");
   app.footer(
       "Columns: ours, a peer on the same work in the same run, ratio (peer / ours: above 1 we are\n"
