@@ -13,6 +13,7 @@
 #include <string>
 
 #include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "grpcpp/create_channel.h"
 #include "gtest/gtest.h"
@@ -396,12 +397,12 @@ TEST_F(ServedCommandTest, APortThatTheUserChoseAndIsTakenIsOneLineBeforeAnyWork)
                            {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
   const std::string port = other->address().substr(other->address().rfind(':') + 1);
   for (const std::string option : {"--port", "--serve --web-port"}) {
-    EXPECT_EQ(RunDemo(option + " " + port + " 2>" + PathOf("err")), 1);
+    EXPECT_EQ(RunDemo(absl::StrCat(option, " ", port, " 2>", PathOf("err"))), 1);
     EXPECT_EQ(Read("out.txt"), "");
     EXPECT_EQ(Read("err"),
-              "tissueform: " + option.substr(option.rfind("--")) + " " + port +
-                  ": cannot listen on 127.0.0.1:" + port +
-                  ": Address already in use; give another port, or 0 for a free one\n");
+              absl::StrCat("tissueform: ", option.substr(option.rfind("--")), " ", port,
+                           ": cannot listen on 127.0.0.1:", port,
+                           ": Address already in use; give another port, or 0 for a free one\n"));
   }
 }
 

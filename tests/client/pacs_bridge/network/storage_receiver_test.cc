@@ -369,7 +369,7 @@ TEST(StorageReceiver, OptionsThatCannotBeAreTold) {
   const auto first = StorageReceiver::Start({}, folder->get(), &sink);
   ASSERT_THAT(first.status(), IsOk());
   EXPECT_THAT(started({.port = (*first)->port()}),
-              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("another address or port")));
+              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("in use; choose another --listen")));
 }
 
 }  // namespace
