@@ -368,8 +368,9 @@ TEST(StorageReceiver, OptionsThatCannotBeAreTold) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("to listen at")));
   const auto first = StorageReceiver::Start({}, folder->get(), &sink);
   ASSERT_THAT(first.status(), IsOk());
-  EXPECT_THAT(started({.port = (*first)->port()}),
-              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("in use; choose another --listen")));
+  EXPECT_THAT(
+      started({.port = (*first)->port()}),
+      StatusIs(absl::StatusCode::kUnavailable, HasSubstr("in use; choose another --listen")));
 }
 
 }  // namespace
