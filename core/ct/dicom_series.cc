@@ -207,7 +207,7 @@ absl::Status CheckNamedFile(const std::vector<DicomHeader>& files, int file_numb
   return NoCtSlice(named.front());
 }
 
-// Takes out of a series of CT slices what is none: captures, reports or scouts that came in it.
+// Takes out of a series of CT slices what is not a slice: captures, reports or scouts.
 // What may be slices that are not read stays, and CheckKinds refuses it.
 std::vector<DicomHeader> TakeStrangers(SliceGroup* series) {
   if (!HasCt(*series)) return {};

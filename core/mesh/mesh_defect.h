@@ -50,8 +50,8 @@ void AddDefect(const DefectWords& words, const std::vector<Eigen::Index>& found,
 inline constexpr double kLeastHeadDiagonalMm = 10;
 inline constexpr double kMostHeadDiagonalMm = 2000;
 
-// The warning implausible_size for places, in mm, whose bounding box is none of a head; nothing
-// where it may be one, or where a coordinate is not finite.
+// The warning implausible_size for places, in mm, whose bounding box cannot be that of a head;
+// nothing where it may be one, or where a coordinate is not finite.
 std::optional<MeshDefect> FindImplausibleSize(const Positions& positions);
 // Adds it where there is one.
 void AddImplausibleSize(const Positions& positions, std::vector<MeshDefect>* defects);

@@ -20,7 +20,7 @@ constexpr size_t kStlHeaderBytes = 80;
 constexpr size_t kCommentBytes = 4096;
 constexpr char kNormals[] = "Normals";  // as VTK's PLY reader calls them
 
-// How a line begins that is no data; null: the format has none that says anything.
+// How a comment line begins; null if the format has no comments to read.
 const char* CommentMark(MeshFormat format) {
   switch (format) {
     case MeshFormat::kStl:

@@ -8,7 +8,7 @@
 Errors: an edge between folders that the table does not allow; a library outside its fence or unknown; an
 include that is relative, not written from the repository root, in angle brackets although it is ours, of
 a .cc file or of a file that does not exist; a folder that the table does not name; a folder of the table that
-does not exist; a circle among folders, files or Python scripts (imports inside functions count, too). Exit code 0 when there is none, 1 otherwise, 2 for wrong use.
+does not exist; a circle among folders, files or Python scripts (imports inside functions count, too). Exit code 0 when there is no such edge, 1 otherwise, 2 for wrong use.
 """
 
 import argparse

@@ -110,7 +110,7 @@ int DaysLeft(SSL* ssl) {
   return least;
 }
 
-// What `print` writes of the server's certificate; empty where there is none.
+// What `print` writes of the server's certificate; empty if it has sent no certificate.
 template <typename Print>
 std::string TextOfCertificate(SSL* ssl, const Print& print) {
   const std::unique_ptr<X509, decltype(&X509_free)> leaf(SSL_get1_peer_certificate(ssl), X509_free);

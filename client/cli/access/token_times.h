@@ -23,7 +23,7 @@ struct TokenState {
 TokenState TokenStateAt(const nlohmann::json& claims, std::chrono::system_clock::time_point now);
 
 // The claims `iat`, `nbf` and `exp` that the token has, by name: "2026-11-26 01:00:00 UTC, in 59
-// min". Empty where it has none of them as a number.
+// min". Empty if no claim of them is a number.
 nlohmann::json TokenTimesAt(const nlohmann::json& claims,
                             std::chrono::system_clock::time_point now);
 

@@ -67,7 +67,7 @@ bool IsControl(char c) { return static_cast<unsigned char>(c) < 0x20 || c == '\x
 bool IsUpper(char c) { return (static_cast<unsigned char>(c) & kHighBit) != 0; }
 bool EndsLine(char c) { return c == '\r' || c == '\n' || c == '\f' || c == '\t'; }
 
-// The encoding of a set that is none of ISO 2022; empty: it is one.
+// The encoding of a set that is not part of ISO 2022; empty for those that are.
 std::string WholeEncoding(absl::string_view name) {
   if (name == "ISO_IR 192") return "UTF-8";
   if (name == "GB18030" || name == "GBK") return std::string(name);

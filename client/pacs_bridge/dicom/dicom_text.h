@@ -14,7 +14,7 @@ class DcmTagKey;
 
 namespace tissueform {
 
-// The texts of one data set as UTF-8, in whatever character set of the standard it is written.
+// The texts of one data set as UTF-8. Every character set of the standard is decoded.
 //
 // The data set outlives it. One thread.
 class DicomTexts {

@@ -139,7 +139,7 @@ class DicomWebClient : public PacsClient {
     return parsed;
   }
 
-  // A CT image where the PACS tells of one, otherwise any; empty: it has none.
+  // A CT image if the PACS lists one, otherwise any object; empty if it lists no object.
   absl::StatusOr<std::string> SourceInstance(const std::string& instances) {
     for (const std::string& wanted :
          {absl::StrCat("SOPClassUID=", kCtImageClass, "&"), std::string()}) {

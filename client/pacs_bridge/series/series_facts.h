@@ -25,7 +25,7 @@ struct SeriesFacts {
   std::string description = {};  // for rules only, never in a text: it may hold anything
   int number = 0;
   int images = 0;
-  int set_aside = 0;  // objects of the series that are none of its images
+  int set_aside = 0;  // objects of the series that are not its images
   int slices = 0;
   int duplicates = 0;  // images at a place that another image has
   int missing = 0;     // places between the first and the last that have no image

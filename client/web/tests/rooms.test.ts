@@ -23,7 +23,7 @@ function imports(file: string): string[] {
   return Array.from(text.matchAll(/from "([^"]+)"/g), (match) => match[1]);
 }
 
-/** Files of `graph` that import each other in a circle, the first one that is found, from a file back to it; [] where there is none. */
+/** Files of `graph` that import each other in a circle, the first one that is found, from a file back to it; [] if there is no circle. */
 function findCircle(graph: ReadonlyMap<string, readonly string[]>): string[] {
   const done = new Set<string>();
   const path: string[] = [];

@@ -88,7 +88,7 @@ TEST_F(GatewaySocketTest, WhoAsksForHeartbeatsHearsThemWhileTheServerIsSilent) {
   for (int i = 0; i < 3; ++i) EXPECT_EQ(socket.Receive().payload, HeartbeatFrame()) << i;
 }
 
-// A heartbeat that is being sent holds an answer up, and loses or doubles none.
+// A heartbeat that is being sent holds an answer up, and loses or doubles no answer.
 TEST_F(GatewaySocketTest, HeartbeatsLeaveTheServersMessagesInOrder) {
   v1::GatewayCallStart start;
   start.set_method(kEcho);

@@ -39,7 +39,7 @@ export interface PackedColumns {
   lower: Int16Array;
 }
 
-/** All sections by name, empty where there is none. Views of the bytes that were read: both stay unchanged. */
+/** All sections by name, empty if the bytes have no sections. They are views of the bytes that were read: both stay unchanged. */
 export interface PreparedColumns {
   version: number;
   numbers: AnswerNumbers;

@@ -132,7 +132,7 @@ export class FollowSession {
     else tell();
   }
 
-  // A watch that has ended meanwhile needs no acknowledgement; its end arrives by itself. The server waits for one that was lost,
+  // A watch that has ended needs no acknowledgment; its end arrives by itself. The server waits for one that was lost,
   // so the newest one is repeated.
   private acknowledge(watch: string, number: bigint): void {
     const options = { headers: sessionMetadata(this.session), timeoutMs: ACKNOWLEDGE_MS };

@@ -9,7 +9,7 @@ const CLICK_PX = 4;
 const TAP_PX = 10;
 
 /**
- * A click or tap, not a turn of the picture, goes to who asked for a point (`Workbench.picking`); where nobody has, it takes the segment
+ * A click or tap, not a turn of the picture, goes to the part that asked for a point (`Workbench.picking`); otherwise it takes the segment
  * in the hand. By keys: Enter takes what is in the picture's middle, Escape leaves it.
  */
 export function bindPicking(bench: Workbench): void {

@@ -15,7 +15,7 @@ export interface LandmarkMovement {
   totalMm: number;
 }
 
-/** A landmark on a segment moves with the segment, whatever vertex of the skin is near it. */
+/** A landmark on a segment moves with the segment, even if a vertex of the skin is near it. */
 export function isOnSkin({ handle, skinVertex }: LandmarkEntry): boolean {
   return handle === "" && skinVertex !== null;
 }

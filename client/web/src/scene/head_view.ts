@@ -73,13 +73,13 @@ export class HeadView {
     this.stage.invalidate();
   }
 
-  /** The handle of the segment below a point of the picture, in the page's pixels; "" for none. */
+  /** The handle of the segment below a point of the picture, in the page's pixels; "" if no segment is there. */
   segmentAt(x: number, y: number): string {
     const hit = this.hitAt(x, y, ({ source }) => source.entry.handle !== "");
     return hit === undefined ? "" : String(hit.object.userData.handle);
   }
 
-  /** The point of a surface of these kinds that is seen at a point of the picture, in the page's pixels; null for none. What lies before it is looked through. */
+  /** The point of a surface of these kinds that is seen at a point of the picture, in the page's pixels; null if no such surface is there. Other surfaces in front of it are ignored. */
   anchorAt(x: number, y: number, kinds: readonly SurfaceKind[]): Anchor | null {
     const hit = this.hitAt(x, y, ({ source }) => kinds.includes(source.entry.kind));
     if (hit?.faceIndex == null) return null;

@@ -145,7 +145,7 @@ test("heartbeats keep a call that says nothing else", () => {
   expect(told).toEqual([]);
 });
 
-test("a gateway that sends none is no dead one", () => {
+test("a gateway that sends no heartbeat is not taken for dead", () => {
   const { clock, socket, told } = timed();
   socket.onopen?.();
   clock.pass(1000);
