@@ -32,7 +32,7 @@ SpaceWords WordsOf(FileSpace space) {
     case FileSpace::kUnstated:
       break;
   }
-  return {"taken as LPS; the file does not state them", ""};
+  return {"taken as LPS; the file states neither LPS nor RAS", ""};
 }
 
 std::string SurfaceReportText(const std::string& path, const TriangleMeshFile& file,

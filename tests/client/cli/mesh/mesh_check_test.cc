@@ -146,10 +146,14 @@ TEST_F(MeshCheckTest, ASurfaceSaysInWhichSpaceItsFileStatesToBe) {
   Write("ras.stl", "solid 3D Slicer output. SPACE=RAS" + facets);
   Write("lps.stl", "solid 3D Slicer output. SPACE=LPS" + facets);
   Write("unstated.stl", "solid a" + facets);
+  Write("unknown.stl", "solid a SPACE=XYZ" + facets);
   EXPECT_THAT(Run({"mesh", "check", "ras.stl"}).out,
               HasSubstr("LPS; the file states RAS: x and y were negated"));
   EXPECT_THAT(Run({"mesh", "check", "lps.stl"}).out, HasSubstr("LPS, as the file states"));
-  EXPECT_THAT(Run({"mesh", "check", "unstated.stl"}).out, HasSubstr("taken as LPS"));
+  for (const char* file : {"unstated.stl", "unknown.stl"}) {
+    EXPECT_THAT(Run({"mesh", "check", file}).out,
+                HasSubstr("taken as LPS; the file states neither LPS nor RAS"));
+  }
   EXPECT_THAT(Run({"mesh", "check", "ras.stl", "--json"}).out,
               HasSubstr("\"stated_space\": \"RAS\""));
 }
