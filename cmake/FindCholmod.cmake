@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
 # CHOLMOD::CHOLMOD. Debian's SuiteSparse 5 ships no CMake package; OpenBLAS is linked by name because
-# its thread count is set per job (core/linear_solvers/blas_threads.h) and because the reference BLAS
+# its thread count is set per job (core/mechanics/linear_solvers/blas_threads.h) and because the reference BLAS
 # that CHOLMOD would otherwise pick up is many times slower.
 
 if(TARGET CHOLMOD::CHOLMOD)

@@ -1,7 +1,7 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
-# tissueform::itk: the modules of ITK that core/ct and core/anatomy use, as one target. ITK's own use file would add its
+# tissueform::itk: the modules of ITK that core/imaging/ct and core/imaging/anatomy use, as one target. ITK's own use file would add its
 # folders to every target of the project and register every format; we name ours.
 
 find_package(ITK 5.2 CONFIG REQUIRED COMPONENTS

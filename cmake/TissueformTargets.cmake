@@ -111,8 +111,8 @@ endfunction()
 
 # tissueform_binary(tissueform INSTALL bin SOURCES main.cc DEPS client_cli_shared)
 #
-# INSTALL bin: users start it; otherwise other programs of ours do (libexec), and find it by FindProgram of core/process.
-# Programs of tests/ are not installed.
+# INSTALL bin: users start it; otherwise other programs of ours do (libexec), and find it by FindProgram of core/base/process.
+# Programs of tests/ and of client/lab/ are not installed.
 function(tissueform_binary name)
   cmake_parse_arguments(ARG "" "PRECOMPILED;INSTALL" "SOURCES;DEPS" ${ARGN})
   if(NOT ARG_PRECOMPILED)
@@ -126,14 +126,14 @@ function(tissueform_binary name)
   file(RELATIVE_PATH folder "${PROJECT_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")
   if(ARG_INSTALL)
     tissueform_install_program(${name} ${ARG_INSTALL})
-  elseif(NOT folder MATCHES "^tests/")
+  elseif(NOT folder MATCHES "^(tests|client/lab)/")
     tissueform_install_program(${name} libexec)
   endif()
 endfunction()
 
-# tissueform_helper(tissueform-mesh-reader SOURCES main.cc DEPS core_process)
+# tissueform_helper(tissueform-mesh-reader SOURCES main.cc DEPS core_base_process)
 #
-# A program that only programs of ours start (core/process/helper_call.h). Who calls it needs it at run time:
+# A program that only programs of ours start (core/base/process/helper_call.h). Who calls it needs it at run time:
 # add_dependencies(LIBRARY HELPER), so the helper must not link that library. It links what it uses and no more,
 # because loading shared libraries is most of what a call costs.
 function(tissueform_helper name)

@@ -4,9 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/access/audit_command.h"
-#include "client/cli/access/token_command.h"
-#include "client/cli/bench/bench_command.h"
+#include "client/cli/account/audit_command.h"
+#include "client/cli/account/token_command.h"
 #include "client/cli/compare/compare_command.h"
 #include "client/cli/mesh/mesh_command.h"
 #include "client/cli/plan_build/plan_build_command.h"
@@ -31,7 +30,7 @@ int main(int argc, char** argv) {
     tissueform::AddCompanionCommand(app, tissueform::kRunCommand, words, work);
     tissueform::AddCompareCommand(app, work);
     tissueform::AddCompanionCommand(app, tissueform::kExperimentsCommand, words, work);
-    tissueform::AddBenchCommand(app, work);
+    tissueform::AddCompanionCommand(app, tissueform::kBenchCommand, words, work);
     tissueform::AddTokenCommand(app, work);
     tissueform::AddCompanionCommand(app, tissueform::kLoadCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kDragCommand, words, work);

@@ -10,7 +10,7 @@
 #include "client/cpp/session_call.h"
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "proto/conversion/case_conversion.h"
 
 namespace tissueform {

@@ -12,7 +12,7 @@
 #include "absl/status/statusor.h"
 
 #include "client/cpp/backoff.h"
-#include "core/mesh_payload/mesh_payload.h"
+#include "core/mesh/payload/mesh_payload.h"
 #include "tissueform/v1/mesh_service.grpc.pb.h"
 
 namespace tissueform {

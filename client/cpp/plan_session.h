@@ -11,13 +11,13 @@
 #include "absl/status/statusor.h"
 
 #include "client/cpp/tissueform_client.h"
-#include "core/mesh_payload/mesh_payload.h"
-#include "core/problem/plan_problem.h"
+#include "core/mechanics/problem/plan_problem.h"
+#include "core/mesh/payload/mesh_payload.h"
 
 namespace tissueform {
 
 // A session on a server that was made from a plan, whether that was read from files or has just
-// been built (core/problem). It is deleted with this object, whatever happens in between.
+// been built (core/mechanics/problem). It is deleted with this object, whatever happens in between.
 class PlanSession {
  public:
   // Uploads the mesh with the stiffness of its tets unless the server has both, and makes the

@@ -9,9 +9,9 @@
 #include "absl/strings/str_cat.h"
 
 #include "client/cpp/session_call.h"
-#include "core/answer_evaluator/answer_bytes.h"
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mechanics/answer_evaluator/answer_bytes.h"
+#include "core/mesh/payload/sha256.h"
 
 namespace tissueform {
 namespace {

@@ -13,7 +13,7 @@
 #include "absl/types/span.h"
 
 #include "client/cpp/session_routes.h"
-#include "core/answer_evaluator/answer_evaluator.h"
+#include "core/mechanics/answer_evaluator/answer_evaluator.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "tissueform/v1/deform_service.grpc.pb.h"
 

@@ -16,8 +16,8 @@
 #include "client/pacs_bridge/bridge_parts.h"
 #include "client/pacs_bridge/bridge_run.h"
 #include "client/pacs_bridge/queue/export_rows.h"
+#include "client/pacs_bridge/review/shown_text.h"
 #include "client/pacs_bridge/status_text.h"
-#include "client/pacs_bridge/worklist/shown_text.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {

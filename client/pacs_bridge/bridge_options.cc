@@ -12,7 +12,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "server/program/program_options.h"
+#include "server/platform/program_options.h"
 
 namespace tissueform {
 namespace {

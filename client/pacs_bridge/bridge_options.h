@@ -15,10 +15,10 @@
 #include "client/cpp/connection_options.h"
 #include "client/pacs_bridge/network/pacs_client.h"
 #include "client/pacs_bridge/network/storage_receiver.h"
+#include "client/pacs_bridge/review/review_server.h"
 #include "client/pacs_bridge/series/series_rules.h"
 #include "client/pacs_bridge/work/plan_work.h"
 #include "client/pacs_bridge/work/retention.h"
-#include "client/pacs_bridge/worklist/worklist_server.h"
 
 namespace tissueform {
 

@@ -22,7 +22,7 @@
 #include "client/pacs_bridge/bridge_parts.h"
 #include "client/pacs_bridge/work/bridge_service.h"
 #include "core/base/status_macros.h"
-#include "server/program/systemd_notices.h"
+#include "server/platform/systemd_notices.h"
 
 namespace tissueform {
 namespace {

@@ -16,8 +16,8 @@
 
 #include "client/pacs_bridge/bridge_commands.h"
 #include "client/pacs_bridge/bridge_options.h"
-#include "server/monitoring/log_lines.h"
-#include "server/program/program_options.h"
+#include "server/platform/log_lines.h"
+#include "server/platform/program_options.h"
 
 namespace {
 

@@ -24,8 +24,8 @@ struct EdgeWeight {
 
 // With area vectors a_k of the facets opposite to corner k, grad phi_k = -a_k / (3 V), so that the
 // weight V grad phi_i . grad phi_j with its sign turned is -a_i . a_j / (9 V). Not by
-// core/operators, which lies above this folder, and from areas and volume: a flat tet, of which a
-// cotangent has no value, is one test.
+// core/mesh/operators, which lies above this folder, and from areas and volume: a flat tet, of
+// which a cotangent has no value, is one test.
 void AddTet(const TetMesh& mesh, Eigen::Index t, std::vector<EdgeWeight>* weights) {
   const auto tet = mesh.tets().row(t);
   std::array<Eigen::Vector3d, 4> corners;

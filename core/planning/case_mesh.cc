@@ -10,9 +10,9 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "core/case_file/case_file.h"
-#include "core/case_file/case_reader.h"
-#include "core/mesh_payload/mesh_payload.h"
+#include "core/mesh/payload/mesh_payload.h"
+#include "core/planning/case_file/case_file.h"
+#include "core/planning/case_file/case_reader.h"
 
 namespace tissueform {
 

@@ -8,7 +8,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh/io/tet_mesh_io.h"
 #include "core/planning/plan.h"
 
 namespace tissueform {

@@ -8,8 +8,8 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/plan_fitting/fit_request.h"
-#include "core/problem/plan_problem.h"
+#include "core/mechanics/plan_fitting/fit_request.h"
+#include "core/mechanics/problem/plan_problem.h"
 
 namespace tissueform {
 

@@ -5,8 +5,8 @@
 
 #include "nlohmann/json.hpp"
 
+#include "core/base/json/json_text.h"
 #include "core/base/status_macros.h"
-#include "core/json/json_text.h"
 #include "core/planning/json_values.h"
 #include "core/planning/plan_schema.h"
 

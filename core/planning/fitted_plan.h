@@ -10,7 +10,7 @@
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
 
-#include "core/constraints/handle_pose.h"
+#include "core/mechanics/constraints/handle_pose.h"
 
 namespace tissueform {
 

@@ -6,7 +6,7 @@
 #include "nlohmann/json_fwd.hpp"
 #include <Eigen/Core>
 
-#include "core/constraints/handle_pose.h"
+#include "core/mechanics/constraints/handle_pose.h"
 #include "core/planning/plan.h"
 
 namespace tissueform {

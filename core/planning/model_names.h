@@ -9,7 +9,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
-#include "core/deformation/create_deformer.h"
+#include "core/mechanics/deformation/create_deformer.h"
 
 namespace tissueform {
 

@@ -13,9 +13,9 @@
 
 #include <Eigen/Core>
 
-#include "core/constraints/handle_pose.h"
-#include "core/deformation/create_deformer.h"
-#include "core/problem/plan_problem.h"
+#include "core/mechanics/constraints/handle_pose.h"
+#include "core/mechanics/deformation/create_deformer.h"
+#include "core/mechanics/problem/plan_problem.h"
 
 namespace tissueform {
 

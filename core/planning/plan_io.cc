@@ -7,9 +7,9 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/json/json_file.h"
 #include "core/base/status_macros.h"
-#include "core/json/json_file.h"
-#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh/io/tet_mesh_io.h"
 
 namespace tissueform {
 namespace {

@@ -8,9 +8,9 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mechanics/problem/plan_problem.h"
+#include "core/mesh/io/tet_mesh_io.h"
 #include "core/planning/plan.h"
-#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 

@@ -8,8 +8,8 @@
 #include "absl/strings/str_cat.h"
 #include "nlohmann/json.hpp"
 
+#include "core/base/json/json_text.h"
 #include "core/base/status_macros.h"
-#include "core/json/json_text.h"
 #include "core/planning/json_values.h"
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"

@@ -8,14 +8,14 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "core/mechanics/problem/plan_problem.h"
+#include "core/mesh/io/tet_mesh_io.h"
 #include "core/mesh/validation.h"
-#include "core/mesh_io/tet_mesh_io.h"
 #include "core/planning/case_mesh.h"
 #include "core/planning/plan_io.h"
 #include "core/planning/selector.h"
 #include "core/planning/stiffness.h"
 #include "core/planning/tissue_ranges.h"
-#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "core/planning/plan_schema.h"
 
-#include "core/json/json_schema.h"
+#include "core/base/json/json_schema.h"
 
 namespace tissueform {
 namespace {

@@ -12,7 +12,7 @@ namespace tissueform {
 const char* PlanSchemaText();
 
 // The published schema of plans, docs/plan.schema.json, as it was when the program was built: that
-// of the newest version (core/json/schema_versions.h).
+// of the newest version (core/base/json/schema_versions.h).
 const nlohmann::json& PlanSchema();
 
 // InvalidArgument in one line when `plan` does not follow the schema of the version that it says:

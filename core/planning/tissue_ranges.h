@@ -8,9 +8,9 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/mechanics/uncertainty/material_uncertainty.h"
 #include "core/mesh/attribute.h"
 #include "core/planning/plan.h"
-#include "core/uncertainty/material_uncertainty.h"
 
 namespace tissueform {
 

@@ -3,8 +3,8 @@
 
 #pragma once
 
-#include "core/deformation/deformation_quality.h"
-#include "core/deformation/deformer.h"
+#include "core/mechanics/deformation/deformation_quality.h"
+#include "core/mechanics/deformation/deformer.h"
 #include "tissueform/v1/deform_service.pb.h"
 #include "tissueform/v1/session.pb.h"
 

@@ -5,9 +5,9 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/plan_fitting/fit_problem.h"
-#include "core/plan_fitting/fit_request.h"
-#include "core/plan_fitting/plan_fit.h"
+#include "core/mechanics/plan_fitting/fit_problem.h"
+#include "core/mechanics/plan_fitting/fit_request.h"
+#include "core/mechanics/plan_fitting/plan_fit.h"
 #include "tissueform/v1/plan_service.pb.h"
 
 namespace tissueform {

@@ -11,7 +11,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/displacement_codec.h"
+#include "core/mesh/payload/displacement_codec.h"
 
 namespace tissueform {
 namespace {

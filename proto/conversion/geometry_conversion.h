@@ -12,8 +12,8 @@
 #include "google/protobuf/repeated_ptr_field.h"
 
 #include "core/base/types.h"
-#include "core/constraints/constraint_set.h"
-#include "core/constraints/handle_pose.h"
+#include "core/mechanics/constraints/constraint_set.h"
+#include "core/mechanics/constraints/handle_pose.h"
 #include "tissueform/v1/geometry.pb.h"
 
 // Poses, choices of vertices and positions between messages and core. What comes from outside is

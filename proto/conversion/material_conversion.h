@@ -8,7 +8,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/types.h"
-#include "core/uncertainty/material_uncertainty.h"
+#include "core/mechanics/uncertainty/material_uncertainty.h"
 #include "tissueform/v1/deform_service.pb.h"
 
 namespace tissueform {

@@ -8,7 +8,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
-#include "core/mesh_payload/mesh_payload.h"
+#include "core/mesh/payload/mesh_payload.h"
 #include "tissueform/v1/mesh_service.pb.h"
 
 namespace tissueform {

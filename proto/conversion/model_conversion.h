@@ -5,7 +5,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/deformation/create_deformer.h"
+#include "core/mechanics/deformation/create_deformer.h"
 #include "tissueform/v1/session.pb.h"
 
 namespace tissueform {

@@ -8,7 +8,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
-#include "core/deformation/comparison.h"
+#include "core/mechanics/deformation/comparison.h"
 #include "tissueform/v1/prediction.pb.h"
 #include "tissueform/v1/prediction_service.pb.h"
 

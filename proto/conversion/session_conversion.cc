@@ -13,7 +13,7 @@
 #include "google/protobuf/io/zero_copy_stream_impl_lite.h"
 
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "proto/conversion/model_conversion.h"
 

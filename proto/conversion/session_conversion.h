@@ -11,8 +11,8 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
-#include "core/constraints/constraint_set.h"
-#include "core/deformation/create_deformer.h"
+#include "core/mechanics/constraints/constraint_set.h"
+#include "core/mechanics/deformation/create_deformer.h"
 #include "tissueform/v1/session_service.pb.h"
 
 namespace tissueform {

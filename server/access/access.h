@@ -16,9 +16,9 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/mutex.h"
+#include "server/access/auth/identity.h"
 #include "server/access/resource_index.h"
 #include "server/access/share_table.h"
-#include "server/auth/identity.h"
 #include "server/store/session_store.h"
 
 namespace tissueform {

@@ -15,7 +15,7 @@
 #include <openssl/rand.h>
 
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "server/access/access_names.h"
 
 namespace tissueform {

@@ -10,7 +10,7 @@
 #include "absl/strings/string_view.h"
 
 #include "server/access/access.h"
-#include "server/auth/authenticator.h"
+#include "server/access/auth/authenticator.h"
 
 namespace tissueform {
 

@@ -15,11 +15,11 @@
 #include "core/base/mutex.h"
 #include "server/access/access_changes.h"
 #include "server/exports/export_book.h"
-#include "server/postgres_store/change_listener.h"
-#include "server/postgres_store/postgres_options.h"
-#include "server/postgres_store/store_change.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session_registry.h"
+#include "server/store/postgres_store/change_listener.h"
+#include "server/store/postgres_store/postgres_options.h"
+#include "server/store/postgres_store/store_change.h"
 #include "server/store/stores.h"
 
 namespace tissueform {

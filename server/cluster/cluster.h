@@ -16,9 +16,9 @@
 #include "server/cluster/cluster_node.h"
 #include "server/cluster/cluster_options.h"
 #include "server/cluster/row_lookups.h"
-#include "server/monitoring/metrics_page.h"
-#include "server/postgres_store/postgres_pool.h"
-#include "server/postgres_store/postgres_stores.h"
+#include "server/platform/metrics_page.h"
+#include "server/store/postgres_store/postgres_pool.h"
+#include "server/store/postgres_store/postgres_stores.h"
 
 namespace tissueform {
 

@@ -15,10 +15,10 @@
 #include "server/cluster/cluster_options.h"
 #include "server/cluster/counted_leases.h"
 #include "server/cluster/node_table.h"
-#include "server/postgres_store/lease_keeper.h"
-#include "server/postgres_store/postgres_pool.h"
-#include "server/postgres_store/postgres_session_leases.h"
 #include "server/session/session_ownership.h"
+#include "server/store/postgres_store/lease_keeper.h"
+#include "server/store/postgres_store/postgres_pool.h"
+#include "server/store/postgres_store/postgres_session_leases.h"
 
 namespace tissueform {
 

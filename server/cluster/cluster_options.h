@@ -10,8 +10,8 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "server/postgres_store/postgres_options.h"
-#include "server/postgres_store/session_leases.h"
+#include "server/store/postgres_store/postgres_options.h"
+#include "server/store/postgres_store/session_leases.h"
 
 namespace tissueform {
 

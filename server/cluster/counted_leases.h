@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "server/postgres_store/session_leases.h"
+#include "server/store/postgres_store/session_leases.h"
 
 namespace tissueform {
 

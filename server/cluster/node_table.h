@@ -14,7 +14,7 @@
 #include "absl/status/status.h"
 
 #include "core/base/mutex.h"
-#include "server/postgres_store/postgres_pool.h"
+#include "server/store/postgres_store/postgres_pool.h"
 
 namespace tissueform {
 

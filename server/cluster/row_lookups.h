@@ -15,11 +15,11 @@
 #include "server/access/access.h"
 #include "server/access/access_changes.h"
 #include "server/exports/export_book.h"
-#include "server/postgres_store/postgres_access_store.h"
-#include "server/postgres_store/postgres_case_store.h"
-#include "server/postgres_store/postgres_pool.h"
-#include "server/postgres_store/postgres_prediction_store.h"
-#include "server/postgres_store/postgres_session_store.h"
+#include "server/store/postgres_store/postgres_access_store.h"
+#include "server/store/postgres_store/postgres_case_store.h"
+#include "server/store/postgres_store/postgres_pool.h"
+#include "server/store/postgres_store/postgres_prediction_store.h"
+#include "server/store/postgres_store/postgres_session_store.h"
 
 namespace tissueform {
 

@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "server/access/access_changes.h"
-#include "server/calls/call_scope.h"
+#include "server/rpc/calls/call_scope.h"
 #include "server/rpc/deform_streams.h"
+#include "server/rpc/watches/session_watches.h"
 #include "server/session/session_registry.h"
-#include "server/watches/session_watches.h"
 #include "tissueform/v1/access_service.grpc.pb.h"
 
 namespace tissueform {

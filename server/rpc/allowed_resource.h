@@ -8,7 +8,7 @@
 #include "absl/status/statusor.h"
 
 #include "server/access/access.h"
-#include "server/calls/call_scope.h"
+#include "server/rpc/calls/call_scope.h"
 #include "server/store/case_store.h"
 
 // What a call names, once it is known that its caller may have it: read from its name, asked for at

@@ -12,8 +12,8 @@
 
 #include "core/base/status_macros.h"
 #include "proto/conversion/case_conversion.h"
-#include "server/calls/message_stream.h"
 #include "server/rpc/allowed_resource.h"
+#include "server/rpc/calls/message_stream.h"
 #include "server/rpc/case_upload_stream.h"
 #include "server/rpc/resource_conversion.h"
 #include "server/store/session_store.h"

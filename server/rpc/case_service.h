@@ -10,7 +10,7 @@
 #include "absl/status/status.h"
 
 #include "server/access/access.h"
-#include "server/calls/call_scope.h"
+#include "server/rpc/calls/call_scope.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
 #include "server/session/worker_pool.h"

@@ -8,7 +8,7 @@
 #include "grpcpp/support/server_callback.h"
 
 #include "server/access/access.h"
-#include "server/calls/call_scope.h"
+#include "server/rpc/calls/call_scope.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session_registry.h"

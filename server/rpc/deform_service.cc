@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
-#include "core/deformation/deformation_quality.h"
+#include "core/mechanics/deformation/deformation_quality.h"
 #include "proto/conversion/answer_conversion.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "server/rpc/allowed_resource.h"

@@ -14,14 +14,14 @@
 
 #include "core/base/mutex.h"
 #include "server/access/access.h"
-#include "server/calls/call_scope.h"
+#include "server/rpc/calls/call_scope.h"
 #include "server/rpc/deform_streams.h"
 #include "server/rpc/stream_answers.h"
+#include "server/rpc/watches/session_watches.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/frame_flow.h"
 #include "server/session/limits.h"
 #include "server/session/session_registry.h"
-#include "server/watches/session_watches.h"
 #include "tissueform/v1/deform_service.pb.h"
 
 namespace tissueform {

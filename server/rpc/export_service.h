@@ -9,8 +9,8 @@
 #include "absl/status/status.h"
 
 #include "server/access/access.h"
-#include "server/calls/call_scope.h"
 #include "server/exports/export_book.h"
+#include "server/rpc/calls/call_scope.h"
 #include "server/rpc/export_watch.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"

@@ -12,9 +12,9 @@
 #include "grpcpp/support/server_callback.h"
 
 #include "core/base/mutex.h"
-#include "server/calls/call_scope.h"
-#include "server/calls/message_stream.h"
 #include "server/exports/export_book.h"
+#include "server/rpc/calls/call_scope.h"
+#include "server/rpc/calls/message_stream.h"
 #include "server/session/deadline_timer.h"
 #include "tissueform/v1/export_service.pb.h"
 

@@ -11,8 +11,8 @@
 
 #include "core/base/status_macros.h"
 #include "proto/conversion/mesh_conversion.h"
-#include "server/calls/message_stream.h"
 #include "server/rpc/allowed_resource.h"
+#include "server/rpc/calls/message_stream.h"
 #include "server/rpc/mesh_surface.h"
 #include "server/rpc/mesh_upload_stream.h"
 #include "server/rpc/resource_conversion.h"

@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "server/access/access_changes.h"
-#include "server/calls/call_scope.h"
+#include "server/rpc/calls/call_scope.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"

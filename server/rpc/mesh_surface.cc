@@ -10,8 +10,8 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 
+#include "core/mesh/payload/sha256.h"
 #include "core/mesh/tet_topology.h"
-#include "core/mesh_payload/sha256.h"
 
 namespace tissueform {
 namespace {

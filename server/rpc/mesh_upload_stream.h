@@ -10,8 +10,8 @@
 #include "absl/status/statusor.h"
 
 #include "server/access/access_changes.h"
-#include "server/calls/call_scope.h"
-#include "server/calls/upload_stream.h"
+#include "server/rpc/calls/call_scope.h"
+#include "server/rpc/calls/upload_stream.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"

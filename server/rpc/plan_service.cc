@@ -14,9 +14,9 @@
 
 #include "core/base/cancellation.h"
 #include "core/base/status_macros.h"
-#include "core/plan_fitting/fit_problem.h"
-#include "core/plan_fitting/plan_fit.h"
-#include "core/prepared_answers/create_response.h"
+#include "core/mechanics/plan_fitting/fit_problem.h"
+#include "core/mechanics/plan_fitting/plan_fit.h"
+#include "core/mechanics/prepared_answers/create_response.h"
 #include "proto/conversion/fit_conversion.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "proto/conversion/model_conversion.h"

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "server/access/access.h"
-#include "server/calls/call_scope.h"
+#include "server/rpc/calls/call_scope.h"
 #include "server/session/session_registry.h"
 #include "tissueform/v1/plan_service.grpc.pb.h"
 

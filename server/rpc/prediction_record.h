@@ -8,7 +8,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "server/auth/identity.h"
+#include "server/access/auth/identity.h"
 #include "server/rpc/single_answer.h"
 #include "server/session/session.h"
 #include "server/store/prediction_store.h"

@@ -11,7 +11,7 @@
 #include "grpcpp/support/server_callback.h"
 
 #include "core/base/mutex.h"
-#include "server/calls/call_scope.h"
+#include "server/rpc/calls/call_scope.h"
 #include "server/rpc/session_preparation.h"
 #include "server/session/clock.h"
 #include "server/session/session_progress.h"

@@ -11,13 +11,13 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "core/answer_evaluator/answer_bytes.h"
 #include "core/base/cancellation.h"
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mechanics/answer_evaluator/answer_bytes.h"
+#include "core/mesh/payload/sha256.h"
 #include "proto/conversion/model_conversion.h"
-#include "server/calls/message_stream.h"
 #include "server/rpc/allowed_resource.h"
+#include "server/rpc/calls/message_stream.h"
 #include "server/rpc/stream_answers.h"
 
 namespace tissueform {

@@ -6,7 +6,7 @@
 #include "grpcpp/support/server_callback.h"
 
 #include "server/access/access.h"
-#include "server/calls/call_scope.h"
+#include "server/rpc/calls/call_scope.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
 #include "server/session/session_registry.h"

@@ -8,7 +8,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "server/auth/identity.h"
+#include "server/access/auth/identity.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session_registry.h"

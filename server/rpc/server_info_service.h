@@ -7,7 +7,7 @@
 #include <map>
 #include <string>
 
-#include "server/calls/call_scope.h"
+#include "server/rpc/calls/call_scope.h"
 #include "server/session/limits.h"
 #include "tissueform/v1/server_info.grpc.pb.h"
 

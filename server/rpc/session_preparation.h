@@ -12,8 +12,8 @@
 
 #include "core/base/mutex.h"
 #include "server/access/access.h"
-#include "server/auth/identity.h"
-#include "server/calls/call_scope.h"
+#include "server/access/auth/identity.h"
+#include "server/rpc/calls/call_scope.h"
 #include "server/rpc/stream_answers.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"

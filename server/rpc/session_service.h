@@ -8,7 +8,7 @@
 #include "absl/status/statusor.h"
 
 #include "server/access/access.h"
-#include "server/calls/call_scope.h"
+#include "server/rpc/calls/call_scope.h"
 #include "server/session/clock.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"

@@ -12,8 +12,8 @@
 #include "absl/status/statusor.h"
 #include "google/protobuf/repeated_ptr_field.h"
 
-#include "core/constraints/handle_pose.h"
-#include "core/deformation/deformer.h"
+#include "core/mechanics/constraints/handle_pose.h"
+#include "core/mechanics/deformation/deformer.h"
 #include "server/session/session.h"
 #include "server/session/session_registry.h"
 #include "tissueform/v1/geometry.pb.h"

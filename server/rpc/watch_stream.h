@@ -16,13 +16,13 @@
 #include "grpcpp/support/server_callback.h"
 
 #include "core/base/mutex.h"
-#include "core/constraints/handle_pose.h"
+#include "core/mechanics/constraints/handle_pose.h"
 #include "server/access/access.h"
-#include "server/calls/call_scope.h"
+#include "server/rpc/calls/call_scope.h"
+#include "server/rpc/watches/session_watches.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
 #include "server/session/session_registry.h"
-#include "server/watches/session_watches.h"
 
 namespace tissueform {
 

@@ -15,8 +15,8 @@
 #include "absl/status/status.h"
 
 #include "core/base/duration_histogram.h"
-#include "core/constraints/handle_pose.h"
-#include "core/deformation/deformer.h"
+#include "core/mechanics/constraints/handle_pose.h"
+#include "core/mechanics/deformation/deformer.h"
 
 namespace tissueform {
 

@@ -16,8 +16,8 @@
 #include "absl/strings/string_view.h"
 
 #include "core/base/mutex.h"
+#include "core/mesh/payload/mesh_payload.h"
 #include "core/mesh/tet_mesh.h"
-#include "core/mesh_payload/mesh_payload.h"
 #include "server/session/clock.h"
 #include "server/session/limits.h"
 #include "server/session/memory_budget.h"

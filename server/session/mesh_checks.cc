@@ -14,8 +14,8 @@
 
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
+#include "core/mesh/payload/sha256.h"
 #include "core/mesh/validation.h"
-#include "core/mesh_payload/sha256.h"
 
 namespace tissueform {
 namespace {

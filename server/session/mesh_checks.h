@@ -9,8 +9,8 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/mesh/payload/mesh_payload.h"
 #include "core/mesh/tet_mesh.h"
-#include "core/mesh_payload/mesh_payload.h"
 #include "server/session/limits.h"
 #include "server/store/upload_store.h"
 

@@ -11,8 +11,8 @@
 
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
-#include "core/prepared_answers/create_response.h"
+#include "core/mechanics/prepared_answers/create_response.h"
+#include "core/mesh/payload/sha256.h"
 
 namespace tissueform {
 namespace {

@@ -16,9 +16,9 @@
 #include <sys/stat.h>
 
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
-#include "server/store/durable_file.h"
-#include "server/store/fault_points.h"
+#include "core/mesh/payload/sha256.h"
+#include "server/platform/storage/durable_file.h"
+#include "server/platform/storage/fault_points.h"
 #include "server/store/store_errors.h"
 
 namespace tissueform {

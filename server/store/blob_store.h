@@ -16,7 +16,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/base/mutex.h"
-#include "server/store/durable_file.h"
+#include "server/platform/storage/durable_file.h"
 
 namespace tissueform {
 

@@ -16,7 +16,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 
 namespace tissueform {
 

@@ -6,7 +6,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "server/store/fault_points.h"
+#include "server/platform/storage/fault_points.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_rows.h"
 

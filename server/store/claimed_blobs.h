@@ -11,9 +11,9 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "server/platform/storage/database.h"
 #include "server/store/blob_store.h"
 #include "server/store/commit_thread.h"
-#include "server/store/database.h"
 
 // What the stores have in common whose rows claim blobs. A blob is written on the caller's thread
 // before its row and removed on the database's thread after the last row that claims it. All block.

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
-#include "server/store/fault_points.h"
+#include "server/platform/storage/fault_points.h"
 
 namespace tissueform {
 namespace {

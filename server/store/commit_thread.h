@@ -14,7 +14,7 @@
 
 #include "core/base/duration_histogram.h"
 #include "core/base/mutex.h"
-#include "server/store/database.h"
+#include "server/platform/storage/database.h"
 
 namespace tissueform {
 

@@ -9,11 +9,11 @@
 #include <sys/stat.h>
 
 #include "core/base/status_macros.h"
+#include "server/platform/storage/durable_file.h"
 #include "server/store/blob_store.h"
 #include "server/store/commit_thread.h"
 #include "server/store/durable_blob_stores.h"
 #include "server/store/durable_case_store.h"
-#include "server/store/durable_file.h"
 #include "server/store/durable_session_store.h"
 #include "server/store/store_check.h"
 

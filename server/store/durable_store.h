@@ -10,7 +10,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "server/store/data_folder.h"
+#include "server/platform/storage/data_folder.h"
 #include "server/store/stores.h"
 
 namespace tissueform {

@@ -10,7 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "core/mesh_payload/mesh_payload.h"
+#include "core/mesh/payload/mesh_payload.h"
 
 namespace tissueform {
 

@@ -11,9 +11,9 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
-#include "core/constraints/constraint_set.h"
-#include "core/constraints/handle_pose.h"
-#include "core/deformation/create_deformer.h"
+#include "core/mechanics/constraints/constraint_set.h"
+#include "core/mechanics/constraints/handle_pose.h"
+#include "core/mechanics/deformation/create_deformer.h"
 
 namespace tissueform {
 

@@ -15,9 +15,9 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "server/platform/storage/durable_file.h"
 #include "server/store/claimed_blobs.h"
 #include "server/store/durable_blob_stores.h"
-#include "server/store/durable_file.h"
 #include "server/store/session_record.h"
 #include "server/store/store_rows.h"
 #include "server/store/store_schema.h"

@@ -10,9 +10,9 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "server/platform/storage/data_folder.h"
+#include "server/platform/storage/database.h"
 #include "server/store/blob_store.h"
-#include "server/store/data_folder.h"
-#include "server/store/database.h"
 #include "server/store/durable_store.h"
 
 namespace tissueform {

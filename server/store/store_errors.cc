@@ -6,22 +6,17 @@
 #include <chrono>
 #include <utility>
 
-#include "absl/strings/cord.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_replace.h"
 
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "server/store/mesh_store.h"
 #include "server/store/prediction_store.h"
 #include "server/store/session_store.h"
 
 namespace tissueform {
 namespace {
-
-constexpr absl::string_view kPathUrl = "type.tissueform/LocalPath";
-constexpr absl::string_view kSentenceUrl = "type.tissueform/ForClients";
 
 const char* SentenceOf(absl::StatusCode code) {
   switch (code) {
@@ -152,33 +147,9 @@ absl::Status CheckPrediction(const PredictionRecord& record, const std::string& 
   return absl::OkStatus();
 }
 
-absl::Status NamingPath(absl::Status status, absl::string_view path) {
-  status.SetPayload(kPathUrl, absl::Cord(path));  // does nothing to an OK status
-  return status;
-}
-
-absl::Status TellingClients(absl::Status status, absl::string_view sentence) {
-  status.SetPayload(kSentenceUrl, absl::Cord(sentence));
-  return status;
-}
-
 absl::Status HidingDatabase(absl::Status status, absl::string_view sentence) {
   const absl::StatusCode code = status.code();
   return TellingClients(std::move(status), sentence.empty() ? SentenceOf(code) : sentence);
-}
-
-bool TellsClientsOtherwise(const absl::Status& status) {
-  return status.GetPayload(kSentenceUrl).has_value();
-}
-
-std::string MessageForClients(const absl::Status& status) {
-  if (const auto sentence = status.GetPayload(kSentenceUrl); sentence.has_value()) {
-    return std::string(*sentence);
-  }
-  const std::string message(status.message());
-  const auto path = status.GetPayload(kPathUrl);
-  if (!path.has_value() || path->empty()) return message;
-  return absl::StrReplaceAll(message, {{std::string(*path), "(on the server)"}});
 }
 
 int64_t SystemUnixSeconds() {

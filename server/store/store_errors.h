@@ -9,6 +9,8 @@
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 
+#include "server/platform/storage/client_messages.h"
+
 namespace tissueform {
 
 // What the stores refuse, in the same words whatever they keep it in.
@@ -33,17 +35,8 @@ absl::Status BadLimit(int limit);                                     // Invalid
 absl::Status CheckMeshName(absl::string_view sha256);                 // InvalidArgument: no SHA-256
 absl::Status Damaged(absl::string_view what, absl::string_view why);  // DataLoss
 
-// `status` whose message names that file or folder of this machine: good for the log and for who
-// starts the server, nothing for its clients. OK stays OK.
-absl::Status NamingPath(absl::Status status, absl::string_view path);
-// `status` with one plain sentence for clients; its message is for the log and for who starts the
-// server. OK stays OK.
-absl::Status TellingClients(absl::Status status, absl::string_view sentence);
-// The same of a database that several servers share, which the message names; by its code where no
-// sentence is given.
+// TellingClients for a database that several servers share, whose address the message contains. The
+// sentence follows from the code where none is given.
 absl::Status HidingDatabase(absl::Status status, absl::string_view sentence = "");
-bool TellsClientsOtherwise(const absl::Status& status);
-// That sentence, or the message of `status` without such a path.
-std::string MessageForClients(const absl::Status& status);
 
 }  // namespace tissueform

@@ -8,7 +8,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "server/store/store_errors.h"
 #include "tissueform/store/v1/store_records.pb.h"
 

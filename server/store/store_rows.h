@@ -11,8 +11,8 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
+#include "server/platform/storage/database.h"
 #include "server/store/blob_store.h"
-#include "server/store/database.h"
 #include "server/store/session_record.h"
 #include "server/store/store_records.h"
 

@@ -10,7 +10,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "server/store/fault_points.h"
+#include "server/platform/storage/fault_points.h"
 
 namespace tissueform {
 namespace {

@@ -8,7 +8,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "server/store/database.h"
+#include "server/platform/storage/database.h"
 
 namespace tissueform {
 
@@ -23,7 +23,7 @@ namespace tissueform {
 //                   positions_sha256
 //   cases           sha256, owner, record, last_used_s; the file is the blob sha256
 //   shares, follow_links, mesh_rights
-//                   name, record: who may do what (server/access_store)
+//                   name, record: who may do what (server/store/access_store)
 //   exports         name, record: what is to go to the PACS (server/exports)
 //
 // Version 1 had neither times nor predictions, version 2 no cases, version 3 one owner a case, and

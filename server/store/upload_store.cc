@@ -22,9 +22,9 @@
 
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
-#include "server/store/durable_file.h"
-#include "server/store/fault_points.h"
+#include "core/mesh/payload/sha256.h"
+#include "server/platform/storage/durable_file.h"
+#include "server/platform/storage/fault_points.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_records.h"
 

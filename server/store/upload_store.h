@@ -15,7 +15,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/base/mutex.h"
-#include "core/mesh_payload/mesh_payload.h"
+#include "core/mesh/payload/mesh_payload.h"
 
 namespace tissueform {
 

@@ -14,14 +14,14 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 
-#include "core/audit_chain/audit_chain.h"
-#include "core/audit_chain/audit_key.h"
+#include "server/platform/audit_chain/audit_chain.h"
+#include "server/platform/audit_chain/audit_key.h"
 
 namespace tissueform {
 
-// The files of an audit log (core/audit_chain/audit_chain.h): the newest one under the log's own
-// name, the others as PATH.000001, PATH.000002 or wherever somebody has moved them. A new one
-// begins when a line would make the newest one larger than `max_bytes`, on a new day (UTC), and
+// The files of an audit log (server/platform/audit_chain/audit_chain.h): the newest one under the
+// log's own name, the others as PATH.000001, PATH.000002 or wherever somebody has moved them. A new
+// one begins when a line would make the newest one larger than `max_bytes`, on a new day (UTC), and
 // when the newest one is no longer where it was.
 //
 // One thread at a time.

@@ -15,8 +15,8 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "core/audit_chain/audit_key.h"
 #include "core/base/mutex.h"
+#include "server/platform/audit_chain/audit_key.h"
 #include "server/telemetry/audit_file.h"
 
 namespace tissueform {

@@ -14,7 +14,7 @@
 #include "absl/time/time.h"
 
 #include "core/base/mutex.h"
-#include "server/calls/call_observer.h"
+#include "server/rpc/calls/call_observer.h"
 #include "server/telemetry/audit_log.h"
 
 namespace tissueform {

@@ -15,8 +15,8 @@
 #include "absl/status/status.h"
 
 #include "core/base/duration_histogram.h"
-#include "server/calls/call_observer.h"
-#include "server/monitoring/metrics_page.h"
+#include "server/platform/metrics_page.h"
+#include "server/rpc/calls/call_observer.h"
 
 namespace tissueform {
 

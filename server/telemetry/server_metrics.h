@@ -8,7 +8,7 @@
 #include <map>
 #include <string>
 
-#include "server/monitoring/metrics_page.h"
+#include "server/platform/metrics_page.h"
 #include "server/session/frame_flow.h"
 #include "server/session/memory_budget.h"
 #include "server/session/mesh_catalog.h"

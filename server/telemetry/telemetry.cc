@@ -7,8 +7,8 @@
 #include <syslog.h>
 #include <utility>
 
-#include "core/audit_chain/audit_key.h"
 #include "core/base/status_macros.h"
+#include "server/platform/audit_chain/audit_key.h"
 
 namespace tissueform {
 namespace {

@@ -9,8 +9,8 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "server/calls/call_observer.h"
-#include "server/monitoring/metrics_page.h"
+#include "server/platform/metrics_page.h"
+#include "server/rpc/calls/call_observer.h"
 #include "server/telemetry/audit_log.h"
 #include "server/telemetry/audit_observer.h"
 #include "server/telemetry/call_metrics.h"

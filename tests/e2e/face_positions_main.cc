@@ -19,8 +19,8 @@
 #include "client/cli/cases/packed_case.h"
 #include "client/cli/export/moving_data.h"
 #include "core/base/status_macros.h"
+#include "core/mechanics/prepared_answers/create_response.h"
 #include "core/planning/model_names.h"
-#include "core/prepared_answers/create_response.h"
 
 namespace tissueform::testing {
 namespace {

@@ -21,9 +21,9 @@
 
 #include "client/cli/cases/packed_case.h"
 #include "core/base/status_macros.h"
-#include "core/case_file/predicted_case.h"
-#include "core/constraints/head_frame.h"
-#include "core/deformation/create_deformer.h"
+#include "core/mechanics/constraints/head_frame.h"
+#include "core/mechanics/deformation/create_deformer.h"
+#include "core/planning/case_file/predicted_case.h"
 
 namespace tissueform::testing {
 namespace {

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/answer_evaluator/answer_bytes.h"
-#include "core/answer_evaluator/answer_evaluator.h"
+#include "core/mechanics/answer_evaluator/answer_bytes.h"
+#include "core/mechanics/answer_evaluator/answer_evaluator.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace tissueform::fuzz {

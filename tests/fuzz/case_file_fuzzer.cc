@@ -4,9 +4,9 @@
 #include <cstdlib>
 #include <string>
 
-#include "core/case_file/case_reader.h"
-#include "core/case_file/case_writer.h"
-#include "core/case_file/viewer_file.h"
+#include "core/planning/case_file/case_reader.h"
+#include "core/planning/case_file/case_writer.h"
+#include "core/planning/case_file/viewer_file.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace tissueform::fuzz {

@@ -8,7 +8,7 @@
 
 #include "spdlog/spdlog.h"
 
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "server/rpc/case_service.h"
 #include "server/store/in_memory_case_store.h"
 #include "tests/fuzz/byte_source.h"

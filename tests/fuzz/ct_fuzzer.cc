@@ -10,10 +10,10 @@
 
 #include <Eigen/LU>
 
-#include "core/ct/dicom_series.h"
-#include "core/ct/dicom_stack.h"
-#include "core/ct/file_bytes.h"
-#include "core/ct/volume_header.h"
+#include "core/imaging/ct/dicom_series.h"
+#include "core/imaging/ct/dicom_stack.h"
+#include "core/imaging/ct/file_bytes.h"
+#include "core/imaging/ct/volume_header.h"
 #include "tests/fuzz/byte_source.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/fuzzed_file.h"

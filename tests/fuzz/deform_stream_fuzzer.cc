@@ -8,7 +8,7 @@
 
 #include "grpcpp/impl/codegen/proto_utils.h"
 
-#include "server/calls/status_conversion.h"
+#include "server/rpc/calls/status_conversion.h"
 #include "server/rpc/watch_stream.h"
 #include "tests/fuzz/byte_source.h"
 #include "tests/fuzz/fuzz_target.h"

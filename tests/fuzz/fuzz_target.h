@@ -18,7 +18,7 @@ void FuzzPlan(const uint8_t* data, size_t size);
 // ValidateTetMesh, RepairOrientation, ValidateTriangleMesh of its boundary).
 void FuzzMeshValidation(const uint8_t* data, size_t size);
 
-// A shape and chunks of a payload (core/mesh_payload) as a server takes them from the network, and
+// A shape and chunks of a payload (core/mesh/payload) as a server takes them from the network, and
 // the mesh that comes of them.
 void FuzzMeshPayload(const uint8_t* data, size_t size);
 

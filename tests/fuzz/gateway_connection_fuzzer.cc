@@ -13,7 +13,7 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
-#include "server/gateway/gateway.h"
+#include "client/gateway/gateway.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace tissueform::fuzz {

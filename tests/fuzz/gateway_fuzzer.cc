@@ -6,10 +6,10 @@
 
 #include "grpcpp/support/slice.h"
 
-#include "server/gateway/call_metadata.h"
-#include "server/gateway/method_table.h"
-#include "server/gateway/socket_frames.h"
-#include "server/gateway/web_frames.h"
+#include "client/gateway/call_metadata.h"
+#include "client/gateway/method_table.h"
+#include "client/gateway/socket_frames.h"
+#include "client/gateway/web_frames.h"
 #include "tests/fuzz/byte_source.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tissueform/v1/deform_service.pb.h"

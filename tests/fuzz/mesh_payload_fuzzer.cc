@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "core/mesh/payload/mesh_payload.h"
 #include "core/mesh/tet_mesh.h"
-#include "core/mesh_payload/mesh_payload.h"
 #include "tests/fuzz/byte_source.h"
 #include "tests/fuzz/fuzz_target.h"
 

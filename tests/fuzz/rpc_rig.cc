@@ -19,7 +19,7 @@
 #include "spdlog/spdlog.h"
 
 #include "core/base/error_reason.h"
-#include "core/linear_solvers/blas_threads.h"
+#include "core/mechanics/linear_solvers/blas_threads.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/session_samples.h"
 

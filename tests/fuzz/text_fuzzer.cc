@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
-#include "core/mesh_io/row_counts.h"
-#include "core/plan_building/recipe.h"
+#include "core/mesh/io/row_counts.h"
+#include "core/planning/plan_building/recipe.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/fuzzed_file.h"
 

@@ -12,10 +12,10 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 
-#include "server/auth/key_set.h"
-#include "server/auth/revocation_list.h"
-#include "server/auth/token_claims.h"
-#include "server/auth/token_text.h"
+#include "server/access/auth/key_set.h"
+#include "server/access/auth/revocation_list.h"
+#include "server/access/auth/token_claims.h"
+#include "server/access/auth/token_text.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace tissueform::fuzz {

@@ -9,7 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "proto/conversion/case_conversion.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "proto/conversion/session_conversion.h"

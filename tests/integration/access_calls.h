@@ -12,7 +12,7 @@
 #include "grpcpp/channel.h"
 #include "grpcpp/client_context.h"
 
-#include "server/auth/authenticator.h"
+#include "server/access/auth/authenticator.h"
 #include "tests/integration/access_world.h"
 #include "tests/integration/service_test.h"
 #include "tissueform/v1/access_service.grpc.pb.h"

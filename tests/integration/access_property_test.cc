@@ -18,7 +18,7 @@
 #include "gtest/gtest.h"
 #include "spdlog/spdlog.h"
 
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "tests/integration/access_calls.h"
 #include "tests/integration/access_world.h"
 #include "tests/integration/service_test.h"

@@ -43,7 +43,7 @@ def lines_of(path):
 
 
 def verify(paths, key):
-    """As docs/operations.md and core/audit_chain/audit_chain.h have the form, with no code of ours."""
+    """As docs/operations.md and server/platform/audit_chain/audit_chain.h have the form, with no code of ours."""
     previous, number = b"0" * 64, 0
     for path in paths:
         for line in lines_of(path):
@@ -59,7 +59,7 @@ def verify(paths, key):
 
 
 def main():
-    server_program, tissueform = sys.argv[1:]
+    server_platform, tissueform = sys.argv[1:]
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         log, moved = folder / "audit.jsonl", folder / "audit.jsonl.1"
@@ -72,7 +72,7 @@ def main():
                 raise SystemExit("WRONG: the server does not answer")
 
         run("audit", "keygen", folder / "key")
-        server = Server(server_program, folder)
+        server = Server(server_platform, folder)
         list_sessions(server)
         wait_for("a call is told", lambda: b"SessionService.ListSessions" in log.read_bytes())
         log.rename(moved)
@@ -84,7 +84,7 @@ def main():
         with log.open("ab") as torn:
             torn.write(b'{"n":5,"event":"ca')
 
-        server = Server(server_program, folder)
+        server = Server(server_platform, folder)
         list_sessions(server)
         wait_for("a torn line is noted", lambda: b'"event":"mended","bytes":18' in log.read_bytes())
         code = server.end(signal.SIGTERM)

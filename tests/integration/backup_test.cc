@@ -13,7 +13,7 @@
 #include "gtest/gtest.h"
 
 #include "client/cpp/tissueform_client.h"
-#include "core/process/child_process.h"
+#include "core/base/process/child_process.h"
 #include "tests/integration/durable_server.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/status_matchers.h"

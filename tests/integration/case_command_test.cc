@@ -10,8 +10,8 @@
 #include "gtest/gtest.h"
 
 #include "client/cpp/tissueform_client.h"
-#include "core/case_file/case_reader.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
+#include "core/planning/case_file/case_reader.h"
 #include "tests/integration/served_cli_test.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/status_matchers.h"

@@ -10,8 +10,8 @@
 #include "gtest/gtest.h"
 #include <sys/wait.h>
 
-#include "core/case_file/case_reader.h"
-#include "core/case_file/viewer_file.h"
+#include "core/planning/case_file/case_reader.h"
+#include "core/planning/case_file/viewer_file.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"

@@ -12,7 +12,7 @@
 
 #include "client/cpp/tissueform_client.h"
 #include "core/base/error_reason.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "tests/integration/durable_server.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/status_matchers.h"

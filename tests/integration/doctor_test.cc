@@ -16,8 +16,8 @@
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
 
-#include "client/cli/access/doctor_command.h"
-#include "client/cli/online/server_process.h"
+#include "client/cli/doctor/doctor_command.h"
+#include "client/cli/session/server_process.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"

@@ -11,7 +11,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "client/cli/online/server_process.h"
+#include "client/cli/session/server_process.h"
 #include "client/cpp/tissueform_client.h"
 
 namespace tissueform::testing {

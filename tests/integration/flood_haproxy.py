@@ -78,7 +78,7 @@ def drag(program, port, folder, seconds):
 
 
 def main():
-    program, server_program, configuration, *more = sys.argv[1:]
+    program, server_platform, configuration, *more = sys.argv[1:]
     seconds = float(more[0]) if more else 3
     haproxy = shutil.which("haproxy", path="/usr/sbin:/usr/bin")
     if haproxy is None or shutil.which("openssl") is None:
@@ -91,7 +91,7 @@ def main():
         folder, port = pathlib.Path(name), listener.getsockname()[1]
         make_certificates(folder)
         try:
-            process, address = start_server(server_program, folder)
+            process, address = start_server(server_platform, folder)
             processes.append(process)
             processes.append(start_haproxy(haproxy, configuration, folder, address, listener))
             context = ssl.create_default_context(cafile=folder / "ca.pem")

@@ -11,8 +11,8 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "core/deformation/create_deformer.h"
-#include "core/mesh_payload/mesh_payload.h"
+#include "core/mechanics/deformation/create_deformer.h"
+#include "core/mesh/payload/mesh_payload.h"
 #include "proto/conversion/mesh_conversion.h"
 
 namespace tissueform::testing {

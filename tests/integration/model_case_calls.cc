@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "proto/conversion/case_conversion.h"
 #include "tests/integration/model_choices.h"
 

@@ -13,9 +13,9 @@
 #include "gtest/gtest.h"
 #include <sys/wait.h>
 
-#include "client/cli/online/server_process.h"
-#include "core/mesh_io/tet_mesh_io.h"
-#include "core/mesh_io/triangle_mesh_io.h"
+#include "client/cli/session/server_process.h"
+#include "core/mesh/io/tet_mesh_io.h"
+#include "core/mesh/io/triangle_mesh_io.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/status_matchers.h"

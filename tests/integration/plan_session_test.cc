@@ -10,7 +10,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "core/deformation/create_deformer.h"
+#include "core/mechanics/deformation/create_deformer.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/status_matchers.h"
 

@@ -16,9 +16,9 @@
 #include "spdlog/sinks/ostream_sink.h"
 #include "spdlog/spdlog.h"
 
-#include "core/audit_chain/audit_key.h"
-#include "core/audit_chain/audit_verification.h"
-#include "server/monitoring/log_lines.h"
+#include "server/platform/audit_chain/audit_key.h"
+#include "server/platform/audit_chain/audit_verification.h"
+#include "server/platform/log_lines.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/http_get.h"
 #include "tests/testing/status_matchers.h"

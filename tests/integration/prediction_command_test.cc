@@ -12,10 +12,10 @@
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
 
-#include "client/rendering/virtual_display.h"
+#include "core/mesh/io/tet_mesh_io.h"
+#include "core/mesh/io/triangle_mesh_io.h"
 #include "core/mesh/tet_topology.h"
-#include "core/mesh_io/tet_mesh_io.h"
-#include "core/mesh_io/triangle_mesh_io.h"
+#include "core/planning/rendering/virtual_display.h"
 #include "tests/integration/served_cli_test.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/scoped_environment.h"
@@ -201,7 +201,7 @@ TEST_F(PredictionCommandTest, RangesOfThePlanGiveAnExportTheBandThatDeformGives)
 
 TEST_F(PredictionCommandTest, PicturesAreOfItsCaseOrOfItsPlan) {
   if (absl::IsNotFound(VirtualDisplay::Open().status())) GTEST_SKIP() << "no display and no Xvfb";
-  // Under AddressSanitizer: Mesa's leaks, see tests/client/rendering/figure_test.cc.
+  // Under AddressSanitizer: Mesa's leaks, see tests/core/planning/rendering/figure_test.cc.
   const ScopedEnvironment no_leak_check("LSAN_OPTIONS", "detect_leaks=0");
   ASSERT_EQ(Run({"case", "pack", kTonguePlan, "--out", "tongue.tfcase"}).exit_code, 0);
   const ProcessResult published =

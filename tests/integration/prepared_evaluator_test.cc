@@ -11,8 +11,8 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "core/answer_evaluator/answer_bytes.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mechanics/answer_evaluator/answer_bytes.h"
+#include "core/mesh/payload/sha256.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/handle_problem.h"
 #include "tests/testing/status_matchers.h"

@@ -137,7 +137,7 @@ def scrape(folder, source, ports):
 
 
 def main():
-    server_program, gateway_program, source = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
+    server_platform, gateway_program, source = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
     if shutil.which("prometheus") is None or shutil.which("promtool") is None:
         print("prometheus is missing: deploy/packages.txt lists it")
         sys.exit(77)
@@ -146,7 +146,7 @@ def main():
         key = folder / "key"
         key.touch(0o600)
         key.write_text(secrets.token_hex(32) + "\n")
-        server = Program(server_program, "--port", "0", "--data-dir", f"{folder}/kept", "--audit-log", f"{folder}/audit.jsonl",
+        server = Program(server_platform, "--port", "0", "--data-dir", f"{folder}/kept", "--audit-log", f"{folder}/audit.jsonl",
                          "--audit-key", key)
         gateway = Program(gateway_program, "--listen", "127.0.0.1:0", "--server", server.address)
         try:

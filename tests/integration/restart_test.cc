@@ -19,7 +19,7 @@
 #include "grpcpp/create_channel.h"
 #include "gtest/gtest.h"
 
-#include "client/cli/online/server_process.h"
+#include "client/cli/session/server_process.h"
 #include "client/cpp/reattaching_stream.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/error_reason.h"

@@ -8,7 +8,7 @@
 
 #include "gtest/gtest.h"
 
-#include "client/cli/online/server_process.h"
+#include "client/cli/session/server_process.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"

@@ -20,16 +20,16 @@
 #include "nlohmann/json.hpp"
 #include <sys/wait.h>
 
-#include "client/cli/online/server_process.h"
+#include "client/cli/session/server_process.h"
 #include "client/cpp/plan_session.h"
 #include "client/cpp/tissueform_client.h"
-#include "client/rendering/virtual_display.h"
+#include "core/mesh/io/tet_mesh_io.h"
+#include "core/mesh/io/triangle_mesh_io.h"
+#include "core/mesh/payload/mesh_payload.h"
 #include "core/mesh/skin_region.h"
 #include "core/mesh/tet_topology.h"
-#include "core/mesh_io/tet_mesh_io.h"
-#include "core/mesh_io/triangle_mesh_io.h"
-#include "core/mesh_payload/mesh_payload.h"
 #include "core/planning/plan_io.h"
+#include "core/planning/rendering/virtual_display.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "tests/testing/scoped_environment.h"
 #include "tests/testing/status_matchers.h"
@@ -81,7 +81,7 @@ class ServedCommandTest : public ::testing::Test {
 
   // Its results go into the folder, what it says into out.txt there.
   int RunDemo(const std::string& options, const std::string& before = "") const {
-    // Under AddressSanitizer: Mesa's leaks, see tests/client/rendering/figure_test.cc.
+    // Under AddressSanitizer: Mesa's leaks, see tests/core/planning/rendering/figure_test.cc.
     const ScopedEnvironment no_leak_check("LSAN_OPTIONS", "detect_leaks=0");
     return ExitCodeOf(before + ProgramPath("tissueform") + " demo --no-browser --out " +
                       folder_.string() + " " + options + " > " + PathOf("out.txt"));

@@ -21,8 +21,8 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
-#include "client/cli/online/server_process.h"
-#include "core/process/child_process.h"
+#include "client/cli/session/server_process.h"
+#include "core/base/process/child_process.h"
 #include "tests/integration/durable_server.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/killed_starter.h"

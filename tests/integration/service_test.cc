@@ -13,7 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "grpcpp/create_channel.h"
 
-#include "core/deformation/create_deformer.h"
+#include "core/mechanics/deformation/create_deformer.h"
 #include "tests/testing/meshes.h"
 
 namespace tissueform::testing {

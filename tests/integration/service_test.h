@@ -14,12 +14,12 @@
 #include "gtest/gtest.h"
 
 #include "client/cpp/tissueform_client.h"
-#include "core/constraints/constraint_set.h"
-#include "core/constraints/handle_pose.h"
+#include "core/mechanics/constraints/constraint_set.h"
+#include "core/mechanics/constraints/handle_pose.h"
+#include "core/mesh/payload/mesh_payload.h"
 #include "core/mesh/tet_mesh.h"
-#include "core/mesh_payload/mesh_payload.h"
-#include "server/server_options.h"
-#include "server/tissueform_server.h"
+#include "server/app/server_options.h"
+#include "server/app/tissueform_server.h"
 
 namespace tissueform::testing {
 

@@ -14,7 +14,7 @@
 
 #include "client/cpp/plan_session.h"
 #include "client/cpp/tissueform_client.h"
-#include "core/deformation/deformer.h"
+#include "core/mechanics/deformation/deformer.h"
 #include "core/planning/plan_io.h"
 #include "tests/integration/served_cli_test.h"
 #include "tests/testing/run_tissueform.h"

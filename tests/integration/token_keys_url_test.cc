@@ -12,9 +12,9 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "client/cli/online/server_process.h"
+#include "client/cli/session/server_process.h"
 #include "core/base/error_reason.h"
-#include "server/auth/token_authenticator.h"
+#include "server/access/auth/token_authenticator.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"

@@ -14,7 +14,7 @@
 #include "gtest/gtest.h"
 #include <sys/wait.h>
 
-#include "server/gateway/gateway.h"
+#include "client/gateway/gateway.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"

@@ -13,7 +13,7 @@
 #include <string>
 #include <unistd.h>
 
-#include "server/store/fault_points.h"
+#include "server/platform/storage/fault_points.h"
 
 namespace tissueform {
 namespace {

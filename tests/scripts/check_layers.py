@@ -5,7 +5,7 @@
 
     tests/scripts/check_layers.py [--root DIR] [--table FILE]
 
-Errors: an edge between folders that the table does not allow; a library outside its fence or unknown; an
+Errors: an edge between wings or folders that the table does not allow; a library outside its fence or unknown; an
 include that is relative, not written from the repository root, in angle brackets although it is ours, of
 a .cc file or of a file that does not exist; a folder that the table does not name; a folder of the table that
 does not exist; a circle among folders, files or Python scripts (imports inside functions count, too). Exit code 0 when there is no such edge, 1 otherwise, 2 for wrong use.
@@ -33,9 +33,10 @@ class Table:
 
     def __init__(self, text):
         data = tomllib.loads(text)
-        unknown = set(data) - {"folders", "library"}
+        unknown = set(data) - {"wings", "folders", "library"}
         if unknown:
             raise ValueError(f"unknown key {sorted(unknown)[0]!r}")
+        self.wings = data.get("wings", {})
         self.folders = data.get("folders", {})
         self.libraries = data.get("library", [])
 
@@ -45,6 +46,12 @@ class Table:
             return folder
         patterns = [p for p in self.folders if p.endswith("/*") and fnmatch.fnmatchcase(folder, p)]
         return max(patterns, key=len, default=None)
+
+    def wing_allows(self, source, target):
+        """Whether the wing of `source` may use `target`; folders of no wing (tests) may use all."""
+        wing = source.split("/")[0]
+        allowed = [wing, *self.wings[wing]] if wing in self.wings else [target]
+        return any(target == folder or target.startswith(f"{folder}/") for folder in allowed)
 
     def allows(self, source, target):
         if source == target:
@@ -99,6 +106,8 @@ def check_include(root, table, file, bracket, name):
     source, target = str(pathlib.PurePosixPath(file).parent), str(pathlib.PurePosixPath(name).parent)
     if table.name_of(source) is None:
         return None  # reported once for the folder
+    if not table.wing_allows(source, target):
+        return f"{source.split('/')[0]} may not include {target} ({name}): see [wings]"
     if not table.allows(source, target):
         return f"{source} may not include {target} ({name})"
     return None

@@ -7,7 +7,7 @@
 
 Every source file begins with the two lines of copyright and licence (after a #! line); headers have `#pragma once`;
 no file holds a mark of unfinished work, a tab, a blank at the end of a line or more than 600 lines; processes are made
-in core/process only (tests may make their own). No two headers define a type of the same name in one namespace:
+in core/base/process only (tests may make their own). No two headers define a type of the same name in one namespace:
 a program that links both would break the one-definition rule.
 """
 
@@ -40,10 +40,10 @@ def errors_of(name, text):
         yield 1, "a header needs #pragma once"
     if len(lines) > MAX_LINES:
         yield len(lines), f"longer than {MAX_LINES} lines: cut it by topic"
-    makes_processes = name.startswith(("core/process/", "tests/")) or not name.endswith((".cc", ".h"))
+    makes_processes = name.startswith(("core/base/process/", "tests/")) or not name.endswith((".cc", ".h"))
     for number, line in enumerate(lines, start=1):
         if not makes_processes and MAKES_PROCESS.search(line.split("//")[0]):
-            yield number, "processes are made in core/process only: ChildProcess, CallHelper, GuardedProgram"
+            yield number, "processes are made in core/base/process only: ChildProcess, CallHelper, GuardedProgram"
         if UNFINISHED.search(line):
             yield number, "unfinished work belongs in an issue"
         if "\t" in line or line != line.rstrip():

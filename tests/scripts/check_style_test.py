@@ -34,11 +34,11 @@ class CheckStyleTest(unittest.TestCase):
                      'popen("ls", "r");', "if (system(text) != 0) {", "posix_spawnp(&pid, name);",
                      "setitimer(ITIMER_REAL, &once, nullptr);"):
             self.assertEqual(len(messages("client/cli/a.cc", line + "\n")), 1, line)
-            self.assertEqual(messages("core/process/a.cc", line + "\n"), [], line)
+            self.assertEqual(messages("core/base/process/a.cc", line + "\n"), [], line)
             self.assertEqual(messages("tests/client/a_test.cc", line + "\n"), [], line)
         for line in ("DirichletSystem& system();", "elastic.system().Solve(rhs);", "solver->system(3);",
                      "// it does not fork()", "pitchfork(2);"):
-            self.assertEqual(messages("core/deformation/a.cc", line + "\n"), [], line)
+            self.assertEqual(messages("core/mechanics/deformation/a.cc", line + "\n"), [], line)
 
     def test_two_headers_define_no_type_of_one_name(self):
         def twice(*texts):

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/audit_chain/audit_chain.h"
+#include "server/platform/audit_chain/audit_chain.h"
 
 namespace tissueform::testing {
 

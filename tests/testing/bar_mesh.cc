@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/accuracy/layered_block.h"
+#include "client/lab/accuracy/layered_block.h"
 #include "tests/testing/meshes.h"
 
 namespace tissueform::testing {

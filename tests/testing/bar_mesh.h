@@ -3,7 +3,7 @@
 
 #pragma once
 
-#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh/io/tet_mesh_io.h"
 
 namespace tissueform::testing {
 

@@ -10,7 +10,7 @@
 
 // A CT scanner for tests: what metal does to slices is made by the physics that makes it in a
 // hospital, so that a correction is tried on something it does not know. It shares no code with
-// core/metal, and no geometry: a fan beam here, supersampled metal, a spectrum.
+// core/imaging/metal, and no geometry: a fan beam here, supersampled metal, a spectrum.
 namespace tissueform::testing {
 
 enum class Metal { kAmalgam, kSteel };

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/deformation/mesh_preparation.h"
+#include "core/mechanics/deformation/mesh_preparation.h"
 #include "tests/testing/meshes.h"
 
 namespace tissueform::testing {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "core/deformation/mesh_preparation.h"
+#include "core/mechanics/deformation/mesh_preparation.h"
 #include "tests/testing/meshes.h"
 
 namespace tissueform::testing {

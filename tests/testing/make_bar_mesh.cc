@@ -6,7 +6,7 @@
 #include <iostream>
 #include <string>
 
-#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh/io/tet_mesh_io.h"
 #include "tests/testing/bar_mesh.h"
 
 int main(int argc, char** argv) {

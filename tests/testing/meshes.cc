@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "core/mesh/bar_mesh.h"
-#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh/io/tet_mesh_io.h"
 #include "tests/testing/test_paths.h"
 
 namespace tissueform::testing {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "core/constraints/constraint_set.h"
+#include "core/mechanics/constraints/constraint_set.h"
 #include "core/mesh/tet_mesh.h"
 
 // Meshes that tests and benchmarks share.

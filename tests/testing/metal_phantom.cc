@@ -15,7 +15,7 @@
 
 #include "core/base/parallel_for.h"
 #include "core/base/status_macros.h"
-#include "core/ct/ct_volume_reader.h"
+#include "core/imaging/ct/ct_volume_reader.h"
 #include "tests/testing/meshes.h"
 
 namespace tissueform::testing {

@@ -9,7 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "core/ct/ct_volume.h"
+#include "core/imaging/ct/ct_volume.h"
 #include "tests/testing/ct_scanner.h"
 
 // The bundled head as a CT with fillings or braces would show it, and without, so that only the

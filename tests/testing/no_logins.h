@@ -4,7 +4,7 @@
 #pragma once
 
 #include "server/access/access_changes.h"
-#include "server/access_store/in_memory_access_store.h"
+#include "server/store/access_store/in_memory_access_store.h"
 
 namespace tissueform::testing {
 

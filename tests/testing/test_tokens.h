@@ -12,9 +12,9 @@
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
 
-#include "client/cli/access/signing_key.h"
-#include "server/auth/authenticator.h"
-#include "server/auth/token_options.h"
+#include "client/cli/account/signing_key.h"
+#include "server/access/auth/authenticator.h"
+#include "server/access/auth/token_options.h"
 
 namespace tissueform::testing {
 

@@ -14,8 +14,8 @@
 #include "client/cli/shared/option_checks.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
-#include "core/case_file/viewer_file.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
+#include "core/planning/case_file/viewer_file.h"
 #include "core/planning/plan_io.h"
 
 namespace tissueform {

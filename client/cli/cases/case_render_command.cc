@@ -18,12 +18,12 @@
 #include "absl/strings/str_join.h"
 #include <Eigen/Geometry>
 
-#include "client/cli/online/prediction_pictures.h"
-#include "client/rendering/virtual_display.h"
+#include "client/cli/prediction/prediction_pictures.h"
 #include "core/base/atomic_folder.h"
 #include "core/base/status_macros.h"
-#include "core/case_file/case_reader.h"
-#include "core/case_file/predicted_case.h"
+#include "core/planning/case_file/case_reader.h"
+#include "core/planning/case_file/predicted_case.h"
+#include "core/planning/rendering/virtual_display.h"
 #include "tissueform/v1/session_service.pb.h"
 
 namespace tissueform {

@@ -16,14 +16,14 @@
 #include "absl/time/time.h"
 
 #include "client/cli/cases/plan_case.h"
-#include "client/cli/online/upload_lines.h"
+#include "client/cli/session/upload_lines.h"
+#include "core/base/json/json_file.h"
 #include "core/base/software_version.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
-#include "core/case_file/case_writer.h"
-#include "core/case_file/viewer_file.h"
-#include "core/json/json_file.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
+#include "core/planning/case_file/case_writer.h"
+#include "core/planning/case_file/viewer_file.h"
 
 namespace tissueform {
 namespace {

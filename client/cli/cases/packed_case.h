@@ -8,9 +8,9 @@
 #include "absl/status/statusor.h"
 
 #include "client/cpp/tissueform_client.h"
-#include "core/case_file/case_file.h"
+#include "core/mechanics/problem/plan_problem.h"
+#include "core/planning/case_file/case_file.h"
 #include "core/planning/plan_io.h"
-#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 

@@ -15,9 +15,9 @@
 
 #include "client/cpp/plan_session.h"
 #include "core/base/status_macros.h"
-#include "core/case_file/mesh_surfaces.h"
-#include "core/case_file/skin_follow.h"
 #include "core/mesh/skin_region.h"
+#include "core/planning/case_file/mesh_surfaces.h"
+#include "core/planning/case_file/skin_follow.h"
 #include "core/planning/model_names.h"
 #include "proto/conversion/material_conversion.h"
 #include "proto/conversion/session_conversion.h"

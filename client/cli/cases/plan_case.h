@@ -8,9 +8,9 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/case_file/case_file.h"
-#include "core/case_file/viewer_file.h"
-#include "core/problem/plan_problem.h"
+#include "core/mechanics/problem/plan_problem.h"
+#include "core/planning/case_file/case_file.h"
+#include "core/planning/case_file/viewer_file.h"
 
 namespace tissueform {
 

@@ -13,9 +13,9 @@
 #include "absl/strings/str_cat.h"
 
 #include "client/cli/cases/packed_case.h"
-#include "client/cli/online/server_process.h"
+#include "client/cli/session/server_process.h"
+#include "core/base/process/child_process.h"
 #include "core/base/status_macros.h"
-#include "core/process/child_process.h"
 
 namespace tissueform {
 namespace {

@@ -3,7 +3,7 @@
 
 #pragma once
 
-#include "client/cli/online/demo_command.h"
+#include "client/cli/prediction/demo_command.h"
 
 namespace tissueform {
 

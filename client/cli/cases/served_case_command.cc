@@ -14,11 +14,11 @@
 #include "absl/strings/str_format.h"
 
 #include "client/cli/cases/packed_case.h"
-#include "client/cli/online/resource_text.h"
-#include "client/cli/online/server_connection.h"
+#include "client/cli/session/resource_text.h"
+#include "client/cli/session/server_connection.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/status_macros.h"
-#include "core/case_file/case_reader.h"
+#include "core/planning/case_file/case_reader.h"
 
 namespace tissueform {
 namespace {

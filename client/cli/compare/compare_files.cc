@@ -19,7 +19,7 @@
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/attribute.h"
-#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh/io/tet_mesh_io.h"
 
 namespace tissueform {
 namespace {

@@ -23,12 +23,12 @@
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
-#include "core/deformation/create_deformer.h"
-#include "core/deformation/deformation_quality.h"
-#include "core/deformation/mesh_preparation.h"
-#include "core/linear_solvers/blas_threads.h"
+#include "core/mechanics/deformation/create_deformer.h"
+#include "core/mechanics/deformation/deformation_quality.h"
+#include "core/mechanics/deformation/mesh_preparation.h"
+#include "core/mechanics/linear_solvers/blas_threads.h"
+#include "core/mechanics/problem/plan_problem.h"
 #include "core/planning/model_names.h"
-#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "core/base/csv_table.h"
 #include "core/base/types.h"
-#include "core/deformation/comparison.h"
+#include "core/mechanics/deformation/comparison.h"
 #include "core/mesh/attribute.h"
 #include "core/mesh/tet_mesh.h"
 #include "core/planning/plan_io.h"

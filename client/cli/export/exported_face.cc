@@ -10,13 +10,13 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 
-#include "core/answer_evaluator/answer_bytes.h"
-#include "core/answer_evaluator/answer_evaluator.h"
 #include "core/base/software_version.h"
 #include "core/base/status_macros.h"
+#include "core/mechanics/answer_evaluator/answer_bytes.h"
+#include "core/mechanics/answer_evaluator/answer_evaluator.h"
+#include "core/mechanics/prepared_answers/create_response.h"
+#include "core/mechanics/uncertainty/band_columns.h"
 #include "core/planning/model_names.h"
-#include "core/prepared_answers/create_response.h"
-#include "core/uncertainty/band_columns.h"
 
 namespace tissueform {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/case_file/case_file.h"
+#include "core/planning/case_file/case_file.h"
 
 namespace tissueform {
 

@@ -14,7 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 
-#include "core/process/child_process.h"
+#include "core/base/process/child_process.h"
 
 namespace tissueform {
 namespace {

@@ -17,7 +17,7 @@
 #include <openssl/rand.h>
 
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 
 namespace tissueform {
 namespace {

@@ -8,11 +8,11 @@
 
 #include "nlohmann/json.hpp"
 
+#include "core/mesh/generation/surface_defects.h"
+#include "core/mesh/generation/surface_remeshing.h"
+#include "core/mesh/io/file_space.h"
+#include "core/mesh/io/tet_mesh_io.h"
 #include "core/mesh/validation.h"
-#include "core/mesh_generation/surface_defects.h"
-#include "core/mesh_generation/surface_remeshing.h"
-#include "core/mesh_io/file_space.h"
-#include "core/mesh_io/tet_mesh_io.h"
 
 namespace tissueform {
 

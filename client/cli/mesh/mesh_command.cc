@@ -14,10 +14,10 @@
 #include "client/cli/shared/report_parts.h"
 #include "client/cli/shared/stage_progress.h"
 #include "core/base/status_macros.h"
+#include "core/mesh/io/tet_mesh_io.h"
+#include "core/mesh/io/triangle_mesh_io.h"
 #include "core/mesh/surface_validation.h"
 #include "core/mesh/validation.h"
-#include "core/mesh_io/tet_mesh_io.h"
-#include "core/mesh_io/triangle_mesh_io.h"
 
 namespace tissueform {
 namespace {

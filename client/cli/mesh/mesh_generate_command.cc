@@ -18,8 +18,8 @@
 #include "client/cli/shared/report_parts.h"
 #include "client/cli/shared/stage_progress.h"
 #include "core/base/status_macros.h"
-#include "core/mesh_generation/tetrahedralization.h"
-#include "core/mesh_io/triangle_mesh_io.h"
+#include "core/mesh/generation/tetrahedralization.h"
+#include "core/mesh/io/triangle_mesh_io.h"
 
 namespace tissueform {
 namespace {

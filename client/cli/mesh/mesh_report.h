@@ -7,8 +7,8 @@
 
 #include "nlohmann/json.hpp"
 
+#include "core/mesh/io/tet_mesh_io.h"
 #include "core/mesh/validation.h"
-#include "core/mesh_io/tet_mesh_io.h"
 
 namespace tissueform {
 

@@ -7,8 +7,8 @@
 
 #include "nlohmann/json.hpp"
 
+#include "core/mesh/io/triangle_mesh_io.h"
 #include "core/mesh/surface_validation.h"
-#include "core/mesh_io/triangle_mesh_io.h"
 
 namespace tissueform {
 

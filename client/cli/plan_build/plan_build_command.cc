@@ -21,7 +21,7 @@
 #include "core/base/atomic_folder.h"
 #include "core/base/parallel_for.h"
 #include "core/base/status_macros.h"
-#include "core/plan_building/plan_build_call.h"
+#include "core/planning/plan_building/plan_build_call.h"
 
 namespace tissueform {
 namespace {

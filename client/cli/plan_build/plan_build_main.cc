@@ -11,14 +11,14 @@
 #include "absl/strings/str_format.h"
 
 #include "client/cli/shared/version.h"
-#include "client/plan_report/cautions.h"
-#include "client/plan_report/plan_measures.h"
-#include "client/plan_report/plan_report.h"
-#include "client/rendering/virtual_display.h"
 #include "core/base/status_macros.h"
-#include "core/linear_solvers/blas_threads.h"
-#include "core/plan_building/plan_build_call.h"
-#include "core/plan_building/plan_builder.h"
+#include "core/mechanics/linear_solvers/blas_threads.h"
+#include "core/planning/plan_building/plan_build_call.h"
+#include "core/planning/plan_building/plan_builder.h"
+#include "core/planning/plan_report/cautions.h"
+#include "core/planning/plan_report/plan_measures.h"
+#include "core/planning/plan_report/plan_report.h"
+#include "core/planning/rendering/virtual_display.h"
 
 namespace tissueform {
 namespace {

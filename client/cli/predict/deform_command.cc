@@ -15,7 +15,7 @@
 #include "core/base/parallel_for.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
-#include "core/linear_solvers/blas_threads.h"
+#include "core/mechanics/linear_solvers/blas_threads.h"
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
 

@@ -20,16 +20,16 @@
 #include "client/cli/shared/report_parts.h"
 #include "client/cli/shared/stage_progress.h"
 #include "core/base/atomic_file.h"
+#include "core/base/json/json_file.h"
 #include "core/base/parallel_for.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
-#include "core/json/json_file.h"
-#include "core/linear_solvers/blas_threads.h"
+#include "core/mechanics/linear_solvers/blas_threads.h"
+#include "core/mechanics/prepared_answers/create_response.h"
 #include "core/planning/fit_targets.h"
 #include "core/planning/fitted_plan.h"
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
-#include "core/prepared_answers/create_response.h"
 
 namespace tissueform {
 namespace {

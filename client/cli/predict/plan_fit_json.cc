@@ -8,7 +8,7 @@
 
 #include "client/cli/predict/fit_values.h"
 #include "client/cli/shared/version.h"
-#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh/io/tet_mesh_io.h"
 #include "core/planning/json_values.h"
 
 namespace tissueform {

@@ -13,7 +13,7 @@
 #include "absl/strings/str_join.h"
 
 #include "client/cli/predict/fit_values.h"
-#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh/io/tet_mesh_io.h"
 
 namespace tissueform {
 namespace {

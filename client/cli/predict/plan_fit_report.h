@@ -7,8 +7,8 @@
 
 #include "absl/status/status.h"
 
-#include "core/plan_fitting/fit_problem.h"
-#include "core/plan_fitting/plan_fit.h"
+#include "core/mechanics/plan_fitting/fit_problem.h"
+#include "core/mechanics/plan_fitting/plan_fit.h"
 #include "core/planning/plan.h"
 
 namespace tissueform {

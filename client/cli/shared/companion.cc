@@ -9,8 +9,8 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/base/process/child_process.h"
 #include "core/base/status_macros.h"
-#include "core/process/child_process.h"
 
 namespace tissueform {
 

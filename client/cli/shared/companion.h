@@ -24,8 +24,11 @@ inline constexpr CompanionCommand kDemoCommand = {
     "demo", "drag the lower jaw of the bundled real head through a server, end to end",
     "tissueform-online"};
 inline constexpr CompanionCommand kLoadCommand = {
-    "load", "drag on a server many times at once, and tell how old the pictures were",
-    "tissueform-online"};
+    "load", "drag many sessions of a server at once and report the age of the frames",
+    "tissueform-load"};
+inline constexpr CompanionCommand kBenchCommand = {
+    "bench", "measure on this machine against the libraries one would use instead",
+    "tissueform-benchmarks"};
 inline constexpr CompanionCommand kDragCommand = {
     "drag", "drag on a server, to and fro; goes on when the server is started again",
     "tissueform-online"};

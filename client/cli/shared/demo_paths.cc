@@ -8,7 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "core/process/child_process.h"
+#include "core/base/process/child_process.h"
 
 namespace tissueform {
 

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "core/base/percentiles.h"
-#include "core/elasticity/tet_strain.h"
-#include "core/operators/piecewise_linear_elements.h"
+#include "core/mechanics/elasticity/tet_strain.h"
+#include "core/mesh/operators/piecewise_linear_elements.h"
 
 namespace tissueform {
 namespace {

@@ -10,9 +10,9 @@
 #include "nlohmann/json.hpp"
 
 #include "core/base/types.h"
-#include "core/elasticity/elastic_state.h"
-#include "core/mesh_io/tet_mesh_io.h"
-#include "core/problem/plan_problem.h"
+#include "core/mechanics/elasticity/elastic_state.h"
+#include "core/mechanics/problem/plan_problem.h"
+#include "core/mesh/io/tet_mesh_io.h"
 
 namespace tissueform {
 

@@ -14,9 +14,9 @@
 
 #include "client/cli/shared/elastic_results.h"
 #include "core/base/status_macros.h"
-#include "core/elasticity/tet_strain.h"
-#include "core/mesh_io/tet_mesh_io.h"
-#include "core/operators/piecewise_linear_elements.h"
+#include "core/mechanics/elasticity/tet_strain.h"
+#include "core/mesh/io/tet_mesh_io.h"
+#include "core/mesh/operators/piecewise_linear_elements.h"
 
 namespace tissueform {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "client/cli/shared/uncertainty_results.h"
 #include "core/base/types.h"
+#include "core/mechanics/problem/plan_problem.h"
 #include "core/planning/plan.h"
-#include "core/problem/plan_problem.h"
 
 namespace tissueform {
 

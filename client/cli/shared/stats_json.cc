@@ -11,7 +11,7 @@
 #include "client/cli/shared/uncertainty_text.h"
 #include "client/cli/shared/version.h"
 #include "core/base/atomic_file.h"
-#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh/io/tet_mesh_io.h"
 #include "core/planning/model_names.h"
 
 namespace tissueform {

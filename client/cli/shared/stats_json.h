@@ -11,9 +11,9 @@
 
 #include "client/cli/shared/elastic_results.h"
 #include "client/cli/shared/uncertainty_results.h"
-#include "core/deformation/deformation_quality.h"
-#include "core/deformation/deformer.h"
-#include "core/problem/plan_problem.h"
+#include "core/mechanics/deformation/deformation_quality.h"
+#include "core/mechanics/deformation/deformer.h"
+#include "core/mechanics/problem/plan_problem.h"
 
 namespace tissueform {
 

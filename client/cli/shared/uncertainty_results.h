@@ -11,10 +11,10 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/types.h"
-#include "core/deformation/mesh_preparation.h"
-#include "core/mesh_io/tet_mesh_io.h"
-#include "core/problem/plan_problem.h"
-#include "core/uncertainty/uncertainty_band.h"
+#include "core/mechanics/deformation/mesh_preparation.h"
+#include "core/mechanics/problem/plan_problem.h"
+#include "core/mechanics/uncertainty/uncertainty_band.h"
+#include "core/mesh/io/tet_mesh_io.h"
 
 namespace tissueform {
 

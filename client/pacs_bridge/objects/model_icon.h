@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/base/types.h"
-#include "core/constraints/head_frame.h"
+#include "core/mechanics/constraints/head_frame.h"
 
 namespace tissueform {
 

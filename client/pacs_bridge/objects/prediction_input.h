@@ -11,8 +11,8 @@
 #include "absl/time/time.h"
 
 #include "core/base/types.h"
-#include "core/case_file/case_file.h"
-#include "core/constraints/handle_pose.h"
+#include "core/mechanics/constraints/handle_pose.h"
+#include "core/planning/case_file/case_file.h"
 #include "tissueform/v1/export_service.pb.h"
 #include "tissueform/v1/prediction.pb.h"
 

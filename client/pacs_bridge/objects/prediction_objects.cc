@@ -20,7 +20,7 @@
 #include "client/pacs_bridge/objects/report_object.h"
 #include "client/pacs_bridge/objects/stl_object.h"
 #include "core/base/status_macros.h"
-#include "core/case_file/predicted_case.h"
+#include "core/planning/case_file/predicted_case.h"
 
 namespace tissueform {
 namespace {

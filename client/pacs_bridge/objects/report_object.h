@@ -6,7 +6,7 @@
 #include "absl/status/status.h"
 
 #include "client/pacs_bridge/objects/prediction_input.h"
-#include "core/case_file/predicted_case.h"
+#include "core/planning/case_file/predicted_case.h"
 
 class DcmDataset;
 

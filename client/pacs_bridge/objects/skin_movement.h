@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "client/pacs_bridge/objects/prediction_input.h"
-#include "core/case_file/predicted_case.h"
+#include "core/planning/case_file/predicted_case.h"
 
 namespace tissueform {
 

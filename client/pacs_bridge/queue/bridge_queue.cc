@@ -9,9 +9,9 @@
 
 #include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
-#include "server/store/durable_file.h"
-#include "server/store/fault_points.h"
+#include "core/mesh/payload/sha256.h"
+#include "server/platform/storage/durable_file.h"
+#include "server/platform/storage/fault_points.h"
 
 namespace tissueform {
 namespace {

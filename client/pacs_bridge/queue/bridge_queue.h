@@ -13,8 +13,8 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/mutex.h"
-#include "server/store/data_folder.h"
-#include "server/store/database.h"
+#include "server/platform/storage/data_folder.h"
+#include "server/platform/storage/database.h"
 
 namespace tissueform {
 

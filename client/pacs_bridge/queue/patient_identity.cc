@@ -5,7 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 
 namespace tissueform {
 

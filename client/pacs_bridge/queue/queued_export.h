@@ -8,7 +8,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "server/store/database.h"
+#include "server/platform/storage/database.h"
 
 namespace tissueform {
 

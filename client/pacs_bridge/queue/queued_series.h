@@ -10,7 +10,7 @@
 #include "absl/status/statusor.h"
 
 #include "client/pacs_bridge/queue/patient_identity.h"
-#include "server/store/database.h"
+#include "server/platform/storage/database.h"
 
 namespace tissueform {
 

@@ -9,10 +9,10 @@
 #include "absl/strings/str_cat.h"
 #include "nlohmann/json.hpp"
 
+#include "core/base/json/json_file.h"
+#include "core/base/json/json_schema.h"
+#include "core/base/json/json_text.h"
 #include "core/base/status_macros.h"
-#include "core/json/json_file.h"
-#include "core/json/json_schema.h"
-#include "core/json/json_text.h"
 
 namespace tissueform {
 namespace {

@@ -13,7 +13,7 @@
 #include "client/pacs_bridge/work/material_band.h"
 #include "core/base/mutex.h"
 #include "core/base/status_macros.h"
-#include "core/case_file/case_reader.h"
+#include "core/planning/case_file/case_reader.h"
 
 namespace tissueform {
 namespace {

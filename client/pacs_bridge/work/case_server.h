@@ -14,7 +14,7 @@
 #include "client/cpp/connection_options.h"
 #include "core/base/cancellation.h"
 #include "core/base/types.h"
-#include "core/case_file/case_file.h"
+#include "core/planning/case_file/case_file.h"
 #include "tissueform/v1/export_service.pb.h"
 #include "tissueform/v1/prediction_service.pb.h"
 

@@ -16,9 +16,9 @@
 #include "client/pacs_bridge/work/plan_work.h"
 #include "client/pacs_bridge/work/retry_times.h"
 #include "core/base/status_macros.h"
-#include "core/case_file/case_reader.h"
-#include "server/store/durable_file.h"
-#include "server/store/fault_points.h"
+#include "core/planning/case_file/case_reader.h"
+#include "server/platform/storage/durable_file.h"
+#include "server/platform/storage/fault_points.h"
 
 namespace tissueform {
 namespace {

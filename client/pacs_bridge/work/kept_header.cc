@@ -16,7 +16,7 @@
 
 #include "client/pacs_bridge/dicom/instance_header.h"
 #include "core/base/status_macros.h"
-#include "server/store/durable_file.h"
+#include "server/platform/storage/durable_file.h"
 
 namespace tissueform {
 namespace {

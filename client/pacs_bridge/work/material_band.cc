@@ -12,10 +12,10 @@
 #include "absl/cleanup/cleanup.h"
 
 #include "client/cpp/prepared_evaluator.h"
-#include "core/answer_evaluator/pose_range.h"
 #include "core/base/status_macros.h"
+#include "core/mechanics/answer_evaluator/pose_range.h"
 #include "proto/conversion/geometry_conversion.h"
-#include "server/store/durable_file.h"
+#include "server/platform/storage/durable_file.h"
 #include "tissueform/v1/session_service.pb.h"
 
 namespace tissueform {

@@ -12,7 +12,7 @@
 
 #include "Eigen/Core"
 #include "client/cpp/tissueform_client.h"
-#include "core/case_file/case_file.h"
+#include "core/planning/case_file/case_file.h"
 #include "tissueform/v1/prediction.pb.h"
 
 namespace tissueform {

@@ -12,7 +12,7 @@
 
 #include "client/pacs_bridge/queue/received_rows.h"
 #include "client/pacs_bridge/work/case_server.h"
-#include "core/case_file/case_file.h"
+#include "core/planning/case_file/case_file.h"
 
 namespace tissueform {
 

@@ -20,11 +20,11 @@
 #include "core/base/error_reason.h"
 #include "core/base/parallel_for.h"
 #include "core/base/status_macros.h"
-#include "core/case_file/case_file.h"
-#include "core/mesh_payload/sha256.h"
-#include "core/plan_building/plan_build_call.h"
-#include "server/store/durable_file.h"
-#include "server/store/fault_points.h"
+#include "core/mesh/payload/sha256.h"
+#include "core/planning/case_file/case_file.h"
+#include "core/planning/plan_building/plan_build_call.h"
+#include "server/platform/storage/durable_file.h"
+#include "server/platform/storage/fault_points.h"
 
 namespace tissueform {
 namespace {

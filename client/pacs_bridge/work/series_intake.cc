@@ -14,8 +14,8 @@
 
 #include "client/pacs_bridge/dicom/dicom_file.h"
 #include "core/base/status_macros.h"
-#include "server/store/durable_file.h"
-#include "server/store/fault_points.h"
+#include "server/platform/storage/durable_file.h"
+#include "server/platform/storage/fault_points.h"
 
 namespace tissueform {
 namespace {

@@ -11,7 +11,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 
-#include "core/process/guarded_program.h"
+#include "core/base/process/guarded_program.h"
 
 namespace tissueform {
 

@@ -20,7 +20,7 @@
 #include "client/cpp/reattaching_watch.h"
 #include "client/cpp/tissueform_client.h"
 #include "core/base/error_reason.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "proto/conversion/case_conversion.h"
 #include "tests/client/cpp/scripted_services.h"
 #include "tests/testing/status_matchers.h"

@@ -5,7 +5,7 @@
 
 #include "gtest/gtest.h"
 
-#include "core/operators/laplacian.h"
+#include "core/mesh/operators/laplacian.h"
 #include "tests/testing/meshes.h"
 
 namespace tissueform {

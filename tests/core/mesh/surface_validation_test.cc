@@ -9,8 +9,8 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/mesh/io/triangle_mesh_io.h"
 #include "core/mesh/tet_topology.h"
-#include "core/mesh_io/triangle_mesh_io.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 

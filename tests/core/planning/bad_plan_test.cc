@@ -5,7 +5,7 @@
 #include <fstream>
 #include <string>
 
-#include "core/json/json_text.h"
+#include "core/base/json/json_text.h"
 #include "core/planning/plan_io.h"
 #include "tests/core/planning/plan_text.h"
 #include "tests/testing/status_matchers.h"

@@ -18,7 +18,7 @@
 #include "proto/conversion/geometry_conversion.h"
 #include "proto/conversion/session_conversion.h"
 #include "tests/server/cluster/cluster_test.h"
-#include "tests/server/postgres_store/test_database.h"
+#include "tests/server/store/postgres_store/test_database.h"
 #include "tests/testing/status_matchers.h"
 
 // What calls are answered, and when, while the database is away.

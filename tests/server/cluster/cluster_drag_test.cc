@@ -13,7 +13,7 @@
 #include "client/cpp/client_call.h"
 #include "core/base/error_reason.h"
 #include "tests/server/cluster/cluster_test.h"
-#include "tests/server/postgres_store/test_database.h"
+#include "tests/server/store/postgres_store/test_database.h"
 #include "tests/testing/status_matchers.h"
 
 // Drags of a session by one of several servers at a time.

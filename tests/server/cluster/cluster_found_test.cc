@@ -12,7 +12,7 @@
 #include "core/base/error_reason.h"
 #include "proto/conversion/session_conversion.h"
 #include "tests/server/cluster/cluster_test.h"
-#include "tests/server/postgres_store/test_database.h"
+#include "tests/server/store/postgres_store/test_database.h"
 #include "tests/testing/status_matchers.h"
 
 // What one server has made or deleted, the others know.

@@ -17,11 +17,11 @@
 #include "gtest/gtest.h"
 
 #include "client/cpp/client_call.h"
-#include "core/process/child_process.h"
+#include "core/base/process/child_process.h"
 #include "server/cluster/cluster_options.h"
 #include "server/cluster/node_table.h"
 #include "tests/server/cluster/cluster_test.h"
-#include "tests/server/postgres_store/test_database.h"
+#include "tests/server/store/postgres_store/test_database.h"
 #include "tests/testing/http_get.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"

@@ -12,7 +12,7 @@
 #include "client/cpp/client_call.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "proto/conversion/session_conversion.h"
-#include "tests/server/postgres_store/test_database.h"
+#include "tests/server/store/postgres_store/test_database.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform::testing {

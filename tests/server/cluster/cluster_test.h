@@ -13,10 +13,10 @@
 #include "grpcpp/support/sync_stream.h"
 #include "gtest/gtest.h"
 
-#include "server/tissueform_server.h"
+#include "server/app/tissueform_server.h"
 #include "tests/integration/access_calls.h"
 #include "tests/integration/service_test.h"
-#include "tests/server/postgres_store/frozen_proxy.h"
+#include "tests/server/store/postgres_store/frozen_proxy.h"
 
 namespace tissueform::testing {
 

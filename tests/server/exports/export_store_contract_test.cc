@@ -10,8 +10,8 @@
 #include "gtest/gtest.h"
 
 #include "server/exports/export_store.h"
-#include "server/store/data_folder.h"
-#include "server/store/database.h"
+#include "server/platform/storage/data_folder.h"
+#include "server/platform/storage/database.h"
 #include "server/store/durable_store.h"
 #include "server/store/in_memory_stores.h"
 #include "tests/testing/status_matchers.h"

@@ -15,7 +15,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "server/rpc/case_service.h"
 #include "server/store/in_memory_case_store.h"
 #include "tests/testing/fake_calls.h"

@@ -15,8 +15,8 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/mesh/payload/sha256.h"
 #include "core/mesh/tet_topology.h"
-#include "core/mesh_payload/sha256.h"
 #include "tests/server/rpc/reactors_fixture.h"
 
 namespace tissueform::testing {

@@ -11,8 +11,8 @@
 #include "gtest/gtest.h"
 #include "spdlog/spdlog.h"
 
-#include "core/answer_evaluator/pose_range.h"
-#include "core/uncertainty/band_columns.h"
+#include "core/mechanics/answer_evaluator/pose_range.h"
+#include "core/mechanics/uncertainty/band_columns.h"
 #include "proto/conversion/material_conversion.h"
 #include "server/rpc/resource_conversion.h"
 #include "tests/server/rpc/reactors_fixture.h"

@@ -12,7 +12,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "server/store/in_memory_stores.h"
 #include "tests/testing/fake_clock.h"
 #include "tests/testing/meshes.h"

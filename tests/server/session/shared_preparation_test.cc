@@ -18,7 +18,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "core/linear_solvers/blas_threads.h"
+#include "core/mechanics/linear_solvers/blas_threads.h"
 #include "tests/testing/handle_problem.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"

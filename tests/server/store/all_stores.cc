@@ -4,7 +4,7 @@
 #include <memory>
 #include <utility>
 
-#include "server/store/data_folder.h"
+#include "server/platform/storage/data_folder.h"
 #include "server/store/durable_store.h"
 #include "server/store/in_memory_stores.h"
 #include "tests/server/store/stores_case.h"

@@ -15,7 +15,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "core/process/child_process.h"
+#include "core/base/process/child_process.h"
 #include "tests/server/store/store_workload.h"
 #include "tests/server/store/stores_case.h"
 #include "tests/testing/status_matchers.h"

@@ -15,7 +15,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "server/store/database.h"
+#include "server/platform/storage/database.h"
 #include "server/store/durable_store.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/stores_case.h"

@@ -18,9 +18,9 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
+#include "server/platform/storage/database.h"
 #include "server/store/commit_thread.h"
-#include "server/store/database.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/store_workload.h"
 #include "tests/server/store/stores_case.h"

@@ -14,7 +14,7 @@
 
 #include "core/base/percentiles.h"
 #include "core/base/stopwatch.h"
-#include "server/store/database.h"
+#include "server/platform/storage/database.h"
 #include "server/store/durable_store.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/waiting_calls.h"

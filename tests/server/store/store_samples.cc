@@ -11,7 +11,7 @@
 #include "absl/strings/str_join.h"
 
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 
 namespace tissueform {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/mesh_payload/mesh_payload.h"
+#include "core/mesh/payload/mesh_payload.h"
 #include "server/store/case_store.h"
 #include "server/store/mesh_store.h"
 #include "server/store/prediction_store.h"

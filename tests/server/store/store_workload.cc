@@ -14,7 +14,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/waiting_calls.h"
 

@@ -13,8 +13,8 @@
 #include "absl/strings/str_cat.h"
 #include <sys/time.h>
 
+#include "server/platform/storage/fault_points.h"
 #include "server/store/durable_store.h"
-#include "server/store/fault_points.h"
 #include "tests/server/store/store_workload.h"
 
 // The program that the crash tests kill. It opens the store in FOLDER, makes the steps of the

@@ -23,7 +23,7 @@ struct StoresCase {
 inline void PrintTo(const StoresCase& stores_case, std::ostream* out) { *out << stores_case.name; }
 
 // Those of this test program: the contract's tests are in that of server/store and once more in
-// that of server/postgres_store.
+// that of server/store/postgres_store.
 std::vector<StoresCase> AllStores();
 
 // A new private folder for a test, which goes with this object.

@@ -18,7 +18,7 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
-#include "core/audit_chain/audit_verification.h"
+#include "server/platform/audit_chain/audit_verification.h"
 #include "tests/testing/audit_samples.h"
 #include "tests/testing/status_matchers.h"
 

@@ -19,8 +19,8 @@
 #include "nlohmann/json.hpp"
 #include <sys/resource.h>
 
-#include "core/audit_chain/audit_verification.h"
 #include "core/base/error_reason.h"
+#include "server/platform/audit_chain/audit_verification.h"
 #include "server/telemetry/audit_log.h"
 #include "tests/testing/audit_samples.h"
 #include "tests/testing/status_matchers.h"

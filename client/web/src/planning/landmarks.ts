@@ -21,7 +21,7 @@ export function isOnSkin({ handle, skinVertex }: LandmarkEntry): boolean {
 }
 
 /**
- * The same rule as PredictCase in core/case_file/predicted_case.cc. A landmark of the skin does not lie exactly on its vertex, so
+ * The same rule as PredictCase in core/planning/case_file/predicted_case.cc. A landmark of the skin does not lie exactly on its vertex, so
  * it moves by the vertex's displacement and keeps its offset. `poses` by handle; `skinMove`: displacement of a vertex of the first
  * skin from rest, LPS, mm.
  */

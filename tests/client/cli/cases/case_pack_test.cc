@@ -8,7 +8,7 @@
 #include "gtest/gtest.h"
 
 #include "client/cpp/plan_session.h"
-#include "core/case_file/case_reader.h"
+#include "core/planning/case_file/case_reader.h"
 #include "core/planning/plan_io.h"
 #include "proto/conversion/session_conversion.h"
 #include "tests/testing/meshes.h"

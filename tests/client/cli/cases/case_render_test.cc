@@ -7,9 +7,9 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "client/rendering/virtual_display.h"
-#include "core/case_file/case_reader.h"
-#include "core/case_file/predicted_case.h"
+#include "core/planning/case_file/case_reader.h"
+#include "core/planning/case_file/predicted_case.h"
+#include "core/planning/rendering/virtual_display.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/scoped_environment.h"
@@ -40,7 +40,7 @@ class CaseRenderTest : public CliTest {
             static_cast<size_t>(moved.size()) * sizeof(float)};
   }
   ProcessResult Render() const {
-    // Under AddressSanitizer: Mesa's leaks, see tests/client/rendering/figure_test.cc.
+    // Under AddressSanitizer: Mesa's leaks, see tests/core/planning/rendering/figure_test.cc.
     const ScopedEnvironment no_leak_check("LSAN_OPTIONS", "detect_leaks=0");
     return Run({"case", "render", "bar.tfcase", "--positions", "after.f32", "--out", "pictures"});
   }

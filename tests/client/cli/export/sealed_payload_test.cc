@@ -15,7 +15,7 @@
 #include "nlohmann/json.hpp"
 #include <openssl/evp.h>
 
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/status_matchers.h"
 

@@ -4,7 +4,7 @@
 #include "absl/strings/ascii.h"
 #include "nlohmann/json.hpp"
 
-#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh/io/tet_mesh_io.h"
 #include "tests/testing/bar_mesh.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/run_tissueform.h"

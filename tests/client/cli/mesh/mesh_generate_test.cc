@@ -9,10 +9,10 @@
 #include "absl/strings/ascii.h"
 #include "nlohmann/json.hpp"
 
+#include "core/mesh/io/tet_mesh_io.h"
+#include "core/mesh/io/triangle_mesh_io.h"
 #include "core/mesh/tet_quality.h"
 #include "core/mesh/validation.h"
-#include "core/mesh_io/tet_mesh_io.h"
-#include "core/mesh_io/triangle_mesh_io.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/status_matchers.h"

@@ -11,8 +11,8 @@
 #include "nlohmann/json.hpp"
 #include <sys/wait.h>
 
-#include "client/rendering/virtual_display.h"
-#include "core/ct/ct_volume_reader.h"
+#include "core/imaging/ct/ct_volume_reader.h"
+#include "core/planning/rendering/virtual_display.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/scoped_environment.h"

@@ -7,7 +7,7 @@
 
 #include "nlohmann/json.hpp"
 
-#include "core/mesh_io/tet_mesh_io.h"
+#include "core/mesh/io/tet_mesh_io.h"
 #include "core/planning/skin_places.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/run_tissueform.h"

@@ -11,7 +11,7 @@
 
 #include "client/pacs_bridge/network/instance_sink.h"
 #include "core/base/mutex.h"
-#include "core/process/guarded_program.h"
+#include "core/base/process/guarded_program.h"
 
 // DICOM programs that nobody here wrote, and a sink that keeps account.
 namespace tissueform::testing {

@@ -8,9 +8,9 @@
 #include "absl/strings/str_format.h"
 #include "gmock/gmock.h"
 
-#include "client/rendering/virtual_display.h"
 #include "core/base/stopwatch.h"
-#include "core/case_file/case_reader.h"
+#include "core/planning/case_file/case_reader.h"
+#include "core/planning/rendering/virtual_display.h"
 #include "tests/client/pacs_bridge/objects/objects_fixture.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/run_tissueform.h"
@@ -55,7 +55,7 @@ class HeadObjectsTest : public ObjectsFixture {
     std::ofstream(folder_ / "after.f32", std::ios::binary)
         .write(reinterpret_cast<const char*>(positions.data()),
                static_cast<std::streamsize>(static_cast<size_t>(positions.size()) * sizeof(float)));
-    // Under AddressSanitizer: Mesa's leaks, see tests/client/rendering/figure_test.cc.
+    // Under AddressSanitizer: Mesa's leaks, see tests/core/planning/rendering/figure_test.cc.
     const ScopedEnvironment no_leak_check("LSAN_OPTIONS", "detect_leaks=0");
     const ProcessResult rendered = RunTissueform(
         {"case", "render", "head.tfcase", "--positions", "after.f32", "--out", "pictures"},

@@ -21,9 +21,9 @@
 
 #include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "client/pacs_bridge/objects/prediction_objects.h"
-#include "core/case_file/predicted_case.h"
+#include "core/planning/case_file/predicted_case.h"
 #include "proto/conversion/geometry_conversion.h"
-#include "tests/core/case_file/sample_case.h"
+#include "tests/core/planning/case_file/sample_case.h"
 #include "tests/testing/ct_series.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"

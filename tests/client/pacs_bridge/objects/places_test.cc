@@ -8,9 +8,9 @@
 
 #include <Eigen/Geometry>
 
-#include "core/anatomy/surface_extraction.h"
-#include "core/ct/ct_volume_reader.h"
-#include "core/ct/isotropic_resample.h"
+#include "core/imaging/anatomy/surface_extraction.h"
+#include "core/imaging/ct/ct_volume_reader.h"
+#include "core/imaging/ct/isotropic_resample.h"
 #include "tests/client/pacs_bridge/objects/objects_fixture.h"
 
 namespace tissueform::testing {

@@ -13,7 +13,7 @@
 
 #include "client/pacs_bridge/queue/export_rows.h"
 #include "client/pacs_bridge/queue/received_rows.h"
-#include "core/process/child_process.h"
+#include "core/base/process/child_process.h"
 #include "tests/client/pacs_bridge/work/bridge_world.h"
 #include "tests/testing/ct_series.h"
 #include "tests/testing/status_matchers.h"

@@ -18,10 +18,10 @@
 #include "client/pacs_bridge/work/export_work.h"
 #include "client/pacs_bridge/work/plan_work.h"
 #include "client/pacs_bridge/work/series_intake.h"
-#include "core/case_file/case_writer.h"
-#include "server/store/fault_points.h"
+#include "core/planning/case_file/case_writer.h"
+#include "server/platform/storage/fault_points.h"
 #include "tests/client/pacs_bridge/work/bridge_world.h"
-#include "tests/core/case_file/sample_case.h"
+#include "tests/core/planning/case_file/sample_case.h"
 
 namespace tissueform {
 namespace {

@@ -18,9 +18,9 @@
 #include "client/pacs_bridge/work/case_server.h"
 #include "client/pacs_bridge/work/object_writer.h"
 #include "core/base/status_macros.h"
-#include "core/mesh_payload/sha256.h"
+#include "core/mesh/payload/sha256.h"
 #include "server/exports/export_record.h"
-#include "tests/core/case_file/sample_case.h"
+#include "tests/core/planning/case_file/sample_case.h"
 
 // What lies about a bridge, as folders, so that it outlives a process that is killed: a server that
 // keeps cases and takes of an export the states that a server takes, a PACS that keeps objects, a

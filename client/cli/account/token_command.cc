@@ -1,0 +1,150 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/cli/account/token_command.h"
+
+#include <chrono>
+#include <iostream>
+#include <iterator>
+#include <memory>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+
+#include "client/cli/account/token_work.h"
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+constexpr size_t kMaxShownBytes = 65536;
+
+void AddKeygen(CLI::App* token, CommandWork* work) {
+  struct Options {
+    std::string out;
+    int rsa_bits = 0;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      token->add_subcommand("keygen", "make a key that signs tokens, and what servers are told");
+  command->add_option("--out", options->out, "folder for the files; nothing is written over")
+      ->required()
+      ->type_name("DIR");
+  command
+      ->add_option("--rsa", options->rsa_bits,
+                   "an RSA key of so many bits (RS256) instead of one of P-256 (ES256)")
+      ->check(CLI::IsMember({2048, 3072, 4096}));
+  command->footer(
+      "Writes into DIR:\n"
+      "  private.pem  makes tokens: whoever has it can be anybody. Keep it off the server.\n"
+      "  public.pem, jwks.json  what the server is told, in two forms: --token-keys\n"
+      "Example:\n"
+      "  tissueform token keygen --out keys\n"
+      "  tissueform-server --token-issuer https://keys.example --token-audience tissueform \\\n"
+      "    --token-keys keys/jwks.json");
+  command->callback([options, work] {
+    *work = [options]() -> absl::Status {
+      TF_RETURN_IF_ERROR(MakeKeyFiles(options->out, options->rsa_bits));
+      std::cout << "made private.pem, public.pem and jwks.json in " << options->out << "\n";
+      return absl::OkStatus();
+    };
+  });
+}
+
+void AddMake(CLI::App* token, CommandWork* work) {
+  struct Options {
+    std::string key;
+    TokenWords words;
+  };
+  auto options = std::make_shared<Options>();
+  TokenWords& words = options->words;
+  CLI::App* command = token->add_subcommand("make", "make a short-lived token; prints it");
+  command->add_option("--key", options->key, "private.pem of `token keygen`")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("--issuer", words.issuer, "as in the server's --token-issuer")->required();
+  command->add_option("--audience", words.audiences, "as in the server's --token-audience")
+      ->required();
+  command->add_option("--subject", words.subject, "whose it is: 1 to 128 printable characters")
+      ->required();
+  command
+      ->add_option(
+          "--lifetime", words.lifetime_seconds,
+          absl::StrCat("seconds until it ends, at most ", kMaxTokenLifetimeSeconds, " (12 hours)"))
+      ->check(CLI::Range(int64_t{1}, kMaxTokenLifetimeSeconds))
+      ->capture_default_str();
+  command->add_option("--role", words.roles, "publisher, bridge or admin; again for more")
+      ->check(CLI::IsMember({"publisher", "bridge", "admin"}));
+  command->add_option("--project", words.projects, "a project that it opens; again for more");
+  command->footer(
+      "Keep a token as you keep a password, in a file that only you read:\n"
+      "  (umask 077; tissueform token make --key keys/private.pem --issuer https://keys.example "
+      "\\\n"
+      "     --audience tissueform --subject alice > token)\n"
+      "It cannot be taken back but by the server's --token-revocations (docs/security.md).");
+  command->callback([options, work] {
+    *work = [options]() -> absl::Status {
+      TF_ASSIGN_OR_RETURN(const std::string made, MakeTokenWith(options->key, options->words));
+      std::cout << made << "\n";
+      return absl::OkStatus();
+    };
+  });
+}
+
+// Of a file, or of standard input where `path` is empty.
+absl::StatusOr<nlohmann::json> Show(const std::string& path) {
+  const auto now = std::chrono::system_clock::now();
+  if (!path.empty()) return ShowTokenFile(path, now);
+  std::string text(kMaxShownBytes, '\0');
+  std::cin.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<size_t>(std::cin.gcount()));
+  return ShowToken(absl::StripAsciiWhitespace(text), now);
+}
+
+void AddShow(CLI::App* token, CommandWork* work) {
+  auto file = std::make_shared<std::string>();
+  CLI::App* command =
+      token->add_subcommand("show", "print what a token says, as JSON, without verifying it");
+  command
+      ->add_option("FILE", *file,
+                   "file that holds the token, as `tissueform login` and `token make > FILE` write "
+                   "it; without FILE the token is read from standard input")
+      ->type_name("");
+  command->footer(
+      "Shows header and claims, times in words, whether the token is in date, and never its\n"
+      "signature. Nothing is verified: anybody can write what is shown. \"token_digest\" is what\n"
+      "the token is called in a revocation list. A token itself is not an argument, since other\n"
+      "users of a machine see those.\n"
+      "Examples:\n"
+      "  tissueform token show ~/.config/tissueform/token\n"
+      "  tissueform token show < token");
+  command->callback([file, work] {
+    *work = [file]() -> absl::Status {
+      TF_ASSIGN_OR_RETURN(const nlohmann::json shown, Show(*file));
+      std::cout << shown.dump(2, ' ', true) << "\n";
+      std::cerr << "not verified: anybody can write this\n";
+      return absl::OkStatus();
+    };
+  });
+}
+
+}  // namespace
+
+void AddTokenCommand(CLI::App& app, CommandWork* work) {
+  CLI::App* token = app.add_subcommand(
+      "token", "keys and short-lived tokens, for tests and for sites without a provider");
+  token->require_subcommand(1);
+  token->footer(
+      "Examples:\n"
+      "  tissueform token keygen --out keys\n"
+      "  tissueform token make --key keys/private.pem --issuer https://keys.example \\\n"
+      "    --audience tissueform --subject alice --lifetime 3600\n"
+      "  tissueform token show token");
+  AddKeygen(token, work);
+  AddMake(token, work);
+  AddShow(token, work);
+}
+
+}  // namespace tissueform

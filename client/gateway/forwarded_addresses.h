@@ -1,0 +1,34 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+
+#include "client/gateway/http_message.h"
+
+namespace tissueform {
+
+// From where requests come, behind proxies that say so in X-Forwarded-For. Anybody can write that
+// header: what counts is what a trusted proxy has put at its end.
+class ForwardedAddresses {
+ public:
+  // `proxies`: addresses that pass CheckProxies.
+  explicit ForwardedAddresses(const std::vector<std::string>& proxies = {});
+
+  // Error: InvalidArgument when one is no address.
+  static absl::Status CheckProxies(const std::vector<std::string>& proxies);
+
+  // The last address of the chain that is no trusted proxy, by the header as far as trusted proxies
+  // have written it, else the other end's. Empty when that is none.
+  std::string Of(const HttpHead& head) const;
+
+ private:
+  std::set<std::string> proxies_;
+};
+
+}  // namespace tissueform

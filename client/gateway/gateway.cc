@@ -1,0 +1,95 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/gateway/gateway.h"
+
+#include <utility>
+
+#include "absl/memory/memory.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "spdlog/spdlog.h"
+
+#include "core/base/software_version.h"
+#include "core/base/status_macros.h"
+#include "server/platform/network_address.h"
+#include "server/platform/process_metrics.h"
+#include "server/platform/tls_credentials.h"
+
+namespace tissueform {
+
+namespace {
+
+std::vector<NodeAddress> ServersOf(const GatewayOptions& options) {
+  std::vector<NodeAddress> servers;
+  for (const std::string& server : options.servers) servers.push_back(ParseNodeAddress(server));
+  return servers;
+}
+
+absl::Status CheckServers(const GatewayOptions& options) {
+  TF_RETURN_IF_ERROR(ServerChoice::Check(ServersOf(options)));
+  if (options.insecure || !options.upstream.roots.empty()) return absl::OkStatus();
+  for (const auto& [node, server] : ServersOf(options)) {
+    std::string host = server.substr(0, server.rfind(':'));
+    if (host.size() > 2 && host.front() == '[') host = host.substr(1, host.size() - 2);
+    if (absl::StartsWith(server, "unix:") || IsLoopback(host)) continue;
+    return absl::FailedPreconditionError(
+        absl::StrCat("--server ", server,
+                     " is another machine, and tokens go there; give "
+                     "--server-ca FILE, or --insecure if the network between "
+                     "is yours alone"));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Gateway>> Gateway::Start(const GatewayOptions& options) {
+  TF_RETURN_IF_ERROR(CheckLoginConfig(options.login));
+  TF_RETURN_IF_ERROR(CheckServers(options));
+  TF_RETURN_IF_ERROR(ForwardedAddresses::CheckProxies(options.trusted_proxies));
+  std::unique_ptr<RotatedFiles> tls_files;
+  if (!options.upstream.roots.empty()) {
+    TF_ASSIGN_OR_RETURN(tls_files, RotatedFiles::Load(options.upstream));
+  }
+  WebFiles files;
+  if (!options.web.empty()) {
+    TF_ASSIGN_OR_RETURN(files, WebFiles::Load(options.web));
+  }
+  auto gateway = absl::WrapUnique(new Gateway(options, std::move(files), std::move(tls_files)));
+  TF_ASSIGN_OR_RETURN(gateway->http_, HttpServer::Start({.host = options.host,
+                                                         .port = options.port,
+                                                         .threads = options.threads,
+                                                         .limits = options.limits},
+                                                        &gateway->routes_, &gateway->counters_));
+  TF_RETURN_IF_ERROR(gateway->ServeMetrics());
+  return gateway;
+}
+
+Gateway::Gateway(const GatewayOptions& options, WebFiles files,
+                 std::unique_ptr<RotatedFiles> tls_files)
+    : options_(options),
+      tls_files_(std::move(tls_files)),
+      pool_(ServersOf(options), options.limits, MakeChannelCredentials(tls_files_.get())),
+      routes_(AccessRules(options.host, options.allowed_hosts, options.allowed_origins),
+              ForwardedAddresses(options.trusted_proxies), std::move(files), options.login, &pool_,
+              &counters_) {}
+
+absl::Status Gateway::ServeMetrics() {
+  if (options_.metrics_port < 0) return absl::OkStatus();
+  metrics_.emplace();
+  AddProcessMetrics("tissueform_gateway", SoftwareVersion(), &*metrics_);
+  AddCounterMetrics(counters_, &*metrics_);
+  metrics_->AddGauge("tissueform_gateway_ready", "1 while a server behind it takes calls.", {},
+                     [this] { return pool_.IsReady() ? 1.0 : 0.0; });
+  TF_RETURN_IF_ERROR(metrics_->Serve(options_.metrics_port));
+  spdlog::info("metrics on http://127.0.0.1:{}/metrics", metrics_->port());
+  return absl::OkStatus();
+}
+
+std::string Gateway::Url() const {
+  const bool is_ipv6 = absl::StrContains(options_.host, ':');
+  return absl::StrCat("http://", is_ipv6 ? "[" : "", options_.host, is_ipv6 ? "]:" : ":", port());
+}
+
+}  // namespace tissueform

@@ -1,0 +1,63 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "client/pacs_bridge/review/review_queue.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <system_error>
+
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+std::vector<std::string> PicturesIn(const std::string& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (std::filesystem::directory_iterator file(folder, error), end; !error && file != end;
+       file.increment(error)) {
+    if (file->path().extension() == ".png") names.push_back(file->path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+}  // namespace
+
+absl::StatusOr<WorkList> ReadWorkList(BridgeQueue* queue) {
+  ReceivedRows received(queue);
+  ExportRows exports(queue);
+  WorkList list;
+  TF_ASSIGN_OR_RETURN(std::vector<QueuedSeries> all, received.List());
+  std::reverse(all.begin(), all.end());
+  std::map<std::string, WorkListSeries> by_case;
+  for (const QueuedSeries& series : all) {
+    if (series.state == SeriesState::kPassedOver) {
+      ++list.passed_over;
+      continue;
+    }
+    TF_ASSIGN_OR_RETURN(const QueuedStudy study, received.GetStudy(series.study_uid));
+    const WorkListSeries row = {series, study};
+    if (!series.case_name.empty()) by_case[series.case_name] = row;
+    if (list.series.size() < kMostWorkListRows) list.series.push_back(row);
+  }
+  TF_ASSIGN_OR_RETURN(const std::vector<QueuedExport> asked, exports.List());
+  for (const QueuedExport& queued : asked) {
+    if (queued.state == BridgeExportState::kTold || list.exports.size() >= kMostWorkListRows) {
+      continue;
+    }
+    const auto found = by_case.find(queued.case_name);
+    if (found == by_case.end()) continue;
+    list.exports.push_back(
+        {queued, found->second, PicturesIn(queue->object_folder(queued.key) + "/pictures")});
+  }
+  std::stable_sort(list.exports.begin(), list.exports.end(),
+                   [](const WorkListExport& a, const WorkListExport& b) {
+                     return a.queued.state < b.queued.state;
+                   });
+  return list;
+}
+
+}  // namespace tissueform

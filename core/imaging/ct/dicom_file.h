@@ -1,0 +1,88 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include <Eigen/Core>
+
+namespace tissueform {
+
+// What a DICOM file holds, as far as a CT volume is concerned.
+enum class DicomKind {
+  kCtSlice,
+  kLocaliser,
+  kSecondaryCapture,  // a photograph, or a copy of a screen
+  kOtherModality,
+  kMultiFrame,  // that does not say where its frames lie
+  kColour,
+  kDeflated,   // its whole data set is compressed (1.2.840.10008.1.2.1.99)
+  kNoImage,    // a report, a dose sheet
+  kDirectory,  // DICOMDIR
+  kDamaged,    // begins as a DICOM file but is none to its end, is a CT image without size, or is
+               // only zeros
+};
+
+// The header of one image: of a file, or of a frame of a multi-frame file.
+struct DicomHeader {
+  std::string path;     // never in a message: it may name the patient
+  int file_number = 0;  // place in the folder, in order of names, from 1
+
+  DicomKind kind = DicomKind::kNoImage;
+  std::string modality;
+  int frame = 0;  // of the file's images, from 0
+  int num_frames = 1;
+  std::optional<int> series_number;
+  std::optional<int> instance_number;
+
+  // For comparison only, never in a message: they may name the patient.
+  std::string patient;
+  std::string series_uid;
+  std::string study_uid;
+  std::string frame_of_reference;
+
+  std::string patient_position;              // "HFS"
+  std::string reconstruction;                // kernel, voltage, phase: the same in one volume
+  std::optional<double> acquisition_time_s;  // all three from some day
+  std::optional<double> series_time_s;
+  std::optional<double> content_time_s;
+  std::optional<int> acquisition_number;
+
+  int rows = 0;
+  int columns = 0;
+  std::optional<Eigen::Vector3d> position_mm;       // of the first pixel's centre, LPS
+  std::optional<Eigen::Vector3d> row_direction;     // along which columns are counted
+  std::optional<Eigen::Vector3d> column_direction;  // along which rows are counted
+  std::optional<Eigen::Vector2d> pixel_spacing_mm;  // between rows; between columns
+  std::optional<double> rescale_slope;
+  std::optional<double> rescale_intercept;
+
+  bool was_lossy = false;   // compressed with loss at some time (0028,2110)
+  size_t pixel_offset = 0;  // where in the file the pixels begin
+};
+
+// "file 12 of the folder (instance number 31)".
+std::string NameOf(const DicomHeader& header);
+
+// "a photograph or copy of a screen (secondary capture)", "of modality MR", ...
+std::string DescribeKind(const DicomHeader& header);
+
+// Reads a header up to its pixels: one, or one for each frame of a multi-frame file. Empty when the
+// file is no DICOM file. In a helper program only: GDCM is not safe from damaged files. Internal to
+// core/imaging/ct.
+std::vector<DicomHeader> ReadDicomHeaders(const std::string& path);
+
+// Stored values of a file's image, row after row, or of all its frames one after the other, from
+// its contents: rescale not applied. In a helper program only.
+//
+// Errors: InvalidArgument when the file is cut off or its pixels cannot be decoded.
+absl::StatusOr<std::vector<float>> DecodeDicomPixels(const DicomHeader& header,
+                                                     const std::string& contents);
+
+}  // namespace tissueform

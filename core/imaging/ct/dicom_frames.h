@@ -1,0 +1,22 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <vector>
+
+#include "core/imaging/ct/dicom_file.h"
+
+namespace gdcm {
+class DataSet;
+}
+
+namespace tissueform {
+
+// The images of a multi-frame file (Enhanced CT), each as the header of a slice: `file` with the
+// position, orientation, pixel spacing, rescale and times of the frame, from the functional groups
+// that are shared or its own (DICOM PS3.3, C.7.6.16). Empty where the file does not tell its frames
+// apart. In a helper program only. Internal to core/imaging/ct.
+std::vector<DicomHeader> FramesOf(const gdcm::DataSet& data, const DicomHeader& file);
+
+}  // namespace tissueform

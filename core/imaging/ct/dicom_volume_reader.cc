@@ -1,0 +1,244 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/imaging/ct/dicom_volume_reader.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "core/imaging/ct/dicom_file.h"
+#include "core/imaging/ct/dicom_series.h"
+#include "core/imaging/ct/file_bytes.h"
+#include "core/imaging/ct/hu_check.h"
+#include "core/imaging/ct/patient_axes.h"
+#include "core/mesh/payload/sha256.h"
+
+namespace tissueform {
+namespace {
+
+absl::StatusOr<std::vector<std::string>> FilesIn(const std::string& folder, int max_files) {
+  std::vector<std::string> paths;
+  int num_folders = 0;
+  std::error_code error;  // exceptions of the file system hold paths
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    num_folders += entry->is_directory(error) ? 1 : 0;
+    if (entry->is_regular_file(error)) paths.push_back(entry->path().string());
+    if (static_cast<int>(paths.size()) > max_files) {
+      return absl::ResourceExhaustedError(
+          absl::StrCat("the folder holds more than ", max_files, " files"));
+    }
+  }
+  if (error) return absl::InvalidArgumentError("the folder cannot be opened");
+  if (paths.empty()) {
+    return absl::InvalidArgumentError(
+        num_folders == 0 ? "the folder is empty; name the folder that holds the CT series"
+                         : absl::StrCat("the folder holds no files but ", num_folders,
+                                        " folders; name the one that holds the CT series"));
+  }
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+struct Folder {
+  std::vector<DicomHeader> files;
+  int others = 0;
+};
+
+Folder ReadHeaders(const std::vector<std::string>& paths) {
+  Folder folder;
+  for (size_t i = 0; i < paths.size(); ++i) {
+    std::vector<DicomHeader> headers = ReadDicomHeaders(paths[i]);
+    folder.others += headers.empty() ? 1 : 0;
+    for (DicomHeader& header : headers) {
+      header.file_number = static_cast<int>(i) + 1;
+      folder.files.push_back(std::move(header));
+    }
+  }
+  return folder;
+}
+
+absl::StatusOr<SeriesChoice> ChoiceOf(const std::string& path, const Folder& folder,
+                                      const CtReadOptions& options) {
+  if (std::filesystem::is_directory(path)) {
+    return SeriesChoice{0, options.series_number, options.join_series};
+  }
+  for (const DicomHeader& file : folder.files) {
+    if (file.path == path) return SeriesChoice{file.file_number, std::nullopt, options.join_series};
+  }
+  return absl::InvalidArgumentError(
+      "the file is no DICOM file, and its ending is none of .nii .nii.gz .nrrd .nhdr .mha .mhd");
+}
+
+// Where a slice lies, as far as a copy of its file would say the same.
+auto PlaceKey(const DicomHeader& header) {
+  const Eigen::Vector3d place = header.position_mm.value_or(Eigen::Vector3d::Zero());
+  return std::tuple(header.series_uid, header.instance_number, place.x(), place.y(), place.z());
+}
+
+// Leaves out files whose bytes are those of another, as folders hold them that were merged. Only
+// files of one series and place are compared.
+int DropCopies(int64_t max_bytes, std::vector<DicomHeader>* files) {
+  std::map<decltype(PlaceKey(files->front())), std::set<std::string>> seen;
+  std::map<decltype(PlaceKey(files->front())), int> count;
+  for (const DicomHeader& file : *files) ++count[PlaceKey(file)];
+  const auto is_copy = [&](const DicomHeader& file) {
+    if (file.kind != DicomKind::kCtSlice || file.num_frames > 1) return false;
+    if (count[PlaceKey(file)] < 2) return false;
+    const absl::StatusOr<std::string> contents = ReadWholeFile(file.path, &max_bytes);
+    return contents.ok() && !seen[PlaceKey(file)].insert(Sha256Hex({*contents})).second;
+  };
+  const auto first = std::stable_partition(files->begin(), files->end(),
+                                           [&](const DicomHeader& file) { return !is_copy(file); });
+  const auto copies = static_cast<int>(files->end() - first);
+  files->erase(first, files->end());
+  return copies;
+}
+
+// A slice that nobody can read is missing from the stack, and it would be wrong to interpolate it
+// in silence.
+absl::Status CheckNoneDamaged(const std::vector<DicomHeader>& files, const DicomStack& stack) {
+  if (stack.slice_origins_mm.empty()) return absl::OkStatus();
+  for (const DicomHeader& file : files) {
+    if (file.kind != DicomKind::kDamaged) continue;
+    return absl::InvalidArgumentError(absl::StrCat(
+        NameOf(file), " is ", DescribeKind(file), ", and ", stack.notes.back(),
+        "; export the series again, or take that file out of the folder to go without it"));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<DicomStack> FindStack(const std::string& path, const CtReadOptions& options) {
+  const std::filesystem::path place(path);
+  const bool is_folder = std::filesystem::is_directory(place);
+  const std::string folder_path = is_folder ? path : place.parent_path().string();
+  TF_ASSIGN_OR_RETURN(const std::vector<std::string> paths,
+                      FilesIn(folder_path, options.limits.max_files));
+  Folder folder = ReadHeaders(paths);
+  TF_ASSIGN_OR_RETURN(const SeriesChoice choice, ChoiceOf(path, folder, options));
+  if (folder.files.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("none of the ", folder.others, " files in the folder is a DICOM file"));
+  }
+  const int copies = DropCopies(options.limits.max_file_bytes, &folder.files);
+  TF_ASSIGN_OR_RETURN(DicomStack stack, ChooseSeries(folder.files, choice));
+  const absl::Status arranged = ArrangeStack(options.hu_offset.has_value(), &stack);
+  if (!arranged.ok() && options.join_series == JoinSeries::kAlways) {
+    return absl::Status(arranged.code(),
+                        absl::StrCat(arranged.message(),
+                                     "; or leave \"join_series\": \"always\" out of the "
+                                     "recipe, without which scans are told apart"));
+  }
+  TF_RETURN_IF_ERROR(arranged);
+  TF_RETURN_IF_ERROR(CheckNoneDamaged(folder.files, stack));
+  if (copies > 0) {
+    stack.notes.push_back(absl::StrCat("left aside: ", copies, " files that are copies of others"));
+  }
+  if (folder.others > 0) {
+    stack.notes.push_back(absl::StrCat("left aside: ", folder.others, " files that are no DICOM"));
+  }
+  return stack;
+}
+
+absl::StatusOr<CtVolume> EmptyVolume(const DicomStack& stack, int64_t max_voxels) {
+  const DicomHeader& first = stack.slices.front();
+  CtVolume volume;
+  volume.size = {first.columns, first.rows, static_cast<int>(stack.slices.size())};
+  volume.spacing_mm = stack.spacing_mm;
+  volume.origin_mm = *first.position_mm;
+  volume.direction = stack.direction;
+  volume.slice_origins_mm = stack.slice_origins_mm;
+  volume.provenance.format = "DICOM";
+  std::set<int> files;
+  for (const DicomHeader& slice : stack.slices) files.insert(slice.file_number);
+  volume.provenance.num_files = static_cast<int>(files.size());
+  volume.provenance.gantry_tilt_deg = stack.gantry_tilt_deg;
+  volume.provenance.notes = stack.notes;
+  if (volume.num_voxels() > max_voxels) {
+    return absl::ResourceExhaustedError(absl::StrCat("the series has ", volume.num_voxels(),
+                                                     " voxels; at most ", max_voxels, " are read"));
+  }
+  volume.hu.resize(static_cast<size_t>(volume.num_voxels()));
+  return volume;
+}
+
+// Lays the values of a slice's image into the volume. `image` begins with the slice's first pixel;
+// `offset` is the recipe's.
+void TakeSlice(const DicomHeader& slice, const float* image, size_t k, double offset,
+               CtVolume* volume) {
+  const double slope = slice.rescale_slope.value_or(1);
+  const double intercept = slice.rescale_intercept.value_or(0) + offset;
+  const size_t count = static_cast<size_t>(slice.rows) * static_cast<size_t>(slice.columns);
+  for (size_t i = 0; i < count; ++i) {
+    volume->hu[k * count + i] = ToHu(slope * static_cast<double>(image[i]) + intercept);
+  }
+}
+
+// Each file is read once, whatever the order of its frames.
+absl::Status ReadSlices(const DicomStack& stack, double offset, int64_t max_bytes,
+                        CtVolume* volume) {
+  std::map<int, std::vector<size_t>> slices_of_file;
+  std::vector<int> files;  // in the order of the volume
+  for (size_t k = 0; k < stack.slices.size(); ++k) {
+    std::vector<size_t>& slices = slices_of_file[stack.slices[k].file_number];
+    if (slices.empty()) files.push_back(stack.slices[k].file_number);
+    slices.push_back(k);
+  }
+  std::string digests;
+  for (const int file : files) {
+    const DicomHeader& first = stack.slices[slices_of_file[file].front()];
+    TF_ASSIGN_OR_RETURN(const std::string contents, ReadWholeFile(first.path, &max_bytes));
+    absl::StrAppend(&digests, Sha256Hex({contents}));
+    TF_ASSIGN_OR_RETURN(const std::vector<float> values, DecodeDicomPixels(first, contents));
+    const size_t image = static_cast<size_t>(first.rows) * static_cast<size_t>(first.columns);
+    for (const size_t k : slices_of_file[file]) {
+      const auto frame = static_cast<size_t>(stack.slices[k].frame);
+      TakeSlice(stack.slices[k], values.data() + frame * image, k, offset, volume);
+    }
+  }
+  volume->provenance.sha256 = Sha256Hex({digests});
+  return absl::OkStatus();
+}
+
+bool StatesRescale(const DicomStack& stack) {
+  return stack.slices.front().rescale_intercept.has_value();
+}
+
+// Where the files say how their values become HU and the recipe says it, too, the values decide: an
+// offset is for those only that are no HU without it. Old scanners write RescaleIntercept 0 beside
+// HU + 1024. CheckHu, without an offset, asks for one in just the cases in which it is taken here,
+// so that no message takes back what another has asked for.
+absl::Status CheckOffsetIsNeeded(const CtVolume& volume) {
+  if (!CheckHu(volume.hu, std::nullopt).ok()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      "the files state how their values become HU (RescaleSlope, RescaleIntercept), and so they "
+      "are "
+      "HU of a body in air; take \"hu_offset\" out of the recipe");
+}
+
+}  // namespace
+
+absl::StatusOr<CtVolume> ReadDicomVolume(const std::string& path, const CtReadOptions& options) {
+  TF_ASSIGN_OR_RETURN(const DicomStack stack, FindStack(path, options));
+  TF_ASSIGN_OR_RETURN(CtVolume volume, EmptyVolume(stack, options.limits.max_voxels));
+  TF_RETURN_IF_ERROR(PlaceVolume(true, "", options.axes, &volume));
+  const int64_t max_bytes = options.limits.max_file_bytes;
+  if (options.hu_offset && StatesRescale(stack)) {
+    TF_RETURN_IF_ERROR(ReadSlices(stack, 0, max_bytes, &volume));
+    TF_RETURN_IF_ERROR(CheckOffsetIsNeeded(volume));
+    volume.provenance.notes.push_back(absl::StrCat(
+        "the files state a rescale (RescaleIntercept ", *stack.slices.front().rescale_intercept,
+        ") after which their values are no HU: \"hu_offset\" of the recipe is added"));
+  }
+  TF_RETURN_IF_ERROR(ReadSlices(stack, options.hu_offset.value_or(0), max_bytes, &volume));
+  return volume;
+}
+
+}  // namespace tissueform

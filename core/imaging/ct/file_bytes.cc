@@ -1,0 +1,89 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/imaging/ct/file_bytes.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <vector>
+#include <zlib.h>
+
+#include "absl/strings/match.h"
+
+namespace tissueform {
+namespace {
+
+constexpr size_t kChunk = size_t{1} << 20;
+constexpr int kGzipOrZlib = 15 + 32;  // window bits, and zlib's "detect which"
+
+class Inflater {
+ public:
+  Inflater() : buffer_(kChunk) { ready_ = inflateInit2(&stream_, kGzipOrZlib) == Z_OK; }
+  ~Inflater() { inflateEnd(&stream_); }
+  Inflater(const Inflater&) = delete;
+  Inflater& operator=(const Inflater&) = delete;
+
+  // Size of the first stream, which it takes from `packed`; -1 when it does not end as it should.
+  int64_t TakeStream(int64_t enough, absl::string_view* packed) {
+    int64_t count = 0;
+    int result = ready_ ? inflateReset(&stream_) : Z_MEM_ERROR;
+    while (result == Z_OK && count <= enough) {
+      const size_t given = std::min(packed->size(), kChunk);
+      // zlib reads only; its type is older than const.
+      stream_.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed->data()));
+      stream_.avail_in = static_cast<uInt>(given);
+      stream_.next_out = buffer_.data();
+      stream_.avail_out = static_cast<uInt>(buffer_.size());
+      result = inflate(&stream_, Z_NO_FLUSH);
+      packed->remove_prefix(given - stream_.avail_in);
+      count += static_cast<int64_t>(buffer_.size() - stream_.avail_out);
+    }
+    return result == Z_OK || result == Z_STREAM_END ? count : -1;
+  }
+
+ private:
+  z_stream stream_{};
+  std::vector<Bytef> buffer_;
+  bool ready_ = false;
+};
+
+}  // namespace
+
+absl::StatusOr<std::string> ReadWholeFile(const std::string& path, int64_t* bytes_left) {
+  std::error_code error;
+  const auto bytes = std::filesystem::is_regular_file(path, error)
+                         ? static_cast<int64_t>(std::filesystem::file_size(path, error))
+                         : int64_t{-1};
+  if (error || bytes < 0) {
+    return absl::InvalidArgumentError("the file, or the data file beside it, cannot be opened");
+  }
+  if (bytes > *bytes_left) {
+    return absl::ResourceExhaustedError("its files are larger than the limit on their bytes");
+  }
+  *bytes_left -= bytes;
+  std::string contents(static_cast<size_t>(bytes), '\0');
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream.read(contents.data(), bytes)) {
+    return absl::InvalidArgumentError("a file cannot be read, or became shorter meanwhile");
+  }
+  return contents;
+}
+
+// Counted and thrown away, a chunk at a time, and no further than is enough: a few kilobytes may
+// unpack to as many gigabytes as whoever packed them liked.
+int64_t UnpackedSize(absl::string_view packed, int64_t enough) {
+  enough += static_cast<int64_t>(kChunk);
+  Inflater inflater;
+  int64_t count = 0;
+  do {
+    const int64_t stream_bytes = inflater.TakeStream(enough - count, &packed);
+    if (stream_bytes < 0) return 0;
+    count += stream_bytes;
+  } while (count <= enough && IsGzip(packed));
+  return count;
+}
+
+bool IsGzip(absl::string_view bytes) { return absl::StartsWith(bytes, "\x1f\x8b"); }
+
+}  // namespace tissueform

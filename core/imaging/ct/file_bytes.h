@@ -1,0 +1,26 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+namespace tissueform {
+
+// Contents of a file of at most `*bytes_left` bytes, which it lowers by what was read. The message
+// of an error (InvalidArgument, ResourceExhausted) does not hold the path.
+absl::StatusOr<std::string> ReadWholeFile(const std::string& path, int64_t* bytes_left);
+
+// How many bytes the streams of gzip or zlib in `packed` hold, one after the other; 0 where they
+// are cut off or damaged. Stops counting soon after `enough`. ITK's readers of NIfTI and MetaImage
+// pass over what is missing. Internal to core/imaging/ct.
+int64_t UnpackedSize(absl::string_view packed, int64_t enough);
+
+// Whether they begin as gzip does.
+bool IsGzip(absl::string_view bytes);
+
+}  // namespace tissueform

@@ -1,0 +1,286 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/imaging/ct/volume_file_reader.h"
+
+#include <array>
+#include <cmath>
+#include <itkImage.h>
+#include <itkImageFileReader.h>
+#include <itkMetaDataObject.h>
+#include <itkMetaImageIO.h>
+#include <itkNiftiImageIO.h>
+#include <itkNrrdImageIO.h>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "core/imaging/ct/file_bytes.h"
+#include "core/imaging/ct/hu_check.h"
+#include "core/imaging/ct/patient_axes.h"
+#include "core/mesh/payload/sha256.h"
+
+namespace tissueform {
+namespace {
+
+using Image = itk::Image<float, 3>;
+
+constexpr int kLeastVoxels = 8;
+constexpr double kLeastSpacingMm = 0.05;
+constexpr double kMostSpacingMm = 10;
+
+const char* NameOf(VolumeFormat format) {
+  switch (format) {
+    case VolumeFormat::kNifti:
+      return "NIfTI";
+    case VolumeFormat::kNrrd:
+      return "NRRD";
+    case VolumeFormat::kMetaImage:
+      return "MetaImage";
+  }
+  return "";
+}
+
+itk::ImageIOBase::Pointer MakeIo(VolumeFormat format) {
+  switch (format) {
+    case VolumeFormat::kNifti:
+      return itk::NiftiImageIO::New().GetPointer();
+    case VolumeFormat::kNrrd:
+      return itk::NrrdImageIO::New().GetPointer();
+    case VolumeFormat::kMetaImage:
+      return itk::MetaImageIO::New().GetPointer();
+  }
+  return nullptr;
+}
+
+absl::Status Damaged() {
+  return absl::InvalidArgumentError("the file is cut off, damaged, or not of its ending's format");
+}
+
+// ITK's messages hold paths, and several lines.
+absl::Status ExplainFailure(const itk::ExceptionObject& exception) {
+  if (absl::StrContains(exception.GetDescription(), "rthonormal")) {
+    return absl::InvalidArgumentError(
+        "the file's axes are not square to each other; resample it upright");
+  }
+  if (absl::StrContains(exception.GetDescription(), "nrrdSpacingStatusScalarWithSpace")) {
+    return absl::InvalidArgumentError(
+        "the header has \"spacings\" beside a \"space\", which needs \"space directions\"; take "
+        "the "
+        "line \"space\" out of it and state \"axes\" in the recipe");
+  }
+  return Damaged();
+}
+
+// What the file and those beside it hold.
+struct FileContents {
+  std::string file;
+  std::string data_file;  // where there is one
+  std::string digests;    // of all, one after the other
+};
+
+absl::StatusOr<FileContents> ReadContents(const std::string& path, const VolumeHeader& header,
+                                          int64_t max_bytes) {
+  FileContents contents;
+  TF_ASSIGN_OR_RETURN(contents.file, ReadWholeFile(path, &max_bytes));
+  contents.digests = Sha256Hex({contents.file});
+  for (const std::string& data_path : header.data_paths) {
+    TF_ASSIGN_OR_RETURN(contents.data_file, ReadWholeFile(data_path, &max_bytes));
+    contents.digests += Sha256Hex({contents.data_file});
+  }
+  return contents;
+}
+
+CtProvenance ProvenanceOf(VolumeFormat format, const VolumeHeader& header,
+                          const FileContents& contents) {
+  CtProvenance provenance;
+  provenance.format = NameOf(format);
+  provenance.num_files = 1 + static_cast<int>(header.data_paths.size());
+  provenance.sha256 = header.data_paths.empty() ? contents.digests : Sha256Hex({contents.digests});
+  return provenance;
+}
+
+std::string MetaDataOf(const itk::ImageIOBase& io, const char* key) {
+  std::string value;
+  itk::ExposeMetaData<std::string>(io.GetMetaDataDictionary(), key, value);
+  return value;
+}
+
+bool HoldsAllOfNifti(const std::string& file, const itk::ImageIOBase& io) {
+  double voxel_offset = 0;
+  double voxel_bits = 0;  // in the file: ITK tells of those after scaling
+  if (!absl::SimpleAtod(MetaDataOf(io, "vox_offset"), &voxel_offset) ||
+      !absl::SimpleAtod(MetaDataOf(io, "bitpix"), &voxel_bits)) {
+    return false;
+  }
+  const auto bytes = static_cast<int64_t>(
+      voxel_offset + static_cast<double>(io.GetImageSizeInPixels()) * voxel_bits / 8);
+  return (IsGzip(file) ? UnpackedSize(file, bytes) : static_cast<int64_t>(file.size())) >= bytes;
+}
+
+bool HoldsAllOfMetaImage(const VolumeHeader& header, const FileContents& contents,
+                         const itk::ImageIOBase& io) {
+  const auto bytes = static_cast<int64_t>(io.GetImageSizeInBytes());
+  const bool local = header.data_paths.empty();
+  absl::string_view data = contents.data_file;
+  if (local) data = absl::string_view(contents.file).substr(header.data_offset);
+  if (!header.compressed) return static_cast<int64_t>(data.size()) >= bytes;
+  // Without the size ITK would take the header for data.
+  if (local && header.compressed_bytes == 0) return false;
+  if (header.compressed_bytes > 0) data = data.substr(0, header.compressed_bytes);
+  return UnpackedSize(data, bytes) >= bytes;
+}
+
+// ITK fills up with anything what is missing from NIfTI and MetaImage: so the bytes are counted
+// against the header before ITK reads them.
+bool HoldsAllVoxels(VolumeFormat format, const VolumeHeader& header, const FileContents& contents,
+                    const itk::ImageIOBase& io) {
+  switch (format) {
+    case VolumeFormat::kNifti:
+      return HoldsAllOfNifti(contents.file, io);
+    case VolumeFormat::kMetaImage:
+      return HoldsAllOfMetaImage(header, contents, io);
+    case VolumeFormat::kNrrd:
+      return true;  // its library sees to it
+  }
+  return false;
+}
+
+bool IsPositiveCode(const itk::ImageIOBase& io, const char* key) {
+  const std::string value = MetaDataOf(io, key);
+  return !value.empty() && value != "0";
+}
+
+struct Orientation {
+  bool stated = false;
+  std::string where;  // what is there instead
+};
+
+Orientation OrientationOf(VolumeFormat format, const VolumeHeader& header,
+                          const itk::ImageIOBase& io) {
+  const std::string quoted = absl::StrCat("\"", header.orientation.substr(0, 40), "\"");
+  switch (format) {
+    case VolumeFormat::kNifti:
+      return {IsPositiveCode(io, "qform_code") || IsPositiveCode(io, "sform_code"),
+              "NIfTI with qform_code and sform_code 0"};
+    case VolumeFormat::kNrrd: {
+      const std::string space = absl::AsciiStrToLower(header.orientation);
+      const bool stated = space == "left-posterior-superior" || space == "lps" ||
+                          space == "right-anterior-superior" || space == "ras" ||
+                          space == "left-anterior-superior" || space == "las";
+      return {stated, header.orientation.empty() ? "NRRD without \"space\""
+                                                 : absl::StrCat("NRRD with \"space\" ", quoted)};
+    }
+    case VolumeFormat::kMetaImage: {
+      const bool stated =
+          header.orientation.size() == 3 && !absl::StrContains(header.orientation, '?');
+      return {stated, "MetaImage without \"AnatomicalOrientation\""};
+    }
+  }
+  return {};
+}
+
+absl::Status CheckShape(const itk::ImageIOBase& io, const CtReadLimits& limits) {
+  if (io.GetNumberOfComponents() > 1) {
+    return absl::InvalidArgumentError(absl::StrCat("the file holds ", io.GetNumberOfComponents(),
+                                                   " numbers a voxel (colour or vectors); a CT "
+                                                   "has one"));
+  }
+  for (unsigned axis = 3; axis < io.GetNumberOfDimensions(); ++axis) {
+    if (io.GetDimensions(axis) > 1) {
+      return absl::InvalidArgumentError(absl::StrCat("the file holds ", io.GetDimensions(axis),
+                                                     " volumes; extract the one to use"));
+    }
+  }
+  double voxels = 1;
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const auto size = axis < io.GetNumberOfDimensions() ? io.GetDimensions(axis) : 1;
+    if (size < kLeastVoxels) {
+      return absl::InvalidArgumentError(absl::StrCat("the file has ", size,
+                                                     " voxels along its axis ", axis + 1,
+                                                     "; a volume needs at least ", kLeastVoxels));
+    }
+    voxels *= static_cast<double>(size);
+  }
+  if (voxels > static_cast<double>(limits.max_voxels)) {
+    return absl::ResourceExhaustedError(absl::StrCat("the volume has ", voxels, " voxels; at most ",
+                                                     limits.max_voxels, " are read"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status TakeGeometry(const Image& image, CtVolume* volume) {
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const double spacing = image.GetSpacing()[axis];
+    if (!(spacing >= kLeastSpacingMm && spacing <= kMostSpacingMm)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("the voxels are ", spacing, " mm apart along axis ", axis + 1, "; between ",
+                       kLeastSpacingMm, " and ", kMostSpacingMm, " mm are read"));
+    }
+    volume->size[axis] = static_cast<int>(image.GetLargestPossibleRegion().GetSize()[axis]);
+    volume->spacing_mm[axis] = spacing;
+    volume->origin_mm[axis] = image.GetOrigin()[axis];
+    for (unsigned row = 0; row < 3; ++row) {
+      volume->direction(row, axis) = image.GetDirection()(row, axis);
+    }
+  }
+  if (!volume->origin_mm.allFinite() || !volume->direction.allFinite()) {
+    return absl::InvalidArgumentError("the file places its voxels at no finite position");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status TakeValues(const Image& image, double offset, CtVolume* volume) {
+  const auto count = static_cast<size_t>(volume->num_voxels());
+  const float* const values = image.GetBufferPointer();
+  volume->hu.resize(count);
+  for (size_t i = 0; i < count; ++i) {
+    if (!std::isfinite(values[i])) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("voxel ", i, " is not a number; replace such voxels by air"));
+    }
+    volume->hu[i] = ToHu(values[i] + offset);
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<CtVolume> ReadWithItk(const std::string& path, VolumeFormat format,
+                                     const VolumeHeader& header, const FileContents& contents,
+                                     const CtReadOptions& options) {
+  const itk::ImageIOBase::Pointer io = MakeIo(format);
+  io->SetFileName(path);
+  io->ReadImageInformation();
+  TF_RETURN_IF_ERROR(CheckShape(*io, options.limits));
+  if (!HoldsAllVoxels(format, header, contents, *io)) return Damaged();
+  const auto reader = itk::ImageFileReader<Image>::New();
+  reader->SetImageIO(io);
+  reader->SetFileName(path);
+  reader->Update();
+  CtVolume volume;
+  TF_RETURN_IF_ERROR(TakeGeometry(*reader->GetOutput(), &volume));
+  const Orientation orientation = OrientationOf(format, header, *io);
+  TF_RETURN_IF_ERROR(PlaceVolume(orientation.stated, orientation.where, options.axes, &volume));
+  TF_RETURN_IF_ERROR(TakeValues(*reader->GetOutput(), options.hu_offset.value_or(0), &volume));
+  return volume;
+}
+
+}  // namespace
+
+absl::StatusOr<CtVolume> ReadVolumeFile(const std::string& path, VolumeFormat format,
+                                        const CtReadOptions& options) {
+  TF_ASSIGN_OR_RETURN(const VolumeHeader header, ReadVolumeHeader(path, format));
+  TF_ASSIGN_OR_RETURN(const FileContents contents,
+                      ReadContents(path, header, options.limits.max_file_bytes));
+  try {
+    TF_ASSIGN_OR_RETURN(CtVolume volume, ReadWithItk(path, format, header, contents, options));
+    volume.provenance = ProvenanceOf(format, header, contents);
+    return volume;
+  } catch (const itk::ExceptionObject& exception) {
+    return ExplainFailure(exception);
+  }
+}
+
+}  // namespace tissueform

@@ -1,0 +1,65 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+#include "core/imaging/ct/ct_volume.h"
+#include "core/imaging/ct/voxel_grid.h"
+#include "core/imaging/metal/metal_detection.h"
+
+namespace tissueform {
+
+// Key `metal` of the recipe.
+struct MetalOptions {
+  bool correct = true;                 // false: metal is neither looked for nor lessened
+  std::optional<double> threshold_hu;  // above it a voxel is metal; found from the CT if not given
+};
+
+// What was found and done.
+struct MetalReport {
+  std::vector<MetalCluster> clusters;  // by falling volume
+  double volume_mm3 = 0;               // of all
+  double threshold_hu = 0;
+  int corrected_slices = 0;  // those with metal, and beside it where its blur is seen
+  double low_z_mm = 0;       // of the metal, patient coordinates
+  double high_z_mm = 0;
+
+  bool any() const { return !clusters.empty(); }
+};
+
+// Lessens the streaks of metal, slice by slice, from the reconstructed slices alone
+// (core/imaging/metal/slice_correction.h), in place. Slices without metal, and of a volume without
+// metal all, stay as they are to the bit. Metal keeps its values; dead voxels inside it get 3000
+// HU.
+//
+// The result does not depend on `threads`.
+MetalReport LessenStreaks(const MetalFindings& findings, int threads, CtVolume* volume);
+
+// A CT on upright cubic voxels, its metal found and its streaks lessened.
+struct CtWithMetal {
+  HuGrid hu;
+  // 1 where a quarter of the voxel or more is metal; without voxels where there is no metal.
+  LabelGrid metal;
+  // What `hu` was before, from 5 mm under to 5 mm over the metal; without voxels where there is
+  // none.
+  HuGrid before;
+  MetalReport report;
+};
+
+// 1 where a quarter of the voxel or more is metal, on the grid that ResampleIsotropic makes of
+// `volume`, in which the metal was found. Its values are overwritten. Errors: those of
+// ResampleIsotropic.
+absl::StatusOr<LabelGrid> ResampleMetal(const MetalFindings& findings, CtVolume volume,
+                                        double spacing_mm, int threads);
+
+// ResampleIsotropic of the volume without streaks; of the volume itself where options.correct is
+// false or no metal is found. Errors: those of ResampleIsotropic.
+absl::StatusOr<CtWithMetal> ResampleWithoutStreaks(CtVolume volume, double spacing_mm,
+                                                   const MetalOptions& options, int threads);
+
+}  // namespace tissueform

@@ -1,0 +1,104 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/mechanics/answer_evaluator/rotation_coefficients.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+namespace tissueform {
+namespace {
+
+// Those of ResponseBasis and of RotationExpansion.
+constexpr double kGainAllowance = 1.5;
+constexpr double kLebesgueAllowance = 16;
+
+// Rotation vector and scale, blended along harmonic values.
+struct Blended {
+  std::array<double, 3> rotation_vector = {};
+  double scale = 1;
+};
+
+Blended BlendPoses(std::span<const AnswerPose> poses, const double* u) {
+  Blended blend;
+  for (size_t h = 0; h < poses.size(); ++h) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      blend.rotation_vector[axis] += u[h] * poses[h].rotation_vector[axis];
+    }
+    blend.scale += u[h] * (poses[h].scale - 1);
+  }
+  return blend;
+}
+
+// Of turning by vectors in a ball of radius r, after polynomials of degree n.
+double RemainderOf(double r, int n) {
+  const double taylor = std::exp((n + 1) * std::log(r) - std::lgamma(n + 2));
+  return std::min(1.0, std::ldexp(kLebesgueAllowance, -n)) * taylor;
+}
+
+double RemainderBound(const PortableAnswers& answers, std::span<const AnswerPose> poses) {
+  std::vector<double> u = answers.simplex_low;
+  std::vector<Blended> corners = {BlendPoses(poses, u.data())};
+  for (size_t h = 0; h < poses.size(); ++h) {
+    u[h] += answers.numbers.simplex_width;
+    corners.push_back(BlendPoses(poses, u.data()));
+    u[h] = answers.simplex_low[h];
+  }
+  double diameter = 0;
+  double smallest = corners.front().scale;
+  double largest = smallest;
+  for (const Blended& a : corners) {
+    for (const Blended& b : corners) {
+      diameter = std::max(diameter, std::hypot(a.rotation_vector[0] - b.rotation_vector[0],
+                                               a.rotation_vector[1] - b.rotation_vector[1],
+                                               a.rotation_vector[2] - b.rotation_vector[2]));
+    }
+    smallest = std::min(smallest, a.scale);
+    largest = std::max(largest, a.scale);
+  }
+  if (diameter == 0) return 0;
+  const auto k = static_cast<double>(poses.size());
+  const auto degree = static_cast<int>(answers.numbers.degree);
+  const double radius = diameter * std::sqrt(k / (2 * k + 2));
+  return 0.5 * (largest + smallest) * RemainderOf(radius, degree) +
+         0.5 * (largest - smallest) * RemainderOf(radius, degree - 1);
+}
+
+}  // namespace
+
+RotationCoefficients ExpandRotation(const PortableAnswers& answers,
+                                    std::span<const AnswerPose> poses) {
+  const size_t nodes = answers.nodes.size() / poses.size();
+  std::vector<double> at_nodes(9 * nodes);
+  for (size_t node = 0; node < nodes; ++node) {
+    const Blended blend = BlendPoses(poses, answers.nodes.data() + node * poses.size());
+    const std::array<double, 9> turn = TurnMinusIdentity(blend.rotation_vector, blend.scale);
+    std::copy(turn.begin(), turn.end(), at_nodes.begin() + static_cast<ptrdiff_t>(9 * node));
+  }
+  RotationCoefficients result;
+  result.coefficients.assign(9 * nodes, 0);
+  std::vector<double> sizes(nodes);
+  for (size_t n = 0; n < nodes; ++n) {
+    double* const C = result.coefficients.data() + 9 * n;
+    for (size_t node = 0; node < nodes; ++node) {
+      const double weight = answers.interpolation[n * nodes + node];
+      for (size_t i = 0; i < 9; ++i) C[i] += weight * at_nodes[9 * node + i];
+    }
+    for (size_t i = 0; i < 9; ++i) sizes[n] += C[i] * C[i];
+    sizes[n] = std::sqrt(sizes[n]);
+  }
+  const std::vector<double>& gains = answers.guard_gains;
+  if (gains.empty()) return result;
+  const auto first = static_cast<size_t>(answers.numbers.num_polynomials);
+  for (size_t g = 0; g < gains.size(); ++g) result.truncation_mm += sizes[first + g] * gains[g];
+  const double largest = *std::max_element(gains.begin(), gains.end());
+  for (size_t n = first + gains.size(); n < nodes; ++n) {
+    result.truncation_mm += kGainAllowance * largest * sizes[n];
+  }
+  result.truncation_mm += answers.numbers.largest_gain_mm * RemainderBound(answers, poses);
+  return result;
+}
+
+}  // namespace tissueform

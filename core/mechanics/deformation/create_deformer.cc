@@ -1,0 +1,48 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/mechanics/deformation/create_deformer.h"
+
+#include "core/base/status_macros.h"
+#include "core/mechanics/deformation/linear_elastic_deformer.h"
+
+namespace tissueform {
+namespace {
+
+absl::StatusOr<std::unique_ptr<Deformer>> CreateGradientField(
+    const std::shared_ptr<MeshPreparation>& preparation, GradientFieldOptions options,
+    const Cancellation& cancellation) {
+  options.backend = preparation->options().backend;
+  options.admission = preparation->options().admission;
+  options.threads = preparation->options().threads;
+  return CreateGradientFieldDeformer(preparation, options, cancellation);
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Deformer>> CreateDeformer(
+    const std::shared_ptr<MeshPreparation>& preparation, const DeformerOptions& options,
+    const Cancellation& cancellation) {
+  switch (options.model) {
+    case DeformationModel::kGradientField:
+      break;
+    case DeformationModel::kArap:
+      return CreateArapDeformer(preparation, options.arap, cancellation);
+    case DeformationModel::kLinearElastic:
+      return CreateLinearElasticDeformer(preparation, cancellation);
+    case DeformationModel::kNeoHookean:
+      return CreateNeoHookeanDeformer(preparation, options.neo_hookean, cancellation);
+  }
+  return CreateGradientField(preparation, options.gradient_field, cancellation);
+}
+
+absl::StatusOr<std::unique_ptr<Deformer>> CreateDeformer(const TetMesh& mesh,
+                                                         const Eigen::VectorXd& stiffness,
+                                                         const ConstraintSet& constraints,
+                                                         const DeformerOptions& options) {
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<MeshPreparation> preparation,
+                      MeshPreparation::Create(mesh, stiffness, constraints, options.preparation));
+  return CreateDeformer(preparation, options);
+}
+
+}  // namespace tissueform

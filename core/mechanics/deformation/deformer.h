@@ -1,0 +1,111 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/types/span.h"
+
+#include "core/base/types.h"
+#include "core/mechanics/constraints/handle_pose.h"
+#include "core/mechanics/linear_solvers/dirichlet_system.h"
+
+namespace tissueform {
+
+// Why an iteration ended before it had converged.
+enum class GaveUp {
+  kNo,          // it has converged, or was cancelled
+  kIterations,  // as many as the options allow
+  kNoRoom,      // the memory for a second factor, which it needs, was refused
+  kArithmetic,  // no step makes it better: rounding is all that is left
+  kBlocked,     // parts of the body would have to pass through each other
+};
+
+// "iterations", "no_room", "arithmetic", "blocked"; empty for kNo.
+absl::string_view GaveUpName(GaveUp gave_up);
+
+// How an answer was found. Not reaching a tolerance is told here; it is not an error.
+struct SolveSummary {
+  int iterations = 1;    // linear solves
+  int newton_steps = 0;  // of them those with a new factor
+  bool converged = true;
+  bool cancelled = false;  // stopped by DeformControl::on_progress
+  double residual = 0;     // relative residual of the last linear solve; 0 unless asked for
+  double solve_seconds = 0;
+  std::vector<double>
+      changes_mm;  // largest vertex change of each iteration; empty for direct models
+  // Of the answer after each iteration, in nJ = Pa mm^3; empty for models that minimise none.
+  std::vector<double> energies_nj;
+  // Share of the poses' motion that was reached; below 1 when a model that loads in steps came no
+  // further.
+  double load = 1;
+  GaveUp gave_up = GaveUp::kNo;
+  // What stands in the way, a sentence without its full stop that names handles; empty where
+  // nothing does.
+  std::string obstacle;
+  int64_t second_factor_bytes = 0;  // that the search took meanwhile
+  // Found by prepared answers (VertexResponse), and how far it may then lie from the direct one.
+  bool prepared = false;
+  double error_bound_mm = 0;
+  // The same of models whose error nobody can bound: an estimate, and error_bound_mm is 0.
+  double error_estimate_mm = 0;
+};
+
+struct Deformation {
+  Positions positions;  // #V by 3, mm
+  SolveSummary summary;
+};
+
+// How an answer is sought, for models that iterate.
+struct DeformControl {
+  // Start from where the last answer ended instead of from rest: for a stream of poses close to
+  // each other. Within the tolerance the answer is the same.
+  bool warm_start = false;
+  // Called with every answer but the last; returning false stops with that answer, marked as
+  // cancelled.
+  std::function<bool(const Deformation& so_far)> on_progress;
+  // May be empty. Asked, with the bytes, before an answer takes room for another factor, which it
+  // gives back at its end; an error leaves the search without that factor.
+  FactorAdmission admission = {};
+};
+
+// What preparing a deformer took and what it holds.
+struct PreparationSummary {
+  double assemble_seconds = 0;
+  double analyse_seconds = 0;
+  double factorise_seconds = 0;
+  double prepare_seconds = 0;  // harmonic fields and whatever else a model makes ready
+  int64_t factor_bytes = 0;
+  int64_t bytes_held = 0;  // everything that the deformer needs, shared parts included
+  int64_t own_bytes = 0;   // of it what it holds beside the shared preparation
+  Eigen::Index negative_weights = 0;
+  double harmonic_min = 0;  // range of the harmonic fields; [0, 1] unless weights are negative
+  double harmonic_max = 1;
+};
+
+// A model of soft tissue, prepared for one mesh, one stiffness and one constraint set: there is no
+// unprepared state. A new pose never factorises again. One thread at a time.
+class Deformer {
+ public:
+  virtual ~Deformer() = default;
+
+  // `poses` has one entry per handle of the constraint set, in its order.
+  //
+  // Errors: InvalidArgument when the number of poses is wrong or a pose is not legal (see
+  // CheckPose).
+  virtual absl::StatusOr<Deformation> Deform(absl::Span<const HandlePose> poses,
+                                             const DeformControl& control) = 0;
+  absl::StatusOr<Deformation> Deform(absl::Span<const HandlePose> poses) {
+    return Deform(poses, DeformControl{});
+  }
+
+  virtual const PreparationSummary& preparation() const = 0;
+};
+
+}  // namespace tissueform

@@ -1,0 +1,49 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/base/types.h"
+#include "core/mechanics/constraints/constraint_set.h"
+#include "core/mechanics/constraints/handle_pose.h"
+#include "core/mechanics/deformation/create_deformer.h"
+#include "core/mechanics/uncertainty/material_uncertainty.h"
+#include "core/mesh/attribute.h"
+#include "core/mesh/tet_mesh.h"
+
+namespace tissueform {
+
+// The axes in which a plan and its mesh are written. RAS and LPS differ by the signs of x and y:
+// half a turn about z. It is its own inverse and keeps handedness, so positions, translations and
+// rotation vectors all change in the same way and tets stay positive.
+enum class CoordinateSystem { kLps, kRas };
+
+// From `system` to LPS or back.
+void SwapToOrFromLps(CoordinateSystem system, Positions* positions);
+HandlePose SwapToOrFromLps(CoordinateSystem system, const HandlePose& pose);
+
+// The signs of the axes: (1, 1, 1) or (-1, -1, 1).
+Eigen::Vector3d SignsToLps(CoordinateSystem system);
+
+// A plan put upon its mesh: all that a deformer or a session needs, whether it was read from files
+// (core/planning) or has just been built (core/planning/plan_building). Everything is in LPS,
+// whatever the plan's own coordinate system was.
+struct PlanProblem {
+  std::shared_ptr<const TetMesh> mesh;
+  std::vector<Attribute> point_data;  // of the mesh file, kept for the result
+  std::vector<Attribute> cell_data;
+  CoordinateSystem written_in = CoordinateSystem::kLps;  // in which results are written back
+  Eigen::VectorXd stiffness;                             // #T, Pa
+  ConstraintSet constraints;
+  std::vector<HandlePose> poses;  // one per handle of `constraints`
+  DeformerOptions deformer;
+  std::optional<MaterialUncertainty> uncertainty;  // what the plan says is not known
+};
+
+}  // namespace tissueform

@@ -1,0 +1,53 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/mesh/generation/surface_distance.h"
+
+#include <cmath>
+#include <vector>
+
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
+#include <CGAL/AABB_triangle_primitive.h>
+#include <CGAL/Simple_cartesian.h>
+
+#include "core/base/parallel_for.h"
+
+namespace tissueform {
+namespace {
+
+using Kernel = CGAL::Simple_cartesian<double>;
+using Triangles = std::vector<Kernel::Triangle_3>;
+using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
+using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
+
+constexpr Eigen::Index kGrain = 512;
+
+Kernel::Point_3 PointOf(const Positions& positions, Eigen::Index row) {
+  return {positions(row, 0), positions(row, 1), positions(row, 2)};
+}
+
+}  // namespace
+
+Eigen::VectorXd DistancesToSurface(const Positions& points, const TriangleMesh& surface,
+                                   int threads) {
+  Triangles triangles;
+  for (const auto& t : surface.triangles().rowwise()) {
+    triangles.emplace_back(PointOf(surface.positions(), t[0]), PointOf(surface.positions(), t[1]),
+                           PointOf(surface.positions(), t[2]));
+  }
+  Tree tree(triangles.begin(), triangles.end());
+  tree.accelerate_distance_queries();
+  Eigen::VectorXd distances(points.rows());
+  if (points.rows() == 0) return distances;
+  // What the tree makes when it is first asked is made before threads ask it.
+  tree.squared_distance(PointOf(points, 0));
+  ParallelFor(threads, points.rows(), kGrain, [&](Eigen::Index begin, Eigen::Index end) {
+    for (Eigen::Index p = begin; p < end; ++p) {
+      distances[p] = std::sqrt(tree.squared_distance(PointOf(points, p)));
+    }
+  });
+  return distances;
+}
+
+}  // namespace tissueform

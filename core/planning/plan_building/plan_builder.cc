@@ -1,0 +1,326 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/planning/plan_building/plan_builder.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_format.h"
+
+#include "core/base/status_macros.h"
+#include "core/imaging/anatomy/head_checks.h"
+#include "core/imaging/anatomy/itk_filters.h"
+#include "core/imaging/anatomy/surface_extraction.h"
+#include "core/imaging/ct/unscanned.h"
+#include "core/planning/plan_building/contact_trial.h"
+#include "core/planning/plan_building/viewer_surfaces.h"
+
+namespace tissueform {
+namespace {
+
+// How large the parts are that have smaller triangles, round the lips and the chin, in mm: it
+// holds a lip, or the soft chin, whole. There tissue is thin over teeth, and its answer is looked
+// at.
+constexpr double kFineRadiusMm = 24;
+
+// Without a number in the recipe: this part of the largest planned move, and no less than so many
+// voxels. Both sides keep this distance, so the gap between them is twice as wide: as wide as the
+// move. Tissue in it is then at worst squeezed or stretched by its own width; what tears all the
+// same is found by the contact trial.
+constexpr double kBandOfMove = 0.5;
+constexpr double kBandVoxels = 2;
+
+// A stage of the work and where in it the others begin.
+class Progress {
+ public:
+  explicit Progress(const StageFunction& tell) : tell_(tell) {}
+
+  void Begin(absl::string_view stage, double from, double to) {
+    from_ = from;
+    to_ = to;
+    TellStage(tell_, stage, from);
+  }
+  // What the parts of a stage are told by.
+  StageFunction Parts() const {
+    return [this](absl::string_view stage, double fraction) {
+      TellStage(tell_, stage, from_ + (to_ - from_) * fraction);
+    };
+  }
+
+ private:
+  const StageFunction& tell_;
+  double from_ = 0;
+  double to_ = 0;
+};
+
+// What the stages hand on, each made whole by one of them.
+
+struct ResampledCt {
+  CtProvenance provenance;
+  std::array<int, 3> size = {0, 0, 0};  // of the CT as it was read
+  Eigen::Vector3d spacing_mm = Eigen::Vector3d::Zero();
+  LabelGrid unscanned;  // core/imaging/ct/unscanned.h
+  CtWithMetal ct;
+};
+
+struct Anatomy {
+  HeadSegmentation head;
+  BoneParts parts;
+  Landmarks landmarks;
+  std::optional<FrankfortLandmarks> frankfort;
+  HeadFrame frame;
+};
+
+struct DividedBone {
+  LabelGrid labels;  // 0 none, 1 stays, 2.. the segments
+  std::vector<BuiltSegment> segments;
+};
+
+struct Description {
+  TetStiffness stiffness;
+  double contact_band_mm = 0;
+  ReleasedContacts released;
+  SkinDistance skin_distance;
+};
+
+absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Recipe& recipe,
+                                            int threads, Progress* progress) {
+  progress->Begin("reading the CT", 0, 0.08);
+  TF_ASSIGN_OR_RETURN(CtVolume volume, ReadCtVolume(ct_path, recipe.ct));
+  progress->Begin("lessening the streaks of metal, resampling", 0.08, 0.12);
+  ResampledCt result{.provenance = std::move(volume.provenance),
+                     .size = volume.size,
+                     .spacing_mm = volume.spacing_mm,
+                     .unscanned = {},
+                     .ct = {}};
+  TF_ASSIGN_OR_RETURN(result.unscanned, ResampleUnscanned(volume, recipe.spacing_mm, threads));
+  TF_ASSIGN_OR_RETURN(result.ct, ResampleWithoutStreaks(std::move(volume), recipe.spacing_mm,
+                                                        recipe.metal, threads));
+  return result;
+}
+
+absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unscanned,
+                                    const Recipe& recipe, Progress* progress) {
+  progress->Begin("finding the head and its bone", 0.12, 0.3);
+  TF_ASSIGN_OR_RETURN(HeadSegmentation head, SegmentHead(ct.hu, recipe.segmentation,
+                                                         progress->Parts(), ct.metal, unscanned));
+  progress->Begin("telling the bones apart", 0.3, 0.42);
+  absl::StatusOr<BoneParts> parts =
+      SeparateBoneParts(head, recipe.occlusal_plane, progress->Parts());
+  const bool plane_given = recipe.occlusal_plane.has_value();
+  if (!parts.ok()) return ExplainMissingAnatomy(head, plane_given, parts.status());
+  progress->Begin("finding landmarks", 0.42, 0.46);
+  const absl::StatusOr<Landmarks> landmarks = FindLandmarks(head, *parts);
+  const absl::Status found = landmarks.ok() ? CheckLandmarks(*landmarks) : landmarks.status();
+  if (!found.ok()) return ExplainMissingAnatomy(head, plane_given, found);
+  TF_RETURN_IF_ERROR(CheckOneHead(ct.hu, head, *parts));
+  const std::optional<FrankfortLandmarks> frankfort =
+      FindFrankfort(head.hu, head.options.bone_above_hu, *landmarks);
+  TF_ASSIGN_OR_RETURN(HeadFrame frame, ChooseHeadFrame({.landmarks = *landmarks,
+                                                        .frankfort = frankfort,
+                                                        .given_midsagittal = recipe.midsagittal,
+                                                        .given_horizontal = recipe.horizontal}));
+  return Anatomy{.head = std::move(head),
+                 .parts = *std::move(parts),
+                 .landmarks = *landmarks,
+                 .frankfort = frankfort,
+                 .frame = std::move(frame)};
+}
+
+absl::StatusOr<TriangleMesh> SegmentSurface(const LabelGrid& bone, uint8_t label) {
+  LabelGrid mask = MaskWhere(bone, [label](uint8_t value) { return value == label; });
+  mask = Crop(mask, Grown(BoundingBox(mask), 3, mask.geometry));
+  return ExtractSurface(GaussianSmooth(SignedDistanceMm(mask), 0.7 * mask.geometry.spacing_mm));
+}
+
+absl::Status CheckMove(const std::string& segment, double largest_move_mm) {
+  if (largest_move_mm <= kMostMoveMm) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrFormat("the \"pose\" of segment \"%s\" moves some of its bone by %.1f mm; a plan "
+                      "moves bone by at most %g mm (is the pivot where the bone is, in mm, LPS?)",
+                      segment, largest_move_mm, kMostMoveMm));
+}
+
+absl::StatusOr<BuiltSegment> BuildSegment(const LabelGrid& bone, uint8_t label,
+                                          OsteotomySegment cut, const HandlePose& pose) {
+  const double largest_move_mm = LargestMoveMm(bone, label, pose);
+  TF_RETURN_IF_ERROR(CheckMove(cut.name, largest_move_mm));
+  TF_ASSIGN_OR_RETURN(TriangleMesh surface, SegmentSurface(bone, label));
+  const auto voxels = std::count(bone.values.begin(), bone.values.end(), label);
+  return BuiltSegment{.cut = std::move(cut),
+                      .pose = pose,
+                      .largest_move_mm = largest_move_mm,
+                      .volume_mm3 = static_cast<double>(voxels) * VoxelVolumeMm3(bone.geometry),
+                      .surface = std::move(surface)};
+}
+
+absl::StatusOr<DividedBone> CutBone(const Anatomy& anatomy,
+                                    const std::vector<RecipeSegment>& planned, Progress* progress) {
+  progress->Begin("cutting the bone", 0.46, 0.5);
+  std::vector<OsteotomySegment> cuts;
+  cuts.reserve(planned.size());
+  for (const RecipeSegment& segment : planned) {
+    cuts.push_back(segment.planes.empty()
+                       ? DefaultSegment(segment.kind, segment.name, anatomy.landmarks)
+                       : OsteotomySegment{segment.name, segment.kind, segment.planes});
+  }
+  DividedBone divided;
+  TF_ASSIGN_OR_RETURN(divided.labels, CutSegments(anatomy.parts.labels, cuts));
+  for (size_t s = 0; s < cuts.size(); ++s) {
+    TF_ASSIGN_OR_RETURN(BuiltSegment segment,
+                        BuildSegment(divided.labels, static_cast<uint8_t>(kFirstSegment + s),
+                                     std::move(cuts[s]), planned[s].pose));
+    divided.segments.push_back(std::move(segment));
+  }
+  return divided;
+}
+
+absl::StatusOr<SoftTissue> FindSoftTissue(const Anatomy& anatomy, const LabelGrid& bone,
+                                          const Recipe& recipe, Progress* progress) {
+  progress->Begin("finding the soft tissue", 0.5, 0.62);
+  RegionOfInterest region = DefaultRegion(anatomy.landmarks, anatomy.head.hu.geometry);
+  region.back = recipe.back.value_or(region.back);
+  region.above = recipe.above.value_or(region.above);
+  region.below = recipe.below.value_or(region.below);
+  return ExtractSoftTissue(anatomy.head, bone, anatomy.landmarks, region, recipe.soft_tissue,
+                           progress->Parts());
+}
+
+std::vector<FineRegion> LipsAndChin(const Landmarks& landmarks, double edge_mm) {
+  std::vector<FineRegion> regions;
+  for (const Eigen::Vector3d& centre :
+       {landmarks.upper_lip, landmarks.lower_lip, landmarks.skin_pogonion}) {
+    regions.push_back({.centre_mm = centre, .radius_mm = kFineRadiusMm, .edge_mm = edge_mm});
+  }
+  return regions;
+}
+
+absl::StatusOr<SoftTissueMesh> Mesh(const SoftTissue& soft_tissue, const Landmarks& landmarks,
+                                    const Recipe& recipe, int threads, Progress* progress) {
+  progress->Begin("meshing", 0.62, 0.9);
+  SoftTissueMeshOptions options;
+  options.edge_mm = recipe.mesh.edge_mm;
+  options.fine_regions = LipsAndChin(landmarks, recipe.mesh.fine_edge_mm);
+  options.interior_edge_factor = recipe.mesh.interior_edge_factor;
+  options.min_dihedral_deg = recipe.mesh.min_dihedral_deg;
+  options.min_cavity_volume_mm3 = recipe.soft_tissue.smallest_cavity_mm3;
+  options.threads = threads;
+  int stages = 0;
+  options.on_stage = [&](absl::string_view stage) {
+    progress->Parts()(stage, std::min(0.9, 0.15 * stages++));
+    return absl::OkStatus();
+  };
+  return MeshSoftTissue(soft_tissue.field, options);
+}
+
+double BandMm(const Recipe& recipe, const std::vector<BuiltSegment>& segments) {
+  if (recipe.contact_band_mm) return *recipe.contact_band_mm;
+  double largest_move_mm = 0;
+  for (const BuiltSegment& segment : segments) {
+    largest_move_mm = std::max(largest_move_mm, segment.largest_move_mm);
+  }
+  return std::max(kBandVoxels * recipe.spacing_mm, kBandOfMove * largest_move_mm);
+}
+
+std::vector<std::string> NamesOf(const std::vector<BuiltSegment>& segments) {
+  std::vector<std::string> names;
+  names.reserve(segments.size());
+  for (const BuiltSegment& segment : segments) names.push_back(segment.cut.name);
+  return names;
+}
+
+// What the tets are made of and what holds the vertices.
+absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTissue& soft_tissue,
+                                     const Anatomy& anatomy,
+                                     const std::vector<BuiltSegment>& segments,
+                                     const Recipe& recipe, int threads, Progress* progress) {
+  progress->Begin("stiffness and regions", 0.9, 0.96);
+  const HeadSegmentation& head = anatomy.head;
+  TF_ASSIGN_OR_RETURN(TetStiffness stiffness, ComputeTetStiffness(built.mesh, head.hu, head.bone,
+                                                                  {.table = recipe.tissues}));
+  std::vector<HandlePose> poses;
+  poses.reserve(segments.size());
+  for (const BuiltSegment& segment : segments) poses.push_back(segment.pose);
+  const double contact_band_mm = BandMm(recipe, segments);
+  const double tissue_above_hu = recipe.segmentation.tissue_above_hu;
+  TF_ASSIGN_OR_RETURN(
+      PlanningRegions regions,
+      AssignRegions(built.mesh, built.surface.num_vertices(), soft_tissue, NamesOf(segments),
+                    contact_band_mm, anatomy.landmarks, {head.hu, tissue_above_hu, &head.cut}));
+  TF_ASSIGN_OR_RETURN(ReleasedContacts released,
+                      ReleaseTornContacts({.mesh = built.mesh,
+                                           .youngs_modulus_pa = stiffness.youngs_modulus_pa,
+                                           .poisson_ratio = recipe.poisson_ratio,
+                                           .poses = std::move(poses),
+                                           .threads = threads},
+                                          std::move(regions)));
+  SkinDistance skin_distance =
+      MeasureSkinDistance(built.surface, released.regions.on_skin, head.hu, tissue_above_hu);
+  return Description{.stiffness = std::move(stiffness),
+                     .contact_band_mm = contact_band_mm,
+                     .released = std::move(released),
+                     .skin_distance = std::move(skin_distance)};
+}
+
+}  // namespace
+
+absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& recipe,
+                                    const PlanBuildOptions& options) {
+  Progress progress(options.tell);
+  SetFilterThreads(options.threads);
+  TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(ct_path, recipe, options.threads, &progress));
+  TF_ASSIGN_OR_RETURN(Anatomy anatomy, FindAnatomy(ct.ct, ct.unscanned, recipe, &progress));
+  ct.unscanned = {};
+  ct.ct.hu = {};  // the head has its own: as large as the CT, and the next stages need the room
+  TF_ASSIGN_OR_RETURN(DividedBone bone, CutBone(anatomy, recipe.segments, &progress));
+  TF_ASSIGN_OR_RETURN(SoftTissue soft_tissue,
+                      FindSoftTissue(anatomy, bone.labels, recipe, &progress));
+  TF_ASSIGN_OR_RETURN(SoftTissueMesh mesh,
+                      Mesh(soft_tissue, anatomy.landmarks, recipe, options.threads, &progress));
+  TF_ASSIGN_OR_RETURN(Description description, Describe(mesh, soft_tissue, anatomy, bone.segments,
+                                                        recipe, options.threads, &progress));
+  progress.Begin("comparing with the CT's skin", 0.96, 0.98);
+  TF_ASSIGN_OR_RETURN(SkinCoverage coverage,
+                      MeasureSkinCoverage(anatomy.head, anatomy.landmarks,
+                                          {mesh.surface, description.released.regions,
+                                           soft_tissue.region, &soft_tissue.outside_air},
+                                          ct.spacing_mm.maxCoeff(), options.threads));
+  progress.Begin("surfaces for a viewer", 0.98, 1);
+  TF_ASSIGN_OR_RETURN(std::vector<CaseSurface> viewer_surfaces,
+                      MakeViewerSurfaces({.head = anatomy.head,
+                                          .outside_air = soft_tissue.outside_air,
+                                          .parts = anatomy.parts.labels,
+                                          .bone = bone.labels,
+                                          .landmarks = anatomy.landmarks,
+                                          .segments = NamesOf(bone.segments),
+                                          .ct_voxel_mm = ct.spacing_mm.maxCoeff()}));
+  soft_tissue.outside_air = {};  // as large as the CT's grid, and not asked for any more
+  TellStage(options.tell, "done", 1);
+  return PlanBuild{.recipe = recipe,
+                   .ct = std::move(ct.provenance),
+                   .ct_size = ct.size,
+                   .ct_spacing_mm = ct.spacing_mm,
+                   .metal = std::move(ct.ct.report),
+                   .before_correction = std::move(ct.ct.before),
+                   .head = std::move(anatomy.head),
+                   .parts = std::move(anatomy.parts),
+                   .bone = std::move(bone.labels),
+                   .landmarks = anatomy.landmarks,
+                   .segments = std::move(bone.segments),
+                   .soft_tissue = std::move(soft_tissue),
+                   .contact_band_mm = description.contact_band_mm,
+                   .mesh = std::move(mesh),
+                   .stiffness = std::move(description.stiffness),
+                   .regions = std::move(description.released.regions),
+                   .freed_by_trial = description.released.freed,
+                   .still_torn = description.released.still_torn,
+                   .skin_distance = std::move(description.skin_distance),
+                   .coverage = std::move(coverage),
+                   .frankfort = anatomy.frankfort,
+                   .head_frame = std::move(anatomy.frame),
+                   .viewer_surfaces = std::move(viewer_surfaces)};
+}
+
+}  // namespace tissueform

@@ -1,0 +1,303 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/planning/plan_building/recipe.h"
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <set>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "nlohmann/json.hpp"
+
+#include "core/base/json/json_schema.h"
+#include "core/base/json/json_text.h"
+#include "core/base/status_macros.h"
+#include "core/mesh/payload/sha256.h"
+#include "core/planning/json_values.h"
+#include "core/planning/model_names.h"
+
+namespace tissueform {
+namespace {
+
+using Json = nlohmann::json;
+
+const JsonSchema& RecipeSchema() {
+  static const JsonSchema* const schema = new JsonSchema(RecipeSchemaText());
+  return *schema;
+}
+
+// What follows reads a text that has passed the schema: keys and types are as they must be.
+
+absl::StatusOr<Plane> ToPlane(const Json& json, const std::string& where) {
+  Plane plane{VectorFromJson(json.at("point_mm")), VectorFromJson(json.at("normal"))};
+  const double length = plane.normal.norm();
+  if (!(length > 1e-6)) {
+    return absl::InvalidArgumentError(absl::StrCat("the normal at ", where, " has no length"));
+  }
+  plane.normal /= length;
+  return plane;
+}
+
+absl::Status ReadPlane(const Json& json, const char* key, const std::string& where,
+                       std::optional<Plane>* plane) {
+  if (!json.contains(key)) return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(*plane, ToPlane(json.at(key), absl::StrCat(where, "/", key)));
+  return absl::OkStatus();
+}
+
+CtReadOptions ToCtOptions(const Json& json) {
+  CtReadOptions options;
+  if (json.contains("hu_offset")) options.hu_offset = json.at("hu_offset").get<double>();
+  options.axes = json.value("axes", "");
+  if (json.contains("series_number")) options.series_number = json.at("series_number").get<int>();
+  const std::string join = json.value("join_series", "auto");
+  options.join_series = join == "always"  ? JoinSeries::kAlways
+                        : join == "never" ? JoinSeries::kNever
+                                          : JoinSeries::kAuto;
+  return options;
+}
+
+MetalOptions ToMetal(const Json& json) {
+  MetalOptions options;
+  options.correct = json != "off";
+  if (json.is_number()) options.threshold_hu = json.get<double>();
+  return options;
+}
+
+HeadSegmentationOptions ToSegmentation(const Json& json) {
+  HeadSegmentationOptions options;
+  const auto threshold = [&json](const char* key, int16_t& hu) {
+    hu = static_cast<int16_t>(std::lround(json.value(key, static_cast<double>(hu))));
+  };
+  threshold("tissue_above_hu", options.tissue_above_hu);
+  threshold("bone_above_hu", options.bone_above_hu);
+  options.opening_radius_mm = json.value("opening_radius_mm", options.opening_radius_mm);
+  options.smallest_bone_mm3 = json.value("smallest_bone_mm3", options.smallest_bone_mm3);
+  return options;
+}
+
+OsteotomyKind ToKind(const std::string& name) {
+  for (const OsteotomyKind kind : {OsteotomyKind::kBssro, OsteotomyKind::kLeFort1}) {
+    if (name == OsteotomyKindName(kind)) return kind;
+  }
+  return OsteotomyKind::kGenioplasty;
+}
+
+absl::StatusOr<RecipeSegment> ToSegment(const Json& json, const std::string& where) {
+  RecipeSegment segment;
+  segment.name = json.at("name");
+  segment.kind = ToKind(json.at("osteotomy"));
+  const Json planes = json.value("planes", Json::array());
+  for (size_t i = 0; i < planes.size(); ++i) {
+    TF_ASSIGN_OR_RETURN(Plane plane, ToPlane(planes[i], absl::StrCat(where, "/planes/", i)));
+    segment.planes.push_back(std::move(plane));
+  }
+  segment.pose = PoseFromJson(json.value("pose", Json::object()));
+  return segment;
+}
+
+absl::Status ReadSegments(const Json& json, Recipe* recipe) {
+  std::set<std::string> names;
+  for (size_t i = 0; i < json.size(); ++i) {
+    const std::string where = absl::StrCat("/segments/", i);
+    TF_ASSIGN_OR_RETURN(RecipeSegment segment, ToSegment(json[i], where));
+    if (!names.insert(segment.name).second) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("two segments are named \"", segment.name, "\" (", where, "/name)"));
+    }
+    recipe->segments.push_back(std::move(segment));
+  }
+  return absl::OkStatus();
+}
+
+SoftTissueOptions ToSoftTissue(const Json& json) {
+  SoftTissueOptions options;
+  options.thinnest_mm = json.value("thinnest_mm", options.thinnest_mm);
+  options.narrowest_neck_mm = json.value("narrowest_neck_mm", options.narrowest_neck_mm);
+  options.smallest_cavity_mm3 = json.value("smallest_cavity_mm3", options.smallest_cavity_mm3);
+  return options;
+}
+
+absl::StatusOr<RecipeMesh> ToMesh(const Json& json) {
+  RecipeMesh mesh;
+  mesh.edge_mm = json.value("edge_mm", mesh.edge_mm);
+  mesh.fine_edge_mm = json.value("fine_edge_mm", std::min(mesh.fine_edge_mm, mesh.edge_mm));
+  mesh.interior_edge_factor = json.value("interior_edge_factor", mesh.interior_edge_factor);
+  mesh.min_dihedral_deg = json.value("min_dihedral_deg", mesh.min_dihedral_deg);
+  if (mesh.fine_edge_mm > mesh.edge_mm) {
+    return absl::InvalidArgumentError(
+        "fine_edge_mm at /mesh is larger than edge_mm; it is for lips and chin");
+  }
+  return mesh;
+}
+
+absl::StatusOr<StiffnessTable> ToTissues(const Json& json) {
+  StiffnessTable table;
+  for (const Json& tissue : json) {
+    table.push_back({.name = tissue.at("name"),
+                     .hu_below = tissue.value("hu_below", std::numeric_limits<double>::infinity()),
+                     .youngs_modulus_pa = tissue.at("youngs_modulus_pa"),
+                     .source = tissue.value("source", ""),
+                     .factor_95 = tissue.value("youngs_modulus_factor_95", 0.0)});
+  }
+  TF_RETURN_IF_ERROR(CheckStiffnessTable(table));
+  return table;
+}
+
+absl::Status ReadRegionOfInterest(const Json& json, Recipe* recipe) {
+  TF_RETURN_IF_ERROR(ReadPlane(json, "back", "/region_of_interest", &recipe->back));
+  TF_RETURN_IF_ERROR(ReadPlane(json, "above", "/region_of_interest", &recipe->above));
+  return ReadPlane(json, "below", "/region_of_interest", &recipe->below);
+}
+
+absl::Status ReadHeadFrame(const Json& json, Recipe* recipe) {
+  TF_RETURN_IF_ERROR(ReadPlane(json, "midsagittal", "/head_frame", &recipe->midsagittal));
+  return ReadPlane(json, "horizontal", "/head_frame", &recipe->horizontal);
+}
+
+absl::StatusOr<Recipe> ToRecipe(const Json& json) {
+  const Json nothing = Json::object();
+  Recipe recipe;
+  recipe.ct = ToCtOptions(json.value("ct", nothing));
+  recipe.spacing_mm = json.value("spacing_mm", recipe.spacing_mm);
+  recipe.metal = ToMetal(json.value("metal", Json("auto")));
+  recipe.segmentation = ToSegmentation(json.value("segmentation", nothing));
+  TF_RETURN_IF_ERROR(ReadPlane(json, "occlusal_plane", "", &recipe.occlusal_plane));
+  TF_RETURN_IF_ERROR(ReadSegments(json.at("segments"), &recipe));
+  TF_RETURN_IF_ERROR(ReadRegionOfInterest(json.value("region_of_interest", nothing), &recipe));
+  TF_RETURN_IF_ERROR(ReadHeadFrame(json.value("head_frame", nothing), &recipe));
+  recipe.soft_tissue = ToSoftTissue(json.value("soft_tissue", nothing));
+  TF_ASSIGN_OR_RETURN(recipe.mesh, ToMesh(json.value("mesh", nothing)));
+  if (json.contains("contact_band_mm")) {
+    recipe.contact_band_mm = json.at("contact_band_mm").get<double>();
+  }
+  if (json.contains("tissues")) {
+    TF_ASSIGN_OR_RETURN(recipe.tissues, ToTissues(json.at("tissues")));
+  }
+  recipe.poisson_ratio = json.value("poisson_ratio", recipe.poisson_ratio);
+  TF_ASSIGN_OR_RETURN(recipe.model, ModelFromName(json.value("model", "gradient_field")));
+  return recipe;
+}
+
+absl::StatusOr<Recipe> ParseUnnamed(const std::string& text) {
+  TF_ASSIGN_OR_RETURN(const Json json, ParseJsonStrictly(text));
+  TF_RETURN_IF_ERROR(RecipeSchema().Check(json));
+  try {
+    return ToRecipe(json);
+  } catch (const std::exception& exception) {
+    return absl::InvalidArgumentError(absl::StrCat("cannot be read: ", exception.what()));
+  }
+}
+
+Json PlaneToJson(const Plane& plane) {
+  return {{"point_mm", ToJson(plane.point_mm)}, {"normal", ToJson(plane.normal)}};
+}
+
+Json CtToJson(const CtReadOptions& options) {
+  Json json = Json::object();
+  if (options.hu_offset) json["hu_offset"] = *options.hu_offset;
+  if (!options.axes.empty()) json["axes"] = options.axes;
+  if (options.series_number) json["series_number"] = *options.series_number;
+  if (options.join_series != JoinSeries::kAuto) {
+    json["join_series"] = options.join_series == JoinSeries::kAlways ? "always" : "never";
+  }
+  return json;
+}
+
+Json SegmentToJson(const RecipeSegment& segment) {
+  Json json = {{"name", segment.name},
+               {"osteotomy", std::string(OsteotomyKindName(segment.kind))},
+               {"pose", ToJson(segment.pose)}};
+  for (const Plane& plane : segment.planes) json["planes"].push_back(PlaneToJson(plane));
+  return json;
+}
+
+Json TissueToJson(const TissueClass& tissue) {
+  Json json = {{"name", tissue.name},
+               {"youngs_modulus_pa", tissue.youngs_modulus_pa},
+               {"source", tissue.source}};
+  if (std::isfinite(tissue.hu_below)) json["hu_below"] = tissue.hu_below;
+  if (tissue.factor_95 != 0) json["youngs_modulus_factor_95"] = tissue.factor_95;
+  return json;
+}
+
+}  // namespace
+
+absl::StatusOr<Recipe> ReadRecipe(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    return absl::NotFoundError(absl::StrCat("recipe ", path, " does not exist or is no file"));
+  }
+  std::ifstream stream(path, std::ios::binary);
+  std::string text(kMaxRecipeBytes + 1, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<size_t>(stream.gcount()));
+  if (text.size() > kMaxRecipeBytes) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("recipe ", path, " has more than ", kMaxRecipeBytes, " bytes; that is none"));
+  }
+  if (!stream.eof()) {
+    return absl::PermissionDeniedError(
+        absl::StrCat("cannot read recipe ", path, "; check its permissions"));
+  }
+  return ParseRecipe(text, path);
+}
+
+absl::StatusOr<Recipe> ParseRecipe(std::string_view json, const std::string& name) {
+  absl::StatusOr<Recipe> recipe = ParseUnnamed(std::string(json));
+  if (recipe.ok()) {
+    recipe->sha256 = Sha256Hex({{json.data(), json.size()}});
+    return recipe;
+  }
+  return absl::Status(recipe.status().code(),
+                      absl::StrCat("recipe ", name, ": ", recipe.status().message()));
+}
+
+std::string RecipeToJson(const Recipe& recipe) {
+  Json json = {{"format", "tissueform-recipe"},
+               {"ct", CtToJson(recipe.ct)},
+               {"spacing_mm", recipe.spacing_mm},
+               {"segmentation",
+                {{"tissue_above_hu", recipe.segmentation.tissue_above_hu},
+                 {"bone_above_hu", recipe.segmentation.bone_above_hu},
+                 {"opening_radius_mm", recipe.segmentation.opening_radius_mm},
+                 {"smallest_bone_mm3", recipe.segmentation.smallest_bone_mm3}}},
+               {"soft_tissue",
+                {{"thinnest_mm", recipe.soft_tissue.thinnest_mm},
+                 {"narrowest_neck_mm", recipe.soft_tissue.narrowest_neck_mm},
+                 {"smallest_cavity_mm3", recipe.soft_tissue.smallest_cavity_mm3}}},
+               {"mesh",
+                {{"edge_mm", recipe.mesh.edge_mm},
+                 {"fine_edge_mm", recipe.mesh.fine_edge_mm},
+                 {"interior_edge_factor", recipe.mesh.interior_edge_factor},
+                 {"min_dihedral_deg", recipe.mesh.min_dihedral_deg}}},
+               {"poisson_ratio", recipe.poisson_ratio},
+               {"model", ModelName(recipe.model)}};
+  for (const RecipeSegment& segment : recipe.segments) {
+    json["segments"].push_back(SegmentToJson(segment));
+  }
+  for (const TissueClass& tissue : recipe.tissues) json["tissues"].push_back(TissueToJson(tissue));
+  const auto add_plane = [](Json& parent, const char* key, const std::optional<Plane>& plane) {
+    if (plane) parent[key] = PlaneToJson(*plane);
+  };
+  add_plane(json, "occlusal_plane", recipe.occlusal_plane);
+  json["region_of_interest"] = Json::object();
+  add_plane(json["region_of_interest"], "back", recipe.back);
+  add_plane(json["region_of_interest"], "above", recipe.above);
+  add_plane(json["region_of_interest"], "below", recipe.below);
+  add_plane(json["head_frame"], "midsagittal", recipe.midsagittal);
+  add_plane(json["head_frame"], "horizontal", recipe.horizontal);
+  if (json["head_frame"].is_null()) json.erase("head_frame");
+  if (recipe.contact_band_mm) json["contact_band_mm"] = *recipe.contact_band_mm;
+  // Only where it is not the default, so that a recipe of version 1 stays one.
+  if (!recipe.metal.correct) json["metal"] = "off";
+  if (recipe.metal.threshold_hu) json["metal"] = *recipe.metal.threshold_hu;
+  json["version"] = RecipeSchema().LowestVersion(json);
+  return json.dump(2);
+}
+
+}  // namespace tissueform

@@ -1,0 +1,78 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/planning/plan_report/cautions.h"
+
+#include <utility>
+
+#include "absl/strings/str_format.h"
+
+#include "core/planning/plan_report/coverage_report.h"
+#include "core/planning/plan_report/lips_report.h"
+#include "core/planning/plan_report/metal_report.h"
+#include "core/planning/plan_report/objects_report.h"
+
+namespace tissueform {
+namespace {
+
+// The bundled head's nose stands 12 mm before the skin under it; one that a CT has cut off, 1.3 mm.
+constexpr double kFlatNoseMm = 3;
+// Below, skin follows freely where the neck would hold it.
+constexpr double kLittleUnderChinMm = 15;
+
+}  // namespace
+
+std::vector<std::string> Cautions(const PlanBuild& build) {
+  std::vector<std::string> cautions = CoverageCautions(build.coverage);
+  for (std::string& caution : CutCautions(build.coverage)) cautions.push_back(std::move(caution));
+  for (std::string& caution : ObjectsCautions(build)) cautions.push_back(std::move(caution));
+  for (std::string& caution : MetalCautions(build)) cautions.push_back(std::move(caution));
+  for (std::string& caution :
+       LipsCautions(MeasureLipContact(build.soft_tissue.labels, build.landmarks))) {
+    cautions.push_back(std::move(caution));
+  }
+  const double nose_mm = build.landmarks.nose_prominence_mm;
+  if (NoseIsCut(build.coverage)) {
+    cautions.push_back(
+        "The CT does not hold the whole nose: how far it stands out is not judged. There may be no "
+        "tip to predict, and what is called nose may lie near the upper lip and move more than a "
+        "tip "
+        "does.");
+  } else if (nose_mm < kFlatNoseMm) {
+    cautions.push_back(absl::StrFormat(
+        "The nose is cut off or pressed flat in this CT: its foremost skin stands %.1f mm before "
+        "the skin under it. There is no tip to predict, and what is called nose lies near "
+        "the upper lip and moves more than a tip does.",
+        nose_mm));
+  }
+  const GridGeometry& grid = build.head.hu.geometry;
+  const double under_chin_mm =
+      build.landmarks.menton.z() - (grid.origin_mm.z() - grid.spacing_mm / 2);
+  if (build.parts.cut_off_mm) {
+    cautions.push_back(absl::StrFormat(
+        "The CT's lower border cuts the chin: about %.1f mm of its bone and the skin under it are "
+        "missing. The neck, which holds the skin there, is missing, too; the chin may move too "
+        "much, "
+        "and its lower rim says little.",
+        *build.parts.cut_off_mm));
+  } else if (under_chin_mm < kLittleUnderChinMm) {
+    cautions.push_back(
+        absl::StrFormat("The CT ends %.0f mm under the bone of the chin: the neck, which holds the "
+                        "skin there, is missing, and the skin under the chin may move too much.",
+                        under_chin_mm));
+  }
+  if (build.still_torn > 0) {
+    cautions.push_back(absl::StrFormat(
+        "%d tets turn inside out at the planned move, or a third beyond it, in some model, and no "
+        "bone near by could be let go: plan a smaller move, or give a wider \"contact_band_mm\".",
+        build.still_torn));
+  }
+  if (build.parts.separation == JawSeparation::kAutomaticCut) {
+    cautions.push_back(
+        "Upper and lower teeth touch in this CT and were cut apart by a plane that was found: look "
+        "at the bone's picture, and give \"occlusal_plane\" in the recipe if it cuts teeth.");
+  }
+  return cautions;
+}
+
+}  // namespace tissueform

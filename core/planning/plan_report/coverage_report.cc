@@ -1,0 +1,281 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/planning/plan_report/coverage_report.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+
+#include "core/planning/json_values.h"
+
+namespace tissueform {
+namespace {
+
+using Eigen::Vector3d;
+using Json = nlohmann::ordered_json;
+
+// Bone comes to the skin where streaks of metal were taken for it, or where tissue is thinner than
+// the CT shows: a sound head has next to none.
+constexpr double kMuchBoneInSkin = 0.01;
+constexpr size_t kMostGapsTold = 5;
+// Fat has -130 to -70 HU.
+constexpr double kLooserThanSkinHu = -180;
+
+const Colour kCoveredColour = kTissueColour;
+const Colour kMissingColour{0.85, 0.10, 0.10};
+const Colour kGapColour{0.45, 0.00, 0.05};
+const Colour kScannerCutColour{0.35, 0.45, 0.70};
+
+// Of a region: less of it at a cut is its edge, not itself.
+constexpr double kLeastCutMm2 = 10;
+
+std::string Words(SkinRegion region) {
+  switch (region) {
+    case SkinRegion::kUpperLip:
+      return "the upper lip";
+    case SkinRegion::kLowerLip:
+      return "the lower lip";
+    case SkinRegion::kChin:
+      return "the chin";
+    case SkinRegion::kNose:
+      return "the nose";
+    case SkinRegion::kLeftCheek:
+      return "the left cheek";
+    case SkinRegion::kRightCheek:
+      return "the right cheek";
+    case SkinRegion::kNone:
+      break;
+  }
+  return "the skin without a name";
+}
+
+std::string KeyOf(SkinRegion region) {
+  return region == SkinRegion::kNone ? "elsewhere" : std::string(SkinRegionName(region));
+}
+
+std::string PlaceText(const Vector3d& place) {
+  return absl::StrFormat("(%.0f, %.0f, %.0f) mm", place.x(), place.y(), place.z());
+}
+
+// The region whose covered share is smallest.
+size_t WorstRegion(const SkinCoverage& coverage) {
+  const auto worst = std::min_element(
+      coverage.regions.begin(), coverage.regions.end(),
+      [](const CoveredPart& a, const CoveredPart& b) { return a.share() < b.share(); });
+  return static_cast<size_t>(worst - coverage.regions.begin());
+}
+
+QualityCheck CheckParts(const std::string& name, const std::string& required,
+                        const std::vector<SkinGap>& gaps, double largest_mm2) {
+  if (gaps.empty()) return {name, required, "none", true};
+  const SkinGap& largest = gaps.front();
+  return {name, required,
+          absl::StrFormat("largest %.2f cm2, in %s, up to %.1f mm", largest.area_mm2 / 100,
+                          Words(largest.region), largest.largest_mm),
+          largest.area_mm2 <= largest_mm2};
+}
+
+// Says so where what is missing is no skin but hair or cloth.
+std::string LooseText(double hu_behind) {
+  if (hu_behind >= kLooserThanSkinHu) return "";
+  return absl::StrFormat(
+      " The densest that the CT shows up to 3 mm behind it has %.0f HU on average, less than fat: "
+      "hair or cloth rather than skin.",
+      hu_behind);
+}
+
+std::string GapText(const SkinGap& gap, double limit_mm) {
+  const std::string text = absl::StrFormat(
+      "Skin of the CT is missing in the mesh: %.1f cm2 of %s are farther than %.1f mm from it, up "
+      "to %.1f mm at %s.",
+      gap.area_mm2 / 100, Words(gap.region), limit_mm, gap.largest_mm, PlaceText(gap.farthest));
+  return absl::StrCat(text, LooseText(gap.hu_behind));
+}
+
+// "the nose (1234 mm2) and the upper lip (56 mm2)"; empty where no named region is cut.
+std::string CutRegionsText(const ScannerCut& cut) {
+  std::vector<std::string> parts;
+  for (const SkinRegion region : kNamedSkinRegions) {
+    const double mm2 = cut.region_mm2[static_cast<size_t>(region)];
+    if (mm2 < kLeastCutMm2) continue;
+    parts.push_back(absl::StrFormat("%s (%.0f mm2)", Words(region), mm2));
+  }
+  return absl::StrJoin(parts, ", ");
+}
+
+Json CutsJson(const std::vector<ScannerCut>& cuts) {
+  Json list = Json::array();
+  for (const ScannerCut& cut : cuts) {
+    Json regions = Json::object();
+    for (size_t r = 0; r < cut.region_mm2.size(); ++r) {
+      if (cut.region_mm2[r] < kLeastCutMm2) continue;
+      regions[KeyOf(static_cast<SkinRegion>(r))] = cut.region_mm2[r];
+    }
+    list.push_back({{"area_mm2", cut.area_mm2},
+                    {"middle_mm", ToJson(cut.middle)},
+                    {"low_mm", ToJson(cut.low)},
+                    {"high_mm", ToJson(cut.high)},
+                    {"area_mm2_by_region", std::move(regions)}});
+  }
+  return list;
+}
+
+Json PartJson(const CoveredPart& part) {
+  return {{"area_mm2", part.area_mm2},
+          {"covered_share", part.share()},
+          {"largest_distance_mm", part.largest_mm},
+          {"at_mm", ToJson(part.farthest)},
+          {"hu_behind_missing", part.hu_behind_missing}};
+}
+
+Json GapsJson(const std::vector<SkinGap>& gaps) {
+  Json list = Json::array();
+  for (const SkinGap& gap : gaps) {
+    list.push_back({{"region", KeyOf(gap.region)},
+                    {"area_mm2", gap.area_mm2},
+                    {"largest_distance_mm", gap.largest_mm},
+                    {"at_mm", ToJson(gap.farthest)},
+                    {"hu_behind", gap.hu_behind}});
+  }
+  return list;
+}
+
+double BoneShare(const SkinCoverage& coverage) {
+  return coverage.mesh_skin_mm2 > 0 ? coverage.mesh_skin_on_bone_mm2 / coverage.mesh_skin_mm2 : 0;
+}
+
+}  // namespace
+
+std::vector<QualityCheck> CheckCoverage(const SkinCoverage& coverage) {
+  const size_t worst = WorstRegion(coverage);
+  const double worst_share = coverage.regions[worst].share();
+  const std::string within =
+      absl::StrFormat("Skin of the CT within %.1f mm of the mesh's", coverage.tolerance_mm);
+  return {
+      {absl::StrCat(within, ", as a whole"), absl::StrFormat("at least %g %%", 100 * kLeastCovered),
+       absl::StrFormat("%.2f %%", 100 * coverage.whole.share()),
+       coverage.whole.share() >= kLeastCovered},
+      {absl::StrCat(within, ", in each region"),
+       absl::StrFormat("at least %g %%", 100 * kLeastCovered),
+       absl::StrFormat("%.2f %% in %s", 100 * worst_share, Words(static_cast<SkinRegion>(worst))),
+       worst_share >= kLeastCovered},
+      CheckParts(absl::StrFormat("Gaps: skin of the CT farther than %g mm", kGapMm),
+                 absl::StrFormat("none over %.1f cm2", kLargestGapMm2 / 100), coverage.gaps,
+                 kLargestGapMm2),
+      CheckParts(absl::StrFormat("Holes: skin of the CT farther than %.1f mm", coverage.hole_mm),
+                 absl::StrFormat("none over %.1f cm2", kLargestHoleMm2 / 100), coverage.holes,
+                 kLargestHoleMm2)};
+}
+
+std::vector<std::string> CoverageCautions(const SkinCoverage& coverage) {
+  std::vector<std::string> cautions;
+  for (size_t r = 0; r < coverage.regions.size(); ++r) {
+    const CoveredPart& part = coverage.regions[r];
+    if (part.share() >= kLeastCovered) continue;
+    const std::string text = absl::StrFormat(
+        "The mesh lacks %.1f %% of %s: %.1f of %.1f cm2 of the CT's skin are farther than %.1f mm "
+        "from the mesh's, up to %.1f mm at %s.",
+        100 * (1 - part.share()), Words(static_cast<SkinRegion>(r)),
+        (part.area_mm2 - part.covered_mm2) / 100, part.area_mm2 / 100, coverage.tolerance_mm,
+        part.largest_mm, PlaceText(part.farthest));
+    cautions.push_back(absl::StrCat(text, LooseText(part.hu_behind_missing)));
+  }
+  size_t told = 0;
+  for (const SkinGap& hole : coverage.holes) {
+    if (hole.area_mm2 <= kLargestHoleMm2 || told++ == kMostGapsTold) break;
+    cautions.push_back(GapText(hole, coverage.hole_mm));
+  }
+  if (BoneShare(coverage) > kMuchBoneInSkin) {
+    cautions.push_back(absl::StrFormat(
+        "%.1f %% of the mesh's skin (%.1f cm2) are bone or held by it: tissue is missing over the "
+        "bone there, or what is called bone is none.",
+        100 * BoneShare(coverage), coverage.mesh_skin_on_bone_mm2 / 100));
+  }
+  return cautions;
+}
+
+std::vector<std::string> CutCautions(const SkinCoverage& coverage) {
+  std::vector<std::string> cautions;
+  for (const ScannerCut& cut : coverage.cuts) {
+    std::string text = absl::StrFormat(
+        "The scanner's circle, or a side of the CT, cuts the face at %s: %.0f mm2, between %s and "
+        "%s. What lies beyond is not in the CT and not in the model. The cut is no skin: it is "
+        "counted neither as covered nor as missing.",
+        PlaceText(cut.middle), cut.area_mm2, PlaceText(cut.low), PlaceText(cut.high));
+    const std::string regions = CutRegionsText(cut);
+    if (!regions.empty()) {
+      absl::StrAppend(
+          &text, " It lies in the front of the face that a prediction is looked at for: of ",
+          regions, " no skin is predicted there, and nothing about its shape is judged.");
+    }
+    cautions.push_back(std::move(text));
+  }
+  return cautions;
+}
+
+bool NoseIsCut(const SkinCoverage& coverage) {
+  return std::any_of(coverage.cuts.begin(), coverage.cuts.end(), [](const ScannerCut& cut) {
+    return cut.region_mm2[static_cast<size_t>(SkinRegion::kNose)] >= kLeastCutMm2;
+  });
+}
+
+Json CoverageJson(const SkinCoverage& coverage) {
+  Json json = {
+      {"means", "the CT's outer skin in the region of interest, by area, against the mesh's skin"},
+      {"tolerance_mm", coverage.tolerance_mm},
+      {"whole", PartJson(coverage.whole)}};
+  for (size_t r = 0; r < coverage.regions.size(); ++r) {
+    const CoveredPart& part = coverage.regions[r];
+    if (part.area_mm2 > 0) json["regions"][KeyOf(static_cast<SkinRegion>(r))] = PartJson(part);
+  }
+  json["gaps_beyond_4_mm"] = GapsJson(coverage.gaps);
+  json["hole_mm"] = coverage.hole_mm;
+  json["holes"] = GapsJson(coverage.holes);
+  json["cut_by_scanner"] = CutsJson(coverage.cuts);
+  json["mesh_skin_mm2"] = coverage.mesh_skin_mm2;
+  json["mesh_skin_on_bone_share"] = BoneShare(coverage);
+  return json;
+}
+
+std::vector<Scene> CoverageScenes(const SkinCoverage& coverage) {
+  SurfaceLayer layer{
+      .positions = coverage.positions, .triangles = coverage.triangles, .edges = false};
+  for (const double mm : coverage.distance_mm) {
+    layer.triangle_colours.push_back(mm > std::max(kGapMm, coverage.tolerance_mm) ? kGapColour
+                                     : mm > coverage.tolerance_mm                 ? kMissingColour
+                                                                                  : kCoveredColour);
+  }
+  std::vector<SurfaceLayer> layers = {std::move(layer)};
+  if (coverage.cut_triangles.rows() > 0) {
+    layers.push_back({.positions = coverage.cut_positions,
+                      .triangles = coverage.cut_triangles,
+                      .colour = kScannerCutColour,
+                      .edges = false});
+  }
+  std::vector<Scene> scenes;
+  for (const auto& [title, from] : {std::pair("from the front", Vector3d(0, -1, 0)),
+                                    std::pair("from the left, front", Vector3d(0.75, -0.75, 0.1)),
+                                    std::pair("from the right, front", Vector3d(-0.75, -0.75, 0.1)),
+                                    std::pair("from below", Vector3d(0, -0.7, -0.7))}) {
+    scenes.push_back({.title = title, .surfaces = layers, .view = {from}});
+  }
+  return scenes;
+}
+
+std::vector<LegendEntry> CoverageLegend(const SkinCoverage& coverage) {
+  const double gap_mm = std::max(kGapMm, coverage.tolerance_mm);
+  std::vector<LegendEntry> legend = {
+      {absl::StrFormat("within %.1f mm of the mesh's skin", coverage.tolerance_mm), kCoveredColour},
+      {absl::StrFormat("missing: farther than %.1f mm", coverage.tolerance_mm), kMissingColour},
+      {absl::StrFormat("farther than %.1f mm", gap_mm), kGapColour}};
+  if (coverage.cut_triangles.rows() > 0) {
+    legend.push_back({"cut by the scanner's circle: no skin", kScannerCutColour});
+  }
+  return legend;
+}
+
+}  // namespace tissueform

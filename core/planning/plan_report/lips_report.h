@@ -1,0 +1,22 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nlohmann/json.hpp"
+
+#include "core/imaging/anatomy/lip_contact.h"
+
+namespace tissueform {
+
+// The key "lips" of report.json (docs/recipe-format.md).
+nlohmann::ordered_json LipsJson(const LipContact& contact);
+
+// Where the lips are one piece of tissue, and how large it is; nothing where they are parted on all
+// but 5 mm.
+std::vector<std::string> LipsCautions(const LipContact& contact);
+
+}  // namespace tissueform

@@ -1,0 +1,99 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/planning/plan_report/metal_report.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_format.h"
+
+#include "core/planning/json_values.h"
+#include "core/planning/plan_report/slice_pictures.h"
+
+namespace tissueform {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr size_t kMostSlices = 3;
+constexpr double kSlicesApartMm = 3;
+// A filling of 200 mm3 is a small crown's; from a few of them on rays are left through no
+// direction.
+constexpr double kMuchMetalMm3 = 2500;
+
+// Heights of the middles of the largest pieces.
+std::vector<double> HeightsToShow(const MetalReport& metal) {
+  std::vector<double> heights;
+  for (const MetalCluster& cluster : metal.clusters) {
+    const double z = cluster.centre_mm.z();
+    const bool beside = std::any_of(heights.begin(), heights.end(), [z](double other) {
+      return std::abs(other - z) < kSlicesApartMm;
+    });
+    if (!beside) heights.push_back(z);
+    if (heights.size() == kMostSlices) break;
+  }
+  return heights;
+}
+
+}  // namespace
+
+Json MetalJson(const PlanBuild& build) {
+  const MetalReport& metal = build.metal;
+  Json json = {{"looked_for", build.recipe.metal.correct}, {"found", metal.any()}};
+  if (!metal.any()) return json;
+  json["volume_mm3"] = metal.volume_mm3;
+  json["threshold_hu"] = metal.threshold_hu;
+  json["low_z_mm"] = metal.low_z_mm;
+  json["high_z_mm"] = metal.high_z_mm;
+  json["corrected_slices"] = metal.corrected_slices;
+  json["streaks_removed_mm3"] = build.head.streaks_mm3;
+  json["streaks_removed_means"] =
+      "still as dense as bone after the correction, but no taller than a streak: soft tissue";
+  json["pieces"] = Json::array();
+  for (const MetalCluster& cluster : metal.clusters) {
+    json["pieces"].push_back({{"volume_mm3", cluster.volume_mm3},
+                              {"centre_mm", ToJson(cluster.centre_mm)},
+                              {"low_z_mm", cluster.low_z_mm},
+                              {"high_z_mm", cluster.high_z_mm},
+                              {"top_hu", cluster.top_hu}});
+  }
+  return json;
+}
+
+std::vector<std::string> MetalCautions(const PlanBuild& build) {
+  const MetalReport& metal = build.metal;
+  if (!metal.any()) return {};
+  std::vector<std::string> cautions = {absl::StrFormat(
+      "There is metal in the mouth: %d piece%s of %.1f cm3 together, from z = %.1f to %.1f mm. Its "
+      "streaks were lessened in %d slices (picture: before and after). Within about 5 mm of it the "
+      "edges of teeth, bone, lips and cheeks are uncertain, and so are the teeth's landmarks: look "
+      "at them, and give \"occlusal_plane\" and the segments' planes in the recipe where they are "
+      "wrong.",
+      static_cast<int>(metal.clusters.size()), metal.clusters.size() == 1 ? "" : "s",
+      metal.volume_mm3 / 1000, metal.low_z_mm, metal.high_z_mm, metal.corrected_slices)};
+  if (metal.volume_mm3 > kMuchMetalMm3) {
+    cautions.push_back(absl::StrFormat(
+        "So much metal (%.1f cm3) hides most of the teeth: planes and landmarks that were found "
+        "from them may be wrong by several mm. Give \"occlusal_plane\" and the planes of the "
+        "segments in the recipe.",
+        metal.volume_mm3 / 1000));
+  }
+  return cautions;
+}
+
+MetalSlices DrawMetalSlices(const PlanBuild& build) {
+  MetalSlices slices;
+  const GridGeometry& over = build.head.hu.geometry;
+  for (const double z : HeightsToShow(build.metal)) {
+    const Eigen::Vector3d through(over.origin_mm.x(), over.origin_mm.y(), z);
+    const std::string at = absl::StrFormat("z = %.1f mm, ", z);
+    slices.before.push_back(
+        DrawPlainSlice(build.before_correction, over, AxialSlice(at + "as it was", through)));
+    slices.after.push_back(
+        DrawPlainSlice(build.head.hu, over, AxialSlice(at + "streaks lessened", through)));
+  }
+  return slices;
+}
+
+}  // namespace tissueform

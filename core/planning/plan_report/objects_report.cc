@@ -1,0 +1,118 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/planning/plan_report/objects_report.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_format.h"
+
+#include "core/imaging/anatomy/plane.h"
+#include "core/planning/json_values.h"
+
+namespace tissueform {
+namespace {
+
+using Eigen::Vector3d;
+
+// Faces of voxels on a smooth surface that may lie any way have 1.5 times its area on average.
+constexpr double kFacesOfSurface = 1.5;
+
+// Where a thing lay on the skin of the region of interest.
+struct Contact {
+  double area_mm2 = 0;
+  Vector3d middle = Vector3d::Zero();
+  Vector3d low = Vector3d::Zero();
+  Vector3d high = Vector3d::Zero();
+};
+
+Contact ContactOf(const AttachedObject& object, const RegionOfInterest& region) {
+  const std::vector<Plane> planes = region.planes();
+  Contact contact;
+  int64_t faces = 0;
+  for (const Vector3d& place : object.contact_mm) {
+    if (LeastHeightMm(planes, place) < 0) continue;
+    contact.low = faces == 0 ? place : Vector3d(contact.low.cwiseMin(place));
+    contact.high = faces == 0 ? place : Vector3d(contact.high.cwiseMax(place));
+    contact.middle += place;
+    ++faces;
+  }
+  if (faces == 0) return contact;
+  contact.middle /= static_cast<double>(faces);
+  contact.area_mm2 = static_cast<double>(faces) * object.face_mm2 / kFacesOfSurface;
+  return contact;
+}
+
+const char* KindText(ObjectKind kind) {
+  switch (kind) {
+    case ObjectKind::kTube:
+      return "A tube";
+    case ObjectKind::kCord:
+      return "A cord";
+    case ObjectKind::kUnknown:
+      break;
+  }
+  return "Something that is larger than an ear, and may hold a part of the face,";
+}
+
+const char* KindKey(ObjectKind kind) {
+  switch (kind) {
+    case ObjectKind::kTube:
+      return "tube";
+    case ObjectKind::kCord:
+      return "cord";
+    case ObjectKind::kUnknown:
+      break;
+  }
+  return "unknown";
+}
+
+}  // namespace
+
+QualityCheck CheckObjects(const PlanBuild& build) {
+  double largest_mm2 = 0;
+  Vector3d place = Vector3d::Zero();
+  for (const AttachedObject& object : build.head.objects) {
+    const Contact contact = ContactOf(object, build.soft_tissue.region);
+    if (object.kind != ObjectKind::kUnknown || contact.area_mm2 <= largest_mm2) continue;
+    largest_mm2 = contact.area_mm2;
+    place = contact.middle;
+  }
+  return {"Pieces taken from the skin that may be face",
+          absl::StrFormat("none that lay on more than %.1f cm2", kLargestHoleMm2 / 100),
+          largest_mm2 == 0 ? "none"
+                           : absl::StrFormat("one that lay on %.1f cm2 at (%.0f, %.0f, %.0f) mm",
+                                             largest_mm2 / 100, place.x(), place.y(), place.z()),
+          largest_mm2 <= kLargestHoleMm2};
+}
+
+std::vector<std::string> ObjectsCautions(const PlanBuild& build) {
+  std::vector<std::string> cautions;
+  for (const AttachedObject& object : build.head.objects) {
+    const Contact contact = ContactOf(object, build.soft_tissue.region);
+    if (contact.area_mm2 == 0) continue;
+    cautions.push_back(absl::StrFormat(
+        "%s lies on the skin and was taken away (%.1f cm3). The skin under it, about %.1f cm2 "
+        "between (%.0f, %.0f, %.0f) and (%.0f, %.0f, %.0f) mm, is not seen in this CT, and its "
+        "edge there is a guess.",
+        KindText(object.kind), object.volume_mm3 / 1e3, contact.area_mm2 / 100, contact.low.x(),
+        contact.low.y(), contact.low.z(), contact.high.x(), contact.high.y(), contact.high.z()));
+  }
+  return cautions;
+}
+
+nlohmann::ordered_json ObjectsJson(const PlanBuild& build) {
+  auto list = nlohmann::ordered_json::array();
+  for (const AttachedObject& object : build.head.objects) {
+    const Contact contact = ContactOf(object, build.soft_tissue.region);
+    nlohmann::ordered_json row = {{"kind", KindKey(object.kind)},
+                                  {"volume_mm3", object.volume_mm3},
+                                  {"at_mm", ToJson(object.middle_mm)},
+                                  {"skin_under_it_mm2", contact.area_mm2}};
+    if (contact.area_mm2 > 0) row["skin_under_it_at_mm"] = ToJson(contact.middle);
+    list.push_back(std::move(row));
+  }
+  return list;
+}
+
+}  // namespace tissueform

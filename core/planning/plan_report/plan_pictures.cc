@@ -1,0 +1,207 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/planning/plan_report/plan_pictures.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+#include "core/planning/plan_report/coverage_report.h"
+#include "core/planning/plan_report/label_colours.h"
+#include "core/planning/plan_report/metal_report.h"
+#include "core/planning/plan_report/plan_scenes.h"
+#include "core/planning/plan_report/slice_pictures.h"
+#include "core/planning/rendering/figure.h"
+
+namespace tissueform {
+namespace {
+
+constexpr int kSceneHeightPx = 560;
+
+absl::Status WriteFigure(const ReportPicture& picture, const Figure& figure,
+                         const std::string& folder) {
+  return figure.WritePng(absl::StrCat(folder, "/", picture.file));
+}
+
+// A figure of one row of scenes.
+absl::Status WriteScenes(const ReportPicture& picture, std::vector<Scene> scenes,
+                         const std::string& folder) {
+  Figure figure(picture.title);
+  figure.AddRow(kSceneHeightPx, std::move(scenes));
+  return WriteFigure(picture, figure, folder);
+}
+
+std::vector<LegendEntry> BoneLegend(const PlanBuild& build) {
+  std::vector<LegendEntry> legend = {{"bone that stays", kFixedBoneColour}};
+  for (size_t s = 0; s < build.segments.size(); ++s) {
+    legend.push_back({build.segments[s].cut.name, SegmentColour(s)});
+  }
+  return legend;
+}
+
+std::vector<LegendEntry> WithTissue(std::vector<LegendEntry> legend, const std::string& name) {
+  legend.insert(legend.begin(), {name, kTissueColour});
+  return legend;
+}
+
+absl::StatusOr<ReportPicture> DrawSlices(const PlanBuild& build, const std::string& folder) {
+  ReportPicture picture{
+      "slices.png", "The CT and what was found in it",
+      "Four slices of the resampled CT, with everything that is not head removed. Radiological "
+      "convention: the patient's right (R) is at the left of the picture, and the midsagittal "
+      "slice looks to the left.",
+      WithTissue(BoneLegend(build), "soft tissue that is modelled")};
+  std::vector<Picture> panels;
+  for (const SlicePlane& plane : PlanSlices(build.landmarks)) {
+    panels.push_back(DrawSlice(build, plane));
+  }
+  Figure figure(picture.title);
+  figure.AddRow(640, {panels[0], panels[1]});
+  figure.AddRow(640, {panels[2], panels[3]});
+  TF_RETURN_IF_ERROR(WriteFigure(picture, figure, folder));
+  return picture;
+}
+
+absl::StatusOr<ReportPicture> DrawMetal(const PlanBuild& build, const std::string& folder) {
+  ReportPicture picture{
+      "metal.png",
+      "Metal, before and after its streaks were lessened",
+      "Slices of the resampled CT through the largest pieces of metal: above as the scanner made "
+      "them, below as the plan was made from them.",
+      {}};
+  MetalSlices slices = DrawMetalSlices(build);
+  Figure figure(picture.title);
+  figure.AddRow(480, std::move(slices.before));
+  figure.AddRow(480, std::move(slices.after));
+  TF_RETURN_IF_ERROR(WriteFigure(picture, figure, folder));
+  return picture;
+}
+
+absl::StatusOr<ReportPicture> DrawBone(const PlanBuild& build, const std::string& folder) {
+  ReportPicture picture{"bone.png", "Bone: what stays and what moves",
+                        "Isosurfaces of the bone's labels, before the planned move.",
+                        BoneLegend(build)};
+  TF_ASSIGN_OR_RETURN(std::vector<Scene> scenes, BoneScenes(build));
+  TF_RETURN_IF_ERROR(WriteScenes(picture, std::move(scenes), folder));
+  return picture;
+}
+
+absl::StatusOr<ReportPicture> DrawSkin(const PlanBuild& build, const std::string& folder) {
+  ReportPicture picture{"skin.png",
+                        "Skin of the mesh and its named regions",
+                        "The boundary of the tet mesh, with its edges.",
+                        {}};
+  for (const auto& [name, region] :
+       {std::pair("nose", SkinRegion::kNose), std::pair("upper lip", SkinRegion::kUpperLip),
+        std::pair("lower lip", SkinRegion::kLowerLip), std::pair("chin", SkinRegion::kChin),
+        std::pair("left cheek", SkinRegion::kLeftCheek),
+        std::pair("right cheek", SkinRegion::kRightCheek),
+        std::pair("other skin", SkinRegion::kNone)}) {
+    picture.legend.push_back({name, SkinRegionColour(region)});
+  }
+  picture.legend.push_back({"no skin", kCutColour});
+  TF_RETURN_IF_ERROR(WriteScenes(picture, SkinScenes(build), folder));
+  return picture;
+}
+
+absl::StatusOr<ReportPicture> DrawCoverage(const PlanBuild& build, const std::string& folder) {
+  ReportPicture picture{
+      "coverage.png", "The CT's own skin, and what of it the mesh lacks",
+      "The outer skin of the CT within the region of interest. Red is missing in the mesh.",
+      CoverageLegend(build.coverage)};
+  Figure figure(picture.title);
+  std::vector<Scene> scenes = CoverageScenes(build.coverage);
+  figure.AddRow(kSceneHeightPx, {scenes[0], scenes[1]});
+  figure.AddRow(kSceneHeightPx, {scenes[2], scenes[3]});
+  TF_RETURN_IF_ERROR(WriteFigure(picture, figure, folder));
+  return picture;
+}
+
+absl::StatusOr<ReportPicture> DrawConstraints(const PlanBuild& build, const std::string& folder) {
+  ReportPicture picture{
+      "constraints.png", "What holds and what moves the tissue",
+      "Where the tet mesh lies on bone, without the rest of its boundary. In the contact band "
+      "between bone that stays and bone that moves it is left free, so that no tissue is torn.",
+      WithTissue(BoneLegend(build), "free")};
+  picture.legend.push_back({"cut through tissue, fixed", kCutColour});
+  picture.legend.push_back({"on bone, left free", kFreedColour});
+  TF_RETURN_IF_ERROR(WriteScenes(picture, ConstraintScenes(build), folder));
+  return picture;
+}
+
+absl::StatusOr<ReportPicture> DrawTets(const PlanBuild& build, const std::string& folder) {
+  ReportPicture picture{"tets.png",
+                        "Inside the mesh: tets by tissue",
+                        "The mesh cut open. The tissue of a tet, and so its stiffness, comes from "
+                        "the CT numbers in it.",
+                        {}};
+  for (size_t t = 0; t < build.recipe.tissues.size(); ++t) {
+    const TissueClass& tissue = build.recipe.tissues[t];
+    picture.legend.push_back(
+        {absl::StrCat(tissue.name, ", ", tissue.youngs_modulus_pa / 1000, " kPa"),
+         TissueClassColour(t)});
+  }
+  TF_RETURN_IF_ERROR(WriteScenes(picture, CutScenes(build), folder));
+  return picture;
+}
+
+// Where a requirement ends: a line from the axis up to the height of the curve.
+constexpr double kLeastPercent = 0.01;  // on the logarithmic axis
+
+Curve LimitCurve(const std::string& name, double x, const Curve& beside, CurveStyle style) {
+  const auto [low, high] = std::minmax_element(beside.y.begin(), beside.y.end());
+  return {.name = name, .x = {x, x}, .y = {*low, *high}, .colour = kOrange, .style = style};
+}
+
+absl::StatusOr<ReportPicture> DrawHistograms(const PlanMeasures& measures,
+                                             const std::string& folder) {
+  ReportPicture picture{"quality.png",
+                        "Quality of the mesh",
+                        "Left: the smallest dihedral angle of every tet; 99.9 % must reach 3 "
+                        "degrees. Right: how far the skin of the mesh lies from the CT's; the mean "
+                        "may be 0.6 voxels, 99 % must lie within 2.",
+                        {}};
+  const Curve angles = HistogramCurve(DihedralHistogram(measures), "tets", kBlue);
+  const Curve distances =
+      HistogramCurve(SkinDistanceHistogram(measures), "vertices", kBlue, kLeastPercent);
+  Figure figure(picture.title);
+  figure.AddRow(
+      500, std::vector<Chart>{
+               {.title = "Smallest dihedral angle",
+                .x_title = "angle [degrees]",
+                .y_title = "tets [%]",
+                .curves = {angles, LimitCurve("3 degrees", 3, angles, CurveStyle::kDashed)}},
+               {.title = "Distance of the skin from the CT's",
+                .x_title = "distance [voxels]",
+                .y_title = "vertices on skin [%]",
+                .logarithmic_y = true,
+                .curves = {distances, LimitCurve("0.6 voxels", 0.6, distances, CurveStyle::kDashed),
+                           LimitCurve("2 voxels", 2, distances, CurveStyle::kDotted)}}});
+  TF_RETURN_IF_ERROR(WriteFigure(picture, figure, folder));
+  return picture;
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<ReportPicture>> DrawPlanPictures(const PlanBuild& build,
+                                                            const PlanMeasures& measures,
+                                                            const std::string& folder) {
+  std::vector<ReportPicture> pictures;
+  for (const auto draw :
+       {DrawSlices, DrawBone, DrawSkin, DrawCoverage, DrawConstraints, DrawTets}) {
+    TF_ASSIGN_OR_RETURN(ReportPicture picture, draw(build, folder));
+    pictures.push_back(std::move(picture));
+  }
+  if (build.metal.any()) {
+    TF_ASSIGN_OR_RETURN(ReportPicture metal, DrawMetal(build, folder));
+    pictures.insert(pictures.begin() + 1, std::move(metal));
+  }
+  TF_ASSIGN_OR_RETURN(ReportPicture quality, DrawHistograms(measures, folder));
+  pictures.push_back(std::move(quality));
+  return pictures;
+}
+
+}  // namespace tissueform

@@ -1,0 +1,439 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/app/tissueform_server.h"
+
+#include <algorithm>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "grpc/health/v1/health.pb.h"
+#include "grpcpp/ext/proto_server_reflection_plugin.h"
+#include "grpcpp/health_check_service_interface.h"
+#include "grpcpp/resource_quota.h"
+#include "grpcpp/server_builder.h"
+#include "spdlog/spdlog.h"
+
+#include "core/base/software_version.h"
+#include "core/base/status_macros.h"
+#include "core/mechanics/linear_solvers/blas_threads.h"
+#include "server/access/access_watch_stores.h"
+#include "server/app/library_logs.h"
+#include "server/platform/network_address.h"
+#include "server/platform/process_metrics.h"
+#include "server/platform/tls_credentials.h"
+#include "server/telemetry/server_metrics.h"
+
+namespace tissueform {
+namespace {
+
+// Keeps gRPC's own buffers bounded beside the memory budget.
+constexpr size_t kTransportQuotaBytes = size_t{512} << 20;
+// Chunks are 1 MiB at most; regions of a mesh of a million vertices fit too.
+constexpr int kMaxReceiveBytes = 4 << 20;
+// A token of 8 KiB, and what else a client says of itself; longer headers gRPC refuses.
+constexpr int kMaxMetadataBytes = 16 << 10;
+constexpr int kKeepaliveMilliseconds = 25'000;
+constexpr int kKeepaliveTimeoutMilliseconds = 10'000;
+constexpr int kMinClientPingMilliseconds = 10'000;
+constexpr int kHandshakeMilliseconds = 10'000;
+// For what was finished just now to leave the buffers.
+constexpr std::chrono::milliseconds kLastMessagesGrace{500};
+
+// Proxies ask for the health every second; who is sent here meanwhile is served as ever.
+constexpr std::chrono::seconds kUntilProxiesSee{3};
+
+// Of the memory budget: how far sessions that are not in use are evicted once something does not
+// fit. The high watermark is the budget itself.
+constexpr double kLowWatermark = 0.8;
+
+void PrepareProcessOnce() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    RouteLibraryLogs();
+    grpc::EnableDefaultHealthCheckService(true);
+    // gRPC's health service has no descriptor of its own; without one, clients that ask reflection
+    // for every service's schema end at it (buf curl --list-methods).
+    google::protobuf::LinkMessageReflection<grpc::health::v1::HealthCheckRequest>();
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  });
+}
+
+void SetTransportLimits(const ServerOptions& options, grpc::ServerBuilder* builder) {
+  builder->SetResourceQuota(grpc::ResourceQuota("tissueform").Resize(kTransportQuotaBytes));
+  builder->SetMaxReceiveMessageSize(kMaxReceiveBytes);
+  builder->SetMaxSendMessageSize(-1);  // an answer is as large as its mesh
+  builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, options.max_calls_per_connection);
+  builder->AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, kMaxMetadataBytes);
+  // A client whose machine is gone is noticed, and its stream ends.
+  builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMilliseconds);
+  builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMilliseconds);
+  builder->AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
+                              kMinClientPingMilliseconds);
+  // Who connects and says nothing does not hold a place for long.
+  builder->AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMilliseconds);
+}
+
+// What the process needs beside connections: libraries, logs, helper processes, gRPC's own.
+constexpr int kOtherDescriptors = 100;
+
+ConnectionListener::Options ListenerOptions(const ServerOptions& options) {
+  const int descriptors = std::max(RaiseDescriptorLimit() - kOtherDescriptors, 1);
+  return {.host = options.host,
+          .port = options.port,
+          .most = std::min(options.max_connections, descriptors),
+          .most_of_address = options.max_connections_per_address};
+}
+
+int64_t MemoryQuota(const ServerOptions& options) {
+  return options.quotas.memory_bytes > 0 ? options.quotas.memory_bytes
+                                         : options.memory_budget_bytes / 2;
+}
+
+// Every option by its place: one that is added does not compile here until it was decided whether
+// it is a limit.
+NamedLimits LimitsOf(const ServerOptions& options) {
+  const auto& [host, port, tls, memory_budget_bytes, workers, service, quotas,
+               max_calls_per_connection, max_connections, max_connections_per_address,
+               drain_deadline, in_memory, data_dir, cluster, log_level, tokens, telemetry, access,
+               exports] = options;
+  NamedLimits limits = ToNamedLimits(service);
+  limits["quota_calls_per_second"] = quotas.calls_per_second;
+  limits["quota_waiting_calls"] = quotas.waiting_calls;
+  limits["quota_streams"] = quotas.streams;
+  limits["quota_sessions"] = quotas.sessions;
+  limits["quota_memory_bytes"] = MemoryQuota(options);
+  limits["quota_disk_bytes"] = quotas.disk_bytes;
+  limits["max_shares_per_resource"] = access.max_shares_per_resource;
+  limits["max_links_per_session"] = access.max_links_per_session;
+  limits["max_link_hours"] = access.max_link_lifetime.count();
+  limits["max_waiting_exports"] = exports.max_waiting;
+  limits["quota_exports"] = exports.max_waiting_of_principal;
+  limits["max_exports"] = exports.max_kept;
+  limits["export_retention_days"] = exports.retention_days;
+  limits["max_export_watches"] = exports.max_watches;
+  limits["max_message_bytes"] = kMaxReceiveBytes;
+  limits["memory_budget_bytes"] = memory_budget_bytes;
+  limits["workers"] = workers;
+  limits["max_calls_per_connection"] = max_calls_per_connection;
+  limits["max_connections"] = max_connections;
+  limits["max_connections_per_address"] = max_connections_per_address;
+  limits["drain_deadline_ms"] = std::chrono::milliseconds(drain_deadline).count();
+  return limits;
+}
+
+SessionOwnership* OwnershipOf(Cluster* cluster) {
+  if (cluster == nullptr) return SoleOwnership::Get();
+  return &cluster->node();
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
+    const ServerOptions& options, Authenticator* authenticator) {
+  const bool has_logins = authenticator != nullptr || options.tokens.configured();
+  TF_RETURN_IF_ERROR(CheckExposure(options.host, options.tls, has_logins));
+  Parts parts;
+  TF_ASSIGN_OR_RETURN(parts.telemetry, Telemetry::Start(options.telemetry));
+  TF_ASSIGN_OR_RETURN(parts.tls_files, LoadServerFiles(options.tls));
+  if (options.tokens.configured()) {
+    TF_ASSIGN_OR_RETURN(parts.tokens, TokenAuthenticator::Start(options.tokens));
+  }
+  parts.authenticator = authenticator != nullptr ? authenticator : parts.tokens.get();
+  TF_ASSIGN_OR_RETURN(parts.opened, OpenStores(options));
+  if (parts.opened.shared != nullptr) {
+    TF_ASSIGN_OR_RETURN(parts.cluster,
+                        Cluster::Open(options.cluster, options.port, parts.opened.shared));
+  }
+  std::unique_ptr<TissueformServer> server(new TissueformServer(options, std::move(parts)));
+  if (server->is_exposed()) {
+    spdlog::warn("INSECURE: {}, and strangers may reach it (--insecure)",
+                 options.tls.enabled() ? "nobody is asked to log in" : "calls are not encrypted");
+  }
+  TF_RETURN_IF_ERROR(server->LearnWhatIsKept());
+  server->housekeeping_.Start();
+  TF_RETURN_IF_ERROR(server->ServeMetrics());
+  TF_RETURN_IF_ERROR(server->Listen());
+  if (server->cluster_ != nullptr) {
+    server->cluster_->Start([raw = server.get()] { return raw->FreeBytes(); });
+  }
+  return server;
+}
+
+absl::Status TissueformServer::LearnWhatIsKept() {
+  TF_RETURN_IF_ERROR(access_changes_.Learn());
+  TF_RETURN_IF_ERROR(TellWhatIsKept(stores_.get(), &access_changes_));
+  TF_RETURN_IF_ERROR(exports_.Learn([&](const std::string& id) {
+    if (access_.KnowsPrediction(id)) return true;
+    // Another server may have made it since; what is not known to be gone stays.
+    return cluster_ != nullptr && !absl::IsNotFound(stores_->predictions().Get(id).status());
+  }));
+  TF_RETURN_IF_ERROR(registry_.LearnKnown());
+  return absl::OkStatus();
+}
+
+TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
+    : options_(options),
+      telemetry_(std::move(parts.telemetry)),
+      tls_files_(std::move(parts.tls_files)),
+      tokens_(std::move(parts.tokens)),
+      quotas_(options.quotas),
+      access_store_(std::move(parts.opened.access)),
+      access_([this] { return stores_->NowS(); }),
+      access_changes_(options.access, access_store_.get(), &access_),
+      export_store_(std::move(parts.opened.exports)),
+      exports_(options.exports, export_store_.get(), [this] { return stores_->NowS(); }),
+      export_watches_(options.exports.max_watches),
+      authenticator_(parts.authenticator == nullptr
+                         ? nullptr
+                         : std::make_unique<LinkAuthenticator>(&access_, parts.authenticator)),
+      cluster_(std::move(parts.cluster)),
+      gate_({.authenticator = authenticator_.get(),
+             .may_call = &Access::MayCall,
+             .observer = telemetry_.get(),
+             .quotas = &quotas_,
+             .gateway_name = options.tls.gateway_name,
+             .node_name = cluster_ == nullptr ? "" : cluster_->name()}),
+      budget_(options.memory_budget_bytes),
+      stores_(WatchStores(std::move(parts.opened.stores), &access_changes_)),
+      catalog_(options.limits, &budget_, stores_->keeps() ? &stores_->meshes() : nullptr,
+               Clock::System(), [stores = stores_.get()] { return stores->NowS(); }),
+      uploads_(options.limits, &catalog_, &stores_->uploads()),
+      pool_(std::make_unique<WorkerPool>(options.workers)),
+      registry_(options.limits, &budget_, pool_.get(), &stores_->sessions(), &catalog_,
+                Clock::System(), OwnershipOf(cluster_.get())),
+      housekeeping_(
+          {.retention_days = options.limits.retention_days,
+           .export_retention_days = options.exports.retention_days,
+           .remove_exports = [this](int64_t before_s,
+                                    int most) { return exports_.RemoveUnchanged(before_s, most); }},
+          stores_.get(), &registry_, &catalog_),
+      streams_(options.limits.max_streams),
+      watches_(options.limits, pool_.get()),
+      mesh_service_(&gate_, options.limits, &access_changes_, &catalog_, &uploads_, &registry_,
+                    pool_.get(), &timer_),
+      session_service_(&gate_, options.limits, &access_, &catalog_, &registry_),
+      deform_service_(&gate_, options.limits, &access_, &registry_, &streams_, &watches_, &timer_),
+      prediction_service_(&gate_, options.limits, &access_, &catalog_, &registry_,
+                          &stores_->predictions(), &timer_),
+      plan_service_(&gate_, &access_, &registry_),
+      case_service_(&gate_, options.limits, &access_, &stores_->cases(), pool_.get(), &timer_),
+      access_service_(&gate_, &access_changes_, &registry_, &streams_, &watches_,
+                      [this] { return stores_->NowS(); }),
+      export_service_(&gate_, options.limits, &access_, &stores_->predictions(), &exports_,
+                      &export_watches_, pool_.get(), &timer_),
+      server_info_service_(&gate_, LimitsOf(options)) {
+  SetBlasThreads(1);  // the pool's workers share the cores already
+  registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
+    telemetry_->session_events().Count(event);
+    streams_.OnSessionEvent(id, event);
+    watches_.OnSessionEvent(id, event);
+  });
+  catalog_.set_on_removed(
+      [this](const std::string& sha256) { access_changes_.MeshRemoved(sha256); });
+  access_changes_.set_on_revoked([this] {
+    streams_.AskAgain();
+    watches_.AskAgain();
+  });
+  exports_.set_on_changed(
+      [this](const ExportRecord& record) { export_watches_.OnChanged(record); });
+  exports_.set_on_exported([this](const std::string& prediction, bool exported) {
+    access_changes_.SetExported(prediction, exported);
+  });
+  access_changes_.set_on_prediction_removed([this](const std::string& id) {
+    // In memory they are gone; a restart finds no prediction of those that the disk has.
+    if (!exports_.RemoveOf(id).ok()) spdlog::warn("exports of what was removed stay on the disk");
+  });
+  access_.set_most_bytes(options.quotas.disk_bytes);
+  registry_.set_most_of_owner(options.quotas.sessions);
+  budget_.set_account_limit(MemoryQuota(options), [this](const std::string& owner, int64_t bytes) {
+    ReclaimOf(owner, bytes);
+  });
+  budget_.set_reclaimer([this](int64_t bytes) { Reclaim(bytes); });
+  if (cluster_ != nullptr) {
+    cluster_->Join({.access = &access_changes_,
+                    .sessions = &registry_,
+                    .meshes = &catalog_,
+                    .exports = &exports_},
+                   &access_);
+  }
+}
+
+TissueformServer::~TissueformServer() {
+  metrics_.reset();
+  if (cluster_ != nullptr) cluster_->Stop();
+  if (server_ != nullptr) {
+    listener_->Stop();
+    server_->Shutdown(std::chrono::system_clock::now());
+    server_->Wait();
+    server_.reset();
+  }
+  housekeeping_.Stop();
+  registry_.Stop();
+  pool_.reset();    // its last jobs may still use the registry and the store
+  stores_.reset();  // its last answers may still use the registry
+}
+
+absl::Status TissueformServer::ServeMetrics() {
+  if (options_.telemetry.metrics_port < 0) return absl::OkStatus();
+  metrics_.emplace();
+  AddProcessMetrics("tissueform", SoftwareVersion(), &*metrics_);
+  telemetry_->AddTo(&*metrics_);
+  AddFrameMetrics(streams_.measures(), &*metrics_);
+  AddLaneMetrics(*pool_, &*metrics_);
+  AddSessionMetrics(registry_, telemetry_->session_events(), &*metrics_);
+  AddMemoryMetrics(budget_, catalog_, &*metrics_);
+  AddStoreMetrics(*stores_, &*metrics_);
+  AddSecurityMetrics(ReadSecurity(), &*metrics_);
+  if (cluster_ != nullptr) cluster_->AddTo(&*metrics_);
+  metrics_->AddGauge("tissueform_streams", "Drags open.", {},
+                     [this] { return static_cast<double>(streams_.size()); });
+  metrics_->AddGauge("tissueform_watches", "Watches open.", {},
+                     [this] { return static_cast<double>(watches_.size()); });
+  metrics_->AddGauge("tissueform_exports_waiting", "Predictions on their way to the PACS.", {},
+                     [this] { return static_cast<double>(exports_.CountWaiting()); });
+  metrics_->AddGauge("tissueform_export_watches", "Watches of exports open.", {},
+                     [this] { return static_cast<double>(export_watches_.size()); });
+  metrics_->AddGauge("tissueform_draining", "1 while the server drains.", {},
+                     [this] { return gate_.draining() ? 1.0 : 0.0; });
+  TF_RETURN_IF_ERROR(metrics_->Serve(options_.telemetry.metrics_port));
+  spdlog::info("metrics on http://127.0.0.1:{}/metrics", metrics_->port());
+  return absl::OkStatus();
+}
+
+SecurityReadings TissueformServer::ReadSecurity() const {
+  SecurityReadings readings = {.insecure = is_exposed()};
+  if (tls_files_ != nullptr && tls_files_->has_identity()) {
+    readings.certificate_expires = [this] {
+      return std::chrono::duration<double>(tls_files_->expiry().time_since_epoch()).count();
+    };
+    readings.certificate_alarm = [this] { return tls_files_->alarm() ? 1.0 : 0.0; };
+  }
+  if (tokens_ == nullptr) return readings;
+  readings.token_keys_alarm = [this] { return tokens_->standing().keys_alarm ? 1.0 : 0.0; };
+  readings.revocations_alarm = [this] { return tokens_->standing().revocations_alarm ? 1.0 : 0.0; };
+  readings.alarms = [this] { return static_cast<double>(tokens_->standing().alarms); };
+  if (!options_.tokens.jwks_url.empty()) {  // a file is read when it changes, which may be never
+    readings.token_keys_read = [this] {
+      return static_cast<double>(
+          std::chrono::system_clock::to_time_t(tokens_->standing().keys_read));
+    };
+  }
+  for (const auto& [reason, count] : tokens_->failures().Counts()) {
+    readings.token_failures[reason] = [this, reason = reason] {
+      return static_cast<double>(tokens_->failures().Counts().at(reason));
+    };
+  }
+  return readings;
+}
+
+absl::Status TissueformServer::Listen() {
+  PrepareProcessOnce();
+  TF_ASSIGN_OR_RETURN(listener_, ConnectionListener::Listen(ListenerOptions(options_)));
+  grpc::ServerBuilder builder;
+  SetTransportLimits(options_, &builder);
+  acceptor_ = builder.experimental().AddExternalConnectionAcceptor(
+      grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+      MakeServerCredentials(options_.tls, tls_files_.get()));
+  builder.RegisterService(&mesh_service_);
+  builder.RegisterService(&session_service_);
+  builder.RegisterService(&deform_service_);
+  builder.RegisterService(&prediction_service_);
+  builder.RegisterService(&plan_service_);
+  builder.RegisterService(&case_service_);
+  builder.RegisterService(&access_service_);
+  builder.RegisterService(&export_service_);
+  builder.RegisterService(&server_info_service_);
+  server_ = builder.BuildAndStart();
+  if (server_ == nullptr) return absl::InternalError("gRPC does not start");
+  if (cluster_ != nullptr) {
+    // Proxies send calls to servers that can take a session; streams stay while leases last.
+    cluster_->node().nodes().TellReach([health = server_->GetHealthCheckService()](bool reached) {
+      health->SetServingStatus(reached);
+    });
+  }
+  listener_->Start([this](int fd, int listener_fd) {
+    grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+    connection.fd = fd;
+    connection.listener_fd = listener_fd;
+    acceptor_->HandleNewConnection(&connection);
+  });
+  return absl::OkStatus();
+}
+
+bool TissueformServer::is_exposed() const {
+  return !IsLoopback(options_.host) && !(options_.tls.enabled() && tokens_ != nullptr);
+}
+
+void TissueformServer::ReclaimOf(const std::string& owner, int64_t bytes) {
+  const MemoryBudget* account = budget_.AccountOf(owner);
+  registry_.Evict([&] { return bytes <= account->limit_bytes() - account->reserved_bytes(); },
+                  owner);
+}
+
+void TissueformServer::Reclaim(int64_t bytes) {
+  // Down to the low watermark, so that the next who needs room finds some.
+  const auto low =
+      static_cast<int64_t>(kLowWatermark * static_cast<double>(options_.memory_budget_bytes));
+  const auto most = [this, bytes](int64_t watermark) {
+    return budget_.reserved_bytes() <= watermark - bytes;
+  };
+  const auto enough = [&] { return most(low); };
+  registry_.Evict(enough);
+  // Afterwards: a mesh is idle only when no session holds it.
+  int meshes = 0;
+  if (catalog_.keeps_meshes()) {
+    if (!enough()) meshes = catalog_.RemoveIdle(SessionRegistry::kInUse);
+  } else if (!most(options_.memory_budget_bytes)) {
+    registry_.RemoveIdle();
+    meshes = catalog_.RemoveIdle(options_.limits.session_idle_ttl);
+  }
+  if (meshes > 0) spdlog::info("{} meshes that nobody uses have left memory", meshes);
+}
+
+int64_t TissueformServer::FreeBytes() const {
+  const int64_t reserved = budget_.reserved_bytes();
+  return budget_.limit_bytes() - reserved + registry_.EvictableBytes();
+}
+
+void TissueformServer::Ask(std::function<void()> answered) {
+  // Not the others: a factorisation, or a disk, may take long and is no reason to start again.
+  pool_->Post(Lane::kFrames, [this, answered = std::move(answered)]() mutable {
+    pool_->Post(Lane::kSolves, std::move(answered));
+  });
+}
+
+void TissueformServer::Drain() {
+  const auto deadline = std::chrono::steady_clock::now() + options_.drain_deadline;
+  spdlog::info("draining: {} open streams, at most {} s", streams_.size(),
+               options_.drain_deadline.count());
+  // Whoever waits for a database that is away is told so while there is time to hear it.
+  if (cluster_ != nullptr) cluster_->BeginDraining(deadline - options_.drain_deadline / 10);
+  server_->GetHealthCheckService()->SetServingStatus(false);
+  if (cluster_ != nullptr) {
+    std::this_thread::sleep_for(
+        std::min<std::chrono::milliseconds>(kUntilProxiesSee, options_.drain_deadline / 4));
+  }
+  gate_.StartDraining();
+  if (cluster_ != nullptr) {
+    registry_.HandOver(deadline);
+  } else {
+    const auto end = std::chrono::system_clock::now() + options_.drain_deadline;
+    streams_.NotifyDraining(end);
+    watches_.NotifyDraining(end);
+  }
+  export_watches_.NotifyDraining();
+  if (!gate_.WaitUntilIdle(deadline)) {
+    spdlog::warn("draining: cancelling the calls that are still open");
+  }
+  housekeeping_.Stop();
+  listener_->Stop();
+  // Only now: a server that shuts down answers CANCELLED instead of UNAVAILABLE, and waits for idle
+  // connections to be closed by their clients.
+  server_->Shutdown(std::chrono::system_clock::now() + kLastMessagesGrace);
+  server_->Wait();
+}
+
+}  // namespace tissueform

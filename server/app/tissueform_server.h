@@ -1,0 +1,171 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "grpcpp/server.h"
+#include "grpcpp/server_builder.h"
+
+#include "server/access/access.h"
+#include "server/access/access_changes.h"
+#include "server/access/auth/authenticator.h"
+#include "server/access/auth/token_authenticator.h"
+#include "server/access/link_authenticator.h"
+#include "server/app/open_stores.h"
+#include "server/app/server_options.h"
+#include "server/cluster/cluster.h"
+#include "server/exports/export_book.h"
+#include "server/exports/export_store.h"
+#include "server/platform/connection_listener.h"
+#include "server/platform/rotated_files.h"
+#include "server/rpc/access_service.h"
+#include "server/rpc/calls/call_scope.h"
+#include "server/rpc/case_service.h"
+#include "server/rpc/deform_service.h"
+#include "server/rpc/deform_streams.h"
+#include "server/rpc/export_service.h"
+#include "server/rpc/export_watch.h"
+#include "server/rpc/mesh_service.h"
+#include "server/rpc/plan_service.h"
+#include "server/rpc/prediction_service.h"
+#include "server/rpc/server_info_service.h"
+#include "server/rpc/session_service.h"
+#include "server/rpc/watches/session_watches.h"
+#include "server/session/deadline_timer.h"
+#include "server/session/housekeeping.h"
+#include "server/session/memory_budget.h"
+#include "server/session/mesh_catalog.h"
+#include "server/session/mesh_uploads.h"
+#include "server/session/session_registry.h"
+#include "server/session/worker_pool.h"
+#include "server/store/access_store/access_store.h"
+#include "server/store/stores.h"
+#include "server/telemetry/telemetry.h"
+
+namespace tissueform {
+
+// A running server: the only place where its objects are joined.
+class TissueformServer {
+ public:
+  // Listens when it returns. Several servers may live in one process.
+  //
+  // Errors: Unavailable, naming the address, when it cannot be listened on; those of CheckExposure,
+  // LoadServerFiles, TokenAuthenticator::Start and OpenStores.
+  //
+  // `authenticator`, which must outlive the server, says who calls; null: what the options say.
+  static absl::StatusOr<std::unique_ptr<TissueformServer>> Start(
+      const ServerOptions& options, Authenticator* authenticator = nullptr);
+
+  // Cancels open calls, waits for them and ends.
+  ~TissueformServer();
+
+  // The port that is listened on, also when the options said 0.
+  int port() const { return listener_->port(); }
+
+  // On which Prometheus finds the page of metrics; 0: there is none.
+  int metrics_port() const { return metrics_.has_value() ? metrics_->port() : 0; }
+
+  // Ends in good order: health turns to NOT_SERVING, streams are told (with the time of the drain
+  // deadline), new work is refused with
+  // UNAVAILABLE; open calls may go on until the drain deadline and are then cancelled; the listener
+  // closes. Blocks until all calls have ended. One thread, once.
+  //
+  // A node of a cluster serves on for some seconds, in which proxies see its health; then it gives
+  // its sessions to the others, and their streams end with SESSION_MOVED.
+  void Drain();
+
+  // Calls `answered` later, when the lanes that planners wait for have each done a job.
+  void Ask(std::function<void()> answered);
+  // Files that it writes may have been moved away. Any thread.
+  void CheckFiles() { telemetry_->CheckFiles(); }
+
+  const MemoryBudget& memory_budget() const { return budget_; }
+  Stores& stores() { return *stores_; }
+  const SessionRegistry& sessions() const { return registry_; }
+  const DeformStreams& streams() const { return streams_; }
+  const SessionWatches& watches() const { return watches_; }
+  const ExportWatches& export_watches() const { return export_watches_; }
+  // Null without TLS.
+  const RotatedFiles* tls_files() const { return tls_files_.get(); }
+  // Strangers may reach it, and it is not protected from them: --insecure.
+  bool is_exposed() const;
+  // Null: nobody logs in.
+  const TokenAuthenticator* tokens() const { return tokens_.get(); }
+  // Null without --store.
+  Cluster* cluster() { return cluster_.get(); }
+
+ private:
+  // What is made before the server itself.
+  struct Parts {
+    std::unique_ptr<Telemetry> telemetry;
+    std::unique_ptr<RotatedFiles> tls_files;     // null without TLS
+    std::unique_ptr<TokenAuthenticator> tokens;  // null: none are configured
+    Authenticator* authenticator = nullptr;      // null: nobody logs in
+    OpenedStores opened;
+    std::unique_ptr<Cluster> cluster;  // null without --store
+  };
+
+  TissueformServer(const ServerOptions& options, Parts parts);
+
+  absl::Status LearnWhatIsKept();
+  absl::Status Listen();
+  // What sessions may still take, where those that nobody uses leave for it.
+  int64_t FreeBytes() const;
+  void Reclaim(int64_t bytes);
+  void ReclaimOf(const std::string& owner, int64_t bytes);
+  // Nothing is told without --metrics-port.
+  absl::Status ServeMetrics();
+  SecurityReadings ReadSecurity() const;
+
+  // Constant.
+  const ServerOptions options_;
+
+  // Self-synchronised; each may use those before it. Destroyed from the last to the first: calls
+  // end, then jobs, then what they used.
+  const std::unique_ptr<Telemetry> telemetry_;
+  const std::unique_ptr<RotatedFiles> tls_files_;  // null without TLS
+  const std::unique_ptr<TokenAuthenticator> tokens_;
+  CallQuotas quotas_;
+  std::unique_ptr<AccessStore> access_store_;  // its rows are those of the stores
+  Access access_;
+  AccessChanges access_changes_;
+  std::unique_ptr<ExportStore> export_store_;  // as access_store_
+  ExportBook exports_;
+  ExportWatches export_watches_;
+  std::unique_ptr<LinkAuthenticator> authenticator_;  // null: nobody logs in
+  std::unique_ptr<Cluster> cluster_;                  // null without --store
+  ServiceGate gate_;
+  MemoryBudget budget_;
+  std::unique_ptr<Stores> stores_;
+  MeshCatalog catalog_;
+  MeshUploads uploads_;
+  std::unique_ptr<WorkerPool> pool_;
+  SessionRegistry registry_;
+  Housekeeping housekeeping_;
+  DeformStreams streams_;
+  SessionWatches watches_;
+  DeadlineTimer timer_;
+  MeshService mesh_service_;
+  SessionService session_service_;
+  DeformService deform_service_;
+  PredictionService prediction_service_;
+  PlanService plan_service_;
+  CaseService case_service_;
+  AccessService access_service_;
+  ExportService export_service_;
+  ServerInfoService server_info_service_;
+  // gRPC gets its connections from the listener, through the acceptor. The server comes last: what
+  // it is given goes to the acceptor of a server that lives.
+  std::unique_ptr<ConnectionListener> listener_;
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
+  std::unique_ptr<grpc::Server> server_;
+  std::optional<MetricsPage> metrics_;  // reads what the others count
+};
+
+}  // namespace tissueform

@@ -1,0 +1,64 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/platform/tls_options.h"
+
+#include "absl/strings/str_cat.h"
+
+#include "server/platform/network_address.h"
+
+namespace tissueform {
+void AddTlsOptions(CLI::App& app, TlsOptions* options) {
+  CLI::Option* certificate =
+      app.add_option("--tls-cert", options->certificate,
+                     "certificate chain of the server in PEM, its own first: calls are encrypted. "
+                     "Renewed by rewriting the file")
+          ->type_name("FILE");
+  CLI::Option* key = app.add_option("--tls-key", options->key,
+                                    "its key in PEM, which others must not be able to read")
+                         ->type_name("FILE")
+                         ->needs(certificate);
+  certificate->needs(key);
+  CLI::Option* client_ca = app.add_option("--tls-client-ca", options->client_ca,
+                                          "authorities in PEM whose certificates clients must show")
+                               ->type_name("FILE")
+                               ->needs(certificate);
+  app.add_option_function<std::string>(
+         "--tls-client-auth",
+         [options](const std::string& word) {
+           options->client_certificate_required = word == "required";
+         },
+         "whether a client must show a certificate, or may, of these authorities")
+      ->check(CLI::IsMember({"required", "optional"}))
+      ->default_str("required")
+      ->needs(client_ca);
+  app.add_option("--gateway-name", options->gateway_name,
+                 "name in the certificate of the gateway: only it may state whom it speaks for "
+                 "(x-tissueform-client-address)")
+      ->type_name("NAME")
+      ->needs(client_ca);
+  app.add_flag("--insecure", options->insecure,
+               "off loopback serve without encryption or logins: to whoever reaches the port");
+}
+
+absl::Status CheckExposure(const std::string& host, const TlsOptions& options, bool has_tokens) {
+  if (options.certificate.empty() != options.key.empty()) {
+    return absl::InvalidArgumentError("--tls-cert and --tls-key belong together; give both");
+  }
+  if (!options.client_ca.empty() && !options.enabled()) {
+    return absl::InvalidArgumentError("--tls-client-ca needs --tls-cert and --tls-key");
+  }
+  if ((options.enabled() && has_tokens) || options.insecure || IsLoopback(host)) {
+    return absl::OkStatus();
+  }
+  const char* const missing = options.enabled() ? "logins (--token-issuer, --token-keys)"
+                              : has_tokens
+                                  ? "encryption (--tls-cert, --tls-key)"
+                                  : "encryption and without logins (--tls-cert, --tls-key, "
+                                    "--token-issuer, --token-keys)";
+  return absl::FailedPreconditionError(absl::StrCat(
+      "--host ", host, " would be reached over the network without ", missing,
+      "; give them, listen on 127.0.0.1, or say --insecure if nobody but you is there"));
+}
+
+}  // namespace tissueform

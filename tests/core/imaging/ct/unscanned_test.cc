@@ -1,0 +1,146 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/imaging/ct/unscanned.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "gtest/gtest.h"
+
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+constexpr int kSize = 80;
+constexpr int kSlices = 3;
+constexpr int kMiddle = kSize / 2;
+
+using Painter = std::function<double(double x, double y)>;  // from the middle, in pixels
+
+CtVolume Painted(const Painter& painter) {
+  CtVolume volume;
+  volume.size = {kSize, kSize, kSlices};
+  for (int k = 0; k < kSlices; ++k) {
+    for (int j = 0; j < kSize; ++j) {
+      for (int i = 0; i < kSize; ++i) {
+        const double hu = painter(i - kMiddle, j - kMiddle);
+        volume.hu.push_back(static_cast<int16_t>(std::lround(std::max(hu, -1024.0))));
+      }
+    }
+  }
+  return volume;
+}
+
+bool InCircle(double x, double y) { return std::hypot(x, y) < 36; }
+// A blurred disc of tissue whose front lies beyond the circle.
+double Head(double x, double y) {
+  const double depth = 20 - std::hypot(x, y + 20);
+  return -1000 + 1040 * std::clamp(depth / 2 + 0.5, 0.0, 1.0);
+}
+
+class UnscannedTest : public ::testing::Test {
+ protected:
+  double Noisy(double hu) { return hu + noise_(random_); }
+
+  std::mt19937 random_{5};
+  std::normal_distribution<double> noise_{0, 8};
+};
+
+TEST_F(UnscannedTest, OutsideOfTheCircleNothingWasScanned) {
+  for (const double fill : {-1024.0, -1000.0}) {
+    const CtVolume volume =
+        Painted([&](double x, double y) { return InCircle(x, y) ? Noisy(Head(x, y)) : fill; });
+    const std::vector<uint8_t> unscanned = FindUnscanned(volume, 2);
+    ASSERT_EQ(unscanned.size(), volume.hu.size());
+    for (int j = 0; j < kSize; ++j) {
+      for (int i = 0; i < kSize; ++i) {
+        const double x = i - kMiddle;
+        const double y = j - kMiddle;
+        const bool found = unscanned[static_cast<size_t>(i + kSize * j)] != 0;
+        if (!InCircle(x, y)) {
+          EXPECT_TRUE(found) << x << " " << y;
+        }
+        if (std::hypot(x, y) < 32) {
+          EXPECT_FALSE(found) << x << " " << y;
+        }
+        if (InCircle(x, y) && Head(x, y) > 0) {
+          EXPECT_FALSE(found) << "tissue at " << x << " " << y;
+        }
+      }
+    }
+  }
+}
+
+// Two scans that were laid upon each other: a circle filled with -1023 in one with -1024, and an
+// edge of two pixels between, as in one real CT.
+TEST_F(UnscannedTest, TwoFillingsAreOne) {
+  const CtVolume volume = Painted([&](double x, double y) {
+    const double inner = std::hypot(x, y - 8);
+    if (!InCircle(x, y)) return -1024.0;
+    return inner < 35 ? Noisy(Head(x, y)) : inner < 36 ? -1014.0 : inner < 37 ? -1024.0 : -1023.0;
+  });
+  const std::vector<uint8_t> unscanned = FindUnscanned(volume, 1);
+  ASSERT_FALSE(unscanned.empty());
+  EXPECT_EQ(unscanned[kMiddle + kSize * 6], 1);  // between both circles
+  EXPECT_EQ(unscanned[kMiddle + kSize * 10], 1);
+  EXPECT_EQ(unscanned[kMiddle + kSize * 12], 1);  // its edge
+  EXPECT_EQ(unscanned[kMiddle + kSize * 14], 0);  // tissue behind the inner one
+}
+
+TEST_F(UnscannedTest, ACircleThatCutsNoTissueIsNotTold) {
+  const CtVolume volume = Painted(
+      [&](double x, double y) { return InCircle(x, y) ? Noisy(Head(x, y - 10)) : -1024.0; });
+  EXPECT_TRUE(FindUnscanned(volume, 1).empty());
+}
+
+TEST_F(UnscannedTest, AirThatWasCutOffAtTheLowestHuIsAir) {
+  const CtVolume volume =
+      Painted([](double x, double y) { return Head(x, y) > -990 ? Head(x, y) : -1024; });
+  EXPECT_TRUE(FindUnscanned(volume, 1).empty());
+}
+
+// Programs that part a head from all else leave a sharp edge all round.
+TEST_F(UnscannedTest, AHeadWithoutItsBackgroundIsNotCutAllRound) {
+  const CtVolume volume =
+      Painted([&](double x, double y) { return Head(x, y) > 0 ? Noisy(Head(x, y)) : -1024.0; });
+  EXPECT_TRUE(FindUnscanned(volume, 1).empty());
+}
+
+TEST_F(UnscannedTest, OnTheGridItEndsWhereTheTissueDoes) {
+  const CtVolume volume =
+      Painted([&](double x, double y) { return InCircle(x, y) ? Noisy(Head(x, y)) : -1024.0; });
+  for (const double spacing_mm : {1.0, 2.0}) {
+    ASSERT_OK_AND_ASSIGN(const LabelGrid unscanned, ResampleUnscanned(volume, spacing_mm, 2));
+    ASSERT_FALSE(unscanned.values.empty());
+    const GridGeometry& grid = unscanned.geometry;
+    for (int y = 0; y < grid.size[1] / 2; ++y) {
+      const Eigen::Vector3d place = grid.Centre(grid.size[0] / 2, y, 0);
+      const double from_middle = kMiddle - place.y();
+      if (from_middle > 36 + spacing_mm) {
+        EXPECT_EQ(unscanned.At(grid.size[0] / 2, y, 0), 1);
+      }
+      if (from_middle < 36 - spacing_mm) {
+        EXPECT_EQ(unscanned.At(grid.size[0] / 2, y, 0), 0);
+      }
+    }
+  }
+}
+
+TEST_F(UnscannedTest, BesideASlantedVolumeNothingWasScanned) {
+  CtVolume volume = Painted([&](double x, double y) { return Noisy(Head(x, y)); });
+  ASSERT_OK_AND_ASSIGN(const LabelGrid upright, ResampleUnscanned(volume, 2, 1));
+  EXPECT_TRUE(upright.values.empty());
+  volume.direction.col(1) = Eigen::Vector3d(0, std::cos(0.3), -std::sin(0.3));
+  ASSERT_OK_AND_ASSIGN(const LabelGrid slanted, ResampleUnscanned(volume, 2, 1));
+  ASSERT_FALSE(slanted.values.empty());
+  EXPECT_EQ(slanted.At(0, 0, 0), 1);
+  const auto& size = slanted.geometry.size;
+  EXPECT_EQ(slanted.At(size[0] / 2, size[1] / 2, size[2] / 2), 0);
+}
+
+}  // namespace
+}  // namespace tissueform

@@ -1,0 +1,229 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/mechanics/deformation/arap_deformer.h"
+
+#include <numbers>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "core/mechanics/deformation/deformation_quality.h"
+#include "core/mechanics/deformation/gradient_field_deformer.h"
+#include "core/mechanics/deformation/rotation_fit.h"
+#include "tests/testing/handle_problem.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::RandomNumbers;
+using testing::RandomPoses;
+using testing::StatusIs;
+
+TetMesh JitteredBar() { return testing::Bar({4, 6, 8}, 2.0, 0.2); }
+
+double LargestDistance(const Positions& a, const Positions& b) {
+  return (a - b).rowwise().norm().maxCoeff();
+}
+
+double EnergyOf(const MeshPreparation& preparation, const Positions& positions) {
+  CellTransforms rotations;
+  return FitRotations(preparation.elements(), preparation.stiffness(),
+                      positions - preparation.mesh().positions(), 1, &rotations);
+}
+
+TEST(ArapDeformerTest, EnergyNeverRises) {
+  RandomNumbers random(1);
+  for (const int depth : {0, 5}) {
+    for (const int num_handles : {1, 3}) {
+      const auto preparation = testing::PrepareMesh(JitteredBar(), num_handles);
+      ArapOptions options;
+      options.acceleration_depth = depth;
+      options.tolerance_mm = 1e-9;  // down to rounding
+      options.max_iterations = 300;
+      ASSERT_OK_AND_ASSIGN(const auto deformer, CreateArapDeformer(preparation, options));
+      for (const double angle : {0.0, 0.5, 1.5, 3.0}) {
+        const auto poses = RandomPoses(num_handles, angle, 0.2, 20, &random);
+        ASSERT_OK_AND_ASSIGN(const Deformation result, deformer->Deform(poses));
+        const std::vector<double>& energies = result.summary.energies_nj;
+        ASSERT_EQ(energies.size(), result.summary.changes_mm.size() + 1);
+        for (size_t i = 1; i < energies.size(); ++i) {
+          EXPECT_LE(energies[i], energies[i - 1]) << "iteration " << i;
+        }
+        EXPECT_NEAR(energies.back(), EnergyOf(*preparation, result.positions),
+                    1e-9 * energies.back());
+      }
+    }
+  }
+}
+
+TEST(ArapDeformerTest, IdentityGivesRestExactly) {
+  const auto preparation = testing::PrepareMesh(JitteredBar(), 3);
+  ASSERT_OK_AND_ASSIGN(const auto deformer, CreateArapDeformer(preparation, {}));
+  ASSERT_OK_AND_ASSIGN(const Deformation result, deformer->Deform(std::vector<HandlePose>(3)));
+  EXPECT_LT(LargestDistance(result.positions, preparation->mesh().positions()), 1e-12);
+  EXPECT_TRUE(result.summary.converged);
+  EXPECT_LT(result.summary.energies_nj.back(), 1e-12);
+}
+
+TEST(ArapDeformerTest, OneRigidPoseOnEverythingIsThatRigidMotion) {
+  const TetMesh bar = JitteredBar();
+  const double top = bar.positions().col(2).maxCoeff() - 1.0;
+  ASSERT_OK_AND_ASSIGN(
+      const ConstraintSet constraints,
+      ConstraintSet::Create(
+          bar, {},
+          {{"low", testing::SelectVertices(bar, [](const auto& v) { return v.z() < 1.0; })},
+           {"high", testing::SelectVertices(bar, [=](const auto& v) { return v.z() > top; })}}));
+  ASSERT_OK_AND_ASSIGN(
+      const auto preparation,
+      MeshPreparation::Create(bar, testing::MixedStiffness(bar.num_tets()), constraints, {}));
+  ASSERT_OK_AND_ASSIGN(const auto deformer, CreateArapDeformer(preparation, {}));
+  HandlePose pose;
+  pose.rotation_vector = {0.4, -2.3, 0.9};
+  pose.pivot_mm = {1, 2, 3};
+  pose.translation_mm = {5, -7, 2};
+  const std::vector<HandlePose> poses = {pose, pose};
+  ASSERT_OK_AND_ASSIGN(const Deformation result, deformer->Deform(poses));
+  for (Eigen::Index v = 0; v < bar.num_vertices(); ++v) {
+    EXPECT_LT(
+        (result.positions.row(v).transpose() - ApplyPose(pose, bar.positions().row(v).transpose()))
+            .norm(),
+        1e-10);
+  }
+}
+
+// Every cross-section of a bar turns by its share, whatever way round.
+TEST(ArapDeformerTest, HalfAndWholeTwistsAreFollowed) {
+  const TetMesh bar = testing::Bar({4, 4, 16}, 1.0);
+  ASSERT_OK_AND_ASSIGN(const auto preparation,
+                       MeshPreparation::Create(bar, Eigen::VectorXd::Constant(bar.num_tets(), 1e4),
+                                               testing::BarEnds(bar), {}));
+  ASSERT_OK_AND_ASSIGN(const auto deformer, CreateArapDeformer(preparation, {}));
+  for (const double angle : {std::numbers::pi, -std::numbers::pi, 2 * std::numbers::pi}) {
+    HandlePose pose;
+    pose.pivot_mm = {2, 2, 16};
+    pose.rotation_vector = {0, 0, angle};
+    ASSERT_OK_AND_ASSIGN(const Deformation result, deformer->Deform(std::vector<HandlePose>{pose}));
+    EXPECT_TRUE(result.summary.converged);
+    const DeformationQuality quality = MeasureDeformation(bar, result.positions);
+    EXPECT_EQ(quality.inverted_tets, 0);
+    EXPECT_GT(quality.min_volume_ratio, 0.4);
+    const int32_t outer = 4 + 5 * (4 + 5 * 8);  // corner (4, 4) of the middle layer
+    const Eigen::Vector3d arm =
+        result.positions.row(outer).transpose() - Eigen::Vector3d(2, 2, result.positions(outer, 2));
+    const Eigen::Vector3d expected = RotationMatrix({0, 0, angle / 2}) * Eigen::Vector3d(2, 2, 0);
+    // The bar also thins.
+    EXPECT_GT(arm.normalized().dot(expected.normalized()), 0.99) << angle;
+  }
+}
+
+TEST(ArapDeformerTest, EndsBelowTheEnergyOfTheGradientField) {
+  RandomNumbers random(3);
+  const auto preparation = testing::PrepareMesh(JitteredBar(), 1);
+  ASSERT_OK_AND_ASSIGN(const auto arap, CreateArapDeformer(preparation, {}));
+  ASSERT_OK_AND_ASSIGN(const auto field, CreateGradientFieldDeformer(preparation, {}));
+  const auto poses = RandomPoses(1, 0.8, 0, 15, &random);
+  ASSERT_OK_AND_ASSIGN(const Deformation result, arap->Deform(poses));
+  ASSERT_OK_AND_ASSIGN(const Deformation start, field->Deform(poses));
+  EXPECT_TRUE(result.summary.converged);
+  EXPECT_LE(result.summary.changes_mm.back(), 0.001);
+  EXPECT_NEAR(result.summary.energies_nj.front(), EnergyOf(*preparation, start.positions),
+              1e-9 * result.summary.energies_nj.front());
+  EXPECT_LT(result.summary.energies_nj.back(), 0.99 * result.summary.energies_nj.front());
+}
+
+// The soft half takes up most of the stretch.
+TEST(ArapDeformerTest, SoftTissueGivesWay) {
+  const TetMesh bar = testing::Bar({3, 3, 12}, 1.0);
+  Eigen::VectorXd stiffness(bar.num_tets());
+  for (Eigen::Index t = 0; t < bar.num_tets(); ++t) {
+    stiffness[t] = bar.positions()(bar.tets()(t, 0), 2) < 6 ? 1e3 : 1e5;
+  }
+  ASSERT_OK_AND_ASSIGN(const auto preparation,
+                       MeshPreparation::Create(bar, stiffness, testing::BarEnds(bar), {}));
+  ASSERT_OK_AND_ASSIGN(const auto deformer, CreateArapDeformer(preparation, {}));
+  HandlePose pose;
+  pose.translation_mm = {0, 0, 3};
+  ASSERT_OK_AND_ASSIGN(const Deformation result, deformer->Deform(std::vector<HandlePose>{pose}));
+  const Eigen::Index middle = 1 + 4 * (1 + 4 * 6);
+  EXPECT_GT(result.positions(middle, 2) - bar.positions()(middle, 2), 2.7);
+}
+
+TEST(ArapDeformerTest, WarmStartIsFasterAndEndsInTheSamePlace) {
+  RandomNumbers random(4);
+  const auto preparation = testing::PrepareMesh(JitteredBar(), 1);
+  ArapOptions options;
+  options.tolerance_mm = 1e-5;
+  ASSERT_OK_AND_ASSIGN(const auto warm, CreateArapDeformer(preparation, options));
+  ASSERT_OK_AND_ASSIGN(const auto cold, CreateArapDeformer(preparation, options));
+  auto poses = RandomPoses(1, 0.8, 0, 15, &random);
+  ASSERT_OK_AND_ASSIGN(const Deformation first, warm->Deform(poses));
+  poses[0].rotation_vector *= 1.01;
+  DeformControl control;
+  control.warm_start = true;
+  ASSERT_OK_AND_ASSIGN(const Deformation a, warm->Deform(poses, control));
+  ASSERT_OK_AND_ASSIGN(const Deformation b, cold->Deform(poses));
+  EXPECT_LT(a.summary.iterations, b.summary.iterations);
+  EXPECT_LT(LargestDistance(a.positions, b.positions), 1e-3);
+  // Back at rest in one jump: the last answer does not trap it.
+  ASSERT_OK_AND_ASSIGN(const Deformation rest, warm->Deform(std::vector<HandlePose>(1), control));
+  EXPECT_LT(LargestDistance(rest.positions, preparation->mesh().positions()), 1e-9);
+}
+
+TEST(ArapDeformerTest, CancellationAndLastIterationAreTold) {
+  RandomNumbers random(5);
+  const auto preparation = testing::PrepareMesh(JitteredBar(), 1);
+  ArapOptions options;
+  options.tolerance_mm = 1e-12;
+  options.max_iterations = 4;
+  ASSERT_OK_AND_ASSIGN(const auto deformer, CreateArapDeformer(preparation, options));
+  const auto poses = RandomPoses(1, 0.8, 0, 15, &random);
+  int calls = 0;
+  DeformControl control;
+  control.on_progress = [&](const Deformation& so_far) {
+    EXPECT_EQ(so_far.positions.rows(), preparation->mesh().num_vertices());
+    return ++calls < 2;
+  };
+  ASSERT_OK_AND_ASSIGN(const Deformation cancelled, deformer->Deform(poses, control));
+  EXPECT_TRUE(cancelled.summary.cancelled);
+  EXPECT_EQ(cancelled.summary.iterations, 2);
+  ASSERT_OK_AND_ASSIGN(const Deformation ended, deformer->Deform(poses));
+  EXPECT_FALSE(ended.summary.converged);
+  EXPECT_FALSE(ended.summary.cancelled);
+  EXPECT_EQ(ended.summary.iterations, 4);
+}
+
+TEST(ArapDeformerTest, AnswerDoesNotDependOnTheNumberOfThreads) {
+  RandomNumbers random(6);
+  const auto poses = RandomPoses(3, 1.0, 0.1, 15, &random);
+  const TetMesh mesh = JitteredBar();
+  std::vector<Deformation> results;
+  for (const int threads : {1, 3}) {
+    PreparationOptions options;
+    options.threads = threads;
+    ASSERT_OK_AND_ASSIGN(const auto deformer,
+                         CreateArapDeformer(testing::PrepareMesh(mesh, 3, options), {}));
+    ASSERT_OK_AND_ASSIGN(Deformation result, deformer->Deform(poses));
+    results.push_back(std::move(result));
+  }
+  EXPECT_EQ(results[0].positions, results[1].positions);
+  EXPECT_EQ(results[0].summary.energies_nj, results[1].summary.energies_nj);
+}
+
+TEST(ArapDeformerTest, OptionsAndPosesAreChecked) {
+  const auto preparation = testing::PrepareMesh(JitteredBar(), 1);
+  using ::tissueform::testing::kInvalid;
+  EXPECT_THAT(CreateArapDeformer(preparation, {0, 0.001, 5}),
+              StatusIs(kInvalid, HasSubstr("max_iterations")));
+  EXPECT_THAT(CreateArapDeformer(preparation, {10, 0.001, -1}),
+              StatusIs(kInvalid, HasSubstr("acceleration_depth")));
+  ASSERT_OK_AND_ASSIGN(const auto deformer, CreateArapDeformer(preparation, {}));
+  EXPECT_THAT(deformer->Deform(std::vector<HandlePose>(2)),
+              StatusIs(kInvalid, HasSubstr("got 2 poses")));
+}
+
+}  // namespace
+}  // namespace tissueform

@@ -1,0 +1,60 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/planning/plan_report/cautions.h"
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "tests/core/planning/plan_report/plan_build_of_mesh.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// A CT that begins at z = -101 mm, with the chin at -60 mm.
+PlanBuild WholeHead() {
+  PlanBuild build = testing::PlanBuildOfMesh();
+  build.head.hu.geometry = {.size = {10, 10, 10}, .origin_mm = {0, 0, -100}, .spacing_mm = 2};
+  build.landmarks.menton = {0, 0, -60};
+  build.landmarks.nose_prominence_mm = 9;
+  return build;
+}
+
+TEST(CautionsTest, AWholeHeadNeedsNone) { EXPECT_THAT(Cautions(WholeHead()), IsEmpty()); }
+
+TEST(CautionsTest, WhatIsMissingIsTold) {
+  PlanBuild build = WholeHead();
+  build.landmarks.nose_prominence_mm = 0.24;
+  EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("stands 0.2 mm before")));
+  build.landmarks.menton.z() = -97;
+  EXPECT_THAT(Cautions(build),
+              ElementsAre(HasSubstr("nose"), HasSubstr("ends 4 mm under the bone of the chin")));
+}
+
+TEST(CautionsTest, ChinThatTheBorderCutsIsTold) {
+  PlanBuild build = WholeHead();
+  build.landmarks.menton.z() = -100;
+  build.parts.cut_off_mm = 1.44;
+  EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("about 1.4 mm of its bone")));
+}
+
+TEST(CautionsTest, TetsThatStayTornAreTold) {
+  PlanBuild build = WholeHead();
+  build.still_torn = 3;
+  EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("3 tets turn inside out")));
+}
+
+TEST(CautionsTest, TeethThatWereCutApartAreToldUnlessTheRecipeSaysWhere) {
+  PlanBuild build = WholeHead();
+  build.parts.separation = JawSeparation::kAutomaticCut;
+  EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("teeth touch")));
+  build.parts.separation = JawSeparation::kGivenCut;
+  EXPECT_THAT(Cautions(build), IsEmpty());
+}
+
+}  // namespace
+}  // namespace tissueform
