@@ -22,7 +22,7 @@ build_what_is_missing() {
   for program in tissueform tissueform-server tissueform-gateway; do
     if [[ ! -x $TISSUEFORM_BUILD_DIR/bin/$program ]]; then
       deploy/install_packages.sh build
-      deploy/build.sh release tissueform tissueform-server tissueform-gateway
+      deploy/build.sh release tissueform tissueform-online tissueform-load tissueform-server tissueform-gateway
       return
     fi
   done

@@ -17,7 +17,7 @@ cd "$(dirname "$0")/.."
 export TISSUEFORM_BUILD_DIR=${TISSUEFORM_BUILD_DIR:-$PWD/build/release}
 
 deploy/install_packages.sh build
-targets=(tissueform tissueform-server)
+targets=(tissueform tissueform-online tissueform-server)
 for option in "$@"; do
   if [[ $option == --serve ]]; then
     targets+=(tissueform-gateway)

@@ -80,23 +80,9 @@ std::vector<NamedPose> NamedPoses(const PlanProblem& problem) {
   return poses;
 }
 
-// The server refuses a stream that asks for what its model does not have
-// (SharedPreparation::CreateResponse has the same rule): who asks first, as here, can do without.
-bool HasPreparedAnswers(const DeformerOptions& options) {
-  if (options.model == DeformationModel::kLinearElastic ||
-      options.model == DeformationModel::kNeoHookean) {
-    return true;
-  }
-  return options.model == DeformationModel::kGradientField &&
-         options.gradient_field.rotation == RotationMode::kPropagated &&
-         options.gradient_field.guidance == Guidance::kCotangent;
-}
-
 v1::PreparedAnswers PreparedAnswersOf(const PlanProblem& problem) {
   v1::PreparedAnswers prepared;
-  const bool is_elastic = problem.deformer.model == DeformationModel::kLinearElastic ||
-                          problem.deformer.model == DeformationModel::kNeoHookean;
-  if (problem.uncertainty && is_elastic) {
+  if (problem.uncertainty && TraitsOf(problem.deformer.model).is_elastic) {
     *prepared.mutable_ranges() = ToProto(*problem.uncertainty);
   }
   return prepared;

@@ -57,10 +57,6 @@ SessionRequest SessionRequestOf(const PlanProblem& problem, const std::string& m
 // The poses of the plan with the names of their handles.
 std::vector<NamedPose> NamedPoses(const PlanProblem& problem);
 
-// Whether the server can prepare answers of the plan's own model (PreparedAnswers in
-// deform_service.proto), so that frames of a stream need not be solved for one by one.
-bool HasPreparedAnswers(const DeformerOptions& options);
-
 // Prepared answers with the usual tolerances, and with the plan's ranges of the material where it
 // gives some and its model can tell of them: then frames hold uncertainty_p95_mm. REQUIRES:
 // HasPreparedAnswers(problem.deformer).

@@ -7,18 +7,9 @@
 #include <array>
 
 #include "google/protobuf/io/coded_stream.h"
-#include "google/protobuf/message.h"
 #include "google/protobuf/wire_format_lite.h"
 
-#include "tissueform/v1/access_service.pb.h"
-#include "tissueform/v1/case_service.pb.h"
-#include "tissueform/v1/deform_service.pb.h"
-#include "tissueform/v1/export_service.pb.h"
-#include "tissueform/v1/mesh_service.pb.h"
-#include "tissueform/v1/plan_service.pb.h"
-#include "tissueform/v1/prediction_service.pb.h"
-#include "tissueform/v1/server_info.pb.h"
-#include "tissueform/v1/session_service.pb.h"
+#include "proto/services/service_list.h"
 
 namespace tissueform {
 namespace {
@@ -38,25 +29,16 @@ constexpr std::array<absl::string_view, 5> kDownloads = {
     "tissueform.v1.PredictionService.ComparePredictions",
     "tissueform.v1.DeformService.GetPreparedAnswers"};
 
-// Descriptors of files that nobody names are left out by the linker.
-void LinkServices() {
-  google::protobuf::LinkMessageReflection<v1::WhoAmIRequest>();
-  google::protobuf::LinkMessageReflection<v1::GetCaseRequest>();
-  google::protobuf::LinkMessageReflection<v1::DeformRequest>();
-  google::protobuf::LinkMessageReflection<v1::GetExportRequest>();
-  google::protobuf::LinkMessageReflection<v1::GetMeshRequest>();
-  google::protobuf::LinkMessageReflection<v1::FitRequest>();
-  google::protobuf::LinkMessageReflection<v1::GetPredictionRequest>();
-  google::protobuf::LinkMessageReflection<v1::GetServerInfoRequest>();
-  google::protobuf::LinkMessageReflection<v1::GetSessionRequest>();
-}
-
 const MethodDescriptor* Find(absl::string_view method) {
-  LinkServices();
   if (method.empty()) return nullptr;
   std::string name(method.substr(1));
   std::replace(name.begin(), name.end(), '/', '.');
-  return google::protobuf::DescriptorPool::generated_pool()->FindMethodByName(name);
+  for (const google::protobuf::ServiceDescriptor* service : AllServices()) {
+    for (int i = 0; i < service->method_count(); ++i) {
+      if (service->method(i)->full_name() == name) return service->method(i);
+    }
+  }
+  return nullptr;
 }
 
 // Of the message that ends at the stream's limit. False when it is none.

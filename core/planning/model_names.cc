@@ -18,12 +18,6 @@ struct Word {
   Value value;
 };
 
-constexpr std::array<Word<DeformationModel>, 4> kModels = {{
-    {"gradient_field", DeformationModel::kGradientField},
-    {"arap", DeformationModel::kArap},
-    {"linear_elastic", DeformationModel::kLinearElastic},
-    {"neo_hookean", DeformationModel::kNeoHookean},
-}};
 constexpr std::array<Word<RotationMode>, 3> kRotations = {{
     {"propagated", RotationMode::kPropagated},
     {"estimated", RotationMode::kEstimated},
@@ -47,14 +41,19 @@ std::string Names(const Words& words) {
   return absl::StrJoin(names, " or ");
 }
 
+template <typename Words>
+absl::Status UnknownName(const Words& words, absl::string_view name, absl::string_view key) {
+  return absl::InvalidArgumentError(
+      absl::StrCat("there is no ", key, " \"", name, "\"; use ", Names(words)));
+}
+
 template <typename Value, size_t N>
 absl::StatusOr<Value> Find(const std::array<Word<Value>, N>& words, absl::string_view name,
                            absl::string_view key) {
   for (const Word<Value>& word : words) {
     if (word.name == name) return word.value;
   }
-  return absl::InvalidArgumentError(
-      absl::StrCat("there is no ", key, " \"", name, "\"; use ", Names(words)));
+  return UnknownName(words, name, key);
 }
 
 template <typename Value, size_t N>
@@ -69,16 +68,18 @@ std::string NameOf(const std::array<Word<Value>, N>& words, Value value) {
 
 std::vector<std::string> KnownModelNames() {
   std::vector<std::string> names;
-  names.reserve(kModels.size());
-  for (const auto& word : kModels) names.emplace_back(word.name);
+  for (const ModelTraits& traits : AllModels()) names.emplace_back(traits.name);
   return names;
 }
 
 absl::StatusOr<DeformationModel> ModelFromName(absl::string_view name) {
-  return Find(kModels, name, "model");
+  for (const ModelTraits& traits : AllModels()) {
+    if (traits.name == name) return traits.model;
+  }
+  return UnknownName(AllModels(), name, "model");
 }
 
-std::string ModelName(DeformationModel model) { return NameOf(kModels, model); }
+std::string ModelName(DeformationModel model) { return std::string(TraitsOf(model).name); }
 
 absl::StatusOr<RotationMode> RotationModeFromName(absl::string_view name) {
   return Find(kRotations, name, "gradient_field.rotation");

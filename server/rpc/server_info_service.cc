@@ -4,30 +4,23 @@
 #include "server/rpc/server_info_service.h"
 
 #include "absl/status/status.h"
-#include "absl/strings/ascii.h"
-#include "absl/strings/strip.h"
 
 #include "core/base/software_version.h"
+#include "core/mechanics/deformation/model.h"
 #include "proto/conversion/geometry_conversion.h"
+#include "proto/conversion/model_conversion.h"
 
 namespace tissueform {
 namespace {
 
 int64_t Milliseconds(std::chrono::milliseconds duration) { return duration.count(); }
 
-// DEFORMATION_MODEL_LINEAR_ELASTIC is the linear_elastic of plans.
-std::string PlanName(v1::DeformationModel model) {
-  return absl::AsciiStrToLower(
-      absl::StripPrefix(v1::DeformationModel_Name(model), "DEFORMATION_MODEL_"));
-}
-
-void AddModel(v1::DeformationModel model, bool iterates, bool has_prepared_answers,
-              v1::ServerInfo* info) {
+void AddModel(const ModelTraits& traits, v1::ServerInfo* info) {
   v1::ModelInfo* proto = info->add_models();
-  proto->set_model(model);
-  proto->set_name(PlanName(model));
-  proto->set_iterates(iterates);
-  proto->set_has_prepared_answers(has_prepared_answers);
+  proto->set_model(ToProto(traits.model));
+  proto->set_name(std::string(traits.name));
+  proto->set_iterates(traits.iterates);
+  proto->set_has_prepared_answers(traits.has_prepared_answers);
 }
 
 // Those that a request may name: conversion decides, not a second list.
@@ -87,10 +80,7 @@ ServerInfoService::ServerInfoService(ServiceGate* gate, const NamedLimits& limit
     limit->set_name(name);
     limit->set_value(value);
   }
-  AddModel(v1::DEFORMATION_MODEL_GRADIENT_FIELD, false, true, &info_);
-  AddModel(v1::DEFORMATION_MODEL_ARAP, true, false, &info_);
-  AddModel(v1::DEFORMATION_MODEL_LINEAR_ELASTIC, false, true, &info_);
-  AddModel(v1::DEFORMATION_MODEL_NEO_HOOKEAN, true, true, &info_);
+  for (const ModelTraits& traits : AllModels()) AddModel(traits, &info_);
   AddEncodings(&info_);
 }
 

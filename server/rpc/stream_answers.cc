@@ -47,8 +47,7 @@ absl::StatusOr<ResponseRequest> ReadResponse(const v1::PreparedAnswers& settings
     TF_ASSIGN_OR_RETURN(request.ranges,
                         ToMaterialUncertainty(settings.ranges(), session.mesh().mesh.num_tets(),
                                               session.poisson_ratio()));
-    if (configuration.model != DeformationModel::kLinearElastic &&
-        configuration.model != DeformationModel::kNeoHookean) {
+    if (!TraitsOf(configuration.model).is_elastic) {
       return absl::InvalidArgumentError(
           "prepared.ranges are of linear_elastic and neo_hookean; choose one of them, or leave "
           "them out");

@@ -130,10 +130,7 @@ bool Session::HasModel(DeformationModel model) const {
 }
 
 Lane Session::LaneOf(DeformationModel model) const {
-  const bool one_solve = model == DeformationModel::kLinearElastic ||
-                         (model == DeformationModel::kGradientField &&
-                          options_.gradient_field.rotation != RotationMode::kEstimated);
-  return one_solve ? Lane::kSolves : Lane::kIterations;
+  return Iterates(model, options_.gradient_field) ? Lane::kIterations : Lane::kSolves;
 }
 
 absl::Status Session::PrepareModel(DeformationModel model, const Cancellation& cancellation) {

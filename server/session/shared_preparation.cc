@@ -39,12 +39,8 @@ int64_t ElasticBytesBesideFactor(int64_t num_vertices) {
   return num_vertices * kPerVertex;
 }
 
-bool IsElastic(DeformationModel model) {
-  return model == DeformationModel::kLinearElastic || model == DeformationModel::kNeoHookean;
-}
-
 // Topics of the feed. Models of one factor share one: it is what takes the time.
-size_t TopicOf(DeformationModel model) { return IsElastic(model) ? 1 : 0; }
+size_t TopicOf(DeformationModel model) { return TraitsOf(model).is_elastic ? 1 : 0; }
 size_t TopicOf(const ResponseRequest& request) {
   return absl::HashOf(request.model, request.vertices, request.tolerance_mm,
                       request.max_rotation_rad);
@@ -86,7 +82,7 @@ int64_t SharedPreparation::BytesBesideFactor(const DeformerOptions& options) con
   const int64_t tets = preparation_->mesh().num_tets();
   const int64_t laplacian =
       LaplacianBytesBesideFactor(vertices, tets, NumHandles(preparation_->constraints()));
-  if (IsElastic(options.model)) {
+  if (TraitsOf(options.model).is_elastic) {
     return preparation_->has_elastic() ? ModelBytes(vertices, tets)
                                        : laplacian + ElasticBytesBesideFactor(vertices);
   }

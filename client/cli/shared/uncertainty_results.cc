@@ -18,10 +18,7 @@
 namespace tissueform {
 namespace {
 
-bool IsElastic(const PlanProblem& problem) {
-  return problem.deformer.model == DeformationModel::kLinearElastic ||
-         problem.deformer.model == DeformationModel::kNeoHookean;
-}
+bool IsElastic(const PlanProblem& problem) { return TraitsOf(problem.deformer.model).is_elastic; }
 
 absl::StatusOr<MaterialExpansion> Expand(const PlanProblem& problem, const Positions& deformed,
                                          MeshPreparation* preparation) {

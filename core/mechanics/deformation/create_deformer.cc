@@ -20,6 +20,22 @@ absl::StatusOr<std::unique_ptr<Deformer>> CreateGradientField(
 
 }  // namespace
 
+bool Iterates(DeformationModel model, const GradientFieldOptions& gradient_field) {
+  return TraitsOf(model).iterates || (model == DeformationModel::kGradientField &&
+                                      gradient_field.rotation == RotationMode::kEstimated);
+}
+
+bool HasPreparedAnswers(DeformationModel model, const GradientFieldOptions& gradient_field) {
+  const bool settings_have = model != DeformationModel::kGradientField ||
+                             (gradient_field.rotation == RotationMode::kPropagated &&
+                              gradient_field.guidance == Guidance::kCotangent);
+  return TraitsOf(model).has_prepared_answers && settings_have;
+}
+
+bool HasPreparedAnswers(const DeformerOptions& options) {
+  return HasPreparedAnswers(options.model, options.gradient_field);
+}
+
 absl::StatusOr<std::unique_ptr<Deformer>> CreateDeformer(
     const std::shared_ptr<MeshPreparation>& preparation, const DeformerOptions& options,
     const Cancellation& cancellation) {

@@ -13,12 +13,11 @@
 #include "core/mechanics/deformation/deformer.h"
 #include "core/mechanics/deformation/gradient_field_deformer.h"
 #include "core/mechanics/deformation/mesh_preparation.h"
+#include "core/mechanics/deformation/model.h"
 #include "core/mechanics/deformation/neo_hookean_deformer.h"
 #include "core/mesh/tet_mesh.h"
 
 namespace tissueform {
-
-enum class DeformationModel { kGradientField, kArap, kLinearElastic, kNeoHookean };
 
 // The model and the options of every model in one place, so that plans, sessions and tests choose a
 // model in one way.
@@ -29,6 +28,13 @@ struct DeformerOptions {
   ArapOptions arap;
   NeoHookeanOptions neo_hookean;
 };
+
+// Whether the model with these settings needs several linear solves for an answer.
+bool Iterates(DeformationModel model, const GradientFieldOptions& gradient_field);
+
+// Whether the model with these settings has prepared answers (core/mechanics/prepared_answers).
+bool HasPreparedAnswers(DeformationModel model, const GradientFieldOptions& gradient_field);
+bool HasPreparedAnswers(const DeformerOptions& options);
 
 // The one switch over models. Models made from one preparation share what it holds;
 // `options.preparation` is not read. `cancellation` is asked between the stages.

@@ -9,13 +9,6 @@
 
 namespace tissueform {
 
-bool HasPreparedAnswers(DeformationModel model, const GradientFieldOptions& gradient_field) {
-  return model == DeformationModel::kLinearElastic || model == DeformationModel::kNeoHookean ||
-         (model == DeformationModel::kGradientField &&
-          gradient_field.rotation == RotationMode::kPropagated &&
-          gradient_field.guidance == Guidance::kCotangent);
-}
-
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponse(
     const std::shared_ptr<MeshPreparation>& preparation, const std::vector<int32_t>& vertices,
     const ResponseOptions& options, const Cancellation& cancellation) {

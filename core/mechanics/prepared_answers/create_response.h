@@ -12,8 +12,8 @@
 
 #include "core/base/cancellation.h"
 #include "core/base/preparation_progress.h"
-#include "core/mechanics/deformation/create_deformer.h"
 #include "core/mechanics/deformation/mesh_preparation.h"
+#include "core/mechanics/deformation/model.h"
 #include "core/mechanics/prepared_answers/vertex_response.h"
 
 namespace tissueform {
@@ -29,10 +29,6 @@ struct ResponseOptions {
   FactorAdmission admission = nullptr;
   PreparationObserver observer = nullptr;
 };
-
-// Of the models gradient_field with propagated rotations and cotangent guidance, linear_elastic and
-// neo_hookean.
-bool HasPreparedAnswers(DeformationModel model, const GradientFieldOptions& gradient_field);
 
 // The one switch over prepared answers. REQUIRES: HasPreparedAnswers.
 //

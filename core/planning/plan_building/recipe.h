@@ -18,7 +18,7 @@
 #include "core/imaging/ct/ct_volume_reader.h"
 #include "core/imaging/metal/metal_reduction.h"
 #include "core/mechanics/constraints/handle_pose.h"
-#include "core/mechanics/deformation/create_deformer.h"
+#include "core/mechanics/deformation/model.h"
 
 namespace tissueform {
 
