@@ -16,14 +16,14 @@
 FROM debian:12 AS builder
 COPY deploy /src/deploy
 WORKDIR /src
-RUN deploy/install_packages.sh build && rm -rf /var/lib/apt/lists/*
+RUN deploy/install_packages.sh build web && rm -rf /var/lib/apt/lists/*
 COPY . .
 ARG JOBS
 # The secret, which need not be there: authorities that npm shall trust beside its own, where a proxy looks into TLS.
 RUN --mount=type=secret,id=authorities \
     if [ -e /run/secrets/authorities ]; then export NODE_EXTRA_CA_CERTS=/run/secrets/authorities; fi \
     && deploy/build_web.sh \
-    && deploy/build.sh release tissueform-server tissueform-gateway \
+    && TISSUEFORM_BUILD_DIR=/src/build/release deploy/build.sh programs tissueform-server tissueform-gateway \
     && deploy/build_packages.sh /packages tissueform-server tissueform-gateway
 
 FROM debian:12-slim

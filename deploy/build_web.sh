@@ -55,7 +55,7 @@ fi
 if ! is_newer "$generated/multiply_columns.ts" "$generated/made" "$web/wasm/multiply_columns.cc"; then
   # wasm-ld is in Debian's lld.
   if ! command -v clang++ >/dev/null || ! command -v wasm-ld >/dev/null; then
-    deploy/install_packages.sh build
+    deploy/install_packages.sh build web
   fi
   module=$(mktemp)
   clang++ --target=wasm32 -msimd128 -O3 -std=c++20 -ffreestanding -fno-exceptions -fno-rtti -nostdlib -Wall -Wextra -Werror \

@@ -21,7 +21,7 @@ build_what_is_missing() {
   local program
   for program in tissueform tissueform-server tissueform-gateway; do
     if [[ ! -x $TISSUEFORM_BUILD_DIR/bin/$program ]]; then
-      deploy/install_packages.sh build
+      deploy/install_packages.sh build test web
       deploy/build.sh release tissueform tissueform-online tissueform-load tissueform-server tissueform-gateway
       return
     fi

@@ -24,5 +24,5 @@ for option in "$@"; do
     deploy/build_web.sh
   fi
 done
-deploy/build.sh release "${targets[@]}"
+deploy/build.sh programs "${targets[@]}"
 exec "$TISSUEFORM_BUILD_DIR/bin/tissueform" demo "$@"

@@ -4,12 +4,12 @@
 #
 # Installs those packages of deploy/packages.txt that are missing; does nothing where none is.
 #
-#   deploy/install_packages.sh [build|run|lint|protocol]...     build, run and lint without an argument
+#   deploy/install_packages.sh [build|test|web|run|lint|protocol]...     all but protocol without an argument
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 list=deploy/packages.txt
-purposes=" ${*:-build run lint} "
+purposes=" ${*:-build test web run lint} "
 
 wanted=()
 while read -r package purpose _; do
@@ -18,7 +18,7 @@ while read -r package purpose _; do
   fi
 done <"$list"
 if [[ ${#wanted[@]} -eq 0 ]]; then
-  echo "install_packages.sh: no package is for:$purposes(known: build run lint protocol)" >&2
+  echo "install_packages.sh: no package is for:$purposes(known: build test web run lint protocol)" >&2
   exit 2
 fi
 

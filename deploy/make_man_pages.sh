@@ -17,7 +17,7 @@ commands=(
   "tissueform"
   "tissueform mesh check" "tissueform mesh generate"
   "tissueform plan build" "tissueform plan check" "tissueform plan fit" "tissueform case pack" "tissueform export"
-  "tissueform deform" "tissueform run" "tissueform demo" "tissueform load" "tissueform server-info" "tissueform doctor" "tissueform compare" "tissueform experiments" "tissueform bench"
+  "tissueform deform" "tissueform run" "tissueform demo" "tissueform server-info" "tissueform doctor" "tissueform compare"
   "tissueform login" "tissueform logout" "tissueform token" "tissueform token keygen" "tissueform token make" "tissueform token show"
   "tissueform-server" "tissueform-gateway" "tissueform-pacs"
 )

@@ -13,7 +13,7 @@ cd "$(dirname "$0")/.."
 export TISSUEFORM_BUILD_DIR=${TISSUEFORM_BUILD_DIR:-$PWD/build/release}
 jobs=${JOBS:-$(nproc)}
 
-deploy/install_packages.sh build
+deploy/install_packages.sh build test web
 deploy/build.sh release
 deploy/build_web.sh
 exec ctest --test-dir "$TISSUEFORM_BUILD_DIR" --output-on-failure --no-tests=error --parallel "$jobs" "$@"

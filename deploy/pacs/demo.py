@@ -131,7 +131,7 @@ def main():
     words = parser.parse_args()
     missing = stack.missing_programs()
     if missing:
-        sys.exit(f"missing: {', '.join(missing)}; deploy/install_packages.sh build installs them")
+        sys.exit(f"missing: {', '.join(missing)}; deploy/install_packages.sh test installs them")
     # Whoever ends this ends what it has started: also by SIGTERM, and where a shell has it pass over Ctrl-C.
     signal.signal(signal.SIGTERM, end_once)
     signal.signal(signal.SIGINT, signal.default_int_handler)

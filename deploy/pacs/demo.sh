@@ -19,7 +19,7 @@ cd "$(dirname "$0")/../.."
 export TISSUEFORM_BUILD_DIR=${TISSUEFORM_BUILD_DIR:-$PWD/build/release}
 
 if [[ " $* " != *" --help "* && " $* " != *" -h "* ]]; then
-  deploy/install_packages.sh build
+  deploy/install_packages.sh build test web
   deploy/build_web.sh
   deploy/build.sh release tissueform tissueform-server tissueform-gateway tissueform-pacs
 fi

@@ -13,12 +13,27 @@
 #include "core/base/status_macros.h"
 
 namespace tissueform {
+namespace {
+
+absl::Status NotInstalled(const CompanionCommand& companion) {
+  return absl::NotFoundError(absl::StrCat(
+      "`", companion.name, "` is for developers and is not installed here; build the target ",
+      companion.program, " from source"));
+}
+
+}  // namespace
 
 void AddCompanionCommand(CLI::App& app, const CompanionCommand& companion,
                          std::vector<std::string> words, CommandWork* work) {
   CLI::App* command = app.add_subcommand(companion.name, companion.description);
   command->prefix_command();
   command->set_help_flag();
+  if (companion.is_lab && !FindProgram(companion.program).ok()) {
+    command->group("");  // not in the help
+    command->callback(
+        [companion, work] { *work = [companion] { return NotInstalled(companion); }; });
+    return;
+  }
   command->callback([program = std::string(companion.program), words = std::move(words), work] {
     *work = [program, words] { return BecomeProgram(program, words); };
   });

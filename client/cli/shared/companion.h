@@ -16,6 +16,7 @@ struct CompanionCommand {
   const char* name;
   const char* description;
   const char* program;  // tissueform-NAME
+  bool is_lab = false;  // of client/lab, which packages leave out
 };
 
 inline constexpr CompanionCommand kRunCommand = {"run", "predict through a tissueform-server",
@@ -25,10 +26,10 @@ inline constexpr CompanionCommand kDemoCommand = {
     "tissueform-online"};
 inline constexpr CompanionCommand kLoadCommand = {
     "load", "drag many sessions of a server at once and report the age of the frames",
-    "tissueform-load"};
+    "tissueform-load", true};
 inline constexpr CompanionCommand kBenchCommand = {
     "bench", "measure on this machine against the libraries one would use instead",
-    "tissueform-benchmarks"};
+    "tissueform-benchmarks", true};
 inline constexpr CompanionCommand kDragCommand = {
     "drag", "drag on a server, to and fro; goes on when the server is started again",
     "tissueform-online"};
@@ -66,10 +67,11 @@ inline constexpr CompanionCommand kLogoutCommand = {
     "logout", "remove the token that `login` has left", "tissueform-online"};
 inline constexpr CompanionCommand kExperimentsCommand = {
     "experiments", "compute the paper's figures and table again, and the models' accuracy",
-    "tissueform-experiments"};
+    "tissueform-experiments", true};
 
 // Adds the command to `app`; all that follows its name, --help too, is left to the companion, which
-// is given the words of this process's command line.
+// is given the words of this process's command line. A command of the laboratory whose program is
+// not installed is left out of the help, and says so when it is used.
 void AddCompanionCommand(CLI::App& app, const CompanionCommand& companion,
                          std::vector<std::string> words, CommandWork* work);
 
