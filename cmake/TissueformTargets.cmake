@@ -150,16 +150,19 @@ function(tissueform_helper name)
   target_link_options(${name} PRIVATE -Wl,--as-needed)
 endfunction()
 
-# tissueform_test(core_mesh SOURCES tet_mesh_test.cc DEPS core_mesh LABELS server)
+# tissueform_test(core_mesh SOURCES tet_mesh_test.cc DEPS core_mesh LABELS server SHARDS 4)
 #
-# One test program a folder, named core_mesh_test; ctest sees every test of it by itself. The targets tests-server
-# and tests-inputs build the programs with these labels: the server; what reads from outside. FIXTURE: what ctest makes
-# before (tests/client/web).
+# One test program a folder, named core_mesh_test, and one entry of ctest, core_mesh: what the tests of a suite share is made
+# once, and a program starts once. SHARDS n: n entries core_mesh.1 to core_mesh.n, each with a part of the tests, for programs
+# that would otherwise end last. Results with the time of each test: test_results/NAME.xml in the build folder.
+# The targets tests-server and tests-inputs build the programs with these labels: the server; what reads from outside. Tests
+# with the label `full` are left to .ci/full; the line before them gives the reason. FIXTURE: what ctest makes before
+# (tests/client/web).
 #
-# WHOLE PROGRAM ARGUMENTS: the test program is run once, as a whole, by that program, which makes what all its tests need;
-# where it is not installed without it: tests that need it are skipped then.
+# WRAPPER PROGRAM ARGUMENTS: that program starts the test program and makes what its tests need. Where it is not installed,
+# the test program runs without it and skips those tests.
 function(tissueform_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT;PRECOMPILED;FIXTURE" "SOURCES;DEPS;LABELS;WHOLE" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT;PRECOMPILED;FIXTURE;SHARDS" "SOURCES;DEPS;LABELS;WRAPPER" ${ARGN})
   if(NOT ARG_PRECOMPILED)
     set(ARG_PRECOMPILED test)
   endif()
@@ -170,48 +173,46 @@ function(tissueform_test name)
   _tissueform_resolve(deps ${ARG_DEPS})
   target_link_libraries(${target} PRIVATE ${deps} GTest::gmock GTest::gtest_main)
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
-  if(NOT ARG_TIMEOUT)
-    set(ARG_TIMEOUT 120)
-  endif()
-  # Scratch files lie in the build folder, so that two builds may run their tests at the same time.
-  set(scratch "${PROJECT_BINARY_DIR}/test_scratch")
-  file(MAKE_DIRECTORY "${scratch}")
-  # Two properties, since gtest_discover_tests takes no list as a value. Paths come at run time and not as macros, so that
-  # two checkouts compile the same (tests/testing/test_paths.h).
-  set(properties TIMEOUT ${ARG_TIMEOUT} ENVIRONMENT "TEST_TMPDIR=${scratch}/"
-      ENVIRONMENT_MODIFICATION "TISSUEFORM_SOURCE_DIR=set:${PROJECT_SOURCE_DIR}")
-  if(ARG_LABELS)
-    list(APPEND properties LABELS "${ARG_LABELS}")
-  endif()
-  if(ARG_FIXTURE)
-    list(APPEND properties FIXTURES_REQUIRED "${ARG_FIXTURE}")
-  endif()
   foreach(label IN LISTS ARG_LABELS)
     if(NOT TARGET tests-${label})
       add_custom_target(tests-${label})
     endif()
     add_dependencies(tests-${label} ${target})
   endforeach()
-  if(ARG_WHOLE)
-    _tissueform_whole_test(${name} "${ARG_WHOLE}" ${properties})
-    return()
+  if(ARG_SHARDS)
+    foreach(shard RANGE 1 ${ARG_SHARDS})
+      math(EXPR index "${shard} - 1")
+      _tissueform_add_test(${name}.${shard} ${target} "GTEST_TOTAL_SHARDS=set:${ARG_SHARDS};GTEST_SHARD_INDEX=set:${index}")
+    endforeach()
+  else()
+    _tissueform_add_test(${name} ${target} "")
   endif()
-  # A parameter is called by its generator's name: its "pretty value" is the bytes of a struct, with addresses.
-  gtest_discover_tests(${target} TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST NO_PRETTY_VALUES
-                       DISCOVERY_TIMEOUT 60 PROPERTIES ${properties})
 endfunction()
 
-function(_tissueform_whole_test name whole)
-  list(POP_FRONT whole program)
-  find_program(TISSUEFORM_${program} ${program})
-  set(command "$<TARGET_FILE:${name}_test>")
-  if(TISSUEFORM_${program})
-    set(command "${TISSUEFORM_${program}}" ${whole} "${command}")
+# One entry of ctest; reads the arguments of tissueform_test. Scratch files are in the build folder, so that two builds may run
+# their tests at the same time. Paths come at run time and not as macros, so that two checkouts compile the same
+# (tests/testing/test_paths.h).
+function(_tissueform_add_test entry target environment)
+  set(command "$<TARGET_FILE:${target}>")
+  if(ARG_WRAPPER)
+    list(POP_FRONT ARG_WRAPPER program)
+    find_program(TISSUEFORM_${program} ${program})
+    if(TISSUEFORM_${program})
+      set(command "${TISSUEFORM_${program}}" ${ARG_WRAPPER} "${command}")
+    endif()
   endif()
-  add_test(NAME ${name} COMMAND ${command})
-  # Where every test that needs the program was skipped. One at a time: two of pg_virtualenv that start together take the
-  # same port.
-  set_tests_properties(${name} PROPERTIES ${ARGN} RESOURCE_LOCK ${program} SKIP_REGULAR_EXPRESSION "this program with ${program}")
+  set(scratch "${PROJECT_BINARY_DIR}/test_scratch")
+  file(MAKE_DIRECTORY "${scratch}")
+  add_test(NAME ${entry} COMMAND ${command} "--gtest_output=xml:${PROJECT_BINARY_DIR}/test_results/${entry}.xml")
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 900)
+  endif()
+  set_tests_properties(${entry} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}" FIXTURES_REQUIRED "${ARG_FIXTURE}"
+    ENVIRONMENT_MODIFICATION "TEST_TMPDIR=set:${scratch}/;TISSUEFORM_SOURCE_DIR=set:${PROJECT_SOURCE_DIR};${environment}")
+  if(ARG_WRAPPER)
+    # Two of pg_virtualenv that start at the same time take the same port.
+    set_tests_properties(${entry} PROPERTIES RESOURCE_LOCK ${program})
+  endif()
 endfunction()
 
 function(_tissueform_resolve out)

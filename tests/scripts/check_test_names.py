@@ -9,6 +9,7 @@ number where a parameter should be named.
 
 import json
 import os
+import pathlib
 import re
 import subprocess
 import sys
@@ -32,9 +33,28 @@ def faults(names):
     return found
 
 
+def listed(text):
+    """The names in the output of --gtest_list_tests: suites at the margin, their tests below."""
+    names, suite = [], ""
+    for line in text.splitlines():
+        word = line.split("  #")[0].rstrip()
+        if not line.startswith(" "):
+            suite = word
+        elif word:
+            names.append(suite + word.strip())
+    return names
+
+
 def names_of(build):
+    """Of the entries of ctest, and of the tests in each test program once, however many shards it has."""
     listing = subprocess.run(["ctest", "--test-dir", build, "--show-only=json-v1"], check=True, capture_output=True)
-    return [test["name"] for test in json.loads(listing.stdout)["tests"]]
+    entries = json.loads(listing.stdout)["tests"]
+    programs = sorted({word for entry in entries for word in entry.get("command", []) if word.endswith("_test")})
+    names = [entry["name"] for entry in entries if not re.search(r"\.\d+$", entry["name"])]
+    for program in programs:
+        text = subprocess.run([program, "--gtest_list_tests"], check=True, capture_output=True, text=True).stdout
+        names += [f"{pathlib.PurePath(program).name}.{name}" for name in listed(text)]
+    return names
 
 
 def main():
