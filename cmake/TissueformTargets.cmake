@@ -121,13 +121,15 @@ endfunction()
 # tissueform_binary(tissueform INSTALL bin SOURCES main.cc DEPS client_cli_shared)
 #
 # INSTALL bin: users start it; otherwise other programs of ours do (libexec), and find it by FindProgram of core/base/process.
-# Programs of tests/ and of client/lab/ are not installed.
+# Programs of tests/ and of client/lab/ are not installed. The target `programs` builds all of them.
+add_custom_target(programs)
 function(tissueform_binary name)
   cmake_parse_arguments(ARG "" "PRECOMPILED;INSTALL" "SOURCES;DEPS" ${ARGN})
   if(NOT ARG_PRECOMPILED)
     set(ARG_PRECOMPILED library)
   endif()
   add_executable(${name} ${ARG_SOURCES})
+  add_dependencies(programs ${name})
   _tissueform_put_together(${name} ${ARG_SOURCES})
   _tissueform_use_precompiled(${name} ${ARG_PRECOMPILED})
   _tissueform_resolve(deps ${ARG_DEPS})
@@ -194,6 +196,7 @@ endfunction()
 # (tests/testing/test_paths.h).
 function(_tissueform_add_test entry target environment)
   set(command "$<TARGET_FILE:${target}>")
+  set(program "")
   if(ARG_WRAPPER)
     list(POP_FRONT ARG_WRAPPER program)
     find_program(TISSUEFORM_${program} ${program})
@@ -209,7 +212,7 @@ function(_tissueform_add_test entry target environment)
   endif()
   set_tests_properties(${entry} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}" FIXTURES_REQUIRED "${ARG_FIXTURE}"
     ENVIRONMENT_MODIFICATION "TEST_TMPDIR=set:${scratch}/;TISSUEFORM_SOURCE_DIR=set:${PROJECT_SOURCE_DIR};${environment}")
-  if(ARG_WRAPPER)
+  if(program)
     # Two of pg_virtualenv that start at the same time take the same port.
     set_tests_properties(${entry} PROPERTIES RESOURCE_LOCK ${program})
   endif()

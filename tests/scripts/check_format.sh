@@ -2,7 +2,7 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
-# Fails when a C++ file is not as clang-format writes it, or a shell script has a fault that shellcheck sees.
+# Fails when a C++ file is not as clang-format writes it, or a shell script has a fault that shellcheck -x sees.
 #
 #   tests/scripts/check_format.sh [--fix]     --fix writes the C++ files
 set -euo pipefail
@@ -17,4 +17,4 @@ elif ! clang-format --dry-run -Werror "${sources[@]}"; then
   echo "check_format.sh: run tests/scripts/check_format.sh --fix" >&2
   exit 1
 fi
-shellcheck "${scripts[@]}"
+shellcheck -x "${scripts[@]}"

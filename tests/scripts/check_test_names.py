@@ -46,12 +46,12 @@ def listed(text):
 
 
 def names_of(build):
-    """Of the entries of ctest, and of the tests in each test program once, however many shards it has."""
+    """Of the entries of ctest, and of the tests in each test program that is built, once, however many shards it has."""
     listing = subprocess.run(["ctest", "--test-dir", build, "--show-only=json-v1"], check=True, capture_output=True)
     entries = json.loads(listing.stdout)["tests"]
     programs = sorted({word for entry in entries for word in entry.get("command", []) if word.endswith("_test")})
     names = [entry["name"] for entry in entries if not re.search(r"\.\d+$", entry["name"])]
-    for program in programs:
+    for program in filter(os.path.exists, programs):
         text = subprocess.run([program, "--gtest_list_tests"], check=True, capture_output=True, text=True).stdout
         names += [f"{pathlib.PurePath(program).name}.{name}" for name in listed(text)]
     return names

@@ -2,20 +2,26 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
-# Builds and runs tests under sanitizers; ends with ctest's summary.
+# Builds and runs tests under sanitizers; ends with the slowest tests and ctest's summary.
 #
-#   tests/scripts/run_sanitizers.sh asan [options of ctest]          AddressSanitizer, LeakSanitizer and
-#                                                                   UndefinedBehaviorSanitizer, all tests but the oracle's
-#   tests/scripts/run_sanitizers.sh asan-inputs [options of ctest]   the same for the tests with the labels "inputs"
-#                                                                   (what reads from outside) and "server"
-#   tests/scripts/run_sanitizers.sh tsan [options of ctest]          ThreadSanitizer, tests with the label "server"
+#   tests/scripts/run_sanitizers.sh RUN [--since COMMIT] [options of ctest]
+#
+# RUN   asan          AddressSanitizer, LeakSanitizer and UndefinedBehaviorSanitizer: all tests but the oracle's
+#       asan-inputs   the same for the tests with the labels "inputs" (what reads from outside) and "server"
+#       tsan          ThreadSanitizer: the tests with the label "server"
+# --since COMMIT      of these only what the changes since that commit can affect (tests/scripts/select_tests.py)
 #
 # TISSUEFORM_BUILD_DIR and JOBS: see deploy/build.sh.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-run=${1:?usage: run_sanitizers.sh asan|asan-inputs|tsan [options of ctest]}
+run=${1:?usage: run_sanitizers.sh asan|asan-inputs|tsan [--since COMMIT] [options of ctest]}
 shift
+since=
+if [[ ${1:-} == --since ]]; then
+  since=${2:?usage: run_sanitizers.sh RUN --since COMMIT}
+  shift 2
+fi
 preset=${run%-inputs}
 export TISSUEFORM_BUILD_DIR=${TISSUEFORM_BUILD_DIR:-$PWD/build/$preset}
 suppressions=$PWD/tests/testing
@@ -36,11 +42,12 @@ case $run in
     LSAN_OPTIONS="print_suppressions=0$(with_suppressions lsan.supp)"
     export ASAN_OPTIONS UBSAN_OPTIONS LSAN_OPTIONS
     targets=()
-    # CalculiX is no code of ours, and what it is compared with runs in other tests, too.
+    # CalculiX is not our code, and what is compared with it also runs in other tests.
     selection=(--label-exclude '^oracle$')
+    labels=
     if [[ $run == asan-inputs ]]; then
       targets=(tests-inputs tests-server)
-      selection+=(--label-regex '^(inputs|server)$')
+      labels='^(inputs|server)$'
     fi
     ;;
   tsan)
@@ -49,7 +56,8 @@ case $run in
     TSAN_OPTIONS+=$(with_suppressions tsan.supp)
     export TSAN_OPTIONS
     targets=(tests-server)
-    selection=(--label-regex '^server$')
+    selection=()
+    labels='^server$'
     ;;
   *)
     echo "run_sanitizers.sh: asan, asan-inputs or tsan, not '$run'" >&2
@@ -57,11 +65,28 @@ case $run in
     ;;
 esac
 
-deploy/build.sh "$preset" "${targets[@]}"
-# A folder that another compiler made is made anew by CMake, without what the preset says.
-if ! grep -q '^TISSUEFORM_SANITIZE:[A-Z]*=.' "$TISSUEFORM_BUILD_DIR/CMakeCache.txt"; then
-  echo "run_sanitizers.sh: $TISSUEFORM_BUILD_DIR is no build with a sanitizer; delete it and try again" >&2
+[[ -z $labels ]] || selection+=(--label-regex "$labels")
+build=$TISSUEFORM_BUILD_DIR
+cmake --preset "$preset" -B "$build"
+if [[ -n $since ]]; then
+  mapfile -t targets < <(tests/scripts/select_tests.py targets "$build" "$since" "$labels")
+  tests=$(tests/scripts/select_tests.py tests "$build" "$since" "$labels" | sed 's/[.]/[.]/g' | paste -sd '|')
+  if [[ -z $tests ]]; then
+    echo "NOT run: $run: the changes since $since affect none of its tests"
+    exit 0
+  fi
+  selection+=(--tests-regex "^($tests)\$")
+fi
+cmake --build "$build" --parallel "${JOBS:-$(nproc)}" ${targets[0]:+--target "${targets[@]}"}
+# CMake makes a folder of another compiler again from the start, without what the preset says.
+if ! grep -q '^TISSUEFORM_SANITIZE:[A-Z]*=.' "$build/CMakeCache.txt"; then
+  echo "run_sanitizers.sh: $build is not a build with a sanitizer; delete it and try again" >&2
   exit 1
 fi
-exec ctest --test-dir "$TISSUEFORM_BUILD_DIR" --output-on-failure --no-tests=error \
-  --parallel "${JOBS:-$(nproc)}" "${selection[@]}" "$@"
+rm -rf "$build/test_results"
+mkdir -p "$build/test_results"
+outcome=0
+ctest --test-dir "$build" --output-on-failure --no-tests=error --parallel "${JOBS:-$(nproc)}" \
+  --output-junit "$build/test_results/ctest.xml" "${selection[@]}" "$@" || outcome=$?
+tests/scripts/test_summary.py "$build/test_results"
+exit "$outcome"
