@@ -74,6 +74,24 @@ def run(words, cwd=None, codes=(0,)):
 
 # --- What is compared -----------------------------------------------------------------------------------------------
 
+def chunks_of(path):
+    """The chunks of a GLB file, by their type: the JSON text and the numbers (glTF 2.0, section 4.4)."""
+    data, chunks, at = path.read_bytes(), {}, 12
+    if data[:4] != b"glTF":
+        raise Failure(f"{path}: not a GLB file")
+    while at < len(data):
+        length, kind = int.from_bytes(data[at:at + 4], "little"), data[at + 4:at + 8]
+        chunks[kind], at = data[at + 8:at + 8 + length], at + 8 + length
+    return chunks
+
+
+def differences_of_scenes(before, now):
+    old, new = chunks_of(before), chunks_of(now)
+    yield from differences_of_json(*(json.loads(chunks[b"JSON"]) for chunks in (old, new)))
+    if old[b"BIN\0"] != new[b"BIN\0"]:
+        yield "the numbers of the scene differ"
+
+
 def arrays_of(path):
     """All number arrays of a result, by name. A string array, as the notice is, is none."""
     reader = vtkSTLReader() if path.suffix == ".stl" else vtkXMLUnstructuredGridReader()
@@ -127,6 +145,8 @@ def differences_of_json(old, new, place=""):
 def differences_of_files(before, now):
     if before.suffix == ".json":
         return differences_of_json(*(json.loads(path.read_text(encoding="utf-8")) for path in (before, now)))
+    if before.suffix == ".glb":
+        return differences_of_scenes(before, now)
     return differences_of_meshes(before, now)
 
 

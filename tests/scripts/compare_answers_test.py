@@ -80,5 +80,25 @@ class JsonTest(unittest.TestCase):
         self.assertEqual(len(self.differences({"a": 1, "b": 1}, {"b": 1.0})), 2)
 
 
+class ScenesTest(unittest.TestCase):
+    def scene(self, name, numbers, text=b'{"a": 1}'):
+        path = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory())) / name
+        chunks = b"".join(len(data).to_bytes(4, "little") + kind + data for kind, data in ((b"JSON", text), (b"BIN\0", numbers)))
+        path.write_bytes(b"glTF" + (2).to_bytes(4, "little") + (12 + len(chunks)).to_bytes(4, "little") + chunks)
+        return path
+
+    def test_a_changed_byte_or_text_is_a_difference(self):
+        before = self.scene("a.glb", b"1234")
+        self.assertEqual(list(compare_answers.differences_of_files(before, self.scene("b.glb", b"1234"))), [])
+        self.assertEqual(len(list(compare_answers.differences_of_files(before, self.scene("b.glb", b"1235")))), 1)
+        self.assertEqual(len(list(compare_answers.differences_of_files(before, self.scene("b.glb", b"1234", b'{"a": 2}')))), 1)
+
+    def test_another_file_is_named(self):
+        path = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory())) / "a.glb"
+        path.write_bytes(b"solid a")
+        with self.assertRaises(compare_answers.Failure):
+            compare_answers.chunks_of(path)
+
+
 if __name__ == "__main__":
     unittest.main()
