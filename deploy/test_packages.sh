@@ -99,7 +99,7 @@ inside runuser -u tissueform -- tissueform-server backup /tmp/backup --config /e
 ok "the running server is backed up by its own user"
 
 if [[ ${installed[*]} == *tissueform-pacs* ]]; then
-  bridge=(tissueform-pacs run --config /etc/tissueform/pacs.ini --server "$server" --listen 127.0.0.1:0 --worklist-listen 127.0.0.1:0 --quiet-seconds 2)
+  bridge=(tissueform-pacs run --config /etc/tissueform/pacs.ini --server "$server" --listen 127.0.0.1:0 --review-listen 127.0.0.1:0 --quiet-seconds 2)
   start bridge tissueform-pacs "${bridge[@]}"
   /usr/bin/python3 -B deploy/pacs/head_series.py "$scratch/series" >/dev/null
   storescu -aet SCANNER -aec TISSUEFORM +sd "${address%:*}" "${address##*:}" "$scratch/series" 2>"$scratch/storescu.log" || fail "the bridge takes no images"

@@ -30,9 +30,9 @@ absl::Status TakeMessage(const v1::GetPreparedAnswersResponse& message, FetchedA
   if (message.has_header()) {
     fetched->header = message.header();
     const int64_t total = message.header().total_bytes();
-    if (total < 0 || total > static_cast<int64_t>(kMostAnswerBytes)) {
+    if (total < 0 || total > static_cast<int64_t>(kMaxAnswerBytes)) {
       return absl::DataLossError(absl::StrCat("the prepared answers have ", total,
-                                              " bytes; at most ", kMostAnswerBytes, " are read"));
+                                              " bytes; at most ", kMaxAnswerBytes, " are read"));
     }
     return absl::OkStatus();
   }

@@ -47,7 +47,7 @@ void SessionAttempts::Succeeded(const grpc::ClientContext& context) const {
 std::optional<std::chrono::milliseconds> SessionAttempts::AfterError(const absl::Status& error) {
   routes_->LearnFrom(error, session_);
   node_ = NodeIn(error);
-  if (!node_.empty() && hops_ < kMostHops) {
+  if (!node_.empty() && hops_ < kMaxHops) {
     ++hops_;
     return kAtOnce;
   }

@@ -28,7 +28,7 @@ enum class CallRepeat {
 };
 
 // How often one call goes to the server that an error names without waiting in between.
-inline constexpr int kMostHops = 4;
+inline constexpr int kMaxHops = 4;
 // For how long a call is tried again while a server of a cluster is away: until another one may
 // hold its sessions, which takes 10 s, and has prepared them.
 inline constexpr std::chrono::milliseconds kFailoverPatience{30'000};
@@ -37,7 +37,7 @@ inline constexpr std::chrono::milliseconds kNoPatience{0};
 // The attempts of one call that may concern a session. What is decided after each:
 //
 //   error                                       at a cluster's servers           at a server alone
-//   SESSION_MOVED, MEMORY_BUDGET_FULL + node    there, at once; kMostHops times  (never said)
+//   SESSION_MOVED, MEMORY_BUDGET_FULL + node    there, at once; kMaxHops times  (never said)
 //   SESSION_MOVED without node                  at once, then after a wait       (never said)
 //   WRONG_NODE, SERVER_DRAINING                 after a wait                     over
 //   UNAVAILABLE, UNKNOWN, INTERNAL              after a wait if kAlways          over

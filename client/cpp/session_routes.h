@@ -18,7 +18,7 @@
 namespace tissueform {
 
 // The most sessions of which it is remembered where they are.
-inline constexpr size_t kMostSessionRoutes = 10'000;
+inline constexpr size_t kMaxSessionRoutes = 10'000;
 
 // Which server of a cluster answered last for a session: its next call names that server in the
 // header kNodeHeader, and a proxy sends it there. Names of sessions are "sessions/{id}".
@@ -26,7 +26,7 @@ inline constexpr size_t kMostSessionRoutes = 10'000;
 // Keeps the sessions that were used last. Thread-safe.
 class SessionRoutes {
  public:
-  explicit SessionRoutes(size_t most = kMostSessionRoutes) : most_(most) {}
+  explicit SessionRoutes(size_t most = kMaxSessionRoutes) : most_(most) {}
 
   // Empty: not known.
   std::string NodeOf(const std::string& session);

@@ -14,12 +14,12 @@
 namespace tissueform {
 namespace {
 
-constexpr int64_t kMost = std::numeric_limits<int32_t>::max();
+constexpr int64_t kMax = std::numeric_limits<int32_t>::max();
 constexpr int64_t kKibibyte = 1 << 10;
 constexpr int64_t kMebibyte = 1 << 20;
 // A body and a message fit into an int of protobuf's.
-constexpr int64_t kMostMebibytes = 1024;
-constexpr int64_t kMostSeconds = 24 * 3600;
+constexpr int64_t kMaxMebibytes = 1024;
+constexpr int64_t kMaxSeconds = 24 * 3600;
 
 template <typename Target>
 void AddLimit(CLI::App& app, const std::string& name, Target* target, int64_t unit, int64_t most,
@@ -37,7 +37,7 @@ void AddSeconds(CLI::App& app, const std::string& name, std::chrono::seconds* ta
                 const std::string& help) {
   app.add_option_function<int64_t>(
          name, [target](const int64_t& value) { *target = std::chrono::seconds(value); }, help)
-      ->check(CLI::Range(int64_t{1}, kMostSeconds))
+      ->check(CLI::Range(int64_t{1}, kMaxSeconds))
       ->default_str(std::to_string(target->count()))
       ->type_name("INT");
 }
@@ -45,18 +45,18 @@ void AddSeconds(CLI::App& app, const std::string& name, std::chrono::seconds* ta
 void AddLimits(CLI::App& app, GatewayLimits* limits) {
   AddLimit(app, "--max-header-kib", &limits->header_bytes, kKibibyte, 1024,
            "line and header fields of a request; more is answered with 431");
-  AddLimit(app, "--max-message-mib", &limits->message_bytes, kMebibyte, kMostMebibytes,
+  AddLimit(app, "--max-message-mib", &limits->message_bytes, kMebibyte, kMaxMebibytes,
            "a message of a client; more is answered with 413, a WebSocket closed with 1009");
-  AddLimit(app, "--max-answer-mib", &limits->answer_bytes, kMebibyte, kMostMebibytes,
+  AddLimit(app, "--max-answer-mib", &limits->answer_bytes, kMebibyte, kMaxMebibytes,
            "a message of a server; more ends the call with RESOURCE_EXHAUSTED");
-  AddLimit(app, "--max-connections", &limits->connections, 1, kMost,
+  AddLimit(app, "--max-connections", &limits->connections, 1, kMax,
            "connections open at the same time, and no more than the descriptors that the process "
            "may open; others are closed at once");
-  AddLimit(app, "--max-connections-per-address", &limits->connections_per_address, 1, kMost,
+  AddLimit(app, "--max-connections-per-address", &limits->connections_per_address, 1, kMax,
            "of these from one address (IPv6: one network of 64 bits); a proxy in front is one");
-  AddLimit(app, "--max-sockets", &limits->sockets, 1, kMost,
+  AddLimit(app, "--max-sockets", &limits->sockets, 1, kMax,
            "of these that are WebSockets; others are answered with 503");
-  AddLimit(app, "--calls-per-channel", &limits->calls_per_channel, 1, kMost,
+  AddLimit(app, "--calls-per-channel", &limits->calls_per_channel, 1, kMax,
            "calls at the same time on one connection to a server, fewer than it takes (128)");
   AddLimit(app, "--channels-per-server", &limits->channels_per_server, 1, 1024,
            "connections to each server; a call that finds no room on them is refused with "

@@ -21,7 +21,7 @@ namespace tissueform {
 namespace {
 
 constexpr size_t kMaxNodeName = 64;
-constexpr uint32_t kMostPort = 65535;
+constexpr uint32_t kMaxPort = 65535;
 
 bool IsNodeName(absl::string_view name) {
   const auto allowed = [](char c) {
@@ -37,7 +37,7 @@ bool IsAddress(absl::string_view text) {
   const size_t colon = text.rfind(':');
   uint32_t port = 0;
   return colon != absl::string_view::npos && colon > 0 &&
-         absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port <= kMostPort;
+         absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port <= kMaxPort;
 }
 
 absl::Status WrongNode(absl::string_view why) {

@@ -24,7 +24,7 @@ namespace tissueform {
 namespace {
 
 // More than the steps that anything has.
-constexpr int kMostSteps = 16;
+constexpr int kMaxSteps = 16;
 
 // Ctrl-C ends a command at once: each of its steps may be repeated, and its children end with it.
 void UnblockEndingSignals() {
@@ -59,7 +59,7 @@ void PrintPatient(const QueuedStudy& study, const QueuedExport& queued) {
 
 // Until the server is told that it is stored. What has failed for good is told there, too.
 absl::Status StepToTheEnd(ExportWork* work, QueuedExport* queued) {
-  for (int step = 0; step < kMostSteps && queued->state != BridgeExportState::kTold; ++step) {
+  for (int step = 0; step < kMaxSteps && queued->state != BridgeExportState::kTold; ++step) {
     const absl::Status status = work->Step(queued);
     if (queued->state == BridgeExportState::kFailed) {
       if (queued->done_s == 0) work->Step(queued).IgnoreError();
@@ -95,7 +95,7 @@ BridgeCommands::BridgeCommands(CLI::App& app, const BridgeOptions* options) : op
   publish_->add_option("SERIES", name_, "its key")->required();
   store_ = app.add_subcommand("store", "show whose prediction it is, and store it in the PACS");
   store_->add_option("EXPORT", name_, "exports/ID, as `status` shows it")->required();
-  store_->add_flag("--patient-is-right", confirmed_,
+  store_->add_flag("--confirm-patient", confirmed_,
                    "store it: you have compared the patient that was shown");
   status_ = app.add_subcommand("status", "how far everything in the queue is; names no patient");
   status_->add_flag("--json", json_, "as JSON");
@@ -228,7 +228,7 @@ absl::Status BridgeCommands::Store() const {
   PrintPatient(study, queued);
   if (queued.state == BridgeExportState::kAsked) {
     if (!confirmed_) {
-      absl::PrintF("compare, then give --patient-is-right to store it\n");
+      absl::PrintF("compare, then give --confirm-patient to store it\n");
       return absl::OkStatus();
     }
     TF_RETURN_IF_ERROR(exports.Confirm(name_, DigestOf(study.patient)));

@@ -17,8 +17,8 @@
 namespace tissueform {
 namespace {
 
-constexpr int64_t kMostPort = 65535;
-constexpr int64_t kMostSetting = std::numeric_limits<int32_t>::max();
+constexpr int64_t kMaxPort = 65535;
+constexpr int64_t kMaxSetting = std::numeric_limits<int32_t>::max();
 constexpr int64_t kBytesOfMebibyte = 1 << 20;
 
 // One whole number, shown in the unit of its option.
@@ -41,7 +41,7 @@ void AddAddress(CLI::App& app, const std::string& name, std::string* host, int* 
                                  int64_t number = -1;
                                  if (colon == std::string::npos || colon == 0 ||
                                      !absl::SimpleAtoi(text.substr(colon + 1), &number) ||
-                                     number < 0 || number > kMostPort) {
+                                     number < 0 || number > kMaxPort) {
                                    throw CLI::ValidationError(name, "HOST:PORT is needed");
                                  }
                                  *host = text.substr(0, colon);
@@ -72,7 +72,7 @@ void AddReceiver(CLI::App& app, BridgeOptions* options) {
       [receiver](int64_t value) { receiver->max_associations = static_cast<int>(value); },
       "associations at once; who comes later is refused for now");
   AddNumber(
-      app, "--watermark-mib", options->watermark_bytes / kBytesOfMebibyte, 1, kMostSetting,
+      app, "--watermark-mib", options->watermark_bytes / kBytesOfMebibyte, 1, kMaxSetting,
       [options](int64_t value) { options->watermark_bytes = value * kBytesOfMebibyte; },
       "what stays free on the disk; an image that would take it is answered with 0xA700");
   CLI::Option* certificate =
@@ -127,11 +127,11 @@ void AddPlans(CLI::App& app, BridgeOptions* options) {
       [plan](int64_t value) { plan->threads = static_cast<int>(value); },
       "threads of `plan build`; 0: all processors");
   AddNumber(
-      app, "--plan-seconds", plan->max_seconds, 1, kMostSetting,
+      app, "--plan-seconds", plan->max_seconds, 1, kMaxSetting,
       [plan](int64_t value) { plan->max_seconds = static_cast<int>(value); },
       "of processor time, after which `plan build` is ended");
   AddNumber(
-      app, "--plan-memory-mib", plan->max_memory_bytes / kBytesOfMebibyte, 256, kMostSetting,
+      app, "--plan-memory-mib", plan->max_memory_bytes / kBytesOfMebibyte, 256, kMaxSetting,
       [plan](int64_t value) { plan->max_memory_bytes = value * kBytesOfMebibyte; },
       "memory that `plan build` may take");
   app.add_flag("--accept-defects", plan->accept_defects,
@@ -157,20 +157,20 @@ void AddServer(CLI::App& app, BridgeOptions* options) {
       ->type_name("FILE");
 }
 
-void AddWorkList(CLI::App& app, BridgeOptions* options) {
-  WorkListOptions* worklist = &options->worklist;
-  AddAddress(app, "--worklist-listen", &worklist->address, &worklist->port, true,
+void AddReview(CLI::App& app, BridgeOptions* options) {
+  ReviewOptions* review = &options->review;
+  AddAddress(app, "--review-listen", &review->address, &review->port, true,
              "where the work list is served; port 0 takes a free one. It shows names of patients");
   app.add_flag_callback(
-      "--no-worklist", [options] { options->has_worklist = false; },
+      "--no-review", [options] { options->has_review = false; },
       "serve none: exports are confirmed by `tissueform-pacs store`");
-  app.add_option("--worklist-host", worklist->allowed_hosts,
+  app.add_option("--review-host", review->allowed_hosts,
                  "name by which browsers reach it, behind a proxy")
       ->type_name("HOST");
-  app.add_option("--worklist-token-file", worklist->token_file,
+  app.add_option("--review-token-file", review->token_file,
                  "its password (HTTP Basic, any name), mode 0600; needed off loopback")
       ->type_name("FILE");
-  app.add_option("--planner-url", worklist->planner_url,
+  app.add_option("--planner-url", review->planner_url,
                  "the planner, to which the work list links: https://planner.example.org/")
       ->type_name("URL");
 }
@@ -185,7 +185,7 @@ void AddRetention(CLI::App& app, RetentionOptions* retention) {
       [retention](int64_t days) { retention->keep_headers = std::chrono::hours(days * 24); },
       "days for which a header without pixels is kept, for where the PACS gives none");
   AddNumber(
-      app, "--keep-asked", retention->keep_asked.count() / 24, 1, 36500,
+      app, "--keep-pending-days", retention->keep_asked.count() / 24, 1, 36500,
       [retention](int64_t days) { retention->keep_asked = std::chrono::hours(days * 24); },
       "days for which a prediction waits for a person, with its pictures; then it has failed");
   AddNumber(
@@ -205,7 +205,7 @@ void AddBridgeOptions(CLI::App& app, BridgeOptions* options) {
   AddPacs(app, &options->pacs);
   AddPlans(app, options);
   AddServer(app, options);
-  AddWorkList(app, options);
+  AddReview(app, options);
   AddRetention(app, &options->retention);
   app.add_option("--log-level", options->log_level,
                  "what is logged on stderr, by keys of the queue and never by patient")

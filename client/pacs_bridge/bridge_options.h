@@ -41,8 +41,8 @@ struct BridgeOptions {
   std::string server = {};  // HOST:PORT; empty: nothing is published or stored
   ConnectionOptions connection = {};
 
-  WorkListOptions worklist = {};
-  bool has_worklist = true;
+  ReviewOptions review = {};
+  bool has_review = true;
 
   RetentionOptions retention = {};
   std::string log_level = "info";

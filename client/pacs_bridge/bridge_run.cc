@@ -94,11 +94,11 @@ absl::Status Serve(const BridgeOptions& options, BridgeRunKind kind) {
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<StorageReceiver> receiver,
                       StorageReceiver::Start(ReceiverOptionsOf(options), &parts->folder(), &sink));
   absl::PrintF("receiving on %s:%d\n", options.receiver.address, receiver->port());
-  std::unique_ptr<WorkListServer> worklist;
-  if (everything && options.has_worklist) {
-    TF_ASSIGN_OR_RETURN(worklist, WorkListServer::Start(options.worklist, &parts->queue(),
-                                                        [&service] { service.Wake(); }));
-    absl::PrintF("work list on http://%s:%d/\n", options.worklist.address, worklist->port());
+  std::unique_ptr<ReviewServer> review;
+  if (everything && options.has_review) {
+    TF_ASSIGN_OR_RETURN(review, ReviewServer::Start(options.review, &parts->queue(),
+                                                    [&service] { service.Wake(); }));
+    absl::PrintF("work list on http://%s:%d/\n", options.review.address, review->port());
   }
   std::fflush(stdout);
   const SystemdWatchdog watchdog([&service](const std::function<void()>& answered) {

@@ -38,7 +38,7 @@ constexpr char kFooter[] =
     "  tissueform-pacs series                 what came, and why a series was chosen or not\n"
     "  tissueform-pacs build SERIES           make a plan of it all the same\n"
     "  tissueform-pacs publish SERIES         give it to the server\n"
-    "  tissueform-pacs store EXPORT           see whose it is; with --patient-is-right, store it\n"
+    "  tissueform-pacs store EXPORT           see whose it is; with --confirm-patient, store it\n"
     "  tissueform-pacs status --json          where everything is\n"
     "Exit codes: 0 done, 1 the work failed, 2 wrong use.";
 

@@ -23,7 +23,7 @@ constexpr std::array<Unit, 3> kOtherUnits = {
     {{"meters", 1000}, {"centimeters", 10}, {"micrometers", 0.001}}};
 
 bool MayBeOfHead(double diagonal_mm) {
-  return diagonal_mm >= kLeastHeadDiagonalMm && diagonal_mm <= kMostHeadDiagonalMm;
+  return diagonal_mm >= kLeastHeadDiagonalMm && diagonal_mm <= kMaxHeadDiagonalMm;
 }
 
 // For the unit that makes a head of it.
@@ -62,7 +62,7 @@ std::optional<MeshDefect> FindImplausibleSize(const Positions& positions) {
   const bool is_small = diagonal_mm < kLeastHeadDiagonalMm;
   defect.explanation = absl::StrFormat(
       "the diagonal of the bounding box is %.4g mm, %s than %.4g mm%s", diagonal_mm,
-      is_small ? "less" : "more", is_small ? kLeastHeadDiagonalMm : kMostHeadDiagonalMm,
+      is_small ? "less" : "more", is_small ? kLeastHeadDiagonalMm : kMaxHeadDiagonalMm,
       UnitAdvice(diagonal_mm));
   return defect;
 }

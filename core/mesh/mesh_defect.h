@@ -48,7 +48,7 @@ void AddDefect(const DefectWords& words, const std::vector<Eigen::Index>& found,
 // The diagonals of bounding boxes, in mm, that a head or a part of it may have. What has another
 // one was probably saved in another unit.
 inline constexpr double kLeastHeadDiagonalMm = 10;
-inline constexpr double kMostHeadDiagonalMm = 2000;
+inline constexpr double kMaxHeadDiagonalMm = 2000;
 
 // The warning implausible_size for places, in mm, whose bounding box cannot be that of a head;
 // nothing where it may be one, or where a coordinate is not finite.

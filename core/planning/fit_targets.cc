@@ -184,7 +184,7 @@ absl::StatusOr<FitRequest> ParseFitTargets(std::string_view json, const std::str
 }
 
 absl::StatusOr<FitRequest> ReadFitTargets(const std::string& path, const PlanProblem& problem) {
-  TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(path, "targets", kMostTargetsBytes));
+  TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(path, "targets", kMaxTargetsBytes));
   return ParseFitTargets(text, path, problem);
 }
 

@@ -14,7 +14,7 @@
 namespace tissueform {
 
 // Largest file of targets that is read.
-inline constexpr size_t kMostTargetsBytes = size_t{1} << 20;
+inline constexpr size_t kMaxTargetsBytes = size_t{1} << 20;
 
 // The text of docs/targets.schema.json.
 const char* FitTargetsSchemaText();
@@ -23,7 +23,7 @@ const char* FitTargetsSchemaText();
 // checked against the published schema, which is built into the program; places are looked up in
 // the mesh.
 //
-// Errors: NotFound (no such file), ResourceExhausted (larger than kMostTargetsBytes),
+// Errors: NotFound (no such file), ResourceExhausted (larger than kMaxTargetsBytes),
 // InvalidArgument: not JSON, unknown key, wrong type, value out of range (by JSON pointer); other
 // axes than the plan's; a target by its name whose place the mesh has not, or that says in no way
 // or in two which point it is or what it is to do.

@@ -73,7 +73,7 @@ def screenshot(programs, name):
         return
     picture = programs.folder / name
     command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1200,1000",
-               f"--user-data-dir={programs.folder / 'browser'}", f"--screenshot={picture}", f"http://{stack.HOST}:{programs.worklist_port}/"]
+               f"--user-data-dir={programs.folder / 'browser'}", f"--screenshot={picture}", f"http://{stack.HOST}:{programs.review_port}/"]
     shot = subprocess.run(command, capture_output=True, timeout=stack.PATIENCE_S, check=False)
     print(f"  the work list: {picture}" if shot.returncode == 0 and picture.exists() else "  the browser has made no picture of the work list")
 
@@ -102,9 +102,9 @@ def run(programs, web):
     tell(f"a planner stores {prediction} and sends it to the PACS")
     programs.tissueform("prediction", "send", prediction)
     form = programs.wait_for("the work list's question, with pictures",
-                             lambda: "<img" in programs.worklist() and (programs.forms() or [None])[0], needs="bridge")
+                             lambda: "<img" in programs.review() and (programs.forms() or [None])[0], needs="bridge")
     tell("the work list shows the patient, with pictures, and asks")
-    screenshot(programs, "worklist.png")
+    screenshot(programs, "review.png")
     programs.confirm(form)
     tell("confirmed in the work list")
     programs.wait_for("the objects", lambda: ": stored" in programs.tissueform("prediction", "send", prediction).stdout
@@ -143,7 +143,7 @@ def main():
         if not words.serve:
             print("the programs end now; with --serve they keep running")
             return
-        print(f"work list http://{stack.HOST}:{programs.worklist_port}/\nplanner   http://localhost:{programs.gateway_port}/\nCtrl-C ends it", flush=True)
+        print(f"work list http://{stack.HOST}:{programs.review_port}/\nplanner   http://localhost:{programs.gateway_port}/\nCtrl-C ends it", flush=True)
         try:
             while all(process.poll() is None for process in programs.running.values()):
                 time.sleep(1)

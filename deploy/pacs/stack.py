@@ -118,7 +118,7 @@ class Stack:
         self.running = {}
         self.authority = Authority(self.folder / "tls")
         self.identities = {name: self.authority.issue(name) for name in ("orthanc", "server", "bridge", "scanner", "gateway")}
-        (self.orthanc_http, self.orthanc_https, self.orthanc_dicom, self.server_port, self.bridge_dicom, self.worklist_port,
+        (self.orthanc_http, self.orthanc_https, self.orthanc_dicom, self.server_port, self.bridge_dicom, self.review_port,
          self.gateway_port) = free_ports(7)
         self.context = ssl.create_default_context(cafile=str(self.authority.certificate))
         self.context.load_cert_chain(*map(str, self.identities["scanner"]))
@@ -296,7 +296,7 @@ backend orthanc
                 "--allow-from", HOST, "--dicom-cert", certificate, "--dicom-key", key, "--dicom-ca", self.authority.certificate,
                 *self.bridge_pacs(), "--recipe", self.recipe, "--quiet-seconds", self.quiet_s, "--plan-threads", self.plan_threads,
                 "--accept-defects", "--server", f"localhost:{self.server_port}", "--server-ca", self.authority.certificate, "--server-cert", certificate,
-                "--server-key", key, "--worklist-listen", f"{HOST}:{self.worklist_port}", "--planner-url", f"http://localhost:{self.gateway_port}/"]
+                "--server-key", key, "--review-listen", f"{HOST}:{self.review_port}", "--planner-url", f"http://localhost:{self.gateway_port}/"]
 
     def start_bridge(self, more=(), wait=True):
         self.start("bridge", [self.bridge_program, "run", *self.bridge_options(), *more])
@@ -309,20 +309,20 @@ backend orthanc
                              capture_output=True, text=True, timeout=PATIENCE_S, check=False)
         return json.loads(run.stdout) if run.returncode == 0 else {}
 
-    def worklist(self):
-        with urllib.request.urlopen(f"http://{HOST}:{self.worklist_port}/", timeout=PATIENCE_S) as reply:
+    def review(self):
+        with urllib.request.urlopen(f"http://{HOST}:{self.review_port}/", timeout=PATIENCE_S) as reply:
             return reply.read().decode()
 
     def forms(self):
         """What the work list asks a person for: the fields of each form."""
-        forms = re.findall(r"<form[^>]*action=\"/store\">(.*?)</form>", self.worklist(), re.DOTALL)
+        forms = re.findall(r"<form[^>]*action=\"/store\">(.*?)</form>", self.review(), re.DOTALL)
         return [dict(re.findall(r"name=\"(\w+)\" value=\"([^\"]*)\"", form)) for form in forms]
 
     def confirm(self, fields):
         """The person's word."""
         data = urllib.parse.urlencode(fields).encode()
-        request = urllib.request.Request(f"http://{HOST}:{self.worklist_port}/store", data=data,
-                                         headers={"Origin": f"http://{HOST}:{self.worklist_port}"})
+        request = urllib.request.Request(f"http://{HOST}:{self.review_port}/store", data=data,
+                                         headers={"Origin": f"http://{HOST}:{self.review_port}"})
         with urllib.request.urlopen(request, timeout=PATIENCE_S) as reply:
             return reply.status
 

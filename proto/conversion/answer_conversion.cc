@@ -6,35 +6,35 @@
 namespace tissueform {
 namespace {
 
-v1::GaveUp ToProto(GaveUp gave_up) {
+v1::GaveUp ToProto(Termination gave_up) {
   switch (gave_up) {
-    case GaveUp::kNo:
+    case Termination::kConverged:
       break;
-    case GaveUp::kIterations:
+    case Termination::kIterations:
       return v1::GAVE_UP_ITERATIONS;
-    case GaveUp::kNoRoom:
+    case Termination::kNoRoom:
       return v1::GAVE_UP_NO_ROOM;
-    case GaveUp::kArithmetic:
+    case Termination::kArithmetic:
       return v1::GAVE_UP_ARITHMETIC;
-    case GaveUp::kBlocked:
+    case Termination::kBlocked:
       return v1::GAVE_UP_BLOCKED;
   }
   return v1::GAVE_UP_UNSPECIFIED;
 }
 
 // Of a reason that this program does not know yet nothing is said: `converged` tells the rest.
-GaveUp ToGaveUp(v1::GaveUp gave_up) {
+Termination ToGaveUp(v1::GaveUp gave_up) {
   switch (gave_up) {
     case v1::GAVE_UP_ITERATIONS:
-      return GaveUp::kIterations;
+      return Termination::kIterations;
     case v1::GAVE_UP_NO_ROOM:
-      return GaveUp::kNoRoom;
+      return Termination::kNoRoom;
     case v1::GAVE_UP_ARITHMETIC:
-      return GaveUp::kArithmetic;
+      return Termination::kArithmetic;
     case v1::GAVE_UP_BLOCKED:
-      return GaveUp::kBlocked;
+      return Termination::kBlocked;
     default:
-      return GaveUp::kNo;
+      return Termination::kConverged;
   }
 }
 

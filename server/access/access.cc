@@ -13,7 +13,7 @@
 #include "core/base/status_macros.h"
 #include "server/access/access_names.h"
 #include "server/session/quotas.h"
-#include "server/session/session_refusals.h"
+#include "server/session/session_errors.h"
 #include "server/store/store_errors.h"
 
 namespace tissueform {
@@ -38,7 +38,7 @@ absl::Status LinkHasEnded() {
 
 }  // namespace
 
-absl::Status Access::MayCall(const Principal& caller, std::string_view method) {
+absl::Status Access::CheckMethodAccess(const Principal& caller, std::string_view method) {
   if (IsLink(caller) && std::ranges::find(kOpenToLinks, method) == kOpenToLinks.end()) {
     return absl::PermissionDeniedError(
         "a follow link may follow its session and nothing else; log in for this");
@@ -57,7 +57,7 @@ absl::Status Access::MayCall(const Principal& caller, std::string_view method) {
   return absl::OkStatus();
 }
 
-absl::Status Access::MayPutInto(const Principal& caller, const std::string& project) {
+absl::Status Access::CheckProjectAccess(const Principal& caller, const std::string& project) {
   if (project.empty()) return absl::OkStatus();
   TF_RETURN_IF_ERROR(CheckAccessName(project, "project"));
   if (caller.anonymous() || caller.projects.contains(project)) return absl::OkStatus();
@@ -65,13 +65,13 @@ absl::Status Access::MayPutInto(const Principal& caller, const std::string& proj
       "the token does not name this project; leave it out, or ask for a token that names it");
 }
 
-absl::Status Access::Judge(Level level, Need need, const absl::Status& not_found) {
+absl::Status Access::Judge(Level level, Permission need, const absl::Status& not_found) {
   if (level == Level::kNothing) return not_found;
-  if (need == Need::kDrag && level < Level::kDrag) {
+  if (need == Permission::kWrite && level < Level::kWrite) {
     return absl::PermissionDeniedError(
         "it is shared with you to look at; ask its owner for the role planner");
   }
-  if (need == Need::kOwn && level < Level::kOwn) {
+  if (need == Permission::kOwner && level < Level::kOwner) {
     return absl::PermissionDeniedError("it is another's, who shares it with you; ask its owner");
   }
   return absl::OkStatus();
@@ -84,62 +84,62 @@ Access::Level Access::LevelOfShare(const std::string& owner, const std::string& 
     role = std::max(role, table_.RoleOf(owner, ProjectResource(project), principal));
   }
   if (!role.has_value()) return Level::kNothing;
-  return *role == ShareRole::kPlanner ? Level::kDrag : Level::kLook;
+  return *role == ShareRole::kPlanner ? Level::kWrite : Level::kRead;
 }
 
 Access::Level Access::SessionLevel(const Principal& caller, const std::string& id) const {
   const ResourceIndex::Session* session = index_.FindSession(id);
-  if (session == nullptr) return caller.anonymous() ? Level::kOwn : Level::kNothing;
+  if (session == nullptr) return caller.anonymous() ? Level::kOwner : Level::kNothing;
   const std::string resource = SessionResource(id);
   if (IsLink(caller)) {
-    return caller.only_session == resource && HasGoodLink(id) ? Level::kLook : Level::kNothing;
+    return caller.only_session == resource && HasGoodLink(id) ? Level::kRead : Level::kNothing;
   }
-  if (session->owner == caller.name) return Level::kOwn;
+  if (session->owner == caller.name) return Level::kOwner;
   return LevelOfShare(session->owner, resource, session->project, caller.name);
 }
 
 Access::Level Access::PredictionLevel(const Principal& caller, const std::string& id) const {
   const ResourceIndex::Prediction* prediction = index_.FindPrediction(id);
-  if (prediction == nullptr) return caller.anonymous() ? Level::kOwn : Level::kNothing;
+  if (prediction == nullptr) return caller.anonymous() ? Level::kOwner : Level::kNothing;
   if (IsLink(caller)) return Level::kNothing;
-  if (prediction->owner == caller.name) return Level::kOwn;
+  if (prediction->owner == caller.name) return Level::kOwner;
   if (table_.RoleOf(prediction->owner, PredictionResource(id), caller.name).has_value()) {
-    return Level::kLook;
+    return Level::kRead;
   }
-  if (IsBridge(caller) && index_.IsExported(id)) return Level::kLook;
+  if (IsBridge(caller) && index_.IsExported(id)) return Level::kRead;
   // Only of one owner: an id of a session may have become another's meanwhile.
   const ResourceIndex::Session* session = index_.FindSession(prediction->session);
   if (session == nullptr || session->owner != prediction->owner) return Level::kNothing;
-  return std::min(Level::kLook, SessionLevel(caller, prediction->session));
+  return std::min(Level::kRead, SessionLevel(caller, prediction->session));
 }
 
 bool Access::IsExportedCase(const CaseKey& key) const {
   for (const std::string& id : index_.ExportedOfCase(key.sha256)) {
     // Whoever names a case that is not open to them opens it to no bridge.
     const Principal planner{.name = index_.FindPrediction(id)->owner};
-    if (CaseLevel(planner, key) >= Level::kLook) return true;
+    if (CaseLevel(planner, key) >= Level::kRead) return true;
   }
   return false;
 }
 
 Access::Level Access::CaseLevel(const Principal& caller, const CaseKey& key) const {
-  if (key.owner == caller.name) return Level::kOwn;
+  if (key.owner == caller.name) return Level::kOwner;
   const ResourceIndex::Case* found = index_.FindCase(key);
   if (found == nullptr) return Level::kNothing;
-  if (IsBridge(caller) && IsExportedCase(key)) return Level::kLook;
-  return std::min(Level::kLook,
+  if (IsBridge(caller) && IsExportedCase(key)) return Level::kRead;
+  return std::min(Level::kRead,
                   LevelOfShare(key.owner, CaseResource(key.sha256), found->project, caller.name));
 }
 
 Access::Level Access::MeshLevel(const Principal& caller, const std::string& sha256) const {
   const ShareTable::Holders& holders = table_.HoldersOf(sha256);
   const bool unclaimed = caller.anonymous() && holders.empty();
-  if (!IsLink(caller) && (unclaimed || holders.contains(caller.name))) return Level::kOwn;
+  if (!IsLink(caller) && (unclaimed || holders.contains(caller.name))) return Level::kOwner;
   for (const std::string& id : index_.SessionsOf(sha256)) {
-    if (SessionLevel(caller, id) >= Level::kLook) return Level::kLook;
+    if (SessionLevel(caller, id) >= Level::kRead) return Level::kRead;
   }
   for (const std::string& id : index_.PredictionsOf(sha256)) {
-    if (PredictionLevel(caller, id) >= Level::kLook) return Level::kLook;
+    if (PredictionLevel(caller, id) >= Level::kRead) return Level::kRead;
   }
   return Level::kNothing;
 }
@@ -160,8 +160,8 @@ bool Access::Knows(const Unknown& what) const {
   return true;
 }
 
-absl::Status Access::LookFor(Unknown::Kind kind, const std::string& name,
-                             const std::string& owner) const {
+absl::Status Access::FetchIfMissing(Unknown::Kind kind, const std::string& name,
+                                    const std::string& owner) const {
   if (!on_unknown_) return absl::OkStatus();
   const Unknown what = {.kind = kind, .name = name, .owner = owner};
   {
@@ -171,34 +171,35 @@ absl::Status Access::LookFor(Unknown::Kind kind, const std::string& name,
   return on_unknown_(what);
 }
 
-absl::Status Access::MaySession(const Principal& caller, const std::string& id, Need need) const {
-  TF_RETURN_IF_ERROR(LookFor(Unknown::Kind::kSession, id));
+absl::Status Access::CheckSessionAccess(const Principal& caller, const std::string& id,
+                                        Permission need) const {
+  TF_RETURN_IF_ERROR(FetchIfMissing(Unknown::Kind::kSession, id));
   MutexLock lock(mutex_);
   if (caller.only_session == SessionResource(id) && !HasGoodLink(id)) return LinkHasEnded();
   return Judge(SessionLevel(caller, id), need, NoSuchSession(id));
 }
 
-absl::Status Access::MayPrediction(const Principal& caller, const std::string& id,
-                                   Need need) const {
-  TF_RETURN_IF_ERROR(LookFor(Unknown::Kind::kPrediction, id));
+absl::Status Access::CheckPredictionAccess(const Principal& caller, const std::string& id,
+                                           Permission need) const {
+  TF_RETURN_IF_ERROR(FetchIfMissing(Unknown::Kind::kPrediction, id));
   MutexLock lock(mutex_);
   return Judge(PredictionLevel(caller, id), need, NoPrediction(id));
 }
 
-absl::StatusOr<CaseKey> Access::MayCase(const Principal& caller, const std::string& sha256,
-                                        Need need) const {
+absl::StatusOr<CaseKey> Access::CheckCaseAccess(const Principal& caller, const std::string& sha256,
+                                                Permission need) const {
   const auto found = [&] {
     MutexLock lock(mutex_);
     return IsLink(caller) ? CaseOfLink(caller, sha256) : FindCase(caller, sha256, need);
   };
   absl::StatusOr<CaseKey> first = found();
   if (first.ok() || IsLink(caller)) return first;
-  TF_RETURN_IF_ERROR(LookFor(Unknown::Kind::kCase, sha256, caller.name));
+  TF_RETURN_IF_ERROR(FetchIfMissing(Unknown::Kind::kCase, sha256, caller.name));
   return found();
 }
 
 absl::StatusOr<CaseKey> Access::FindCase(const Principal& caller, const std::string& sha256,
-                                         Need need) const {
+                                         Permission need) const {
   CaseKey own{.sha256 = sha256, .owner = caller.name};
   if (caller.anonymous() || index_.FindCase(own) != nullptr) return own;
   const auto& cases = index_.cases();
@@ -217,7 +218,8 @@ absl::StatusOr<CaseKey> Access::CaseOfLink(const Principal& link, const std::str
   if (!HasGoodLink(session)) return LinkHasEnded();
   for (const FollowLinkRow& row : table_.LinksOf(session)) {
     if (row.case_sha256 != sha256 || !IsGood(row)) continue;
-    absl::StatusOr<CaseKey> found = FindCase(Principal{.name = row.maker}, sha256, Need::kLook);
+    absl::StatusOr<CaseKey> found =
+        FindCase(Principal{.name = row.maker}, sha256, Permission::kRead);
     if (found.ok()) return found;
   }
   return NoCase(sha256);
@@ -228,22 +230,23 @@ std::optional<std::string> Access::ExportsSeenBy(const Principal& caller) {
   return caller.name;
 }
 
-absl::Status Access::MayExport(const Principal& caller, const std::string& owner,
-                               const absl::Status& not_found, Need need) {
-  const Level level = owner == caller.name ? Level::kOwn
-                      : IsBridge(caller)   ? Level::kLook
+absl::Status Access::CheckExportAccess(const Principal& caller, const std::string& owner,
+                                       const absl::Status& not_found, Permission need) {
+  const Level level = owner == caller.name ? Level::kOwner
+                      : IsBridge(caller)   ? Level::kRead
                                            : Level::kNothing;
   return Judge(level, need, not_found);
 }
 
-absl::Status Access::MayMesh(const Principal& caller, const std::string& sha256, Need need) const {
+absl::Status Access::CheckMeshAccess(const Principal& caller, const std::string& sha256,
+                                     Permission need) const {
   const auto judged = [&] {
     MutexLock lock(mutex_);
     return Judge(MeshLevel(caller, sha256), need, NoSuchMesh());
   };
   const absl::Status first = judged();
   if (first.ok() || IsLink(caller)) return first;
-  TF_RETURN_IF_ERROR(LookFor(Unknown::Kind::kMesh, sha256, caller.name));
+  TF_RETURN_IF_ERROR(FetchIfMissing(Unknown::Kind::kMesh, sha256, caller.name));
   return judged();
 }
 
@@ -272,7 +275,7 @@ std::set<std::string> Access::SharedSessions(const Principal& caller) const {
   if (!table_.HasAny(caller.name)) return shared;
   for (const auto& [id, session] : index_.sessions()) {
     const Level level = SessionLevel(caller, id);
-    if (level != Level::kNothing && level != Level::kOwn) shared.insert(id);
+    if (level != Level::kNothing && level != Level::kOwner) shared.insert(id);
   }
   return shared;
 }
@@ -282,7 +285,7 @@ std::set<std::string> Access::SharedPredictions(const Principal& caller) const {
   MutexLock lock(mutex_);
   if (!table_.HasAny(caller.name) && !IsBridge(caller)) return shared;
   for (const auto& [id, prediction] : index_.predictions()) {
-    if (PredictionLevel(caller, id) == Level::kLook) shared.insert(id);
+    if (PredictionLevel(caller, id) == Level::kRead) shared.insert(id);
   }
   return shared;
 }
@@ -292,7 +295,7 @@ std::set<CaseKey> Access::SharedCases(const Principal& caller) const {
   MutexLock lock(mutex_);
   if (!table_.HasAny(caller.name) && !IsBridge(caller)) return shared;
   for (const auto& [key, of_case] : index_.cases()) {
-    const absl::StatusOr<CaseKey> found = FindCase(caller, key.sha256, Need::kLook);
+    const absl::StatusOr<CaseKey> found = FindCase(caller, key.sha256, Permission::kRead);
     if (found.ok() && found->owner != caller.name) shared.insert(*found);
   }
   return shared;
@@ -300,7 +303,7 @@ std::set<CaseKey> Access::SharedCases(const Principal& caller) const {
 
 bool Access::IsGood(const FollowLinkRow& link) const {
   return link.expires_s > clock_() && index_.FindSession(link.session) != nullptr &&
-         SessionLevel(Principal{.name = link.maker}, link.session) >= Level::kDrag;
+         SessionLevel(Principal{.name = link.maker}, link.session) >= Level::kWrite;
 }
 
 bool Access::HasGoodLink(const std::string& session) const {
@@ -311,7 +314,7 @@ bool Access::HasGoodLink(const std::string& session) const {
 }
 
 absl::StatusOr<FollowLinkRow> Access::FindLink(const std::string& digest) const {
-  TF_RETURN_IF_ERROR(LookFor(Unknown::Kind::kLink, digest));
+  TF_RETURN_IF_ERROR(FetchIfMissing(Unknown::Kind::kLink, digest));
   MutexLock lock(mutex_);
   const FollowLinkRow* link = table_.FindLink(digest);
   if (link == nullptr || !IsGood(*link)) return LinkHasEnded();
@@ -325,7 +328,7 @@ std::map<std::string, Access::Holdings> Access::HoldingsByOwner() const {
   return holdings;
 }
 
-absl::Status Access::MayKeep(const Principal& caller, int64_t bytes) const {
+absl::Status Access::CheckStorageQuota(const Principal& caller, int64_t bytes) const {
   // A deleted file is gone in a moment.
   constexpr std::chrono::seconds kUntilDeleted{5};
   if (most_bytes_ == 0 || caller.anonymous()) return absl::OkStatus();
@@ -343,13 +346,13 @@ absl::Status Access::MayKeep(const Principal& caller, int64_t bytes) const {
 }
 
 bool Access::KnowsSession(const std::string& id) const {
-  LookFor(Unknown::Kind::kSession, id).IgnoreError();
+  FetchIfMissing(Unknown::Kind::kSession, id).IgnoreError();
   MutexLock lock(mutex_);
   return index_.FindSession(id) != nullptr;
 }
 
 bool Access::KnowsPrediction(const std::string& id) const {
-  LookFor(Unknown::Kind::kPrediction, id).IgnoreError();
+  FetchIfMissing(Unknown::Kind::kPrediction, id).IgnoreError();
   MutexLock lock(mutex_);
   return index_.FindPrediction(id) != nullptr;
 }

@@ -23,11 +23,11 @@
 
 namespace tissueform {
 
-// What somebody wants of a resource; each includes the ones before.
-enum class Need {
-  kLook,  // read it, watch it
-  kDrag,  // have it answer poses, and keep the answers
-  kOwn,   // change it, delete it, share it
+// Access to a resource; each level includes the ones before.
+enum class Permission {
+  kRead,   // read it, watch it
+  kWrite,  // drag it and keep its answers
+  kOwner,  // change it, delete it, share it
 };
 
 // Who may do what: the one place that decides it (docs/security.md, "Who may what").
@@ -65,21 +65,24 @@ class Access {
 
   // Whether the principal may call a method ("CaseService.UploadCase") at all: publishers publish,
   // and a follow link follows. Errors: PermissionDenied.
-  static absl::Status MayCall(const Principal& caller, std::string_view method);
+  static absl::Status CheckMethodAccess(const Principal& caller, std::string_view method);
   // Whether new resources may go into the project; empty: none. Errors: InvalidArgument,
   // PermissionDenied.
-  static absl::Status MayPutInto(const Principal& caller, const std::string& project);
+  static absl::Status CheckProjectAccess(const Principal& caller, const std::string& project);
 
   // Errors: NotFound, PermissionDenied; Unauthenticated for a follow link that has ended.
-  absl::Status MaySession(const Principal& caller, const std::string& id, Need need) const;
-  absl::Status MayPrediction(const Principal& caller, const std::string& id, Need need) const;
+  absl::Status CheckSessionAccess(const Principal& caller, const std::string& id,
+                                  Permission need) const;
+  absl::Status CheckPredictionAccess(const Principal& caller, const std::string& id,
+                                     Permission need) const;
   // Whose case the caller's name of it means: its own, else the first that it may look at.
-  absl::StatusOr<CaseKey> MayCase(const Principal& caller, const std::string& sha256,
-                                  Need need) const;
+  absl::StatusOr<CaseKey> CheckCaseAccess(const Principal& caller, const std::string& sha256,
+                                          Permission need) const;
   // A mesh is looked at, and sessions are made of it, by who has sent its bytes and who may look at
   // a session or a prediction that holds it; who has sent its bytes owns it. Errors: NotFound,
   // PermissionDenied.
-  absl::Status MayMesh(const Principal& caller, const std::string& sha256, Need need) const;
+  absl::Status CheckMeshAccess(const Principal& caller, const std::string& sha256,
+                               Permission need) const;
   // Whether somebody else has sent its bytes, or has a session of it.
   bool OthersHoldMesh(const Principal& caller, const std::string& sha256) const;
   // How many sessions of the caller are made from it.
@@ -88,8 +91,8 @@ class Access {
   // Whose exports the caller sees: its own; unset: all, as bridges do.
   static std::optional<std::string> ExportsSeenBy(const Principal& caller);
   // An export that is the owner's. Errors: NotFound, PermissionDenied.
-  static absl::Status MayExport(const Principal& caller, const std::string& owner,
-                                const absl::Status& not_found, Need need);
+  static absl::Status CheckExportAccess(const Principal& caller, const std::string& owner,
+                                        const absl::Status& not_found, Permission need);
 
   // What of others' a list shows to the caller.
   std::set<std::string> SharedSessions(const Principal& caller) const;
@@ -105,7 +108,7 @@ class Access {
   using Holdings = ResourceIndex::Holdings;
   std::map<std::string, Holdings> HoldingsByOwner() const;
   // Whether the caller may keep so many bytes more. Errors: ResourceExhausted (a quota).
-  absl::Status MayKeep(const Principal& caller, int64_t bytes) const;
+  absl::Status CheckStorageQuota(const Principal& caller, int64_t bytes) const;
   // 0: as many as there is room for. Call it before anything else.
   void set_most_bytes(int64_t most) { most_bytes_ = most; }
   // Whether there is such a one: what is asked for without a name may be anything.
@@ -117,9 +120,9 @@ class Access {
  private:
   friend class AccessChanges;
 
-  enum class Level { kNothing, kLook, kDrag, kOwn };
+  enum class Level { kNothing, kRead, kWrite, kOwner };
 
-  static absl::Status Judge(Level level, Need need, const absl::Status& not_found);
+  static absl::Status Judge(Level level, Permission need, const absl::Status& not_found);
   // All with the lock.
   Level LevelOfShare(const std::string& owner, const std::string& resource,
                      const std::string& project, const std::string& principal) const
@@ -135,15 +138,15 @@ class Access {
   Level MeshLevel(const Principal& caller, const std::string& sha256) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<CaseKey> FindCase(const Principal& caller, const std::string& sha256,
-                                   Need need) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+                                   Permission need) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<CaseKey> CaseOfLink(const Principal& link, const std::string& sha256) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool IsGood(const FollowLinkRow& link) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool HasGoodLink(const std::string& session) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   // Have it looked for where it is not known.
-  absl::Status LookFor(Unknown::Kind kind, const std::string& name,
-                       const std::string& owner = {}) const ABSL_LOCKS_EXCLUDED(mutex_);
+  absl::Status FetchIfMissing(Unknown::Kind kind, const std::string& name,
+                              const std::string& owner = {}) const ABSL_LOCKS_EXCLUDED(mutex_);
   bool Knows(const Unknown& what) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const UnixClock clock_;

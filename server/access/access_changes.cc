@@ -12,7 +12,7 @@
 
 #include "core/base/status_macros.h"
 #include "server/access/access_names.h"
-#include "server/session/session_refusals.h"
+#include "server/session/session_errors.h"
 #include "server/store/store_errors.h"
 
 namespace tissueform {
@@ -30,14 +30,14 @@ absl::Status TooMany(absl::string_view what, int limit, absl::string_view option
 
 }  // namespace
 
-absl::Status AccessChanges::Learn() {
+absl::Status AccessChanges::LoadAll() {
   TF_ASSIGN_OR_RETURN(const AccessRows rows, store_->Load());
   MutexLock lock(access_.mutex_);
   access_.table_.Add(rows);
   return absl::OkStatus();
 }
 
-absl::Status AccessChanges::LearnAgain() {
+absl::Status AccessChanges::ReloadRows() {
   MutexLock learning(learning_);
   {
     MutexLock lock(access_.mutex_);
@@ -58,7 +58,7 @@ absl::Status AccessChanges::LearnAgain() {
   return absl::OkStatus();
 }
 
-void AccessChanges::Heard(const AccessRows& rows) {
+void AccessChanges::OnRemoteChange(const AccessRows& rows) {
   MutexLock lock(access_.mutex_);
   access_.table_.Add(rows);
 }
@@ -119,16 +119,17 @@ void AccessChanges::End(Unseen* unseen, bool kept) {
   Erase(std::move(of_nothing), WarnUnlessErased);
 }
 
-absl::Status AccessChanges::LookFor(const Principal& caller, absl::string_view resource) const {
+absl::Status AccessChanges::FetchIfMissing(const Principal& caller,
+                                           absl::string_view resource) const {
   using Kind = Access::Unknown::Kind;
   if (absl::ConsumePrefix(&resource, kSessionsPrefix)) {
-    return access_.LookFor(Kind::kSession, std::string(resource));
+    return access_.FetchIfMissing(Kind::kSession, std::string(resource));
   }
   if (absl::ConsumePrefix(&resource, kPredictionsPrefix)) {
-    return access_.LookFor(Kind::kPrediction, std::string(resource));
+    return access_.FetchIfMissing(Kind::kPrediction, std::string(resource));
   }
   if (absl::ConsumePrefix(&resource, kCasesPrefix)) {
-    return access_.LookFor(Kind::kCase, std::string(resource), caller.name);
+    return access_.FetchIfMissing(Kind::kCase, std::string(resource), caller.name);
   }
   return absl::OkStatus();
 }
@@ -140,16 +141,16 @@ absl::Status AccessChanges::MayOwn(const Principal& caller, const std::string& r
   if (absl::ConsumePrefix(&name, kSessionsPrefix)) {
     const std::string id(name);
     if (access_.index_.FindSession(id) == nullptr) return NoSuchSession(id);
-    return Access::Judge(access_.SessionLevel(caller, id), Need::kOwn, NoSuchSession(id));
+    return Access::Judge(access_.SessionLevel(caller, id), Permission::kOwner, NoSuchSession(id));
   }
   if (absl::ConsumePrefix(&name, kPredictionsPrefix)) {
     const std::string id(name);
     if (access_.index_.FindPrediction(id) == nullptr) return NoPrediction(id);
-    return Access::Judge(access_.PredictionLevel(caller, id), Need::kOwn, NoPrediction(id));
+    return Access::Judge(access_.PredictionLevel(caller, id), Permission::kOwner, NoPrediction(id));
   }
   if (absl::ConsumePrefix(&name, kCasesPrefix)) {
     const std::string sha256(name);
-    TF_ASSIGN_OR_RETURN(const CaseKey key, access_.FindCase(caller, sha256, Need::kOwn));
+    TF_ASSIGN_OR_RETURN(const CaseKey key, access_.FindCase(caller, sha256, Permission::kOwner));
     return access_.index_.FindCase(key) == nullptr ? NoCase(sha256) : absl::OkStatus();
   }
   return absl::InvalidArgumentError(
@@ -159,7 +160,7 @@ absl::Status AccessChanges::MayOwn(const Principal& caller, const std::string& r
 
 absl::Status AccessChanges::CheckShare(const Principal& caller, const ShareRow& share) const {
   TF_RETURN_IF_ERROR(CheckAccessName(share.principal, "principal"));
-  TF_RETURN_IF_ERROR(LookFor(caller, share.resource));
+  TF_RETURN_IF_ERROR(FetchIfMissing(caller, share.resource));
   MutexLock lock(access_.mutex_);
   TF_RETURN_IF_ERROR(MayOwn(caller, share.resource));
   const bool is_new =
@@ -186,7 +187,7 @@ void AccessChanges::Share(const Principal& caller, ShareRow share, const Done& d
 
 void AccessChanges::Unshare(const Principal& caller, const std::string& resource,
                             const std::string& with, const Done& done) {
-  absl::Status status = LookFor(caller, resource);
+  absl::Status status = FetchIfMissing(caller, resource);
   if (status.ok()) {
     MutexLock lock(access_.mutex_);
     status = MayOwn(caller, resource);
@@ -204,23 +205,24 @@ void AccessChanges::Unshare(const Principal& caller, const std::string& resource
 
 absl::StatusOr<std::vector<ShareRow>> AccessChanges::SharesOf(const Principal& caller,
                                                               const std::string& resource) const {
-  TF_RETURN_IF_ERROR(LookFor(caller, resource));
+  TF_RETURN_IF_ERROR(FetchIfMissing(caller, resource));
   MutexLock lock(access_.mutex_);
   TF_RETURN_IF_ERROR(MayOwn(caller, resource));
   return access_.table_.SharesOf(caller.name, resource);
 }
 
 absl::Status AccessChanges::CheckLink(const Principal& caller, const FollowLinkRow& link) const {
-  TF_RETURN_IF_ERROR(LookFor(caller, SessionResource(link.session)));
+  TF_RETURN_IF_ERROR(FetchIfMissing(caller, SessionResource(link.session)));
   if (!link.case_sha256.empty()) {
-    TF_RETURN_IF_ERROR(LookFor(caller, CaseResource(link.case_sha256)));
+    TF_RETURN_IF_ERROR(FetchIfMissing(caller, CaseResource(link.case_sha256)));
   }
   MutexLock lock(access_.mutex_);
   if (access_.index_.FindSession(link.session) == nullptr) return NoSuchSession(link.session);
-  TF_RETURN_IF_ERROR(Access::Judge(access_.SessionLevel(caller, link.session), Need::kDrag,
+  TF_RETURN_IF_ERROR(Access::Judge(access_.SessionLevel(caller, link.session), Permission::kWrite,
                                    NoSuchSession(link.session)));
   if (!link.case_sha256.empty()) {
-    TF_ASSIGN_OR_RETURN(const CaseKey key, access_.FindCase(caller, link.case_sha256, Need::kLook));
+    TF_ASSIGN_OR_RETURN(const CaseKey key,
+                        access_.FindCase(caller, link.case_sha256, Permission::kRead));
     if (access_.index_.FindCase(key) == nullptr) return NoCase(key.sha256);
   }
   if (access_.table_.LinksOf(link.session).size() >=
@@ -247,7 +249,8 @@ void AccessChanges::AddLink(const Principal& caller, FollowLinkRow link, const D
 
 void AccessChanges::RemoveLinks(const Principal& caller, const std::string& session,
                                 const Done& done) {
-  if (const absl::Status status = access_.MaySession(caller, session, Need::kDrag); !status.ok()) {
+  if (const absl::Status status = access_.CheckSessionAccess(caller, session, Permission::kWrite);
+      !status.ok()) {
     done(status);
     return;
   }
@@ -265,14 +268,14 @@ void AccessChanges::RemoveLinks(const Principal& caller, const std::string& sess
 absl::Status AccessChanges::GrantMesh(const Principal& caller, const std::string& sha256,
                                       int64_t bytes) {
   // What nobody with a name has is open to those without one as it is.
-  if (access_.MayMesh(caller, sha256, Need::kOwn).ok()) return absl::OkStatus();
+  if (access_.CheckMeshAccess(caller, sha256, Permission::kOwner).ok()) return absl::OkStatus();
   std::promise<absl::Status> kept;
   Put({.mesh_rights = {{.principal = caller.name, .sha256 = sha256, .bytes = bytes}}},
       [&kept](const absl::Status& status) { kept.set_value(status); });
   return kept.get_future().get();
 }
 
-absl::Status AccessChanges::ForsakeMesh(const Principal& caller, const std::string& sha256) {
+absl::Status AccessChanges::ReleaseMesh(const Principal& caller, const std::string& sha256) {
   std::promise<absl::Status> erased;
   Erase({.mesh_rights = {{.principal = caller.name, .sha256 = sha256}}},
         [&erased](const absl::Status& status) { erased.set_value(status); });

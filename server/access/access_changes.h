@@ -45,17 +45,17 @@ class AccessChanges {
 
   // Reads what the store has. Call it before anything else; blocks. Errors: those of
   // AccessStore::Load.
-  absl::Status Learn();
+  absl::Status LoadAll();
 
   // Where others write to the store as well. Before anything else: from now on changes that are
-  // under way are not undone by what LearnAgain has read before them.
-  void FollowOthers() { follows_ = true; }
+  // under way are not undone by what ReloadRows has read before them.
+  void EnableClusterMode() { follows_ = true; }
   // Takes what the store has in place of what was known. Blocks. Errors: those of
   // AccessStore::Load.
-  absl::Status LearnAgain();
+  absl::Status ReloadRows();
   // Rows that others have put there.
-  void Heard(const AccessRows& rows);
-  // What others have deleted: their rows go by LearnAgain. What is known of a session's rows is
+  void OnRemoteChange(const AccessRows& rows);
+  // What others have deleted: their rows go by ReloadRows. What is known of a session's rows is
   // erased from the store, too: who deleted it may not have known all, and the next session of its
   // name is another's.
   void SessionGone(const std::string& id);
@@ -80,15 +80,15 @@ class AccessChanges {
   absl::StatusOr<std::vector<ShareRow>> SharesOf(const Principal& caller,
                                                  const std::string& resource) const;
 
-  // Keeps a follow link of the caller's making. Errors: those of Access::MaySession (kDrag) and
-  // MayCase; ResourceExhausted.
+  // Keeps a follow link of the caller's making. Errors: those of Access::CheckSessionAccess
+  // (kWrite) and CheckCaseAccess; ResourceExhausted.
   void AddLink(const Principal& caller, FollowLinkRow link, const Done& done);
-  // All of the session. Errors: those of Access::MaySession (kDrag).
+  // All of the session. Errors: those of Access::CheckSessionAccess (kWrite).
   void RemoveLinks(const Principal& caller, const std::string& session, const Done& done);
 
   // The caller has sent the bytes of the mesh, and wants it no more. Both block on the disk.
   absl::Status GrantMesh(const Principal& caller, const std::string& sha256, int64_t bytes);
-  absl::Status ForsakeMesh(const Principal& caller, const std::string& sha256);
+  absl::Status ReleaseMesh(const Principal& caller, const std::string& sha256);
 
   // What there is has changed. Removed resources take their shares and links with them.
   template <typename Record>
@@ -115,7 +115,7 @@ class AccessChanges {
       ABSL_LOCKS_EXCLUDED(access_.mutex_);
 
   // Has it looked for where nobody here knows it.
-  absl::Status LookFor(const Principal& caller, absl::string_view resource) const
+  absl::Status FetchIfMissing(const Principal& caller, absl::string_view resource) const
       ABSL_LOCKS_EXCLUDED(access_.mutex_);
 
   // From memory at once, then from the store.
@@ -142,7 +142,7 @@ class AccessChanges {
   std::function<void()> on_revoked_ = [] {};
   std::function<void(const std::string&)> on_prediction_removed_ = [](const std::string&) {};
 
-  Mutex learning_;                                                               // over LearnAgain
+  Mutex learning_;                                                               // over ReloadRows
   std::vector<std::shared_ptr<Unseen>> unseen_ ABSL_GUARDED_BY(access_.mutex_);  // in their order
 };
 

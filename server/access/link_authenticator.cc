@@ -63,8 +63,9 @@ absl::StatusOr<Authenticated> LinkAuthenticator::Authenticate(const Credentials&
       .token_id = link.digest};
 }
 
-absl::Status LinkAuthenticator::StillGood(const Authenticated& authenticated) {
-  if (authenticated.principal->only_session.empty()) return others_->StillGood(authenticated);
+absl::Status LinkAuthenticator::IsStillAuthorized(const Authenticated& authenticated) {
+  if (authenticated.principal->only_session.empty())
+    return others_->IsStillAuthorized(authenticated);
   return access_->FindLink(authenticated.token_id).status();
 }
 

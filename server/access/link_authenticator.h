@@ -28,7 +28,7 @@ class LinkAuthenticator final : public Authenticator {
       : access_(access), others_(others) {}
 
   absl::StatusOr<Authenticated> Authenticate(const Credentials& credentials) override;
-  absl::Status StillGood(const Authenticated& authenticated) override;
+  absl::Status IsStillAuthorized(const Authenticated& authenticated) override;
 
  private:
   const Access* const access_;

@@ -12,7 +12,7 @@
 #include "server/access/access_options.h"
 #include "server/access/auth/token_options.h"
 #include "server/cluster/cluster_options.h"
-#include "server/exports/export_book.h"
+#include "server/exports/export_queue.h"
 #include "server/platform/tls_options.h"
 #include "server/session/limits.h"
 #include "server/session/quotas.h"

@@ -19,8 +19,9 @@
 #include "core/base/software_version.h"
 #include "core/base/status_macros.h"
 #include "core/mechanics/linear_solvers/blas_threads.h"
-#include "server/access/access_watch_stores.h"
+#include "server/access/observed_stores.h"
 #include "server/app/library_logs.h"
+#include "server/app/number_options.h"
 #include "server/platform/network_address.h"
 #include "server/platform/process_metrics.h"
 #include "server/platform/tls_credentials.h"
@@ -32,7 +33,6 @@ namespace {
 // Keeps gRPC's own buffers bounded beside the memory budget.
 constexpr size_t kTransportQuotaBytes = size_t{512} << 20;
 // Chunks are 1 MiB at most; regions of a mesh of a million vertices fit too.
-constexpr int kMaxReceiveBytes = 4 << 20;
 // A token of 8 KiB, and what else a client says of itself; longer headers gRPC refuses.
 constexpr int kMaxMetadataBytes = 16 << 10;
 constexpr int kKeepaliveMilliseconds = 25'000;
@@ -87,43 +87,6 @@ ConnectionListener::Options ListenerOptions(const ServerOptions& options) {
           .most_of_address = options.max_connections_per_address};
 }
 
-int64_t MemoryQuota(const ServerOptions& options) {
-  return options.quotas.memory_bytes > 0 ? options.quotas.memory_bytes
-                                         : options.memory_budget_bytes / 2;
-}
-
-// Every option by its place: one that is added does not compile here until it was decided whether
-// it is a limit.
-NamedLimits LimitsOf(const ServerOptions& options) {
-  const auto& [host, port, tls, memory_budget_bytes, workers, service, quotas,
-               max_calls_per_connection, max_connections, max_connections_per_address,
-               drain_deadline, in_memory, data_dir, cluster, log_level, tokens, telemetry, access,
-               exports] = options;
-  NamedLimits limits = ToNamedLimits(service);
-  limits["quota_calls_per_second"] = quotas.calls_per_second;
-  limits["quota_waiting_calls"] = quotas.waiting_calls;
-  limits["quota_streams"] = quotas.streams;
-  limits["quota_sessions"] = quotas.sessions;
-  limits["quota_memory_bytes"] = MemoryQuota(options);
-  limits["quota_disk_bytes"] = quotas.disk_bytes;
-  limits["max_shares_per_resource"] = access.max_shares_per_resource;
-  limits["max_links_per_session"] = access.max_links_per_session;
-  limits["max_link_hours"] = access.max_link_lifetime.count();
-  limits["max_waiting_exports"] = exports.max_waiting;
-  limits["quota_exports"] = exports.max_waiting_of_principal;
-  limits["max_exports"] = exports.max_kept;
-  limits["export_retention_days"] = exports.retention_days;
-  limits["max_export_watches"] = exports.max_watches;
-  limits["max_message_bytes"] = kMaxReceiveBytes;
-  limits["memory_budget_bytes"] = memory_budget_bytes;
-  limits["workers"] = workers;
-  limits["max_calls_per_connection"] = max_calls_per_connection;
-  limits["max_connections"] = max_connections;
-  limits["max_connections_per_address"] = max_connections_per_address;
-  limits["drain_deadline_ms"] = std::chrono::milliseconds(drain_deadline).count();
-  return limits;
-}
-
 SessionOwnership* OwnershipOf(Cluster* cluster) {
   if (cluster == nullptr) return SoleOwnership::Get();
   return &cluster->node();
@@ -152,7 +115,7 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
     spdlog::warn("INSECURE: {}, and strangers may reach it (--insecure)",
                  options.tls.enabled() ? "nobody is asked to log in" : "calls are not encrypted");
   }
-  TF_RETURN_IF_ERROR(server->LearnWhatIsKept());
+  TF_RETURN_IF_ERROR(server->LoadIndex());
   server->housekeeping_.Start();
   TF_RETURN_IF_ERROR(server->ServeMetrics());
   TF_RETURN_IF_ERROR(server->Listen());
@@ -162,10 +125,10 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
   return server;
 }
 
-absl::Status TissueformServer::LearnWhatIsKept() {
-  TF_RETURN_IF_ERROR(access_changes_.Learn());
-  TF_RETURN_IF_ERROR(TellWhatIsKept(stores_.get(), &access_changes_));
-  TF_RETURN_IF_ERROR(exports_.Learn([&](const std::string& id) {
+absl::Status TissueformServer::LoadIndex() {
+  TF_RETURN_IF_ERROR(access_changes_.LoadAll());
+  TF_RETURN_IF_ERROR(NotifyExisting(stores_.get(), &access_changes_));
+  TF_RETURN_IF_ERROR(exports_.LoadAll([&](const std::string& id) {
     if (access_.KnowsPrediction(id)) return true;
     // Another server may have made it since; what is not known to be gone stays.
     return cluster_ != nullptr && !absl::IsNotFound(stores_->predictions().Get(id).status());
@@ -191,7 +154,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
                          : std::make_unique<LinkAuthenticator>(&access_, parts.authenticator)),
       cluster_(std::move(parts.cluster)),
       gate_({.authenticator = authenticator_.get(),
-             .may_call = &Access::MayCall,
+             .may_call = &Access::CheckMethodAccess,
              .observer = telemetry_.get(),
              .quotas = &quotas_,
              .gateway_name = options.tls.gateway_name,
@@ -234,8 +197,8 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
   catalog_.set_on_removed(
       [this](const std::string& sha256) { access_changes_.MeshRemoved(sha256); });
   access_changes_.set_on_revoked([this] {
-    streams_.AskAgain();
-    watches_.AskAgain();
+    streams_.RecheckAccess();
+    watches_.RecheckAccess();
   });
   exports_.set_on_changed(
       [this](const ExportRecord& record) { export_watches_.OnChanged(record); });

@@ -20,7 +20,7 @@
 #include "server/app/open_stores.h"
 #include "server/app/server_options.h"
 #include "server/cluster/cluster.h"
-#include "server/exports/export_book.h"
+#include "server/exports/export_queue.h"
 #include "server/exports/export_store.h"
 #include "server/platform/connection_listener.h"
 #include "server/platform/rotated_files.h"
@@ -113,7 +113,7 @@ class TissueformServer {
 
   TissueformServer(const ServerOptions& options, Parts parts);
 
-  absl::Status LearnWhatIsKept();
+  absl::Status LoadIndex();
   absl::Status Listen();
   // What sessions may still take, where those that nobody uses leave for it.
   int64_t FreeBytes() const;
@@ -136,11 +136,11 @@ class TissueformServer {
   Access access_;
   AccessChanges access_changes_;
   std::unique_ptr<ExportStore> export_store_;  // as access_store_
-  ExportBook exports_;
+  ExportQueue exports_;
   ExportWatches export_watches_;
   std::unique_ptr<LinkAuthenticator> authenticator_;  // null: nobody logs in
   std::unique_ptr<Cluster> cluster_;                  // null without --store
-  ServiceGate gate_;
+  AdmissionControl gate_;
   MemoryBudget budget_;
   std::unique_ptr<Stores> stores_;
   MeshCatalog catalog_;

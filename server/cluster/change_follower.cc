@@ -21,7 +21,7 @@ namespace {
 using Kind = StoreChange::Kind;
 
 // More than these are one: read everything.
-constexpr size_t kMostWaiting = 10'000;
+constexpr size_t kMaxWaiting = 10'000;
 constexpr int kPageOfAll = 1'000;
 constexpr std::chrono::milliseconds kBeforeTryingAgain{500};
 
@@ -44,7 +44,7 @@ absl::StatusOr<std::unique_ptr<ChangeFollower>> ChangeFollower::Start(
   std::unique_ptr<ChangeFollower> follower(new ChangeFollower());
   TF_ASSIGN_OR_RETURN(follower->listener_,
                       ChangeListener::Start(options, [raw = follower.get()](const auto& change) {
-                        raw->Heard(change);
+                        raw->OnRemoteChange(change);
                       }));
   return follower;
 }
@@ -59,16 +59,16 @@ ChangeFollower::~ChangeFollower() {
   if (thread_.joinable()) thread_.join();
 }
 
-void ChangeFollower::Begin(const SharedRooms& rooms) {
+void ChangeFollower::Begin(const ClusterListeners& rooms) {
   rooms_ = rooms;
   thread_ = std::thread([this] { Loop(); });
 }
 
-void ChangeFollower::Heard(const StoreChange& change) {
+void ChangeFollower::OnRemoteChange(const StoreChange& change) {
   MutexLock lock(mutex_);
   // What waits is read as it is then: once is enough.
   if (std::find(heard_.begin(), heard_.end(), change) != heard_.end()) return;
-  if (heard_.size() >= kMostWaiting) {
+  if (heard_.size() >= kMaxWaiting) {
     heard_.assign(1, {.kind = Kind::kMissed});
   } else {
     heard_.push_back(change);
@@ -112,11 +112,11 @@ absl::Status ChangeFollower::Apply(const StoreChange& change) {
     case Kind::kMeshDeleted:
       return LookAtMesh(change.name);
     case Kind::kAccessChanged:
-      return rooms_.access->LearnAgain();
+      return rooms_.access->ReloadRows();
     case Kind::kExportsChanged:
-      return rooms_.exports->LearnAgain();
+      return rooms_.exports->ReloadRows();
     case Kind::kMissed:
-      return LookAtAll();
+      return ResyncAll();
   }
   return absl::OkStatus();
 }
@@ -163,7 +163,7 @@ absl::Status ChangeFollower::LookAtMesh(const std::string& sha256) {
   return absl::OkStatus();
 }
 
-absl::Status ChangeFollower::LookAtAll() {
+absl::Status ChangeFollower::ResyncAll() {
   // What comes to be known from here on has come after what is read.
   const AccessChanges::Known known = rooms_.access->AllKnown();
   const std::vector<std::string> meshes = rooms_.meshes->HeldNames();
@@ -171,8 +171,8 @@ absl::Status ChangeFollower::LookAtAll() {
   TF_RETURN_IF_ERROR(LookAtAllPredictions(known.predictions));
   TF_RETURN_IF_ERROR(LookAtAllCases(known.cases));
   for (const std::string& sha256 : meshes) TF_RETURN_IF_ERROR(LookAtMesh(sha256));
-  TF_RETURN_IF_ERROR(rooms_.access->LearnAgain());
-  return rooms_.exports->LearnAgain();
+  TF_RETURN_IF_ERROR(rooms_.access->ReloadRows());
+  return rooms_.exports->ReloadRows();
 }
 
 absl::Status ChangeFollower::LookAtAllSessions(const std::vector<std::string>& known) {

@@ -14,7 +14,7 @@
 
 #include "core/base/mutex.h"
 #include "server/access/access_changes.h"
-#include "server/exports/export_book.h"
+#include "server/exports/export_queue.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session_registry.h"
 #include "server/store/postgres_store/change_listener.h"
@@ -25,12 +25,12 @@
 namespace tissueform {
 
 // What this server knows of a store that it shares, and who is told when others change it.
-struct SharedRooms {
+struct ClusterListeners {
   Stores* stores = nullptr;  // those of the database themselves
   AccessChanges* access = nullptr;
   SessionRegistry* sessions = nullptr;
   MeshCatalog* meshes = nullptr;
-  ExportBook* exports = nullptr;
+  ExportQueue* exports = nullptr;
 };
 
 // Follows what others change in the store: reads what a notice names and tells the rooms, on a
@@ -47,12 +47,12 @@ class ChangeFollower {
 
   // `rooms`, which must outlive it, have learnt what there is: what has changed since Start is told
   // first. Once.
-  void Begin(const SharedRooms& rooms);
+  void Begin(const ClusterListeners& rooms);
 
  private:
   ChangeFollower() = default;
 
-  void Heard(const StoreChange& change);
+  void OnRemoteChange(const StoreChange& change);
   // False at the end.
   bool Next(StoreChange* change);
   void Loop();
@@ -61,13 +61,13 @@ class ChangeFollower {
   absl::Status LookAtPrediction(const std::string& id);
   absl::Status LookAtCase(const CaseKey& key);
   absl::Status LookAtMesh(const std::string& sha256);
-  absl::Status LookAtAll();
+  absl::Status ResyncAll();
   // What there is of each kind; what was known before and is not there goes.
   absl::Status LookAtAllSessions(const std::vector<std::string>& known);
   absl::Status LookAtAllPredictions(const std::vector<std::string>& known);
   absl::Status LookAtAllCases(const std::vector<CaseKey>& known);
 
-  SharedRooms rooms_;  // constant once its thread runs
+  ClusterListeners rooms_;  // constant once its thread runs
 
   Mutex mutex_;
   ConditionVariable changed_;

@@ -42,12 +42,13 @@ Cluster::Cluster(const ClusterOptions& options, std::string name, PostgresStores
                  std::unique_ptr<PostgresPool> pool)
     : pool_(std::move(pool)), stores_(stores), node_(pool_.get(), options, std::move(name)) {}
 
-void Cluster::Join(SharedRooms rooms, Access* access) {
+void Cluster::Join(ClusterListeners rooms, Access* access) {
   rooms.stores = stores_;
   rooms_ = rooms;
-  lookups_ = std::make_unique<RowLookups>(pool_.get(), rooms.access, rooms.exports);
-  rooms.access->FollowOthers();
-  access->set_on_unknown([this](const Access::Unknown& what) { return lookups_->LookFor(what); });
+  lookups_ = std::make_unique<ReadThroughLoader>(pool_.get(), rooms.access, rooms.exports);
+  rooms.access->EnableClusterMode();
+  access->set_on_unknown(
+      [this](const Access::Unknown& what) { return lookups_->FetchIfMissing(what); });
   rooms.exports->set_on_unknown(
       [this](const std::string& id) { return lookups_->LookForExport(id); });
   rooms.sessions->set_naming_room(

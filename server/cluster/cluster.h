@@ -15,7 +15,7 @@
 #include "server/cluster/change_follower.h"
 #include "server/cluster/cluster_node.h"
 #include "server/cluster/cluster_options.h"
-#include "server/cluster/row_lookups.h"
+#include "server/cluster/read_through_loader.h"
 #include "server/platform/metrics_page.h"
 #include "server/store/postgres_store/postgres_pool.h"
 #include "server/store/postgres_store/postgres_stores.h"
@@ -39,10 +39,10 @@ class Cluster {
   ClusterNode& node() { return node_; }
   const std::string& name() const { return node_.name(); }
   // Once joined.
-  const RowLookups& lookups() const { return *lookups_; }
+  const ReadThroughLoader& lookups() const { return *lookups_; }
 
   // Whatever the rooms do not know they look for from now on. All must outlive Stop.
-  void Join(SharedRooms rooms, Access* access);
+  void Join(ClusterListeners rooms, Access* access);
   // `free_bytes` says how much memory sessions may still take here; any thread.
   void Start(std::function<int64_t()> free_bytes);
   // No room is told of anything any more; leases are renewed no longer.
@@ -62,8 +62,8 @@ class Cluster {
   const std::unique_ptr<PostgresPool> pool_;
   PostgresStores* const stores_;
   ClusterNode node_;
-  SharedRooms rooms_;
-  std::unique_ptr<RowLookups> lookups_;
+  ClusterListeners rooms_;
+  std::unique_ptr<ReadThroughLoader> lookups_;
   std::unique_ptr<ChangeFollower> follower_;
 };
 

@@ -10,7 +10,7 @@
 
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
-#include "server/session/session_refusals.h"
+#include "server/session/session_errors.h"
 
 namespace tissueform {
 

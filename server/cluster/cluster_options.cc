@@ -16,7 +16,7 @@
 namespace tissueform {
 namespace {
 
-constexpr size_t kMostHostNameBytes = 48;
+constexpr size_t kMaxHostNameBytes = 48;
 constexpr int kNodeConnections = 8;
 
 bool MayStandInName(char c) {
@@ -49,12 +49,12 @@ void AddClusterOptions(CLI::App& app, ClusterOptions* options, CLI::Option* data
 }
 
 absl::Status CheckNodeName(const std::string& name) {
-  if (!name.empty() && name.size() <= kMostNodeNameBytes &&
+  if (!name.empty() && name.size() <= kMaxNodeNameBytes &&
       std::all_of(name.begin(), name.end(), MayStandInName)) {
     return absl::OkStatus();
   }
   return absl::InvalidArgumentError(absl::StrCat("not a name of a node: give it 1 to ",
-                                                 kMostNodeNameBytes,
+                                                 kMaxNodeNameBytes,
                                                  " letters, digits, \"-\", \"_\", \".\" or \":\""));
 }
 
@@ -63,7 +63,7 @@ std::string DefaultNodeName(int port) {
   std::string name = gethostname(host.data(), host.size() - 1) == 0 ? host.data() : "";
   std::erase_if(name, [](char c) { return !MayStandInName(c); });
   if (name.empty()) name = "node";
-  return absl::StrCat(name.substr(0, kMostHostNameBytes), ":",
+  return absl::StrCat(name.substr(0, kMaxHostNameBytes), ":",
                       port != 0 ? absl::StrCat(port) : RandomId().substr(0, 8));
 }
 

@@ -36,9 +36,9 @@ struct ClusterOptions {
 void AddClusterOptions(CLI::App& app, ClusterOptions* options, CLI::Option* data_dir,
                        CLI::Option* in_memory);
 
-inline constexpr int kMostNodeNameBytes = 64;
+inline constexpr int kMaxNodeNameBytes = 64;
 
-// Letters, digits, "-", "_", "." and ":", at most kMostNodeNameBytes. Errors: InvalidArgument.
+// Letters, digits, "-", "_", "." and ":", at most kMaxNodeNameBytes. Errors: InvalidArgument.
 absl::Status CheckNodeName(const std::string& name);
 
 // The machine's name and the port; where that is any free one, a random number in its place.

@@ -112,7 +112,7 @@ absl::Status NodeTable::Exchange() {
         }
         return absl::OkStatus();
       },
-      PostgresPool::Clock::now() + kPatience, PostgresPool::Twice::kIsOnce);
+      PostgresPool::Clock::now() + kPatience, PostgresPool::Idempotent::kNo);
   MutexLock lock(mutex_);
   others_ = std::move(others);
   return status;

@@ -92,75 +92,78 @@ absl::StatusOr<std::string> AskedPrincipal(const Principal& caller, const std::s
 grpc::ServerUnaryReactor* AccessService::WhoAmI(grpc::CallbackServerContext* context,
                                                 const v1::WhoAmIRequest* /*request*/,
                                                 v1::Caller* response) {
-  return RunUpkeep(context, "AccessService.WhoAmI", gate_,
-                   [&](CallScope& scope, const EndCall& end) -> absl::Status {
-                     const Principal& caller = scope.principal();
-                     response->set_principal(caller.name);
-                     for (const std::string& role : caller.roles) response->add_roles(role);
-                     for (const std::string& name : caller.projects) response->add_projects(name);
-                     response->set_only_session(caller.only_session);
-                     const system_clock::time_point expires = scope.authenticated().expires;
-                     if (expires != system_clock::time_point::max()) {
-                       *response->mutable_expire_time() = ToTimestamp(expires);
-                     }
-                     *response->mutable_server_time() = ToTimestamp(system_clock::now());
-                     end(absl::OkStatus());
-                     return absl::OkStatus();
-                   });
+  return HandleUnaryCall(context, "AccessService.WhoAmI", gate_,
+                         [&](CallScope& scope, const FinishCall& end) -> absl::Status {
+                           const Principal& caller = scope.principal();
+                           response->set_principal(caller.name);
+                           for (const std::string& role : caller.roles) response->add_roles(role);
+                           for (const std::string& name : caller.projects)
+                             response->add_projects(name);
+                           response->set_only_session(caller.only_session);
+                           const system_clock::time_point expires = scope.authenticated().expires;
+                           if (expires != system_clock::time_point::max()) {
+                             *response->mutable_expire_time() = ToTimestamp(expires);
+                           }
+                           *response->mutable_server_time() = ToTimestamp(system_clock::now());
+                           end(absl::OkStatus());
+                           return absl::OkStatus();
+                         });
 }
 
 grpc::ServerUnaryReactor* AccessService::CreateShare(grpc::CallbackServerContext* context,
                                                      const v1::CreateShareRequest* request,
                                                      v1::Share* response) {
-  return RunUpkeep(context, "AccessService.CreateShare", gate_,
-                   [=, this](CallScope& scope, const EndCall& end) -> absl::Status {
-                     TF_ASSIGN_OR_RETURN(const ShareRow share, ToShare(request->share()));
-                     *response = ToProto(share);
-                     scope.SetResource(share.resource);
-                     changes_->Share(scope.principal(), share, end);
-                     return absl::OkStatus();
-                   });
+  return HandleUnaryCall(context, "AccessService.CreateShare", gate_,
+                         [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
+                           TF_ASSIGN_OR_RETURN(const ShareRow share, ToShare(request->share()));
+                           *response = ToProto(share);
+                           scope.SetResource(share.resource);
+                           changes_->Share(scope.principal(), share, end);
+                           return absl::OkStatus();
+                         });
 }
 
 grpc::ServerUnaryReactor* AccessService::ListShares(grpc::CallbackServerContext* context,
                                                     const v1::ListSharesRequest* request,
                                                     v1::ListSharesResponse* response) {
-  return RunUpkeep(context, "AccessService.ListShares", gate_,
-                   [=, this](CallScope& scope, const EndCall& end) -> absl::Status {
-                     TF_ASSIGN_OR_RETURN(
-                         const std::vector<ShareRow> shares,
-                         changes_->SharesOf(scope.principal(), request->resource()));
-                     scope.SetResource(request->resource());
-                     for (const ShareRow& share : shares) *response->add_shares() = ToProto(share);
-                     end(absl::OkStatus());
-                     return absl::OkStatus();
-                   });
+  return HandleUnaryCall(context, "AccessService.ListShares", gate_,
+                         [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
+                           TF_ASSIGN_OR_RETURN(
+                               const std::vector<ShareRow> shares,
+                               changes_->SharesOf(scope.principal(), request->resource()));
+                           scope.SetResource(request->resource());
+                           for (const ShareRow& share : shares)
+                             *response->add_shares() = ToProto(share);
+                           end(absl::OkStatus());
+                           return absl::OkStatus();
+                         });
 }
 
 grpc::ServerUnaryReactor* AccessService::DeleteShare(grpc::CallbackServerContext* context,
                                                      const v1::DeleteShareRequest* request,
                                                      google::protobuf::Empty* /*response*/) {
-  return RunUpkeep(context, "AccessService.DeleteShare", gate_,
-                   [=, this](CallScope& scope, const EndCall& end) -> absl::Status {
-                     scope.SetResource(request->resource());
-                     changes_->Unshare(scope.principal(), request->resource(), request->principal(),
-                                       end);
-                     return absl::OkStatus();
-                   });
+  return HandleUnaryCall(context, "AccessService.DeleteShare", gate_,
+                         [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
+                           scope.SetResource(request->resource());
+                           changes_->Unshare(scope.principal(), request->resource(),
+                                             request->principal(), end);
+                           return absl::OkStatus();
+                         });
 }
 
 grpc::ServerUnaryReactor* AccessService::CreateFollowLink(
     grpc::CallbackServerContext* context, const v1::CreateFollowLinkRequest* request,
     v1::FollowLink* response) {
-  return RunUpkeep(
+  return HandleUnaryCall(
       context, "AccessService.CreateFollowLink", gate_,
-      [=, this](CallScope& scope, const EndCall& end) -> absl::Status {
+      [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
         const std::string token = NewLinkToken();
         TF_ASSIGN_OR_RETURN(
             const FollowLinkRow link,
             ToLink(*request, token, changes_->options().max_link_lifetime, clock_()));
         TF_RETURN_IF_ERROR(
-            AllowedSession(changes_->access(), &scope, request->session(), Need::kDrag).status());
+            AllowedSession(changes_->access(), &scope, request->session(), Permission::kWrite)
+                .status());
         changes_->AddLink(scope.principal(), link, [=](const absl::Status& status) {
           if (status.ok()) {
             response->set_token(token);
@@ -175,41 +178,43 @@ grpc::ServerUnaryReactor* AccessService::CreateFollowLink(
 grpc::ServerUnaryReactor* AccessService::DeleteFollowLinks(
     grpc::CallbackServerContext* context, const v1::DeleteFollowLinksRequest* request,
     google::protobuf::Empty* /*response*/) {
-  return RunUpkeep(context, "AccessService.DeleteFollowLinks", gate_,
-                   [=, this](CallScope& scope, const EndCall& end) -> absl::Status {
-                     TF_ASSIGN_OR_RETURN(const std::string id,
-                                         AllowedSession(changes_->access(), &scope,
-                                                        request->session(), Need::kDrag));
-                     changes_->RemoveLinks(scope.principal(), id, end);
-                     return absl::OkStatus();
-                   });
+  return HandleUnaryCall(
+      context, "AccessService.DeleteFollowLinks", gate_,
+      [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
+        TF_ASSIGN_OR_RETURN(
+            const std::string id,
+            AllowedSession(changes_->access(), &scope, request->session(), Permission::kWrite));
+        changes_->RemoveLinks(scope.principal(), id, end);
+        return absl::OkStatus();
+      });
 }
 
 grpc::ServerUnaryReactor* AccessService::GetUsage(grpc::CallbackServerContext* context,
                                                   const v1::GetUsageRequest* request,
                                                   v1::Usage* response) {
-  return RunUpkeep(context, "AccessService.GetUsage", gate_,
-                   [=, this](CallScope& scope, const EndCall& end) -> absl::Status {
-                     TF_ASSIGN_OR_RETURN(const std::string asked,
-                                         AskedPrincipal(scope.principal(), request->principal()));
-                     std::map<std::string, v1::PrincipalUsage> usage = CollectUsage();
-                     if (asked != kEverybody) {
-                       v1::PrincipalUsage one = std::move(usage[asked]);
-                       usage.clear();
-                       usage[asked] = std::move(one);
-                     }
-                     for (auto& [name, of_name] : usage) {
-                       of_name.set_principal(name);
-                       *response->add_principals() = std::move(of_name);
-                     }
-                     std::stable_sort(response->mutable_principals()->begin(),
-                                      response->mutable_principals()->end(),
-                                      [](const v1::PrincipalUsage& a, const v1::PrincipalUsage& b) {
-                                        return a.memory_bytes() > b.memory_bytes();
-                                      });
-                     end(absl::OkStatus());
-                     return absl::OkStatus();
-                   });
+  return HandleUnaryCall(
+      context, "AccessService.GetUsage", gate_,
+      [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
+        TF_ASSIGN_OR_RETURN(const std::string asked,
+                            AskedPrincipal(scope.principal(), request->principal()));
+        std::map<std::string, v1::PrincipalUsage> usage = CollectUsage();
+        if (asked != kEverybody) {
+          v1::PrincipalUsage one = std::move(usage[asked]);
+          usage.clear();
+          usage[asked] = std::move(one);
+        }
+        for (auto& [name, of_name] : usage) {
+          of_name.set_principal(name);
+          *response->add_principals() = std::move(of_name);
+        }
+        std::stable_sort(response->mutable_principals()->begin(),
+                         response->mutable_principals()->end(),
+                         [](const v1::PrincipalUsage& a, const v1::PrincipalUsage& b) {
+                           return a.memory_bytes() > b.memory_bytes();
+                         });
+        end(absl::OkStatus());
+        return absl::OkStatus();
+      });
 }
 
 std::map<std::string, v1::PrincipalUsage> AccessService::CollectUsage() const {

@@ -19,7 +19,7 @@ namespace tissueform {
 // tissueform.v1.AccessService. Stateless; all pointers must outlive it.
 class AccessService final : public v1::AccessService::CallbackService {
  public:
-  AccessService(ServiceGate* gate, AccessChanges* changes, const SessionRegistry* registry,
+  AccessService(AdmissionControl* gate, AccessChanges* changes, const SessionRegistry* registry,
                 const DeformStreams* streams, const SessionWatches* watches,
                 UnixClock clock = SystemUnixSeconds)
       : gate_(gate),
@@ -53,7 +53,7 @@ class AccessService final : public v1::AccessService::CallbackService {
  private:
   std::map<std::string, v1::PrincipalUsage> CollectUsage() const;
 
-  ServiceGate* const gate_;
+  AdmissionControl* const gate_;
   AccessChanges* const changes_;
   const SessionRegistry* const registry_;
   const DeformStreams* const streams_;

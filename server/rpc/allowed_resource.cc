@@ -12,34 +12,34 @@
 namespace tissueform {
 
 absl::StatusOr<std::string> AllowedSession(const Access& access, CallScope* scope,
-                                           const std::string& name, Need need) {
+                                           const std::string& name, Permission need) {
   TF_ASSIGN_OR_RETURN(std::string id, ParseSessionName(name));
-  TF_RETURN_IF_ERROR(access.MaySession(scope->principal(), id, need));
+  TF_RETURN_IF_ERROR(access.CheckSessionAccess(scope->principal(), id, need));
   // What nobody has made is a text of the client's, and goes to no log.
   if (access.KnowsSession(id)) scope->SetResource(name);
   return id;
 }
 
 absl::StatusOr<std::string> AllowedPrediction(const Access& access, CallScope* scope,
-                                              const std::string& name, Need need) {
+                                              const std::string& name, Permission need) {
   TF_ASSIGN_OR_RETURN(std::string id, ParsePredictionName(name));
-  TF_RETURN_IF_ERROR(access.MayPrediction(scope->principal(), id, need));
+  TF_RETURN_IF_ERROR(access.CheckPredictionAccess(scope->principal(), id, need));
   if (access.KnowsPrediction(id)) scope->SetResource(name);
   return id;
 }
 
 absl::StatusOr<std::string> AllowedMesh(const Access& access, CallScope* scope,
-                                        const std::string& name, Need need) {
+                                        const std::string& name, Permission need) {
   TF_ASSIGN_OR_RETURN(std::string sha256, ParseMeshName(name));
-  TF_RETURN_IF_ERROR(access.MayMesh(scope->principal(), sha256, need));
+  TF_RETURN_IF_ERROR(access.CheckMeshAccess(scope->principal(), sha256, need));
   scope->SetResource(name);
   return sha256;
 }
 
 absl::StatusOr<CaseKey> AllowedCase(const Access& access, CallScope* scope, const std::string& name,
-                                    Need need) {
+                                    Permission need) {
   TF_ASSIGN_OR_RETURN(const std::string sha256, ParseCaseName(name));
-  TF_ASSIGN_OR_RETURN(CaseKey key, access.MayCase(scope->principal(), sha256, need));
+  TF_ASSIGN_OR_RETURN(CaseKey key, access.CheckCaseAccess(scope->principal(), sha256, need));
   scope->SetResource(name);
   return key;
 }

@@ -31,7 +31,8 @@ struct CasePart {
 // Blocks on the disk.
 absl::StatusOr<CasePart> OpenPart(const v1::ReadCaseRequest& request, const Access& access,
                                   CallScope* scope, CaseStore* store) {
-  TF_ASSIGN_OR_RETURN(const CaseKey key, AllowedCase(access, scope, request.name(), Need::kLook));
+  TF_ASSIGN_OR_RETURN(const CaseKey key,
+                      AllowedCase(access, scope, request.name(), Permission::kRead));
   if (request.read_limit() < 0) {
     return absl::InvalidArgumentError(
         absl::StrCat("read_limit is ", request.read_limit(), "; it must be 0 (all) or more"));
@@ -77,7 +78,7 @@ grpc::ServerReadReactor<v1::UploadCaseRequest>* CaseService::UploadCase(
 grpc::ServerWriteReactor<v1::ReadCaseResponse>* CaseService::ReadCase(
     grpc::CallbackServerContext* context, const v1::ReadCaseRequest* request) {
   auto* call = new MessageStream<v1::ReadCaseResponse>(
-      CallScope(context, "CaseService.ReadCase", CallKind::kUpkeep, gate_), CancelOf(context),
+      CallScope(context, "CaseService.ReadCase", CallKind::kMetadata, gate_), CancelOf(context),
       timer_, limits_.upload_silence);
   const auto post = [pool = pool_](WorkerPool::Job job) {
     pool->Post(Lane::kStore, std::move(job));
@@ -103,10 +104,12 @@ grpc::ServerWriteReactor<v1::ReadCaseResponse>* CaseService::ReadCase(
 grpc::ServerUnaryReactor* CaseService::Run(grpc::CallbackServerContext* context,
                                            std::string_view method,
                                            std::function<absl::Status(CallScope* scope)> work) {
-  return RunUpkeep(context, method, gate_, [&, this](CallScope& scope, const EndCall& end) {
-    pool_->Post(Lane::kStore, [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
-    return absl::OkStatus();
-  });
+  return HandleUnaryCall(
+      context, method, gate_, [&, this](CallScope& scope, const FinishCall& end) {
+        pool_->Post(Lane::kStore,
+                    [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
+        return absl::OkStatus();
+      });
 }
 
 grpc::ServerUnaryReactor* CaseService::GetCase(grpc::CallbackServerContext* context,
@@ -132,7 +135,8 @@ grpc::ServerUnaryReactor* CaseService::DeleteCase(grpc::CallbackServerContext* c
 
 absl::Status CaseService::Find(CallScope* scope, const v1::GetCaseRequest& request,
                                v1::Case* response) {
-  TF_ASSIGN_OR_RETURN(const CaseKey key, AllowedCase(access_, scope, request.name(), Need::kLook));
+  TF_ASSIGN_OR_RETURN(const CaseKey key,
+                      AllowedCase(access_, scope, request.name(), Permission::kRead));
   TF_ASSIGN_OR_RETURN(const CaseRecord record, store_->Find(key));
   *response = ToProto(record);
   return absl::OkStatus();
@@ -153,7 +157,8 @@ absl::Status CaseService::List(const v1::ListCasesRequest& request, const Princi
 }
 
 absl::Status CaseService::Remove(CallScope* scope, const v1::DeleteCaseRequest& request) {
-  TF_ASSIGN_OR_RETURN(const CaseKey key, AllowedCase(access_, scope, request.name(), Need::kOwn));
+  TF_ASSIGN_OR_RETURN(const CaseKey key,
+                      AllowedCase(access_, scope, request.name(), Permission::kOwner));
   return store_->Delete(key);
 }
 

@@ -22,7 +22,7 @@ namespace tissueform {
 // tissueform.v1.CaseService over a store. All pointers must outlive it.
 class CaseService final : public v1::CaseService::CallbackService {
  public:
-  CaseService(ServiceGate* gate, const ServiceLimits& limits, const Access* access,
+  CaseService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
               CaseStore* store, WorkerPool* pool, DeadlineTimer* timer)
       : gate_(gate), limits_(limits), access_(*access), store_(store), pool_(pool), timer_(timer) {}
 
@@ -50,7 +50,7 @@ class CaseService final : public v1::CaseService::CallbackService {
   absl::Status Remove(CallScope* scope, const v1::DeleteCaseRequest& request);
 
   // Constant.
-  ServiceGate* const gate_;
+  AdmissionControl* const gate_;
   const ServiceLimits limits_;
   const Access& access_;
   CaseStore* const store_;

@@ -70,7 +70,7 @@ absl::StatusOr<CaseUploadStream::After> CaseUploadStream::TakeHeader(
                     .created_s = now_s,
                     .last_used_s = now_s};
   TF_RETURN_IF_ERROR(CheckCaseRecord(record));
-  TF_RETURN_IF_ERROR(Access::MayPutInto(scope().principal(), header.project()));
+  TF_RETURN_IF_ERROR(Access::CheckProjectAccess(scope().principal(), header.project()));
   scope().SetResource(CaseName(record.sha256));
   const auto known = store_->Find(record.key());
   // A store that was waited for in vain is not waited for once more after the bytes.
@@ -81,7 +81,7 @@ absl::StatusOr<CaseUploadStream::After> CaseUploadStream::TakeHeader(
     response_->set_already_existed(true);
     return After::kEnd;
   }
-  TF_RETURN_IF_ERROR(access_.MayKeep(scope().principal(), record.total_bytes));
+  TF_RETURN_IF_ERROR(access_.CheckStorageQuota(scope().principal(), record.total_bytes));
   TF_RETURN_IF_ERROR(TakePlace());
   TF_ASSIGN_OR_RETURN(writer_, store_->Begin(std::move(record), limits_.max_cases));
   return After::kMore;

@@ -83,8 +83,9 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
 
  private:
   absl::Status ReadBoth() {
-    TF_ASSIGN_OR_RETURN(const std::string one,
-                        AllowedPrediction(access_, &scope(), request_.prediction(), Need::kLook));
+    TF_ASSIGN_OR_RETURN(
+        const std::string one,
+        AllowedPrediction(access_, &scope(), request_.prediction(), Permission::kRead));
     TF_ASSIGN_OR_RETURN(one_, Read(one, store_));
     if (!request_.vertices().has_skin()) {
       TF_ASSIGN_OR_RETURN(choice_, ToVertexChoice(request_.vertices(),
@@ -95,7 +96,8 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
     told.set_model(one_.prediction.model());
     if (request_.has_other_model()) {
       TF_ASSIGN_OR_RETURN(const std::string session, ParseSessionName(one_.prediction.session()));
-      TF_RETURN_IF_ERROR(access_.MaySession(scope().principal(), session, Need::kLook));
+      TF_RETURN_IF_ERROR(
+          access_.CheckSessionAccess(scope().principal(), session, Permission::kRead));
       AskModel();
       return absl::OkStatus();
     }
@@ -104,7 +106,7 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
           "nothing to compare with; set other_prediction or other_model");
     }
     TF_ASSIGN_OR_RETURN(const std::string id, ParsePredictionName(request_.other_prediction()));
-    TF_RETURN_IF_ERROR(access_.MayPrediction(scope().principal(), id, Need::kLook));
+    TF_RETURN_IF_ERROR(access_.CheckPredictionAccess(scope().principal(), id, Permission::kRead));
     TF_ASSIGN_OR_RETURN(ReadPrediction other, Read(id, store_));
     if (other.prediction.mesh() != one_.prediction.mesh()) {
       return NotComparable(

@@ -30,7 +30,7 @@ class DeformOnceCall : public grpc::ServerUnaryReactor {
   void Start(const Access& access) {
     absl::Status status = scope_.admission();
     if (status.ok()) {
-      status = AllowedSession(access, &scope_, request_.session(), Need::kDrag).status();
+      status = AllowedSession(access, &scope_, request_.session(), Permission::kWrite).status();
     }
     if (status.ok()) status = CheckEncoding(request_.encoding());
     if (!status.ok()) {
@@ -117,9 +117,9 @@ grpc::ServerWriteReactor<grpc::ByteBuffer>* DeformService::Watch(
 grpc::ServerUnaryReactor* DeformService::AcknowledgeWatch(
     grpc::CallbackServerContext* context, const v1::AcknowledgeWatchRequest* request,
     google::protobuf::Empty* /*response*/) {
-  return RunUpkeep(
+  return HandleUnaryCall(
       context, "DeformService.AcknowledgeWatch", gate_,
-      [&](CallScope& scope, const EndCall& end) -> absl::Status {
+      [&](CallScope& scope, const FinishCall& end) -> absl::Status {
         TF_ASSIGN_OR_RETURN(const std::string watch, ParseWatchName(request->watch()));
         TF_RETURN_IF_ERROR(watches_->Acknowledge(watch, request->number(), scope.authenticated()));
         end(absl::OkStatus());

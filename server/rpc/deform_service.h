@@ -25,7 +25,7 @@ using DeformServiceBase = v1::DeformService::WithCallbackMethod_DeformOnce<
 // it.
 class DeformService final : public DeformServiceBase {
  public:
-  DeformService(ServiceGate* gate, const ServiceLimits& limits, const Access* access,
+  DeformService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
                 SessionRegistry* registry, DeformStreams* streams, SessionWatches* watches,
                 DeadlineTimer* timer)
       : gate_(gate),
@@ -50,7 +50,7 @@ class DeformService final : public DeformServiceBase {
                                              google::protobuf::Empty* response) override;
 
  private:
-  ServiceGate* const gate_;
+  AdmissionControl* const gate_;
   const ServiceLimits limits_;
   const Access& access_;
   SessionRegistry* const registry_;

@@ -48,7 +48,7 @@ DeformStreamReactor::DeformStreamReactor(CallScope scope, const ServiceLimits& l
   if (admission.ok()) {
     deadline_ = timer_->Start(std::chrono::steady_clock::now() + limits_.configuration_deadline,
                               [this] { EndUnlessConfigured(); });
-    WaitForStanding();
+    WaitToReauthorize();
     StartRead(&request_);
   } else {
     End(admission);
@@ -92,19 +92,19 @@ void DeformStreamReactor::OnCancel() {
   Advance();
 }
 
-void DeformStreamReactor::WaitForStanding() {
+void DeformStreamReactor::WaitToReauthorize() {
   if (!scope_.may_end_early()) return;
-  standing_ = timer_->Start(std::chrono::steady_clock::now() + kStandingPeriod,
-                            [this] { CheckStanding(); });
+  standing_ = timer_->Start(std::chrono::steady_clock::now() + kReauthorizePeriod,
+                            [this] { RecheckAuthorization(); });
 }
 
-void DeformStreamReactor::CheckStanding() {
+void DeformStreamReactor::RecheckAuthorization() {
   {
     MutexLock lock(mutex_);
     if (finished_) return;
-    const absl::Status good = scope_.StillGood();
+    const absl::Status good = scope_.IsStillAuthorized();
     if (good.ok()) {
-      WaitForStanding();
+      WaitToReauthorize();
       return;
     }
     End(good);
@@ -191,11 +191,11 @@ void DeformStreamReactor::NotifyDraining(std::chrono::system_clock::time_point e
   Advance();
 }
 
-void DeformStreamReactor::AskAgain() {
+void DeformStreamReactor::RecheckAccess() {
   MutexLock lock(mutex_);
   if (!flow_.has_value()) return;  // is asked when it names its session
-  const absl::Status allowed =
-      access_.MaySession(scope_.principal(), stream_request_.session_id, Need::kDrag);
+  const absl::Status allowed = access_.CheckSessionAccess(
+      scope_.principal(), stream_request_.session_id, Permission::kWrite);
   if (!allowed.ok()) End(allowed);
   Advance();
 }
@@ -245,7 +245,8 @@ absl::Status DeformStreamReactor::TakeConfiguration() {
     return absl::InvalidArgumentError("the first message must be the configuration");
   }
   TF_RETURN_IF_ERROR(
-      AllowedSession(access_, &scope_, request_.configuration().session(), Need::kDrag).status());
+      AllowedSession(access_, &scope_, request_.configuration().session(), Permission::kWrite)
+          .status());
   TF_ASSIGN_OR_RETURN(stream_request_, ReadStreamRequest(request_.configuration(), limits_));
   flow_.emplace(stream_request_.max_unacked, &streams_->measures());
   StartOpening();
@@ -440,7 +441,7 @@ std::optional<WaitingPose> DeformStreamReactor::TakePose() {
 }
 
 void DeformStreamReactor::AnswerNewest(const Configuration& configuration,
-                                       const std::shared_ptr<ResponseClaim>& claim) {
+                                       const std::shared_ptr<PreparedAnswersRef>& claim) {
   std::optional<WaitingPose> pose = TakePose();
   absl::StatusOr<std::optional<AnswerFrame>> answer = std::optional<AnswerFrame>();
   if (pose.has_value()) answer = AnswerFromPrepared(*configuration, *claim, *pose);
@@ -477,7 +478,7 @@ void DeformStreamReactor::Refine(const StreamConfiguration& configuration) {
     // Early answers begin with the linear one, which is worse than the estimate that is there.
     answer = SolvePose(configuration, *pose, [this](const MakeFrame& /*make_frame*/) {
       MutexLock lock(mutex_);
-      return !outcome_.has_value() && flow_->JudgeEarly() != FrameFlow::EarlyAnswer::kStop;
+      return !outcome_.has_value() && flow_->JudgeEarly() != FrameScheduler::EarlyAnswer::kStop;
     });
   }
   FinishAnswer(*configuration.session, std::move(pose), std::move(answer));
@@ -524,14 +525,14 @@ void DeformStreamReactor::FinishAnswer(const Session& session, std::optional<Wai
 }
 
 bool DeformStreamReactor::ShowEarly(const MakeFrame& make_frame) {
-  FrameFlow::EarlyAnswer judgement = FrameFlow::EarlyAnswer::kStop;
+  FrameScheduler::EarlyAnswer judgement = FrameScheduler::EarlyAnswer::kStop;
   {
     MutexLock lock(mutex_);
     if (!outcome_.has_value()) {
       judgement = flow_->JudgeEarly();
     }
   }
-  if (judgement == FrameFlow::EarlyAnswer::kShow) {
+  if (judgement == FrameScheduler::EarlyAnswer::kShow) {
     AnswerFrame frame = make_frame();  // without the lock: it encodes all vertices
     MutexLock lock(mutex_);
     if (!outcome_.has_value()) {
@@ -539,7 +540,7 @@ bool DeformStreamReactor::ShowEarly(const MakeFrame& make_frame) {
       Advance();
     }
   }
-  return judgement != FrameFlow::EarlyAnswer::kStop;
+  return judgement != FrameScheduler::EarlyAnswer::kStop;
 }
 
 bool DeformStreamReactor::Ended() {

@@ -19,15 +19,15 @@
 #include "server/rpc/stream_answers.h"
 #include "server/rpc/watches/session_watches.h"
 #include "server/session/deadline_timer.h"
-#include "server/session/frame_flow.h"
+#include "server/session/frame_scheduler.h"
 #include "server/session/limits.h"
 #include "server/session/session_registry.h"
 #include "tissueform/v1/deform_service.pb.h"
 
 namespace tissueform {
 
-// One Deform call: hands poses and acknowledgements to a FrameFlow and does what that says, with
-// one read, one write and one job at a time: on the session's making strand before the stream
+// One Deform call: hands poses and acknowledgements to a FrameScheduler and does what that says,
+// with one read, one write and one job at a time: on the session's making strand before the stream
 // begins, then in the lane of frames while prepared answers cover the poses, else on its strand.
 // A session that has left memory is opened again, and the stream goes on with that. Beside all
 // this, one commit of a pose at a time is on its way to the store. Deletes itself when gRPC is done
@@ -57,7 +57,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   // Tells the client that the server drains, and when it ends. Any thread.
   void NotifyDraining(std::chrono::system_clock::time_point end);
   // Ends the stream where its caller may not drag the session any more. Any thread.
-  void AskAgain();
+  void RecheckAccess();
   // Ends the stream where it is of this session, and that is not held any more. Any thread.
   void EndIfMoved(const std::string& session_id);
   // The name of who drags, however the token is renewed.
@@ -72,8 +72,8 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   void Tell(int followers) ABSL_LOCKS_EXCLUDED(mutex_);
 
   // Its caller's token may have ended.
-  void WaitForStanding() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void CheckStanding() ABSL_LOCKS_EXCLUDED(mutex_);
+  void WaitToReauthorize() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void RecheckAuthorization() ABSL_LOCKS_EXCLUDED(mutex_);
 
   // The client has had its time for the configuration.
   void EndUnlessConfigured() ABSL_LOCKS_EXCLUDED(mutex_);
@@ -115,8 +115,8 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   void StartCommit() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void FinishCommit(uint64_t sequence, const absl::Status& outcome) ABSL_LOCKS_EXCLUDED(mutex_);
   // On any worker.
-  void AnswerNewest(const Configuration& configuration, const std::shared_ptr<ResponseClaim>& claim)
-      ABSL_LOCKS_EXCLUDED(mutex_);
+  void AnswerNewest(const Configuration& configuration,
+                    const std::shared_ptr<PreparedAnswersRef>& claim) ABSL_LOCKS_EXCLUDED(mutex_);
   // On the session's strand. `pose` is the newest one when there is none.
   void SolveNewest(const StreamConfiguration& configuration, std::optional<WaitingPose> pose)
       ABSL_LOCKS_EXCLUDED(mutex_);
@@ -160,9 +160,9 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   Mutex mutex_;
   int told_followers_ ABSL_GUARDED_BY(mutex_) = 0;
   StreamRequest stream_request_ ABSL_GUARDED_BY(mutex_);
-  std::optional<FrameFlow> flow_ ABSL_GUARDED_BY(mutex_);         // empty before the first message
-  Configuration configuration_ ABSL_GUARDED_BY(mutex_);           // null before there is a session
-  std::shared_ptr<ResponseClaim> claim_ ABSL_GUARDED_BY(mutex_);  // null: none are prepared
+  std::optional<FrameScheduler> flow_ ABSL_GUARDED_BY(mutex_);  // empty before the first message
+  Configuration configuration_ ABSL_GUARDED_BY(mutex_);         // null before there is a session
+  std::shared_ptr<PreparedAnswersRef> claim_ ABSL_GUARDED_BY(mutex_);  // null: none are prepared
   std::optional<DragPublisher> publisher_ ABSL_GUARDED_BY(mutex_);     // empty before `started`
   std::optional<v1::DeformResponse> started_ ABSL_GUARDED_BY(mutex_);  // waits for its write
   bool has_started_ ABSL_GUARDED_BY(mutex_) = false;                   // it was written

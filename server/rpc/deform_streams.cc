@@ -34,9 +34,9 @@ void DeformStreams::NotifyDraining(std::chrono::system_clock::time_point end) {
   }
 }
 
-void DeformStreams::AskAgain() {
+void DeformStreams::RecheckAccess() {
   MutexLock lock(mutex_);
-  for (DeformStreamReactor* stream : streams_) stream->AskAgain();
+  for (DeformStreamReactor* stream : streams_) stream->RecheckAccess();
 }
 
 void DeformStreams::OnSessionEvent(const std::string& session_id, SessionEvent event) {

@@ -12,8 +12,8 @@
 #include "absl/status/status.h"
 
 #include "core/base/mutex.h"
-#include "server/session/frame_flow.h"
-#include "server/session/session_endings.h"
+#include "server/session/frame_scheduler.h"
+#include "server/session/session_evictor.h"
 
 namespace tissueform {
 
@@ -33,7 +33,7 @@ class DeformStreams {
 
   void NotifyDraining(std::chrono::system_clock::time_point end);
   // Each whether it may still drag.
-  void AskAgain();
+  void RecheckAccess();
   // As the registry's observer.
   void OnSessionEvent(const std::string& session_id, SessionEvent event);
   std::map<std::string, int64_t> CountByPrincipal() const;

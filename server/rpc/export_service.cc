@@ -22,7 +22,7 @@ namespace tissueform {
 namespace {
 
 // A page fits into the 4 MiB that clients take by default, however much was measured.
-constexpr size_t kMostPageBytes = size_t{2} << 20;
+constexpr size_t kMaxPageBytes = size_t{2} << 20;
 
 std::string ExportRequestKey(const Principal& owner, const std::string& request_id) {
   if (request_id.empty()) return "";
@@ -49,10 +49,12 @@ absl::StatusOr<ExportState> ToState(v1::ExportState state) {
 grpc::ServerUnaryReactor* ExportService::Run(grpc::CallbackServerContext* context,
                                              std::string_view method,
                                              std::function<absl::Status(CallScope* scope)> work) {
-  return RunUpkeep(context, method, gate_, [&, this](CallScope& scope, const EndCall& end) {
-    pool_->Post(Lane::kStore, [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
-    return absl::OkStatus();
-  });
+  return HandleUnaryCall(
+      context, method, gate_, [&, this](CallScope& scope, const FinishCall& end) {
+        pool_->Post(Lane::kStore,
+                    [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
+        return absl::OkStatus();
+      });
 }
 
 grpc::ServerUnaryReactor* ExportService::CreateExport(grpc::CallbackServerContext* context,
@@ -66,7 +68,8 @@ grpc::ServerUnaryReactor* ExportService::GetExport(grpc::CallbackServerContext* 
                                                    const v1::GetExportRequest* request,
                                                    v1::Export* response) {
   return Run(context, "ExportService.GetExport", [=, this](CallScope* scope) -> absl::Status {
-    TF_ASSIGN_OR_RETURN(const ExportRecord record, Allowed(scope, request->name(), Need::kLook));
+    TF_ASSIGN_OR_RETURN(const ExportRecord record,
+                        Allowed(scope, request->name(), Permission::kRead));
     *response = ToProto(record);
     return absl::OkStatus();
   });
@@ -96,16 +99,18 @@ grpc::ServerUnaryReactor* ExportService::DeleteExport(grpc::CallbackServerContex
                                                       const v1::DeleteExportRequest* request,
                                                       google::protobuf::Empty* /*response*/) {
   return Run(context, "ExportService.DeleteExport", [=, this](CallScope* scope) -> absl::Status {
-    TF_ASSIGN_OR_RETURN(const ExportRecord record, Allowed(scope, request->name(), Need::kOwn));
+    TF_ASSIGN_OR_RETURN(const ExportRecord record,
+                        Allowed(scope, request->name(), Permission::kOwner));
     return book_->Remove(record.id);
   });
 }
 
 absl::StatusOr<ExportRecord> ExportService::Allowed(CallScope* scope, const std::string& name,
-                                                    Need need) const {
+                                                    Permission need) const {
   TF_ASSIGN_OR_RETURN(const std::string id, ParseExportName(name));
   TF_ASSIGN_OR_RETURN(ExportRecord record, book_->Find(id));
-  TF_RETURN_IF_ERROR(Access::MayExport(scope->principal(), record.owner, NoExport(id), need));
+  TF_RETURN_IF_ERROR(
+      Access::CheckExportAccess(scope->principal(), record.owner, NoExport(id), need));
   scope->SetResource(name);
   return record;
 }
@@ -119,7 +124,7 @@ absl::StatusOr<ExportRecord> ExportService::Wanted(CallScope* scope,
   }
   TF_RETURN_IF_ERROR(CheckMeasures(request.measures()));
   TF_ASSIGN_OR_RETURN(const std::string id,
-                      AllowedPrediction(*access_, scope, request.prediction(), Need::kOwn));
+                      AllowedPrediction(*access_, scope, request.prediction(), Permission::kOwner));
   TF_ASSIGN_OR_RETURN(const PredictionRecord prediction, predictions_->Get(id));
   if (prediction.case_sha256.empty()) {
     return absl::FailedPreconditionError(
@@ -151,7 +156,7 @@ absl::Status ExportService::List(const Principal& caller, const v1::ListExportsR
                                  v1::ListExportsResponse* response) const {
   TF_ASSIGN_OR_RETURN(const PageRequest page,
                       ReadPageRequest(request.page_size(), request.page_token()));
-  ExportBook::ListRequest wanted{
+  ExportQueue::ListRequest wanted{
       .owner = Access::ExportsSeenBy(caller), .after = page.after, .limit = page.size};
   if (!request.prediction().empty()) {
     TF_ASSIGN_OR_RETURN(wanted.prediction, ParsePredictionName(request.prediction()));
@@ -159,12 +164,12 @@ absl::Status ExportService::List(const Principal& caller, const v1::ListExportsR
   if (!request.case_().empty()) {
     TF_ASSIGN_OR_RETURN(wanted.case_sha256, ParseCaseName(request.case_()));
   }
-  const ExportBook::Page found = book_->List(wanted);
+  const ExportQueue::Page found = book_->List(wanted);
   response->set_next_page_token(found.next);
   size_t bytes = 0;
   for (size_t i = 0; i < found.records.size(); ++i) {
     bytes += found.records[i].measures.size();
-    if (bytes > kMostPageBytes && i > 0) {
+    if (bytes > kMaxPageBytes && i > 0) {
       response->set_next_page_token(found.records[i - 1].id);
       break;
     }
@@ -180,7 +185,7 @@ absl::Status ExportService::Update(CallScope* scope, const v1::UpdateExportReque
   if (request.stored_objects() < 0) {
     return absl::InvalidArgumentError("stored_objects is below 0; say how many are in the PACS");
   }
-  TF_ASSIGN_OR_RETURN(const ExportRecord record, Allowed(scope, request.name(), Need::kLook));
+  TF_ASSIGN_OR_RETURN(const ExportRecord record, Allowed(scope, request.name(), Permission::kRead));
   TF_ASSIGN_OR_RETURN(const ExportRecord changed,
                       book_->Update(record.id, {.etag = request.etag(),
                                                 .state = state,

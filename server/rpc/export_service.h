@@ -9,7 +9,7 @@
 #include "absl/status/status.h"
 
 #include "server/access/access.h"
-#include "server/exports/export_book.h"
+#include "server/exports/export_queue.h"
 #include "server/rpc/calls/call_scope.h"
 #include "server/rpc/export_watch.h"
 #include "server/session/deadline_timer.h"
@@ -23,8 +23,8 @@ namespace tissueform {
 // tissueform.v1.ExportService over a book. Stateless; all pointers must outlive it.
 class ExportService final : public v1::ExportService::CallbackService {
  public:
-  ExportService(ServiceGate* gate, const ServiceLimits& limits, const Access* access,
-                PredictionStore* predictions, ExportBook* book, ExportWatches* watches,
+  ExportService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
+                PredictionStore* predictions, ExportQueue* book, ExportWatches* watches,
                 WorkerPool* pool, DeadlineTimer* timer)
       : gate_(gate),
         limits_(limits),
@@ -59,7 +59,8 @@ class ExportService final : public v1::ExportService::CallbackService {
                                 std::function<absl::Status(CallScope* scope)> work);
 
   // The export, once its caller may have it.
-  absl::StatusOr<ExportRecord> Allowed(CallScope* scope, const std::string& name, Need need) const;
+  absl::StatusOr<ExportRecord> Allowed(CallScope* scope, const std::string& name,
+                                       Permission need) const;
   absl::StatusOr<ExportRecord> Wanted(CallScope* scope,
                                       const v1::CreateExportRequest& request) const;
   absl::Status Create(CallScope* scope, const v1::CreateExportRequest& request,
@@ -69,11 +70,11 @@ class ExportService final : public v1::ExportService::CallbackService {
   absl::Status Update(CallScope* scope, const v1::UpdateExportRequest& request,
                       v1::Export* response);
 
-  ServiceGate* const gate_;
+  AdmissionControl* const gate_;
   const ServiceLimits limits_;
   const Access* const access_;
   PredictionStore* const predictions_;
-  ExportBook* const book_;
+  ExportQueue* const book_;
   ExportWatches* const watches_;
   WorkerPool* const pool_;
   DeadlineTimer* const timer_;

@@ -33,7 +33,7 @@ v1::Export ToProto(const ExportRecord& record) {
   proto.set_principal(record.owner);
   proto.mutable_create_time()->set_seconds(record.created_s);
   proto.mutable_update_time()->set_seconds(record.updated_s);
-  proto.set_etag(ExportBook::EtagOf(record));
+  proto.set_etag(ExportQueue::EtagOf(record));
   return proto;
 }
 
@@ -79,7 +79,7 @@ int ExportWatches::size() const {
 }
 
 ExportWatch::ExportWatch(CallScope scope, CancelCall cancel, std::chrono::milliseconds patience,
-                         const ExportBook* book, ExportWatches* watches, DeadlineTimer* timer)
+                         const ExportQueue* book, ExportWatches* watches, DeadlineTimer* timer)
     : scope_(std::move(scope)),
       cancel_(std::move(cancel)),
       patience_(patience),
@@ -151,14 +151,14 @@ void ExportWatch::EndWatch(const absl::Status& outcome) {
 }
 
 void ExportWatch::WaitForTick() {
-  tick_ = timer_->Start(std::chrono::steady_clock::now() + kStandingPeriod, [this] { Tick(); });
+  tick_ = timer_->Start(std::chrono::steady_clock::now() + kReauthorizePeriod, [this] { Tick(); });
 }
 
 void ExportWatch::Tick() {
   MutexLock lock(mutex_);
   if (finished_) return;
   if (scope_.may_end_early()) {
-    if (const absl::Status good = scope_.StillGood(); !good.ok()) End(good);
+    if (const absl::Status good = scope_.IsStillAuthorized(); !good.ok()) End(good);
   }
   if (writing_ && std::chrono::steady_clock::now() - written_at_ > patience_) cancel_();
   Advance();

@@ -12,7 +12,7 @@
 #include "grpcpp/support/server_callback.h"
 
 #include "core/base/mutex.h"
-#include "server/exports/export_book.h"
+#include "server/exports/export_queue.h"
 #include "server/rpc/calls/call_scope.h"
 #include "server/rpc/calls/message_stream.h"
 #include "server/session/deadline_timer.h"
@@ -65,7 +65,7 @@ class ExportWatch : public grpc::ServerWriteReactor<v1::WatchExportsResponse>,
  public:
   // A message that is not taken within `patience` is the last one. All pointers must outlive it.
   ExportWatch(CallScope scope, CancelCall cancel, std::chrono::milliseconds patience,
-              const ExportBook* book, ExportWatches* watches, DeadlineTimer* timer);
+              const ExportQueue* book, ExportWatches* watches, DeadlineTimer* timer);
 
   void OnSendInitialMetadataDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -90,7 +90,7 @@ class ExportWatch : public grpc::ServerWriteReactor<v1::WatchExportsResponse>,
   // Constant after the constructor.
   const CancelCall cancel_;
   const std::chrono::milliseconds patience_;
-  const ExportBook& book_;
+  const ExportQueue& book_;
   ExportWatches* const watches_;
   DeadlineTimer* const timer_;
   const std::optional<std::string> owner_;  // whose exports it sees; unset: all

@@ -16,7 +16,7 @@
 #include "server/rpc/mesh_surface.h"
 #include "server/rpc/mesh_upload_stream.h"
 #include "server/rpc/resource_conversion.h"
-#include "server/session/session_refusals.h"
+#include "server/session/session_errors.h"
 
 namespace tissueform {
 namespace {
@@ -65,7 +65,7 @@ grpc::ServerReadReactor<v1::UploadMeshRequest>* MeshService::UploadMesh(
 grpc::ServerUnaryReactor* MeshService::Run(grpc::CallbackServerContext* context,
                                            std::string_view method,
                                            std::function<absl::Status(CallScope* scope)> work) {
-  return RunUpkeep(context, method, gate_, [&](CallScope& scope, const EndCall& end) {
+  return HandleUnaryCall(context, method, gate_, [&](CallScope& scope, const FinishCall& end) {
     pool_->Post(Lane::kStore, [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
     return absl::OkStatus();
   });
@@ -96,7 +96,7 @@ grpc::ServerWriteReactor<v1::GetSurfaceResponse>* MeshService::GetSurface(
     return call;
   }
   const absl::StatusOr<std::string> sha256 =
-      AllowedMesh(changes_->access(), &call->scope(), request->name(), Need::kLook);
+      AllowedMesh(changes_->access(), &call->scope(), request->name(), Permission::kRead);
   if (!sha256.ok()) {
     call->End(sha256.status());
     return call;
@@ -140,7 +140,7 @@ absl::Status MeshService::FindUpload(const Principal& caller, const v1::QueryUpl
 absl::Status MeshService::FindMesh(CallScope* scope, const v1::GetMeshRequest& request,
                                    v1::Mesh* response) {
   TF_ASSIGN_OR_RETURN(const std::string sha256,
-                      AllowedMesh(changes_->access(), scope, request.name(), Need::kLook));
+                      AllowedMesh(changes_->access(), scope, request.name(), Permission::kRead));
   TF_ASSIGN_OR_RETURN(const MeshView mesh, catalog_->Look(sha256));
   *response = ToProto(mesh);
   return absl::OkStatus();
@@ -155,7 +155,8 @@ absl::Status MeshService::List(const Principal& caller, const v1::ListMeshesRequ
   do {
     TF_ASSIGN_OR_RETURN(const MeshViewPage views, catalog_->List(after, page.size));
     for (const MeshView& view : views.views) {
-      if (!changes_->access().MayMesh(caller, view.record.sha256, Need::kLook).ok()) continue;
+      if (!changes_->access().CheckMeshAccess(caller, view.record.sha256, Permission::kRead).ok())
+        continue;
       if (response->meshes_size() == page.size) {
         response->set_next_page_token(last);
         return absl::OkStatus();
@@ -172,14 +173,14 @@ absl::Status MeshService::List(const Principal& caller, const v1::ListMeshesRequ
 absl::Status MeshService::RemoveMesh(CallScope* scope, const v1::DeleteMeshRequest& request) {
   const Access& access = changes_->access();
   TF_ASSIGN_OR_RETURN(const std::string sha256,
-                      AllowedMesh(access, scope, request.name(), Need::kLook));
+                      AllowedMesh(access, scope, request.name(), Permission::kRead));
   const Principal& caller = scope->principal();
   // A prediction may hold the name of one that has gone.
   TF_RETURN_IF_ERROR(catalog_->Look(sha256).status());
-  TF_RETURN_IF_ERROR(access.MayMesh(caller, sha256, Need::kOwn));
+  TF_RETURN_IF_ERROR(access.CheckMeshAccess(caller, sha256, Permission::kOwner));
   if (!access.OthersHoldMesh(caller, sha256)) return registry_->RemoveMesh(sha256);
   const int sessions = access.CountSessionsOf(caller, sha256);
-  return sessions > 0 ? MeshInUse(sessions) : changes_->ForsakeMesh(caller, sha256);
+  return sessions > 0 ? MeshInUse(sessions) : changes_->ReleaseMesh(caller, sha256);
 }
 
 }  // namespace tissueform

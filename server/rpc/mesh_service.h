@@ -21,7 +21,7 @@ namespace tissueform {
 // tissueform.v1.MeshService over a catalog. Stateless; all arguments must outlive it.
 class MeshService final : public v1::MeshService::CallbackService {
  public:
-  MeshService(ServiceGate* gate, const ServiceLimits& limits, AccessChanges* changes,
+  MeshService(AdmissionControl* gate, const ServiceLimits& limits, AccessChanges* changes,
               MeshCatalog* catalog, MeshUploads* uploads, SessionRegistry* registry,
               WorkerPool* pool, DeadlineTimer* timer)
       : gate_(gate),
@@ -61,7 +61,7 @@ class MeshService final : public v1::MeshService::CallbackService {
                     v1::ListMeshesResponse* response);
   absl::Status RemoveMesh(CallScope* scope, const v1::DeleteMeshRequest& request);
 
-  ServiceGate* const gate_;
+  AdmissionControl* const gate_;
   const ServiceLimits limits_;
   AccessChanges* const changes_;
   MeshCatalog* const catalog_;

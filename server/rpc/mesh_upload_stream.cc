@@ -53,14 +53,14 @@ absl::StatusOr<MeshUploadStream::After> MeshUploadStream::TakeHeader(
   // A store that was waited for in vain is not waited for once more, nor after the bytes.
   if (absl::IsUnavailable(known.status())) return known.status();
   // Whoever may not use the mesh does not hear that it is here: the bytes say who has it.
-  const bool may_use = changes_->access().MayMesh(caller, sha256_, Need::kLook).ok();
+  const bool may_use = changes_->access().CheckMeshAccess(caller, sha256_, Permission::kRead).ok();
   if (may_use && known.ok()) {
     *response_->mutable_mesh() = ToProto(*known);
     response_->set_already_existed(true);
     response_->set_committed_bytes(announcement.total_bytes);
     return After::kEnd;
   }
-  TF_RETURN_IF_ERROR(changes_->access().MayKeep(caller, announcement.total_bytes));
+  TF_RETURN_IF_ERROR(changes_->access().CheckStorageQuota(caller, announcement.total_bytes));
   TF_ASSIGN_OR_RETURN(upload_, uploads_->Open(std::move(announcement)));
   return After::kMore;
 }

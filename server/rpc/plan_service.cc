@@ -35,7 +35,7 @@ class SessionModel final : public Deformer {
 
   absl::StatusOr<Deformation> Deform(absl::Span<const HandlePose> poses,
                                      const DeformControl& control) override {
-    return session_.Deform(model_, poses, control);
+    return session_.Solve(model_, poses, control);
   }
   const PreparationSummary& preparation() const override { return session_.preparation(); }
 
@@ -66,7 +66,7 @@ class FitCall : public grpc::ServerUnaryReactor {
     EndUnlessOk([this, &access]() -> absl::Status {
       TF_RETURN_IF_ERROR(scope_.admission());
       TF_ASSIGN_OR_RETURN(const std::string id,
-                          AllowedSession(access, &scope_, request_.session(), Need::kDrag));
+                          AllowedSession(access, &scope_, request_.session(), Permission::kWrite));
       TF_ASSIGN_OR_RETURN(wanted_, ToFitRequest(request_));
       registry_->Open(id, cancelled_, [this](absl::StatusOr<std::shared_ptr<Session>> session) {
         if (!session.ok()) {
@@ -162,7 +162,7 @@ class FitCall : public grpc::ServerUnaryReactor {
   std::shared_ptr<Session> session_;
   DeformationModel model_ = DeformationModel::kGradientField;
   FitProblem problem_;
-  std::shared_ptr<ResponseClaim> claim_;
+  std::shared_ptr<PreparedAnswersRef> claim_;
 };
 
 }  // namespace

@@ -96,8 +96,9 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
 
   void Solve() {
     absl::Status allowed =
-        AllowedSession(access_, &scope_, request_.session(), Need::kDrag).status();
-    if (allowed.ok()) allowed = access_.MayKeep(scope_.principal(), 1);  // before the work
+        AllowedSession(access_, &scope_, request_.session(), Permission::kWrite).status();
+    if (allowed.ok())
+      allowed = access_.CheckStorageQuota(scope_.principal(), 1);  // before the work
     if (!allowed.ok()) {
       End(allowed);
       return;
@@ -115,8 +116,8 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
   }
 
   absl::Status Keep() {
-    TF_RETURN_IF_ERROR(
-        access_.MayKeep(scope_.principal(), static_cast<int64_t>(keep_.positions.size())));
+    TF_RETURN_IF_ERROR(access_.CheckStorageQuota(scope_.principal(),
+                                                 static_cast<int64_t>(keep_.positions.size())));
     const absl::Status kept = store_->Create(keep_.record, keep_.positions);
     // The same request twice at once: the other one was first.
     if (absl::IsAlreadyExists(kept) && !key_.fingerprint.empty()) return TakeEarlier();
@@ -167,14 +168,14 @@ grpc::ServerUnaryReactor* PredictionService::CreatePrediction(
 grpc::ServerWriteReactor<v1::ReadPositionsResponse>* PredictionService::ReadPositions(
     grpc::CallbackServerContext* context, const v1::ReadPositionsRequest* request) {
   auto* call = new MessageStream<v1::ReadPositionsResponse>(
-      CallScope(context, "PredictionService.ReadPositions", CallKind::kUpkeep, gate_),
+      CallScope(context, "PredictionService.ReadPositions", CallKind::kMetadata, gate_),
       CancelOf(context), timer_, limits_.upload_silence);
   if (!call->scope().admission().ok()) {
     call->End(call->scope().admission());
     return call;
   }
   absl::StatusOr<std::string> id =
-      AllowedPrediction(*access_, &call->scope(), request->name(), Need::kLook);
+      AllowedPrediction(*access_, &call->scope(), request->name(), Permission::kRead);
   if (!id.ok()) {
     call->End(id.status());
     return call;
@@ -204,11 +205,12 @@ grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* PredictionService::Com
 grpc::ServerUnaryReactor* PredictionService::Run(
     grpc::CallbackServerContext* context, std::string_view method,
     std::function<absl::Status(CallScope* scope)> work) {
-  return RunUpkeep(context, method, gate_, [&, this](CallScope& scope, const EndCall& end) {
-    registry_->pool().Post(Lane::kStore,
-                           [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
-    return absl::OkStatus();
-  });
+  return HandleUnaryCall(
+      context, method, gate_, [&, this](CallScope& scope, const FinishCall& end) {
+        registry_->pool().Post(Lane::kStore,
+                               [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
+        return absl::OkStatus();
+      });
 }
 
 grpc::ServerUnaryReactor* PredictionService::GetPrediction(grpc::CallbackServerContext* context,
@@ -235,7 +237,7 @@ grpc::ServerUnaryReactor* PredictionService::DeletePrediction(
 absl::Status PredictionService::Find(CallScope* scope, const v1::GetPredictionRequest& request,
                                      v1::Prediction* response) {
   TF_ASSIGN_OR_RETURN(const std::string id,
-                      AllowedPrediction(*access_, scope, request.name(), Need::kLook));
+                      AllowedPrediction(*access_, scope, request.name(), Permission::kRead));
   TF_ASSIGN_OR_RETURN(const PredictionRecord record, store_->Get(id));
   TF_ASSIGN_OR_RETURN(KeptPrediction kept, FromRecord(record));
   *response = std::move(kept.prediction);
@@ -278,7 +280,7 @@ absl::Status PredictionService::List(const v1::ListPredictionsRequest& request,
 absl::Status PredictionService::Remove(CallScope* scope,
                                        const v1::DeletePredictionRequest& request) {
   TF_ASSIGN_OR_RETURN(const std::string id,
-                      AllowedPrediction(*access_, scope, request.name(), Need::kOwn));
+                      AllowedPrediction(*access_, scope, request.name(), Permission::kOwner));
   return store_->Delete(id);
 }
 

@@ -22,7 +22,7 @@ namespace tissueform {
 // tissueform.v1.PredictionService over a store. Stateless; all pointers must outlive it.
 class PredictionService final : public v1::PredictionService::CallbackService {
  public:
-  PredictionService(ServiceGate* gate, const ServiceLimits& limits, const Access* access,
+  PredictionService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
                     MeshCatalog* catalog, SessionRegistry* registry, PredictionStore* store,
                     DeadlineTimer* timer)
       : gate_(gate),
@@ -61,7 +61,7 @@ class PredictionService final : public v1::PredictionService::CallbackService {
                     v1::ListPredictionsResponse* response);
   absl::Status Remove(CallScope* scope, const v1::DeletePredictionRequest& request);
 
-  ServiceGate* const gate_;
+  AdmissionControl* const gate_;
   const ServiceLimits limits_;
   const Access* const access_;
   MeshCatalog* const catalog_;

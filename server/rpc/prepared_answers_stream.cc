@@ -50,7 +50,7 @@ class PreparedAnswersStream final : public MessageStream<v1::GetPreparedAnswersR
     EndUnlessOk([this, &access]() -> absl::Status {
       TF_RETURN_IF_ERROR(scope().admission());
       TF_ASSIGN_OR_RETURN(const std::string id,
-                          AllowedSession(access, &scope(), request_.session(), Need::kDrag));
+                          AllowedSession(access, &scope(), request_.session(), Permission::kWrite));
       if (!request_.has_prepared()) {
         return absl::InvalidArgumentError(
             "`prepared` is left out; set it as for the stream whose frames are to be evaluated");
@@ -89,7 +89,7 @@ class PreparedAnswersStream final : public MessageStream<v1::GetPreparedAnswersR
     TF_ASSIGN_OR_RETURN(const std::shared_ptr<const StreamConfiguration> configuration,
                         ReadConfiguration(wanted_, std::move(session)));
     TF_ASSIGN_OR_RETURN(
-        const std::shared_ptr<ResponseClaim> claim,
+        const std::shared_ptr<PreparedAnswersRef> claim,
         configuration->session->PrepareResponse(*configuration->response, cancellation_));
     const std::shared_ptr<const SharedResponse> shared = claim->Get();
     if (shared == nullptr) return absl::NotFoundError("the session was deleted meanwhile");
@@ -105,7 +105,7 @@ class PreparedAnswersStream final : public MessageStream<v1::GetPreparedAnswersR
     if (shared.band != nullptr) shared.band->Describe(&answers);
     bytes_ = WriteAnswers(answers);
     const auto size = static_cast<int64_t>(bytes_.size());
-    const int64_t most = std::min<int64_t>(limits_.max_prepared_answer_bytes, kMostAnswerBytes);
+    const int64_t most = std::min<int64_t>(limits_.max_prepared_answer_bytes, kMaxAnswerBytes);
     if (size > most) {
       return absl::ResourceExhaustedError(absl::StrCat("the prepared answers have ", size,
                                                        " bytes; the server sends at most ", most,

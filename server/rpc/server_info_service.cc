@@ -13,8 +13,6 @@
 namespace tissueform {
 namespace {
 
-int64_t Milliseconds(std::chrono::milliseconds duration) { return duration.count(); }
-
 void AddModel(const ModelTraits& traits, v1::ServerInfo* info) {
   v1::ModelInfo* proto = info->add_models();
   proto->set_model(ToProto(traits.model));
@@ -36,42 +34,8 @@ void AddEncodings(v1::ServerInfo* info) {
 
 }  // namespace
 
-// Every member by its place: one that is added to ServiceLimits does not compile here until it has
-// a name, too.
-NamedLimits ToNamedLimits(const ServiceLimits& limits) {
-  const auto& [max_vertices, max_tets, max_mesh_bytes, max_sessions, max_stored_sessions,
-               max_case_bytes, max_cases, max_streams, max_watches, max_watches_per_session,
-               session_idle_ttl, retention_days, configuration_deadline, upload_silence,
-               max_handles, max_cell_arrays, max_name_bytes, max_request_id_bytes, max_title_bytes,
-               max_case_uploads, max_chunk_bytes, max_prepared_answer_bytes, max_unacked,
-               max_iterations] = limits;
-  return {{"max_vertices", max_vertices},
-          {"max_tets", max_tets},
-          {"max_mesh_bytes", max_mesh_bytes},
-          {"max_sessions", max_sessions},
-          {"max_stored_sessions", max_stored_sessions},
-          {"max_case_bytes", max_case_bytes},
-          {"max_cases", max_cases},
-          {"max_streams", max_streams},
-          {"max_watches", max_watches},
-          {"max_watches_per_session", max_watches_per_session},
-          {"session_idle_ttl_ms", Milliseconds(session_idle_ttl)},
-          {"retention_days", retention_days},
-          {"configuration_deadline_ms", Milliseconds(configuration_deadline)},
-          {"upload_silence_ms", Milliseconds(upload_silence)},
-          {"max_handles", max_handles},
-          {"max_cell_arrays", max_cell_arrays},
-          {"max_name_bytes", max_name_bytes},
-          {"max_request_id_bytes", max_request_id_bytes},
-          {"max_title_bytes", max_title_bytes},
-          {"max_case_uploads", max_case_uploads},
-          {"max_chunk_bytes", max_chunk_bytes},
-          {"max_prepared_answer_bytes", max_prepared_answer_bytes},
-          {"max_unacked", max_unacked},
-          {"max_iterations", max_iterations}};
-}
-
-ServerInfoService::ServerInfoService(ServiceGate* gate, const NamedLimits& limits) : gate_(gate) {
+ServerInfoService::ServerInfoService(AdmissionControl* gate, const NamedLimits& limits)
+    : gate_(gate) {
   info_.set_version(SoftwareVersion());
   info_.set_commit(SoftwareCommit());
   info_.set_api_version("tissueform.v1");
@@ -87,7 +51,7 @@ ServerInfoService::ServerInfoService(ServiceGate* gate, const NamedLimits& limit
 grpc::ServerUnaryReactor* ServerInfoService::GetServerInfo(
     grpc::CallbackServerContext* context, const v1::GetServerInfoRequest* /*request*/,
     v1::ServerInfo* response) {
-  CallScope scope(context, "ServerInfoService.GetServerInfo", CallKind::kUpkeep, gate_);
+  CallScope scope(context, "ServerInfoService.GetServerInfo", CallKind::kMetadata, gate_);
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   if (scope.admission().ok()) {
     *response = info_;

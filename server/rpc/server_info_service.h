@@ -8,7 +8,6 @@
 #include <string>
 
 #include "server/rpc/calls/call_scope.h"
-#include "server/session/limits.h"
 #include "tissueform/v1/server_info.grpc.pb.h"
 
 namespace tissueform {
@@ -16,20 +15,17 @@ namespace tissueform {
 // Limits by name, as ServerInfo has them.
 using NamedLimits = std::map<std::string, int64_t>;
 
-NamedLimits ToNamedLimits(const ServiceLimits& limits);
-
 // tissueform.v1.ServerInfoService. `gate` must outlive it.
 class ServerInfoService final : public v1::ServerInfoService::CallbackService {
  public:
-  // `limits` are told as they are.
-  ServerInfoService(ServiceGate* gate, const NamedLimits& limits);
+  ServerInfoService(AdmissionControl* gate, const NamedLimits& limits);
 
   grpc::ServerUnaryReactor* GetServerInfo(grpc::CallbackServerContext* context,
                                           const v1::GetServerInfoRequest* request,
                                           v1::ServerInfo* response) override;
 
  private:
-  ServiceGate* const gate_;
+  AdmissionControl* const gate_;
   v1::ServerInfo info_;  // constant
 };
 

@@ -32,13 +32,13 @@ absl::Status SessionPreparation::Authorise(const Access& access,
   switch (request.what_case()) {
     case v1::PrepareSessionRequest::kCreate: {
       TF_ASSIGN_OR_RETURN(const std::string mesh, ParseMeshName(request.create().mesh()));
-      TF_RETURN_IF_ERROR(access.MayMesh(scope->principal(), mesh, Need::kLook));
-      return Access::MayPutInto(scope->principal(), request.create().project());
+      TF_RETURN_IF_ERROR(access.CheckMeshAccess(scope->principal(), mesh, Permission::kRead));
+      return Access::CheckProjectAccess(scope->principal(), request.create().project());
     }
     case v1::PrepareSessionRequest::kUpdate:
-      return AllowedSession(access, scope, request.update().name(), Need::kOwn).status();
+      return AllowedSession(access, scope, request.update().name(), Permission::kOwner).status();
     case v1::PrepareSessionRequest::kOpen:
-      return AllowedSession(access, scope, request.open(), Need::kDrag).status();
+      return AllowedSession(access, scope, request.open(), Permission::kWrite).status();
     case v1::PrepareSessionRequest::WHAT_NOT_SET:
       break;
   }

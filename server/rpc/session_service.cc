@@ -67,11 +67,11 @@ grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerCont
 grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext* context,
                                                      const v1::GetSessionRequest* request,
                                                      v1::Session* response) {
-  return RunUpkeep(
+  return HandleUnaryCall(
       context, "SessionService.GetSession", gate_,
-      [=, this](CallScope& scope, const EndCall& end) -> absl::Status {
+      [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
         TF_ASSIGN_OR_RETURN(const std::string id,
-                            AllowedSession(access_, &scope, request->name(), Need::kLook));
+                            AllowedSession(access_, &scope, request->name(), Permission::kRead));
         registry_->Look(id, [end, response](const absl::StatusOr<SessionRegistry::View>& view) {
           if (view.ok()) *response = ToProto(*view);
           end(view.status());
@@ -83,9 +83,9 @@ grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext
 grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerContext* context,
                                                        const v1::ListSessionsRequest* request,
                                                        v1::ListSessionsResponse* response) {
-  return RunUpkeep(
+  return HandleUnaryCall(
       context, "SessionService.ListSessions", gate_,
-      [=, this](CallScope& scope, const EndCall& end) -> absl::Status {
+      [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
         TF_ASSIGN_OR_RETURN(const PageRequest page,
                             ReadPageRequest(request->page_size(), request->page_token()));
         registry_->List({.owner = scope.principal().name,
@@ -127,14 +127,14 @@ grpc::ServerWriteReactor<v1::PrepareSessionResponse>* SessionService::PrepareSes
 grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerContext* context,
                                                         const v1::DeleteSessionRequest* request,
                                                         google::protobuf::Empty* /*response*/) {
-  return RunUpkeep(context, "SessionService.DeleteSession", gate_,
-                   [=, this](CallScope& scope, const EndCall& end) -> absl::Status {
-                     TF_ASSIGN_OR_RETURN(
-                         const std::string id,
-                         AllowedSession(access_, &scope, request->name(), Need::kOwn));
-                     registry_->Delete(id, end);
-                     return absl::OkStatus();
-                   });
+  return HandleUnaryCall(
+      context, "SessionService.DeleteSession", gate_,
+      [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
+        TF_ASSIGN_OR_RETURN(const std::string id,
+                            AllowedSession(access_, &scope, request->name(), Permission::kOwner));
+        registry_->Delete(id, end);
+        return absl::OkStatus();
+      });
 }
 
 }  // namespace tissueform

@@ -20,7 +20,7 @@ namespace tissueform {
 // tissueform.v1.SessionService over a registry. Stateless; all pointers must outlive it.
 class SessionService final : public v1::SessionService::CallbackService {
  public:
-  SessionService(ServiceGate* gate, const ServiceLimits& limits, const Access* access,
+  SessionService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
                  MeshCatalog* catalog, SessionRegistry* registry,
                  const Clock* clock = Clock::System())
       : gate_(gate),
@@ -49,7 +49,7 @@ class SessionService final : public v1::SessionService::CallbackService {
                                           google::protobuf::Empty* response) override;
 
  private:
-  ServiceGate* const gate_;
+  AdmissionControl* const gate_;
   const ServiceLimits limits_;
   const Access& access_;
   MeshCatalog* const catalog_;

@@ -86,7 +86,7 @@ class Search : public std::enable_shared_from_this<Search> {
       return !cancellation_.requested();
     };
     TF_ASSIGN_OR_RETURN(answer_.deformation,
-                        answer_.session->Deform(answer_.model, answer_.poses, control));
+                        answer_.session->Solve(answer_.model, answer_.poses, control));
     if (answer_.deformation.summary.cancelled) return ClientHasCancelled();
     return answer_.session->CheckHeld();
   }

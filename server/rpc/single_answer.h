@@ -45,7 +45,7 @@ using AnswerCallback = std::function<void(absl::StatusOr<SingleAnswer> answer)>;
 // registry->CancelWait(cancelled). `registry` must outlive the call.
 //
 // Errors: InvalidArgument (the question); those of `check`, SessionRegistry::Open,
-// Session::PrepareModel and Session::Deform; Cancelled.
+// Session::PrepareModel and Session::Solve; Cancelled.
 void FindSingleAnswer(SessionRegistry* registry, AnswerQuestion question,
                       SessionRegistry::CancelFlag cancelled, CheckSession check,
                       AnswerCallback done);

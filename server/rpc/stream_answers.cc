@@ -161,7 +161,8 @@ absl::StatusOr<StreamBegin> PrepareAnswers(const StreamConfiguration& configurat
 }
 
 absl::StatusOr<std::optional<AnswerFrame>> AnswerFromPrepared(
-    const StreamConfiguration& configuration, const ResponseClaim& claim, const WaitingPose& pose) {
+    const StreamConfiguration& configuration, const PreparedAnswersRef& claim,
+    const WaitingPose& pose) {
   TF_ASSIGN_OR_RETURN(const std::optional<PreparedAnswer> answer,
                       configuration.session->Respond(claim, pose.poses));
   if (!answer.has_value()) return std::optional<AnswerFrame>();
@@ -182,7 +183,7 @@ absl::StatusOr<AnswerFrame> SolvePose(const StreamConfiguration& configuration,
     return on_early([&] { return FrameOf(configuration, pose, so_far); });
   };
   TF_ASSIGN_OR_RETURN(const Deformation deformation,
-                      configuration.session->Deform(configuration.model, pose.poses, control));
+                      configuration.session->Solve(configuration.model, pose.poses, control));
   return FrameOf(configuration, pose, deformation);
 }
 

@@ -13,7 +13,7 @@
 
 #include "core/base/cancellation.h"
 #include "proto/conversion/geometry_conversion.h"
-#include "server/session/frame_flow.h"
+#include "server/session/frame_scheduler.h"
 #include "server/session/limits.h"
 #include "server/session/session.h"
 #include "tissueform/v1/deform_service.pb.h"
@@ -53,8 +53,8 @@ absl::StatusOr<std::shared_ptr<const StreamConfiguration>> ConfigurationFor(
 
 // What was made for a stream before it began.
 struct StreamBegin {
-  v1::DeformResponse started;            // the first message of the server
-  std::shared_ptr<ResponseClaim> claim;  // null: every frame is solved directly
+  v1::DeformResponse started;                 // the first message of the server
+  std::shared_ptr<PreparedAnswersRef> claim;  // null: every frame is solved directly
 };
 
 StreamBegin BeginWithoutPreparation(const StreamConfiguration& configuration);
@@ -65,7 +65,8 @@ absl::StatusOr<StreamBegin> PrepareAnswers(const StreamConfiguration& configurat
 // The answer to a pose from prepared answers, where they cover it. Any worker. Errors: those of
 // Session::Respond.
 absl::StatusOr<std::optional<AnswerFrame>> AnswerFromPrepared(
-    const StreamConfiguration& configuration, const ResponseClaim& claim, const WaitingPose& pose);
+    const StreamConfiguration& configuration, const PreparedAnswersRef& claim,
+    const WaitingPose& pose);
 
 // On the session's strand: the answer to a pose by a solve. One that iterates shows what it has by
 // `on_early`, which makes the frame when it wants it and returns false when the solve is to stop.

@@ -66,7 +66,7 @@ WatchStreamReactor::WatchStreamReactor(CallScope scope, const grpc::ByteBuffer& 
   MutexLock lock(mutex_);
   if (admission.ok()) {
     opening_ = true;
-    WaitForStanding();
+    WaitToReauthorize();
     // Opening goes on when that is done: then the library has bound the reactor.
     StartSendInitialMetadata();
   } else {
@@ -82,7 +82,7 @@ absl::Status WatchStreamReactor::ReadRequest(const grpc::ByteBuffer& bytes) {
     return absl::InvalidArgumentError("the request is no WatchRequest");
   }
   TF_ASSIGN_OR_RETURN(session_id_,
-                      AllowedSession(access_, &scope_, request.session(), Need::kLook));
+                      AllowedSession(access_, &scope_, request.session(), Permission::kRead));
   if (!request.has_max_unacked()) return absl::OkStatus();
   max_unacked_ = request.max_unacked();
   if (max_unacked_ >= 1 && max_unacked_ <= limits_.max_unacked) return absl::OkStatus();
@@ -121,7 +121,7 @@ void WatchStreamReactor::Join(const std::shared_ptr<Session>& session) {
   absl::Status allowed = joined.status();
   if (allowed.ok()) {
     MutexLock lock(mutex_);
-    allowed = access_.MaySession(scope_.principal(), session_id_, Need::kLook);
+    allowed = access_.CheckSessionAccess(scope_.principal(), session_id_, Permission::kRead);
   }
   if (!allowed.ok() || joined->has_frame) {
     FinishOpening(allowed);
@@ -150,7 +150,7 @@ void WatchStreamReactor::MakeBase(const std::shared_ptr<Session>& session,
   }
   DeformControl control;
   control.on_progress = [this](const Deformation& /*so_far*/) { return !cancelled_->load(); };
-  const absl::StatusOr<Deformation> answer = session->Deform(session->model(), committed, control);
+  const absl::StatusOr<Deformation> answer = session->Solve(session->model(), committed, control);
   if (answer.ok()) {
     channel_->PublishBase(v1::WATCH_ORIGIN_COMMITTED, SkinFrame(mesh, answer->positions),
                           SkinForm(mesh));
@@ -191,19 +191,19 @@ void WatchStreamReactor::OnDone() {
   delete this;
 }
 
-void WatchStreamReactor::WaitForStanding() {
+void WatchStreamReactor::WaitToReauthorize() {
   if (!scope_.may_end_early()) return;
-  standing_ = timer_->Start(std::chrono::steady_clock::now() + kStandingPeriod,
-                            [this] { CheckStanding(); });
+  standing_ = timer_->Start(std::chrono::steady_clock::now() + kReauthorizePeriod,
+                            [this] { RecheckAuthorization(); });
 }
 
-void WatchStreamReactor::CheckStanding() {
+void WatchStreamReactor::RecheckAuthorization() {
   {
     MutexLock lock(mutex_);
     if (finished_) return;
-    const absl::Status good = scope_.StillGood();
+    const absl::Status good = scope_.IsStillAuthorized();
     if (good.ok()) {
-      WaitForStanding();
+      WaitToReauthorize();
       return;
     }
     End(good);
@@ -246,9 +246,10 @@ absl::Status WatchStreamReactor::Acknowledge(uint64_t number, const Authenticate
   return absl::OkStatus();
 }
 
-void WatchStreamReactor::AskAgain() {
+void WatchStreamReactor::RecheckAccess() {
   MutexLock lock(mutex_);
-  const absl::Status allowed = access_.MaySession(scope_.principal(), session_id_, Need::kLook);
+  const absl::Status allowed =
+      access_.CheckSessionAccess(scope_.principal(), session_id_, Permission::kRead);
   if (!allowed.ok()) End(allowed);
   Advance();
 }

@@ -51,12 +51,12 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   void Tell(const v1::DeformNotice& notice) override;
   void EndWatch(const absl::Status& outcome) override;
   absl::Status Acknowledge(uint64_t number, const Authenticated& by) override;
-  void AskAgain() override;
+  void RecheckAccess() override;
 
  private:
   // Its caller's token may have ended.
-  void WaitForStanding() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void CheckStanding() ABSL_LOCKS_EXCLUDED(mutex_);
+  void WaitToReauthorize() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void RecheckAuthorization() ABSL_LOCKS_EXCLUDED(mutex_);
 
   absl::Status ReadRequest(const grpc::ByteBuffer& bytes);
 
@@ -90,8 +90,8 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
 
   Mutex mutex_;
   bool opening_ ABSL_GUARDED_BY(mutex_) = false;
-  SessionHoldPtr hold_ ABSL_GUARDED_BY(mutex_);  // from the opening on
-  SharedBytes writing_ ABSL_GUARDED_BY(mutex_);  // null: no write is in flight
+  SessionLeaseHandlePtr hold_ ABSL_GUARDED_BY(mutex_);  // from the opening on
+  SharedBytes writing_ ABSL_GUARDED_BY(mutex_);         // null: no write is in flight
   std::shared_ptr<const WatchedFrame> newest_ ABSL_GUARDED_BY(mutex_);      // waits for its write
   std::shared_ptr<const v1::WatchForm> sent_form_ ABSL_GUARDED_BY(mutex_);  // null: not begun
   std::deque<v1::DeformNotice> notices_ ABSL_GUARDED_BY(mutex_);

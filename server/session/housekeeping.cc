@@ -150,7 +150,7 @@ int Housekeeping::RemoveUploads(int64_t before_s) {
 
 int Housekeeping::RemoveSessions(int64_t before_s) {
   const auto page = Await<absl::StatusOr<SessionStore::Page>>(
-      [&](auto done) { stores_->sessions().ListUnused(before_s, kMostOfARound, std::move(done)); });
+      [&](auto done) { stores_->sessions().ListUnused(before_s, kMaxOfARound, std::move(done)); });
   WarnUnlessOk(page.status(), "sessions that nobody used stay");
   if (!page.ok()) return 0;
   std::vector<std::string> ids;
@@ -168,7 +168,7 @@ bool Housekeeping::RemovePredictions(int64_t before_s, Claimed* claimed, int* re
     if (!page.ok()) return false;
     for (const PredictionRecord& record : page->records) {
       const bool old = record.created_s < before_s && !registry_->Knows(record.session);
-      if (old && *removed < kMostOfARound && store.Delete(record.id).ok()) {
+      if (old && *removed < kMaxOfARound && store.Delete(record.id).ok()) {
         ++*removed;
       } else {
         claimed->meshes.insert(record.mesh_sha256);
@@ -190,7 +190,7 @@ int Housekeeping::RemoveMeshes(int64_t before_s, const std::set<std::string>& of
   if (!unused.ok()) return 0;
   std::vector<std::string> of_unknown_age;
   for (const MeshRecord& record : *unused) {
-    if (removed == kMostOfARound) break;
+    if (removed == kMaxOfARound) break;
     if (of_predictions.contains(record.sha256) || registry_->CountMadeFrom(record.sha256) > 0) {
       continue;
     }
@@ -209,14 +209,14 @@ int Housekeeping::RemoveMeshes(int64_t before_s, const std::set<std::string>& of
 
 int Housekeeping::RemoveExports(int64_t before_s) {
   if (!options_.remove_exports) return 0;
-  const absl::StatusOr<int> removed = options_.remove_exports(before_s, kMostOfARound);
+  const absl::StatusOr<int> removed = options_.remove_exports(before_s, kMaxOfARound);
   WarnUnlessOk(removed.status(), "exports that have not changed stay");
   return removed.value_or(0);
 }
 
 int Housekeeping::RemoveCases(int64_t before_s, const std::set<std::string>& of_predictions) {
   const absl::StatusOr<std::vector<CaseKey>> removed =
-      stores_->cases().RemoveUnused(before_s, of_predictions, kMostOfARound);
+      stores_->cases().RemoveUnused(before_s, of_predictions, kMaxOfARound);
   WarnUnlessOk(removed.status(), "cases that nobody used stay");
   return removed.ok() ? static_cast<int>(removed->size()) : 0;
 }

@@ -66,12 +66,12 @@ class Housekeeping {
   void Stop();
 
   // One round. Blocks on the disk; what fails is logged and left to the next round. At most
-  // kMostOfARound of each kind go at once, so that nobody's commit waits long behind them.
+  // kMaxOfARound of each kind go at once, so that nobody's commit waits long behind them.
   Removed RunOnce();
   // Only the first part of a round. False when it failed.
   bool WriteUse();
 
-  static constexpr int kMostOfARound = 100;
+  static constexpr int kMaxOfARound = 100;
 
  private:
   void Work();

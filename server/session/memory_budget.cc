@@ -18,7 +18,7 @@
 namespace tissueform {
 namespace {
 
-// When a session that nobody uses any longer may be evicted (SessionEndings::kInUse).
+// When a session that nobody uses any longer may be evicted (SessionEvictor::kInUse).
 constexpr int64_t kSessionsInUseMs = 10'000;
 
 std::string Mebibytes(int64_t bytes) {

@@ -10,7 +10,7 @@
 #include "core/base/status_macros.h"
 #include "core/mesh/tet_topology.h"
 #include "server/session/mesh_checks.h"
-#include "server/session/session_refusals.h"
+#include "server/session/session_errors.h"
 
 namespace tissueform {
 namespace {

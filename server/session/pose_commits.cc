@@ -8,7 +8,7 @@
 #include "absl/status/status.h"
 
 #include "core/base/error_reason.h"
-#include "server/session/session_refusals.h"
+#include "server/session/session_errors.h"
 
 namespace tissueform {
 

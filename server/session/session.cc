@@ -10,7 +10,7 @@
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
-#include "server/session/session_refusals.h"
+#include "server/session/session_errors.h"
 
 namespace tissueform {
 namespace {
@@ -161,7 +161,7 @@ absl::Status Session::Keep(DeformationModel model, Model made) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::shared_ptr<ResponseClaim>> Session::PrepareResponse(
+absl::StatusOr<std::shared_ptr<PreparedAnswersRef>> Session::PrepareResponse(
     const ResponseRequest& request, const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(PrepareModel(request.model, cancellation));
   TF_ASSIGN_OR_RETURN(const std::shared_ptr<SharedPreparation> preparation, OpenPreparation());
@@ -170,7 +170,7 @@ absl::StatusOr<std::shared_ptr<ResponseClaim>> Session::PrepareResponse(
       preparation->PrepareResponse(request, options_.gradient_field, cancellation);
   making_ = false;
   TF_RETURN_IF_ERROR(response.status());
-  auto claim = std::make_shared<ResponseClaim>(*std::move(response));
+  auto claim = std::make_shared<PreparedAnswersRef>(*std::move(response));
   MutexLock lock(mutex_);
   if (!models_.has_value()) {
     claim->Drop();
@@ -187,9 +187,9 @@ std::shared_ptr<const ProgressFeed::Follower> Session::Follow(const ResponseRequ
   return preparation.ok() ? (*preparation)->Follow(request, std::move(tell)) : nullptr;
 }
 
-absl::StatusOr<Deformation> Session::Deform(DeformationModel model,
-                                            absl::Span<const HandlePose> poses,
-                                            const DeformControl& control) {
+absl::StatusOr<Deformation> Session::Solve(DeformationModel model,
+                                           absl::Span<const HandlePose> poses,
+                                           const DeformControl& control) {
   Touch();
   std::shared_ptr<Deformer> deformer;
   {
@@ -210,7 +210,7 @@ absl::StatusOr<Deformation> Session::Deform(DeformationModel model,
   return deformer->Deform(poses, with_room);
 }
 
-absl::StatusOr<std::optional<PreparedAnswer>> Session::Respond(const ResponseClaim& claim,
+absl::StatusOr<std::optional<PreparedAnswer>> Session::Respond(const PreparedAnswersRef& claim,
                                                                absl::Span<const HandlePose> poses) {
   Touch();
   const Stopwatch stopwatch;
@@ -241,8 +241,8 @@ void Session::Close(CloseReason reason) {
     own_bytes_ = 0;
   }
   if (!closed.has_value()) return;
-  for (const std::weak_ptr<ResponseClaim>& known : closed->claims) {
-    if (const std::shared_ptr<ResponseClaim> claim = known.lock()) claim->Drop();
+  for (const std::weak_ptr<PreparedAnswersRef>& known : closed->claims) {
+    if (const std::shared_ptr<PreparedAnswersRef> claim = known.lock()) claim->Drop();
   }
 }
 

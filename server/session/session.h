@@ -26,7 +26,7 @@
 #include "server/session/clock.h"
 #include "server/session/memory_budget.h"
 #include "server/session/mesh_catalog.h"
-#include "server/session/session_holds.h"
+#include "server/session/session_lease_table.h"
 #include "server/session/shared_preparation.h"
 #include "server/session/worker_pool.h"
 #include "server/store/session_record.h"
@@ -42,9 +42,9 @@ struct PreparedAnswer {
 
 // A stream's claim on prepared answers; empty once its session is closed, so that no stream keeps
 // their memory. Thread-safe.
-class ResponseClaim {
+class PreparedAnswersRef {
  public:
-  explicit ResponseClaim(std::shared_ptr<const SharedResponse> response)
+  explicit PreparedAnswersRef(std::shared_ptr<const SharedResponse> response)
       : response_(std::move(response)) {}
 
   // Null when dropped.
@@ -83,8 +83,8 @@ class Session {
 
   // By which this server holds it; null where its store is its own. Set once, before anybody but
   // its maker has it.
-  void SetHold(SessionHoldPtr hold) { hold_ = std::move(hold); }
-  const SessionHoldPtr& hold() const { return hold_; }
+  void SetHold(SessionLeaseHandlePtr hold) { hold_ = std::move(hold); }
+  const SessionLeaseHandlePtr& hold() const { return hold_; }
   // Under which it is written.
   int64_t epoch() const { return EpochUnder(hold_); }
   // Any thread, under any lock; costs nothing where the store is not shared. What it answers may be
@@ -124,20 +124,20 @@ class Session {
   // Errors: those of SharedPreparation::MakeModel and PrepareResponse, NotFound (the session was
   // closed).
   absl::Status PrepareModel(DeformationModel model, const Cancellation& cancellation);
-  absl::StatusOr<std::shared_ptr<ResponseClaim>> PrepareResponse(const ResponseRequest& request,
-                                                                 const Cancellation& cancellation);
+  absl::StatusOr<std::shared_ptr<PreparedAnswersRef>> PrepareResponse(
+      const ResponseRequest& request, const Cancellation& cancellation);
 
   // On the strand. `poses` has one entry per handle, in the order of the constraints.
   //
   // Errors: InvalidArgument (a pose that is not legal), NotFound (the session was closed, see
   // evicted), Unavailable (it was closed, see moved), FailedPrecondition (a model that was not
   // prepared).
-  absl::StatusOr<Deformation> Deform(DeformationModel model, absl::Span<const HandlePose> poses,
-                                     const DeformControl& control);
+  absl::StatusOr<Deformation> Solve(DeformationModel model, absl::Span<const HandlePose> poses,
+                                    const DeformControl& control);
 
   // Any thread. The same from prepared answers; empty when they do not cover the poses: use Deform
   // then. Errors: NotFound (the session was closed).
-  absl::StatusOr<std::optional<PreparedAnswer>> Respond(const ResponseClaim& claim,
+  absl::StatusOr<std::optional<PreparedAnswer>> Respond(const PreparedAnswersRef& claim,
                                                         absl::Span<const HandlePose> poses);
 
   // Any thread. Hears how far the prepared answers are for as long as the result lives; see
@@ -180,7 +180,7 @@ class Session {
     std::shared_ptr<SharedPreparation> preparation;
     MemoryReservation reservation;  // of answers
     std::map<DeformationModel, Model> models;
-    std::vector<std::weak_ptr<ResponseClaim>> claims;
+    std::vector<std::weak_ptr<PreparedAnswersRef>> claims;
   };
 
   Session(const SessionRecord& record, std::shared_ptr<const StoredMesh> mesh,
@@ -207,7 +207,7 @@ class Session {
   const std::variant<double, std::string> stiffness_;
   DeformerOptions options_;
   PreparationSummary summary_;
-  SessionHoldPtr hold_;
+  SessionLeaseHandlePtr hold_;
 
   // Self-synchronised.
   Strand strand_;

@@ -7,7 +7,7 @@
 
 #include "core/base/error_reason.h"
 #include "core/base/random_id.h"
-#include "server/session/session_refusals.h"
+#include "server/session/session_errors.h"
 
 namespace tissueform {
 
@@ -17,7 +17,7 @@ SessionRegistry::SessionRegistry(const ServiceLimits& limits, MemoryBudget* budg
     : pool_(pool),
       store_(store),
       clock_(clock),
-      holds_(std::make_shared<SessionHolds>(ownership, pool)),
+      holds_(std::make_shared<SessionLeaseTable>(ownership, pool)),
       maker_(budget, pool, store, catalog, holds_.get(), clock),
       endings_(limits, &sessions_, store, catalog, holds_.get(), clock,
                [this](const std::string& id, Event event) { observer_(id, event); }),
@@ -25,7 +25,7 @@ SessionRegistry::SessionRegistry(const ServiceLimits& limits, MemoryBudget* budg
                [this](const std::string& id, Event event) { observer_(id, event); }),
       commits_(store),
       updates_(&maker_, store, &commits_,
-               [this](const SessionMaker::Made& remade, bool other_handles) {
+               [this](const SessionFactory::Made& remade, bool other_handles) {
                  return Replace(remade, other_handles);
                }),
       news_(&sessions_, store, clock) {}
@@ -63,7 +63,7 @@ void SessionRegistry::WhenKnown(const std::string& id, Ask ask, const std::funct
 
 void SessionRegistry::Delete(const std::string& id, const StatusCallback& done) {
   WhenKnown(
-      id, &SessionNews::Ask, [this, id, done] { endings_.Delete(id, done); }, done);
+      id, &StoreSync::Ask, [this, id, done] { endings_.Delete(id, done); }, done);
 }
 
 SessionRegistry::SessionCallback SessionRegistry::NamingRoom(const SessionCallback& done) const {
@@ -84,7 +84,7 @@ void SessionRegistry::Create(SessionRecord record, const std::shared_ptr<const S
   }
   // The same request may have been made of another server, before anything is prepared for it.
   WhenKnown(
-      record.id, &SessionNews::Ask,
+      record.id, &StoreSync::Ask,
       [this, record, mesh, waiter] { makings_.Create(record, mesh, waiter); }, done);
 }
 
@@ -96,12 +96,12 @@ void SessionRegistry::Open(const std::string& id, CancelFlag cancelled, const Se
   }
   const SessionWaiter waiter{std::move(cancelled), NamingRoom(done), tell};
   WhenKnown(
-      id, &SessionNews::AskBriefly, [this, id, waiter] { makings_.Open(id, waiter); }, done);
+      id, &StoreSync::AskBriefly, [this, id, waiter] { makings_.Open(id, waiter); }, done);
 }
 
 std::shared_ptr<Session> SessionRegistry::Loaded(const std::string& id) {
   MutexLock lock(sessions_.mutex);
-  const KnownSession* known = sessions_.table.Find(id);
+  const SessionEntry* known = sessions_.table.Find(id);
   if (known == nullptr || known->session == nullptr) return nullptr;
   if (!known->session->CheckHeld().ok()) return nullptr;
   known->session->Touch();
@@ -137,7 +137,7 @@ void SessionRegistry::List(const SessionStore::ListRequest& request,
     {
       MutexLock lock(sessions_.mutex);
       for (SessionRecord& record : page->records) {
-        const KnownSession* known = sessions_.table.Find(record.id);
+        const SessionEntry* known = sessions_.table.Find(record.id);
         views.views.push_back({std::move(record), known == nullptr ? nullptr : known->session});
       }
     }
@@ -146,14 +146,14 @@ void SessionRegistry::List(const SessionStore::ListRequest& request,
 }
 
 void SessionRegistry::Update(const std::string& id, const std::string& etag,
-                             SessionMaker::Change change, CancelFlag cancelled,
+                             SessionFactory::Change change, CancelFlag cancelled,
                              const std::function<void(absl::StatusOr<View>)>& done,
                              TellSession tell) {
   const SessionCaller caller{.cancellation = Cancellation(
                                  [cancelled = std::move(cancelled)] { return cancelled->load(); }),
                              .tell = std::move(tell)};
   WhenKnown(
-      id, &SessionNews::Ask,
+      id, &StoreSync::Ask,
       [this, id, etag, change = std::move(change), caller, done] {
         if (absl::Status refusal = makings_.AdmitRemaking(id); !refusal.ok()) {
           done(std::move(refusal));
@@ -165,24 +165,25 @@ void SessionRegistry::Update(const std::string& id, const std::string& etag,
 }
 
 void SessionRegistry::StartUpdate(const std::string& id, const std::string& etag,
-                                  const SessionMaker::Change& change, const SessionCaller& caller,
+                                  const SessionFactory::Change& change, const SessionCaller& caller,
                                   const std::function<void(absl::StatusOr<View>)>& done) {
-  updates_.Update(id, etag, change, caller, [id, done](absl::StatusOr<SessionMaker::Made> remade) {
-    if (remade.ok()) {
-      done(View{std::move(remade->record), std::move(remade->session)});
-    } else if (HasReason(remade.status(), ErrorReason::kSessionNotFound)) {
-      done(NoSuchSession(id));
-    } else {
-      done(remade.status());
-    }
-  });
+  updates_.Update(id, etag, change, caller,
+                  [id, done](absl::StatusOr<SessionFactory::Made> remade) {
+                    if (remade.ok()) {
+                      done(View{std::move(remade->record), std::move(remade->session)});
+                    } else if (HasReason(remade.status(), ErrorReason::kSessionNotFound)) {
+                      done(NoSuchSession(id));
+                    } else {
+                      done(remade.status());
+                    }
+                  });
 }
 
-absl::Status SessionRegistry::Replace(const SessionMaker::Made& remade, bool other_handles) {
+absl::Status SessionRegistry::Replace(const SessionFactory::Made& remade, bool other_handles) {
   std::shared_ptr<Session> before;
   {
     MutexLock lock(sessions_.mutex);
-    KnownSession* known = sessions_.table.Find(remade.record.id);
+    SessionEntry* known = sessions_.table.Find(remade.record.id);
     if (known == nullptr) return NoSuchSession(remade.record.id);  // deleted meanwhile
     before = std::exchange(known->session, remade.session);
     known->mesh.reset();

@@ -21,15 +21,15 @@
 #include "server/session/mesh_catalog.h"
 #include "server/session/pose_commits.h"
 #include "server/session/session.h"
-#include "server/session/session_endings.h"
-#include "server/session/session_holds.h"
-#include "server/session/session_maker.h"
-#include "server/session/session_makings.h"
-#include "server/session/session_news.h"
+#include "server/session/session_evictor.h"
+#include "server/session/session_factory.h"
+#include "server/session/session_lease_table.h"
+#include "server/session/session_loader.h"
 #include "server/session/session_ownership.h"
 #include "server/session/session_progress.h"
 #include "server/session/session_table.h"
 #include "server/session/session_updates.h"
+#include "server/session/store_sync.h"
 #include "server/session/worker_pool.h"
 #include "server/store/session_store.h"
 
@@ -48,7 +48,7 @@ class SessionRegistry {
 
   using Event = SessionEvent;
   using Observer = SessionObserver;
-  static constexpr std::chrono::seconds kInUse = SessionEndings::kInUse;
+  static constexpr std::chrono::seconds kInUse = SessionEvictor::kInUse;
 
   // A session as it is kept, and itself while it is in memory.
   struct View {
@@ -86,11 +86,11 @@ class SessionRegistry {
   // SessionStore::List.
   absl::Status LearnKnown() { return news_.LearnKnown(); }
 
-  // What others do in a store that is shared (see SessionNews). Who does not know a session asks
+  // What others do in a store that is shared (see StoreSync). Who does not know a session asks
   // the store before it is refused; so these may come late.
-  void Learn(const SessionRecord& record) { news_.Learn(record); }      // it was created
-  void Changed(const SessionRecord& record) { news_.Changed(record); }  // it was updated
-  void Forget(const std::string& id) { endings_.Gone(id); }             // it was deleted
+  void OnCreated(const SessionRecord& record) { news_.OnCreated(record); }  // it was created
+  void Changed(const SessionRecord& record) { news_.Changed(record); }      // it was updated
+  void Forget(const std::string& id) { endings_.Gone(id); }                 // it was deleted
 
   // This server does not hold the session any longer: it leaves memory, and what streams and
   // watches there are of it are told (Event::kMoved). Nothing where it has been taken anew since.
@@ -118,7 +118,7 @@ class SessionRegistry {
 
   // Gives the session, made again from its record where it is not in memory. At once where it is.
   //
-  // Errors: NotFound; those of Session::Create, SessionHolds::Take, SessionStore::Get and
+  // Errors: NotFound; those of Session::Create, SessionLeaseTable::Take, SessionStore::Get and
   // MeshCatalog::Load; ResourceExhausted; Cancelled; Unavailable (SESSION_MOVED: it was lost while
   // it was made).
   void Open(const std::string& id, CancelFlag cancelled, const SessionCallback& done,
@@ -147,9 +147,9 @@ class SessionRegistry {
   // durable as far as the store is; after an error it is as it was.
   //
   // Errors: NotFound; Aborted (another version, or somebody else was faster); those of
-  // SessionMaker::Remake and SessionStore::Update; ResourceExhausted; Cancelled; Unavailable
+  // SessionFactory::Remake and SessionStore::Update; ResourceExhausted; Cancelled; Unavailable
   // (SESSION_MOVED: another server holds it).
-  void Update(const std::string& id, const std::string& etag, SessionMaker::Change change,
+  void Update(const std::string& id, const std::string& etag, SessionFactory::Change change,
               CancelFlag cancelled, const std::function<void(absl::StatusOr<View>)>& done,
               TellSession tell = {});
 
@@ -161,7 +161,7 @@ class SessionRegistry {
   }
 
   // Calls `done` when the memory of the session is free and its record is gone. Errors: NotFound,
-  // those of SessionHolds::Take and SessionStore::Delete.
+  // those of SessionLeaseTable::Take and SessionStore::Delete.
   void Delete(const std::string& id, const StatusCallback& done);
 
   // Evicts sessions that are not in use, of one owner where one is given, those first that were
@@ -214,17 +214,17 @@ class SessionRegistry {
   WorkerPool& pool() { return *pool_; }
 
  private:
-  using Ask = void (SessionNews::*)(const std::string&, const std::function<void(absl::Status)>&);
+  using Ask = void (StoreSync::*)(const std::string&, const std::function<void(absl::Status)>&);
 
   SessionCallback NamingRoom(const SessionCallback& done) const;
   // `then` when a session that is there is known; `refuse` when that cannot be found out.
   void WhenKnown(const std::string& id, Ask ask, const std::function<void()>& then,
                  const StatusCallback& refuse);
   void StartUpdate(const std::string& id, const std::string& etag,
-                   const SessionMaker::Change& change, const SessionCaller& caller,
+                   const SessionFactory::Change& change, const SessionCaller& caller,
                    const std::function<void(absl::StatusOr<View>)>& done);
   // Puts an updated session into its place. Errors: NotFound.
-  absl::Status Replace(const SessionMaker::Made& remade, bool other_handles)
+  absl::Status Replace(const SessionFactory::Made& remade, bool other_handles)
       ABSL_LOCKS_EXCLUDED(sessions_.mutex);
   std::shared_ptr<Session> Loaded(const std::string& id) ABSL_LOCKS_EXCLUDED(sessions_.mutex);
 
@@ -236,14 +236,14 @@ class SessionRegistry {
   std::function<absl::Status(const absl::Status&)> naming_room_;  // empty: nobody else has any
 
   // Self-synchronised. Sessions end before what they were made with.
-  const std::shared_ptr<SessionHolds> holds_;
-  SessionMaker maker_;
+  const std::shared_ptr<SessionLeaseTable> holds_;
+  SessionFactory maker_;
   SharedSessionTable sessions_;
-  SessionEndings endings_;
-  SessionMakings makings_;
+  SessionEvictor endings_;
+  SessionLoader makings_;
   PoseCommits commits_;
   SessionUpdates updates_;
-  SessionNews news_;
+  StoreSync news_;
 };
 
 }  // namespace tissueform

@@ -9,17 +9,17 @@
 
 namespace tissueform {
 
-bool SessionMaking::wanted() const {
+bool PendingSession::wanted() const {
   return std::any_of(waiters.begin(), waiters.end(),
                      [](const SessionWaiter& waiter) { return !waiter.cancelled->load(); });
 }
 
-KnownSession* SessionTable::Find(const std::string& id) {
+SessionEntry* SessionTable::Find(const std::string& id) {
   const auto found = known_.find(id);
   return found == known_.end() ? nullptr : &found->second;
 }
 
-const KnownSession* SessionTable::Find(const std::string& id) const {
+const SessionEntry* SessionTable::Find(const std::string& id) const {
   const auto found = known_.find(id);
   return found == known_.end() ? nullptr : &found->second;
 }
@@ -29,29 +29,32 @@ std::string SessionTable::IdOfRequest(const std::string& request_id) const {
   return found == session_of_request_.end() ? "" : found->second;
 }
 
-KnownSession* SessionTable::FindRequest(const std::string& request_id) {
+SessionEntry* SessionTable::FindRequest(const std::string& request_id) {
   return Find(IdOfRequest(request_id));
 }
 
-SessionTable::MakingPtr SessionTable::FindMaking(const std::string& id) const {
+SessionTable::PendingSessionPtr SessionTable::FindMaking(const std::string& id) const {
+  const auto found =
+      std::find_if(makings_.begin(), makings_.end(),
+                   [&id](const PendingSessionPtr& making) { return making->id == id; });
+  return found == makings_.end() ? nullptr : *found;
+}
+
+SessionTable::PendingSessionPtr SessionTable::FindMakingOfRequest(
+    const std::string& request_id) const {
   const auto found = std::find_if(makings_.begin(), makings_.end(),
-                                  [&id](const MakingPtr& making) { return making->id == id; });
+                                  [&request_id](const PendingSessionPtr& making) {
+                                    return making->key.request_id == request_id;
+                                  });
   return found == makings_.end() ? nullptr : *found;
 }
 
-SessionTable::MakingPtr SessionTable::FindMakingOfRequest(const std::string& request_id) const {
-  const auto found = std::find_if(
-      makings_.begin(), makings_.end(),
-      [&request_id](const MakingPtr& making) { return making->key.request_id == request_id; });
-  return found == makings_.end() ? nullptr : *found;
-}
-
-void SessionTable::Add(const std::string& id, KnownSession known) {
+void SessionTable::Add(const std::string& id, SessionEntry known) {
   if (!known.key.request_id.empty()) session_of_request_[known.key.request_id] = id;
   known_.emplace(id, std::move(known));
 }
 
-std::optional<KnownSession> SessionTable::Take(const std::string& id) {
+std::optional<SessionEntry> SessionTable::Take(const std::string& id) {
   auto node = known_.extract(id);
   if (node.empty()) return std::nullopt;
   session_of_request_.erase(node.mapped().key.request_id);
@@ -59,27 +62,28 @@ std::optional<KnownSession> SessionTable::Take(const std::string& id) {
   return std::move(node.mapped());
 }
 
-SessionTable::MakingPtr SessionTable::StartMaking(std::string id, RequestKey key, std::string owner,
-                                                  std::string mesh_sha256, bool restores,
-                                                  SessionWaiter waiter) {
+SessionTable::PendingSessionPtr SessionTable::StartMaking(std::string id, RequestKey key,
+                                                          std::string owner,
+                                                          std::string mesh_sha256, bool restores,
+                                                          SessionWaiter waiter) {
   makings_.push_back(
-      std::make_shared<SessionMaking>(SessionMaking{.id = std::move(id),
-                                                    .key = std::move(key),
-                                                    .owner = std::move(owner),
-                                                    .mesh_sha256 = std::move(mesh_sha256),
-                                                    .restores = restores,
-                                                    .waiters = {std::move(waiter)}}));
+      std::make_shared<PendingSession>(PendingSession{.id = std::move(id),
+                                                      .key = std::move(key),
+                                                      .owner = std::move(owner),
+                                                      .mesh_sha256 = std::move(mesh_sha256),
+                                                      .restores = restores,
+                                                      .waiters = {std::move(waiter)}}));
   return makings_.back();
 }
 
-std::vector<SessionWaiter> SessionTable::EndMaking(const MakingPtr& making) {
+std::vector<SessionWaiter> SessionTable::EndMaking(const PendingSessionPtr& making) {
   makings_.erase(std::find(makings_.begin(), makings_.end(), making));
   return std::move(making->waiters);
 }
 
 std::vector<SessionWaiter> SessionTable::TakeWaiters(const SessionWaiter::CancelFlag& cancelled) {
   std::vector<SessionWaiter> taken;
-  for (const MakingPtr& making : makings_) {
+  for (const PendingSessionPtr& making : makings_) {
     std::vector<SessionWaiter>& waiters = making->waiters;
     const auto first = std::stable_partition(
         waiters.begin(), waiters.end(),
@@ -122,9 +126,9 @@ int64_t SessionTable::BytesUnusedSince(Clock::TimePoint before) const {
 int SessionTable::CountOf(const std::string& owner) const {
   const auto known = std::count_if(known_.begin(), known_.end(),
                                    [&](const auto& entry) { return entry.second.owner == owner; });
-  const auto made = std::count_if(makings_.begin(), makings_.end(), [&](const MakingPtr& making) {
-    return making->owner == owner && !making->restores;
-  });
+  const auto made = std::count_if(
+      makings_.begin(), makings_.end(),
+      [&](const PendingSessionPtr& making) { return making->owner == owner && !making->restores; });
   return static_cast<int>(known + made);
 }
 
@@ -137,18 +141,18 @@ std::vector<std::string> SessionTable::UnusedSince(Clock::TimePoint until) const
 }
 
 bool SessionTable::IsUnusedSince(const std::string& id, Clock::TimePoint until) const {
-  const KnownSession* known = Find(id);
+  const SessionEntry* known = Find(id);
   return known != nullptr && IsUnused(id, *known, until);
 }
 
-bool SessionTable::IsUnused(const std::string& id, const KnownSession& known,
+bool SessionTable::IsUnused(const std::string& id, const SessionEntry& known,
                             Clock::TimePoint until) const {
   const Clock::TimePoint used =
       known.session == nullptr ? known.last_used : known.session->last_used();
   return used <= until && FindMaking(id) == nullptr;
 }
 
-bool SessionTable::IsInUse(const std::string& id, const KnownSession& known,
+bool SessionTable::IsInUse(const std::string& id, const SessionEntry& known,
                            Clock::TimePoint since) const {
   const std::shared_ptr<Session>& session = known.session;
   // The table's own reference is one.
@@ -160,7 +164,7 @@ bool SessionTable::IsInUse(const std::string& id, const KnownSession& known,
 }
 
 bool SessionTable::IsInUse(const std::string& id, Clock::TimePoint since) const {
-  const KnownSession* known = Find(id);
+  const SessionEntry* known = Find(id);
   return known != nullptr && IsInUse(id, *known, since);
 }
 
@@ -179,8 +183,8 @@ int SessionTable::CountMadeFrom(const std::string& mesh_sha256) const {
   const auto known = std::count_if(known_.begin(), known_.end(), [&mesh_sha256](const auto& entry) {
     return entry.second.mesh_sha256 == mesh_sha256;
   });
-  const auto new_ones =
-      std::count_if(makings_.begin(), makings_.end(), [&mesh_sha256](const MakingPtr& making) {
+  const auto new_ones = std::count_if(
+      makings_.begin(), makings_.end(), [&mesh_sha256](const PendingSessionPtr& making) {
         return !making->restores && making->mesh_sha256 == mesh_sha256;
       });
   return static_cast<int>(known + new_ones + ending);

@@ -47,7 +47,7 @@ struct SessionWaiter {
 };
 
 // A session that is being made, or made again from its record.
-struct SessionMaking {
+struct PendingSession {
   std::string id;
   RequestKey key;
   std::string owner;  // empty: nobody with a name
@@ -63,7 +63,7 @@ struct SessionMaking {
 };
 
 // A session that the server knows.
-struct KnownSession {
+struct SessionEntry {
   std::shared_ptr<Session> session;  // null: it is in the store only
   RequestKey key;
   std::string owner = {};  // empty: nobody with a name
@@ -79,22 +79,22 @@ struct KnownSession {
 // out. No threads, no store: those who share it (SharedSessionTable) guard it and act.
 class SessionTable {
  public:
-  using MakingPtr = std::shared_ptr<SessionMaking>;
+  using PendingSessionPtr = std::shared_ptr<PendingSession>;
 
   // Null where there is none.
-  KnownSession* Find(const std::string& id);
-  const KnownSession* Find(const std::string& id) const;
-  KnownSession* FindRequest(const std::string& request_id);
+  SessionEntry* Find(const std::string& id);
+  const SessionEntry* Find(const std::string& id) const;
+  SessionEntry* FindRequest(const std::string& request_id);
   // Empty where there is none.
   std::string IdOfRequest(const std::string& request_id) const;
-  MakingPtr FindMaking(const std::string& id) const;
-  MakingPtr FindMakingOfRequest(const std::string& request_id) const;
+  PendingSessionPtr FindMaking(const std::string& id) const;
+  PendingSessionPtr FindMakingOfRequest(const std::string& request_id) const;
 
   // REQUIRES: the id is not known.
-  void Add(const std::string& id, KnownSession known);
+  void Add(const std::string& id, SessionEntry known);
   // Empty when it is not known. Whoever takes a session ends it; until that is told by Ended its id
   // is not free.
-  std::optional<KnownSession> Take(const std::string& id);
+  std::optional<SessionEntry> Take(const std::string& id);
   // One that has been made and never was in the table: as if taken.
   void TakeUnknown(const std::string& id, const std::string& mesh_sha256) {
     ending_.emplace(id, mesh_sha256);
@@ -111,10 +111,10 @@ class SessionTable {
     return leaving_meshes_.contains(mesh_sha256);
   }
 
-  MakingPtr StartMaking(std::string id, RequestKey key, std::string owner, std::string mesh_sha256,
-                        bool restores, SessionWaiter waiter);
+  PendingSessionPtr StartMaking(std::string id, RequestKey key, std::string owner,
+                                std::string mesh_sha256, bool restores, SessionWaiter waiter);
   // Those who still wait for it. REQUIRES: under way.
-  std::vector<SessionWaiter> EndMaking(const MakingPtr& making);
+  std::vector<SessionWaiter> EndMaking(const PendingSessionPtr& making);
   // Whoever came with this flag and still waits, taken out.
   std::vector<SessionWaiter> TakeWaiters(const SessionWaiter::CancelFlag& cancelled);
 
@@ -148,12 +148,12 @@ class SessionTable {
   std::vector<std::shared_ptr<Session>> Loaded() const;
 
  private:
-  bool IsInUse(const std::string& id, const KnownSession& known, Clock::TimePoint since) const;
-  bool IsUnused(const std::string& id, const KnownSession& known, Clock::TimePoint until) const;
+  bool IsInUse(const std::string& id, const SessionEntry& known, Clock::TimePoint since) const;
+  bool IsUnused(const std::string& id, const SessionEntry& known, Clock::TimePoint until) const;
 
-  std::map<std::string, KnownSession> known_;              // by id
+  std::map<std::string, SessionEntry> known_;              // by id
   std::map<std::string, std::string> session_of_request_;  // request id: id
-  std::vector<MakingPtr> makings_;
+  std::vector<PendingSessionPtr> makings_;
   std::map<std::string, std::string> ending_;  // id: mesh
   std::multiset<std::string> leaving_meshes_;
 };

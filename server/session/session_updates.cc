@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/status_macros.h"
-#include "server/session/session_refusals.h"
+#include "server/session/session_errors.h"
 #include "server/store/store_errors.h"
 
 namespace tissueform {
@@ -22,7 +22,7 @@ bool SameHandleNames(const std::vector<HandleRegion>& a, const std::vector<Handl
 }  // namespace
 
 void SessionUpdates::Update(const std::string& id, const std::string& etag,
-                            SessionMaker::Change change, const SessionCaller& caller, Done done) {
+                            SessionFactory::Change change, const SessionCaller& caller, Done done) {
   // Before anything is prepared for a change that cannot be kept.
   auto checked = [etag, change = std::move(change)](
                      SessionRecord record,
@@ -30,17 +30,18 @@ void SessionUpdates::Update(const std::string& id, const std::string& etag,
     TF_RETURN_IF_ERROR(CheckSessionWrite(record.id, etag, record.epoch, record.etag, record.epoch));
     return change(std::move(record), mesh);
   };
-  maker_->Remake(id, std::move(checked), caller,
-                 [this, caller, done = std::move(done)](absl::StatusOr<SessionMaker::Made> remade) {
-                   if (remade.ok()) {
-                     Keep(*std::move(remade), caller, done);
-                   } else {
-                     done(remade.status());
-                   }
-                 });
+  maker_->Remake(
+      id, std::move(checked), caller,
+      [this, caller, done = std::move(done)](absl::StatusOr<SessionFactory::Made> remade) {
+        if (remade.ok()) {
+          Keep(*std::move(remade), caller, done);
+        } else {
+          done(remade.status());
+        }
+      });
 }
 
-void SessionUpdates::Keep(SessionMaker::Made remade, const SessionCaller& caller, Done done) {
+void SessionUpdates::Keep(SessionFactory::Made remade, const SessionCaller& caller, Done done) {
   // The last moment.
   absl::Status may_go_on = caller.cancellation.Check();
   if (may_go_on.ok()) may_go_on = remade.session->CheckHeld();
@@ -52,7 +53,7 @@ void SessionUpdates::Keep(SessionMaker::Made remade, const SessionCaller& caller
   caller.Tell(SessionStage::kKeeping);
   const std::string id = remade.record.id;
   commits_->Hold(id);
-  auto finish = [this, id, done = std::move(done)](absl::StatusOr<SessionMaker::Made> result) {
+  auto finish = [this, id, done = std::move(done)](absl::StatusOr<SessionFactory::Made> result) {
     commits_->Release(id);
     done(std::move(result));
   };
@@ -79,7 +80,7 @@ void SessionUpdates::Keep(SessionMaker::Made remade, const SessionCaller& caller
                        finish(refusal);
                        return;
                      }
-                     SessionMaker::Made result{*std::move(kept), std::move(session)};
+                     SessionFactory::Made result{*std::move(kept), std::move(session)};
                      const absl::Status status = replace_(result, other_handles);
                      if (status.ok()) {
                        finish(std::move(result));

@@ -13,7 +13,7 @@
 
 #include "server/session/pose_commits.h"
 #include "server/session/session.h"
-#include "server/session/session_maker.h"
+#include "server/session/session_factory.h"
 #include "server/store/session_store.h"
 
 namespace tissueform {
@@ -24,26 +24,27 @@ namespace tissueform {
 // Thread-safe.
 class SessionUpdates {
  public:
-  using Done = std::function<void(absl::StatusOr<SessionMaker::Made>)>;
+  using Done = std::function<void(absl::StatusOr<SessionFactory::Made>)>;
   // Puts a session whose record is kept into its place; not OK when there is none any more.
-  using Replace = std::function<absl::Status(const SessionMaker::Made& remade, bool other_handles)>;
+  using Replace =
+      std::function<absl::Status(const SessionFactory::Made& remade, bool other_handles)>;
 
   // All must outlive it.
-  SessionUpdates(SessionMaker* maker, SessionStore* store, PoseCommits* commits, Replace replace)
+  SessionUpdates(SessionFactory* maker, SessionStore* store, PoseCommits* commits, Replace replace)
       : maker_(maker), store_(store), commits_(commits), replace_(std::move(replace)) {}
 
   // `etag` is that of the version that is changed; empty: whatever it is. `done` gets the record as
   // it is kept. Committed poses stay where the handles' names and their order do.
   //
-  // Errors: Aborted (another version), those of SessionMaker::Remake, SessionStore::Update and
+  // Errors: Aborted (another version), those of SessionFactory::Remake, SessionStore::Update and
   // `replace`.
-  void Update(const std::string& id, const std::string& etag, SessionMaker::Change change,
+  void Update(const std::string& id, const std::string& etag, SessionFactory::Change change,
               const SessionCaller& caller, Done done);
 
  private:
-  void Keep(SessionMaker::Made remade, const SessionCaller& caller, Done done);
+  void Keep(SessionFactory::Made remade, const SessionCaller& caller, Done done);
 
-  SessionMaker* const maker_;
+  SessionFactory* const maker_;
   SessionStore* const store_;
   PoseCommits* const commits_;
   const Replace replace_;

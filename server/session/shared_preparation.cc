@@ -18,7 +18,7 @@ namespace tissueform {
 namespace {
 
 // Kept for streams that come back, beside what open streams hold.
-constexpr size_t kMostResponses = 4;
+constexpr size_t kMaxResponses = 4;
 
 // Upper bound of what the preparation and the models on the Laplacian hold and need while they are
 // made, the factor apart: the mesh's operators, the system matrix and its parts (some 15 entries a
@@ -128,7 +128,7 @@ absl::StatusOr<std::shared_ptr<const SharedResponse>> SharedPreparation::Prepare
   const absl::Cleanup end_of_topic = [this] { feed_.End(); };
   std::shared_ptr<const BandColumns> band = FindBand(request);
   // Before the new one is made, so that old and new need not fit together.
-  while (responses_.size() >= kMostResponses) responses_.pop_back();
+  while (responses_.size() >= kMaxResponses) responses_.pop_back();
   Settle();
   auto shared = std::make_shared<SharedResponse>();
   shared->request = request;

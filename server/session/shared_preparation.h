@@ -82,7 +82,7 @@ class SharedPreparation {
                                                       const Cancellation& cancellation);
 
   // On the strand. Makes prepared answers unless the same were asked for before; some are kept
-  // beside those in use (kMostResponses, the last used). REQUIRES: Begin succeeded.
+  // beside those in use (kMaxResponses, the last used). REQUIRES: Begin succeeded.
   //
   // Errors: InvalidArgument (a model that has none, a tolerance or range that is not possible),
   // and those of MakeModel.

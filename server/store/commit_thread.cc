@@ -14,7 +14,7 @@ namespace tissueform {
 namespace {
 
 // More would make the first of them wait for the last for no gain: the sync is shared already.
-constexpr size_t kMostTogether = 64;
+constexpr size_t kMaxTogether = 64;
 // When a backup reads the log that should be emptied.
 constexpr std::chrono::seconds kTruncateAgain{1};
 
@@ -77,7 +77,7 @@ std::vector<CommitThread::Job> CommitThread::Next(bool* ending) {
     }
   }
   *ending = ending_;
-  while (!waiting_.empty() && jobs.size() < kMostTogether) {
+  while (!waiting_.empty() && jobs.size() < kMaxTogether) {
     jobs.push_back(std::move(waiting_.front()));
     waiting_.pop_front();
   }

@@ -24,11 +24,11 @@ namespace tissueform {
 class InMemoryCaseStore final : public CaseStore {
  public:
   // Where the disk bounds a store on a disk, this bounds one that takes memory from sessions.
-  static constexpr int64_t kMostBytes = int64_t{1} << 30;
+  static constexpr int64_t kMaxBytes = int64_t{1} << 30;
 
   // Refuses (ResourceExhausted) what would make it hold more than `most_bytes`, those on their way
   // included.
-  explicit InMemoryCaseStore(int64_t most_bytes = kMostBytes) : most_bytes_(most_bytes) {}
+  explicit InMemoryCaseStore(int64_t most_bytes = kMaxBytes) : most_bytes_(most_bytes) {}
 
   absl::StatusOr<std::unique_ptr<CaseWriter>> Begin(CaseRecord record, int most) override;
   absl::StatusOr<CaseRecord> Find(const CaseKey& key) override;

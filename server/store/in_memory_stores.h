@@ -44,11 +44,11 @@ class InMemoryMeshStore : public MeshStore {
 class InMemoryPredictionStore final : public PredictionStore {
  public:
   // Where the disk bounds a store on a disk, this bounds one that takes memory from sessions.
-  static constexpr int64_t kMostBytes = int64_t{1} << 30;
+  static constexpr int64_t kMaxBytes = int64_t{1} << 30;
 
   // Refuses (ResourceExhausted) what would make it hold more than `most_bytes` of positions and
   // metadata.
-  explicit InMemoryPredictionStore(int64_t most_bytes = kMostBytes) : most_bytes_(most_bytes) {}
+  explicit InMemoryPredictionStore(int64_t most_bytes = kMaxBytes) : most_bytes_(most_bytes) {}
 
   absl::Status Create(const PredictionRecord& record, const std::string& positions) override;
   absl::StatusOr<PredictionRecord> Get(const std::string& id) override;

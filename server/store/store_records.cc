@@ -17,8 +17,8 @@ namespace {
 
 constexpr size_t kSealBytes = 64;
 // Far beyond what any server takes; so that sizes fit into 64 bits, whatever a record says.
-constexpr int64_t kMostElements = int64_t{1} << 40;
-constexpr int kMostCellArrays = 1 << 10;
+constexpr int64_t kMaxElements = int64_t{1} << 40;
+constexpr int kMaxCellArrays = 1 << 10;
 
 bool Parse(absl::string_view bytes, google::protobuf::MessageLite* message) {
   return bytes.size() <= std::numeric_limits<int>::max() &&
@@ -38,8 +38,8 @@ MeshPayloadShape ToShape(const store::v1::MeshShape& proto) {
 }
 
 bool Fits(const MeshPayloadShape& shape, int64_t total_bytes) {
-  return shape.num_vertices >= 0 && shape.num_vertices <= kMostElements && shape.num_tets >= 0 &&
-         shape.num_tets <= kMostElements && shape.cell_arrays.size() <= kMostCellArrays &&
+  return shape.num_vertices >= 0 && shape.num_vertices <= kMaxElements && shape.num_tets >= 0 &&
+         shape.num_tets <= kMaxElements && shape.cell_arrays.size() <= kMaxCellArrays &&
          total_bytes == shape.TotalBytes();
 }
 
@@ -110,7 +110,7 @@ absl::StatusOr<PredictionRow> ParsePrediction(absl::string_view bytes) {
   if (!Parse(bytes, &proto)) return Damaged("a prediction's record", "its bytes are none");
   if (proto.id().empty()) return Damaged("a prediction's record", "it has no id");
   if (!IsSha256Hex(proto.positions_sha256()) || proto.vertex_count() < 0 ||
-      proto.vertex_count() > kMostElements) {
+      proto.vertex_count() > kMaxElements) {
     return Damaged("a prediction's record", "it names no positions");
   }
   PredictionRow row;

@@ -24,7 +24,7 @@
 namespace tissueform {
 namespace {
 
-constexpr int kMostNames = 100;
+constexpr int kMaxNames = 100;
 
 // What is found of a log in one of its files.
 struct FileEnd {
@@ -202,7 +202,7 @@ absl::Status AuditFile::MoveAway() const {
   // By link and not by rename, which would take the place of another file: one of another log may
   // have the name.
   for (int i = 1; link(options_.path.c_str(), name.c_str()) != 0; ++i) {
-    if (errno != EEXIST || i == kMostNames) return DiskError("cannot be moved to make room");
+    if (errno != EEXIST || i == kMaxNames) return DiskError("cannot be moved to make room");
     name = absl::StrCat(numbered, "-", i);
   }
   return unlink(options_.path.c_str()) == 0 ? absl::OkStatus()

@@ -18,7 +18,7 @@ namespace tissueform {
 namespace {
 
 // More would make a file grow far beyond its size before the next one begins.
-constexpr size_t kMostTogether = 1024;
+constexpr size_t kMaxTogether = 1024;
 
 absl::Status NotWritten(const char* why) {
   return WithReason(
@@ -142,7 +142,7 @@ void AuditLog::Work() {
 
 void AuditLog::WriteBatch() {
   std::vector<std::string> batch;
-  const size_t count = std::min(waiting_.size(), kMostTogether);
+  const size_t count = std::min(waiting_.size(), kMaxTogether);
   std::move(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(count),
             std::back_inserter(batch));
   waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(count));

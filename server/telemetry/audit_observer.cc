@@ -15,7 +15,7 @@ namespace tissueform {
 namespace {
 
 // Names are shorter; with all escapes a line stays below kMaxAuditLineBytes.
-constexpr size_t kMostOfAName = 256;
+constexpr size_t kMaxOfAName = 256;
 
 using Json = nlohmann::ordered_json;
 
@@ -34,11 +34,11 @@ Json Event(const char* event, absl::Time now) {
 
 Json CallEvent(const char* event, absl::Time now, const ObservedCall& call) {
   Json line = Event(event, now);
-  line["principal"] = call.principal.name.substr(0, kMostOfAName);
+  line["principal"] = call.principal.name.substr(0, kMaxOfAName);
   line["rpc"] = call.method;
-  line["resource"] = call.resource.substr(0, kMostOfAName);
-  line["address"] = call.address.substr(0, kMostOfAName);
-  line["request_id"] = call.request_id.substr(0, kMostOfAName);
+  line["resource"] = call.resource.substr(0, kMaxOfAName);
+  line["address"] = call.address.substr(0, kMaxOfAName);
+  line["request_id"] = call.request_id.substr(0, kMaxOfAName);
   return line;
 }
 

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "server/platform/metrics_page.h"
-#include "server/session/frame_flow.h"
+#include "server/session/frame_scheduler.h"
 #include "server/session/memory_budget.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session_registry.h"

@@ -56,7 +56,7 @@ class Bridge:
         self.process = None
 
     def start(self):
-        command = [self.cluster.programs / "tissueform-pacs", "run", "--state-dir", self.folder, "--listen", f"{processes.HOST}:0", "--no-worklist",
+        command = [self.cluster.programs / "tissueform-pacs", "run", "--state-dir", self.folder, "--listen", f"{processes.HOST}:0", "--no-review",
                    "--allow-ae", "SCANNER", "--recipe", ROOT / "tests/pacs/recipe.json", "--pacs", f"{processes.HOST}:1", "--pacs-ae-title", "PACS",
                    "--server", self.cluster.address("workstations")]
         self.process = processes.start(command, self.cluster.log(BRIDGE))

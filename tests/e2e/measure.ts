@@ -37,10 +37,10 @@ test.each(["gradient_field", "linear_elastic", "neo_hookean"])("pose to position
   console.log(JSON.stringify({ model: name, ...told, ...result }, null, 1));
 }, 1000 * SECONDS + 120_000);
 
-test("from a wish to the bone that gives it, while one pulls", async () => {
+test("from a target to the bone that gives it, while one pulls", async () => {
   const { page } = await openCase(await planner.browse(), planner);
   await page.evaluate(() => (globalThis as unknown as { tissueform: any }).tissueform.view.stage.setDrawing(false));
-  await page.locator("summary").getByText("Wished-for face", { exact: true }).click();
+  await page.locator("summary").getByText("Soft-tissue targets", { exact: true }).click();
   await page.getByLabel("or a place").selectOption({ label: "Chin" });
   const forward = page.getByRole("textbox", { name: "forward", exact: true });
   const times: number[] = [];
@@ -48,7 +48,7 @@ test("from a wish to the bone that gives it, while one pulls", async () => {
     await forward.fill((3 + (i % 40) / 10).toFixed(1));
     await forward.press("Enter");
     await page.waitForTimeout(i === 0 ? 5000 : 150);
-    times.push(await page.evaluate(() => (globalThis as unknown as { tissueform: any }).tissueform.bench.wishes.fitted.value.milliseconds));
+    times.push(await page.evaluate(() => (globalThis as unknown as { tissueform: any }).tissueform.bench.targets.fitted.value.milliseconds));
   }
   const rising = times.slice(1).sort((a, b) => a - b);
   const at = (part: number) => rising[Math.floor(part * (rising.length - 1))];

@@ -139,7 +139,7 @@ async function openReport(page: Page, html: string): Promise<{ page: Page; fault
 }
 
 function forwardOf(page: Page, place: string) {
-  return page.getByRole("group", { name: `Wish for ${place}` }).getByRole("textbox", { name: "forward" });
+  return page.getByRole("group", { name: `Target for ${place}` }).getByRole("textbox", { name: "forward" });
 }
 
 /** The arrow that points forward, which goes to the left as the head is seen from its left, by so many pixels. */
@@ -148,7 +148,7 @@ async function pullForward(page: Page, pixels: number): Promise<void> {
     const { view, bench } = (globalThis as unknown as Hook).tissueform;
     await new Promise<void>((done) => view.stage.invalidate(done));
     const box = view.stage.surface.getBoundingClientRect();
-    const point = view.head.toWorld(bench.wishes.wishes.value[0].place.drawnMm).project(view.stage.camera);
+    const point = view.head.toWorld(bench.targets.targets.value[0].place.drawnMm).project(view.stage.camera);
     return { x: box.left + ((point.x + 1) / 2) * box.width, y: box.top + ((1 - point.y) / 2) * box.height };
   });
   await page.mouse.move(at.x - 40, at.y);
@@ -158,9 +158,9 @@ async function pullForward(page: Page, pixels: number): Promise<void> {
 }
 
 describe("the bundled head", () => {
-  test("is pulled to a wished-for chin, told what cannot be reached, and takes the bone as one step", async () => {
+  test("is pulled to a targeted chin, told what cannot be reached, and takes the bone as one step", async () => {
     const { page, faults } = await openCase(await planner.browse(), planner);
-    await open(page, "Wished-for face");
+    await open(page, "Soft-tissue targets");
     await page.getByLabel("or a place").selectOption({ label: "Chin" });
     const forward = forwardOf(page, "Chin");
     await forward.fill("5");
@@ -185,7 +185,7 @@ describe("the bundled head", () => {
     await moved(page, 2.5, 7);
     await page.keyboard.press("Control+z");
     await moved(page, 0, 0.05);
-    // A wish on a planned face leaves it: it begins where the skin is, and asks nothing.
+    // A target on a planned face leaves it: it begins where the skin is, and asks nothing.
     await takeSegment(page, "Lower jaw");
     await typeMove(page, "Forward", "6");
     await moved(page, 4, 8);
@@ -194,7 +194,7 @@ describe("the bundled head", () => {
     await expect.poll(() => forwardOf(page, "Chin").inputValue()).toMatch(/^[3-7]\.\d$/);
     await page.getByText("This is the face as planned").waitFor();
     expect((await state(page)).moves).toEqual(planned);
-    await page.getByRole("button", { name: "Remove the wish for Chin" }).click();
+    await page.getByRole("button", { name: "Remove the target for Chin" }).click();
     // This case has the scanner's axes alone.
     await open(page, "Measures");
     await page.getByText("In the axes of the scanner").waitFor();

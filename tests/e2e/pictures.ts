@@ -86,7 +86,7 @@ test("seven pictures", async () => {
   await live(page);
 });
 
-test("measures, a wish, the band and the bite", async () => {
+test("measures, a target, the band and the bite", async () => {
   const { page } = await openCase(await planner.browse(), planner);
   const open = (title: string) => page.locator("summary").getByText(title, { exact: true }).click();
   const toTop = (title: string) =>
@@ -125,7 +125,7 @@ test("measures, a wish, the band and the bite", async () => {
   await page.getByRole("button", { name: "Reset" }).click();
   await page.getByRole("button", { name: "Rest shape" }).click();
   await page.getByRole("button", { name: "Left", exact: true }).click();
-  await open("Wished-for face");
+  await open("Soft-tissue targets");
   await page.getByLabel("or a place").selectOption({ label: "Chin" });
   const forward = page.getByRole("textbox", { name: "forward", exact: true });
   // The first answer takes what the server prepares for the point; those of a hand that pulls do not.
@@ -143,10 +143,10 @@ test("measures, a wish, the band and the bite", async () => {
   await setDrawing(true);
   await page.getByText(/Chin: reached/).waitFor();
   await moved(page, 4, 10);
-  await toTop("Wished-for face");
-  await picture(page, "wished-for-chin");
+  await toTop("Soft-tissue targets");
+  await picture(page, "targeted-chin");
   await page.getByRole("button", { name: "Reject", exact: true }).click();
-  await open("Wished-for face");
+  await open("Soft-tissue targets");
   await page.getByRole("button", { name: "Rest shape" }).click();
 
   await open("Jaw and bite");

@@ -23,7 +23,7 @@ namespace {
 using Upload = testing::FakeReaderCall<v1::UploadCaseRequest>;
 using Download = testing::FakeWriterCall<v1::ReadCaseResponse>;
 
-constexpr int kMostCaseActions = 64;
+constexpr int kMaxCaseActions = 64;
 // In a fuzzer's message it stands for a case that is kept.
 constexpr char kOwnCase[] = "cases/own";
 
@@ -32,7 +32,7 @@ struct CaseRig {
   CaseRig() { spdlog::set_level(spdlog::level::off); }
 
   ServiceLimits limits{.max_case_bytes = 64 << 10, .max_cases = 3};
-  ServiceGate gate;
+  AdmissionControl gate;
   InMemoryCaseStore store{128 << 10};
   WorkerPool workers{2};
   DeadlineTimer timer;
@@ -144,7 +144,7 @@ void FuzzCaseUpload(const uint8_t* data, size_t size) {
   {
     ByteSource source(data, size);
     CasePlay play(rig);
-    for (int i = 0; i < kMostCaseActions && source.left() > 0; ++i) {
+    for (int i = 0; i < kMaxCaseActions && source.left() > 0; ++i) {
       const int action = source.Take<uint8_t>() % 8;
       const size_t count = source.Take<uint16_t>();
       play.Act(action, source.TakeBytes(count));

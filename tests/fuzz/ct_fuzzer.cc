@@ -27,7 +27,7 @@ void Require(bool promise) {
 
 // A header from outside must not choose what is read.
 void CheckDataPath(const std::string& header_path, const VolumeHeader& header) {
-  Require(header.data_paths.size() <= kMostDataFiles);
+  Require(header.data_paths.size() <= kMaxDataFiles);
   for (const std::string& path : header.data_paths) {
     const std::filesystem::path data(path);
     Require(data.parent_path() == std::filesystem::path(header_path).parent_path());

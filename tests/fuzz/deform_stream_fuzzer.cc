@@ -20,8 +20,8 @@ namespace {
 using Stream = testing::FakeBidiCall<v1::DeformRequest, v1::DeformResponse>;
 
 // Inputs stay short: what a long one finds a shorter one finds as well.
-constexpr int kMostActions = 64;
-constexpr size_t kMostWatches = 3;
+constexpr int kMaxActions = 64;
+constexpr size_t kMaxWatches = 3;
 // In a fuzzer's message it stands for the name that the server has chosen.
 constexpr char kOwnWatch[] = "watches/own";
 
@@ -119,7 +119,7 @@ class Play {
     switch (action) {
       case 0:
         watches_.push_back(std::make_unique<Watch>(rig_, bytes));
-        if (watches_.size() > kMostWatches) watches_.erase(watches_.begin());
+        if (watches_.size() > kMaxWatches) watches_.erase(watches_.begin());
         break;
       case 1:
         if (v1::AcknowledgeWatchRequest request;
@@ -163,7 +163,7 @@ void FuzzDeformStream(const uint8_t* data, size_t size) {
   static auto* const rig = new RpcRig();
   ByteSource source(data, size);
   Play play(rig);
-  for (int i = 0; i < kMostActions && source.left() > 0; ++i) {
+  for (int i = 0; i < kMaxActions && source.left() > 0; ++i) {
     const int action = source.Take<uint8_t>() % 16;
     const size_t count = source.Take<uint16_t>();
     play.Act(action, source.TakeBytes(count));

@@ -55,7 +55,7 @@ void FuzzMultipart(const uint8_t* data, size_t size) {
   const absl::string_view body(reinterpret_cast<const char*>(data), size);
   const std::string whole = PartsOf(body, std::max<size_t>(size, 1));
   // Headers that are too long are seen sooner in small pieces.
-  if (size < MultipartSplitter::kMostHeaderBytes) RequireOfPacs(PartsOf(body, 1) == whole);
+  if (size < MultipartSplitter::kMaxHeaderBytes) RequireOfPacs(PartsOf(body, 1) == whole);
 }
 
 void FuzzInstanceHeader(const uint8_t* data, size_t size) {

@@ -27,7 +27,7 @@ struct RpcRig {
   RpcRig();
 
   ServiceLimits limits;
-  ServiceGate gate;
+  AdmissionControl gate;
   MemoryBudget budget{64 << 20};
   testing::FakeClock clock;
   MeshCatalog catalog{limits, &budget, nullptr, &clock};

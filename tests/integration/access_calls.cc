@@ -158,7 +158,7 @@ absl::StatusOr<Authenticated> NamedCallers::Authenticate(const Credentials& cred
   return Authenticated{.principal = std::make_shared<const Principal>(std::move(principal))};
 }
 
-absl::Status NamedCallers::StillGood(const Authenticated& /*authenticated*/) {
+absl::Status NamedCallers::IsStillAuthorized(const Authenticated& /*authenticated*/) {
   return absl::OkStatus();
 }
 

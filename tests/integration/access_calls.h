@@ -32,7 +32,7 @@ namespace tissueform::testing {
 class NamedCallers final : public Authenticator {
  public:
   absl::StatusOr<Authenticated> Authenticate(const Credentials& credentials) override;
-  absl::Status StillGood(const Authenticated& authenticated) override;
+  absl::Status IsStillAuthorized(const Authenticated& authenticated) override;
 };
 
 // The headers of a call by this caller.

@@ -36,8 +36,8 @@ using ::testing::ElementsAreArray;
 
 constexpr int kCallsOfCi = 5'000;
 constexpr int kCallsBetweenRestarts = 2'500;
-constexpr size_t kMostSessions = 16;
-constexpr size_t kMostPredictions = 40;
+constexpr size_t kMaxSessions = 16;
+constexpr size_t kMaxPredictions = 40;
 
 int CallsToMake() {
   const char* wanted = std::getenv("TISSUEFORM_ACCESS_CALLS");
@@ -251,7 +251,7 @@ class AccessPropertyTest : public ServiceTest {
   }
 
   void CreateSession() {
-    if (world_.sessions.size() >= kMostSessions) return DeleteSession();
+    if (world_.sessions.size() >= kMaxSessions) return DeleteSession();
     const Caller caller = AnyCaller();
     const bool invented = OneIn(10);
     const SentMesh& mesh = Any(meshes_);
@@ -278,7 +278,7 @@ class AccessPropertyTest : public ServiceTest {
   }
 
   void CreatePrediction() {
-    if (world_.predictions.size() >= kMostPredictions) return DeletePrediction();
+    if (world_.predictions.size() >= kMaxPredictions) return DeletePrediction();
     const Caller caller = AnyCaller();
     v1::CreatePredictionRequest request;
     request.set_session(AnyName(Kind::kSession));

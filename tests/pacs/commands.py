@@ -143,10 +143,10 @@ def check_store(programs, bridge, case, count):
     shown = bridge.run("store", export)
     check("store shows whose it is", shown.returncode == 0 and "Planted" in shown.stdout and "PLANTED-4711" in shown.stdout, shown.stdout + shown.stderr)
     check("and stores nothing without a person's word", count() == before)
-    stored = bridge.run("store", export, "--patient-is-right")
+    stored = bridge.run("store", export, "--confirm-patient")
     check("store with a person's word", stored.returncode == 0 and f"{export} is told" in stored.stdout, stored.stdout + stored.stderr)
     check("every object is in the PACS", count() - before == OBJECTS, str(count() - before))
-    bridge.run("store", export, "--patient-is-right")
+    bridge.run("store", export, "--confirm-patient")
     check("and once only", count() - before == OBJECTS, str(count() - before))
     table, exports = bridge.run("status").stdout, bridge.status()["exports"]
     check("status tells it", [found["state"] for found in exports if found["name"] == export] == ["told"] and export in table, table)
@@ -162,14 +162,14 @@ def check_merged(programs, bridge, case, study):
     programs.orthanc(f"/patients/{name}/modify", {"Replace": {"PatientID": "MERGED-1"}, "Force": True, "KeepSource": False,
                                                  "Keep": ["StudyInstanceUID", "SeriesInstanceUID", "SOPInstanceUID"]})
     before = len(programs.instances_of(study))
-    check_refused("storing what is another patient's by now", bridge.run("store", export, "--patient-is-right"), "another patient ID")
+    check_refused("storing what is another patient's by now", bridge.run("store", export, "--confirm-patient"), "another patient ID")
     state_of = {found["name"]: found["state"] for found in bridge.status()["exports"]}
     check("it waits for a person again, and nothing is stored", state_of[export] == "asked" and len(programs.instances_of(study)) == before, str(state_of))
     sent = programs.tissueform("prediction", "sent").stdout
     check("of which the server knows", re.search(rf"{export}.*have changed", sent) is not None, sent)
     shown = bridge.run("store", export)
     check("who sees the patient of now, and that it has changed", "MERGED-1" in shown.stdout and "another patient ID" in shown.stdout, shown.stdout)
-    stored = bridge.run("store", export, "--patient-is-right")
+    stored = bridge.run("store", export, "--confirm-patient")
     check("and stores it for that one", stored.returncode == 0 and len(programs.instances_of(study)) == before + OBJECTS, stored.stdout + stored.stderr)
 
 

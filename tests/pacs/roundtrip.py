@@ -80,7 +80,7 @@ def confirm(programs, export, looks=False):
     """The person's word; who looks waits for the pictures."""
     def form():
         try:
-            if looks and "<img" not in programs.worklist():
+            if looks and "<img" not in programs.review():
                 return None
             return next((fields for fields in programs.forms() if fields.get("export") == export), None)
         except OSError:

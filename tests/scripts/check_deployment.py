@@ -53,7 +53,7 @@ def check_units(programs, scratch):
 ELSEWHERE = {
     "tissueform-server": ["--data-dir", "@/server", "--port", "0"],
     "tissueform-gateway": ["--web", "@/web", "--listen", "127.0.0.1:0"],
-    "tissueform-pacs": ["--state-dir", "@/pacs", "--listen", "127.0.0.1:0", "--worklist-listen", "127.0.0.1:0"],
+    "tissueform-pacs": ["--state-dir", "@/pacs", "--listen", "127.0.0.1:0", "--review-listen", "127.0.0.1:0"],
 }
 
 

@@ -18,7 +18,7 @@
 namespace tissueform {
 namespace {
 
-constexpr int kMostHours = 24 * 365;
+constexpr int kMaxHours = 24 * 365;
 
 struct LinkOptions {
   ServerConnection server;
@@ -67,7 +67,7 @@ void AddFollowLinkCommands(CLI::App& session, CommandWork* work) {
   CLI::App* link =
       add("link", "make a token with which anybody may watch it, and nothing else", MakeLink);
   link->add_option("--hours", options->hours, "after which it ends (default: 8)")
-      ->check(CLI::Range(1, kMostHours));
+      ->check(CLI::Range(1, kMaxHours));
   link->add_option("--case", options->case_name, "the case that a follower's page needs, too");
   add("unlink", "end all its follow links, and the watches that stand on them", EndLinks);
 }

@@ -39,9 +39,9 @@ absl::StatusOr<std::string> ReadCaseBytes(const std::string& path) {
   if (error) {
     return absl::NotFoundError(absl::StrCat("cannot read ", path, ": ", error.message()));
   }
-  if (size > kMostCaseBytes) {
+  if (size > kMaxCaseBytes) {
     return absl::ResourceExhaustedError(
-        absl::StrCat(path, " has ", size, " bytes; a case may have ", kMostCaseBytes));
+        absl::StrCat(path, " has ", size, " bytes; a case may have ", kMaxCaseBytes));
   }
   std::string bytes(size, '\0');
   std::ifstream stream(path, std::ios::binary);

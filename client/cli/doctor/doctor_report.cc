@@ -27,8 +27,8 @@ const char* NameOf(Finding finding) {
 
 // What servers and libraries say may hold anything; a terminal and JSON get printable ASCII of it.
 std::string Printable(const std::string& text) {
-  constexpr size_t kMost = 500;
-  std::string printable = text.substr(0, kMost);
+  constexpr size_t kMax = 500;
+  std::string printable = text.substr(0, kMax);
   std::replace_if(
       printable.begin(), printable.end(), [](unsigned char c) { return !absl::ascii_isprint(c); },
       '?');

@@ -30,7 +30,7 @@ using SteadyClock = std::chrono::steady_clock;
 
 // The beginning of HTTP/2, and an empty frame of settings.
 constexpr absl::string_view kPreface("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\4\0\0\0\0\0", 33);
-constexpr size_t kMostAddresses = 8;
+constexpr size_t kMaxAddresses = 8;
 
 // Null and `error` set when there is none.
 Addresses Resolve(const ServerEndpoint& endpoint, std::string* error) {
@@ -71,7 +71,7 @@ Connection ConnectToAny(const ServerEndpoint& endpoint) {
   const Addresses addresses = Resolve(endpoint, &ignored);
   int error = EADDRNOTAVAIL;
   size_t tried = 0;
-  for (const addrinfo* address = addresses.get(); address != nullptr && tried < kMostAddresses;
+  for (const addrinfo* address = addresses.get(); address != nullptr && tried < kMaxAddresses;
        address = address->ai_next, ++tried) {
     ProbeSocket made(socket(address->ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     if (made.fd() < 0) continue;
@@ -139,7 +139,7 @@ DoctorLine CheckName(const ServerEndpoint& endpoint) {
   }
   std::vector<std::string> texts;
   for (const addrinfo* address = addresses.get();
-       address != nullptr && texts.size() < kMostAddresses; address = address->ai_next) {
+       address != nullptr && texts.size() < kMaxAddresses; address = address->ai_next) {
     texts.push_back(TextOf(*address));
   }
   return {.check = "name", .text = absl::StrCat(endpoint.host, " is ", absl::StrJoin(texts, ", "))};

@@ -130,11 +130,11 @@ std::string NamesOf(SSL* ssl) {
 // ", issued by CN=...": where a box on the way inspects TLS, its authority stands here. Bounded:
 // the name is the peer's.
 std::string IssuerOf(SSL* ssl) {
-  constexpr size_t kMostBytes = 160;
+  constexpr size_t kMaxBytes = 160;
   const std::string issuer = TextOfCertificate(ssl, [](BIO* text, X509* leaf) {
     return X509_NAME_print_ex(text, X509_get_issuer_name(leaf), 0, XN_FLAG_RFC2253);
   });
-  return issuer.empty() ? "" : absl::StrCat(", issued by ", issuer.substr(0, kMostBytes));
+  return issuer.empty() ? "" : absl::StrCat(", issued by ", issuer.substr(0, kMaxBytes));
 }
 
 // What the peer picked of the protocol that was offered; empty: nothing.

@@ -27,7 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kOwnerOnlyMode = 0600;
-constexpr size_t kMostTitleBytes = 256;
+constexpr size_t kMaxTitleBytes = 256;
 
 struct ExportOptions {
   std::string plan;
@@ -48,9 +48,9 @@ absl::Status CheckExport(const ExportOptions& options) {
   }
   const std::string& title = options.face.title;
   const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20; };
-  if (title.size() > kMostTitleBytes || std::any_of(title.begin(), title.end(), is_control)) {
+  if (title.size() > kMaxTitleBytes || std::any_of(title.begin(), title.end(), is_control)) {
     return absl::InvalidArgumentError(
-        absl::StrCat("--title is to be one line of at most ", kMostTitleBytes, " bytes"));
+        absl::StrCat("--title is to be one line of at most ", kMaxTitleBytes, " bytes"));
   }
   return absl::OkStatus();
 }

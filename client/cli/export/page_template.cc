@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kTemplateFile[] = "share/tissueform/web/moving-file.html";
-constexpr uintmax_t kMostTemplateBytes = uintmax_t{16} << 20;
+constexpr uintmax_t kMaxTemplateBytes = uintmax_t{16} << 20;
 constexpr char kEnvelopeMark[] = "@TISSUEFORM-ENVELOPE@";
 constexpr char kPayloadMark[] = "@TISSUEFORM-PAYLOAD@";
 
@@ -42,7 +42,7 @@ absl::StatusOr<std::string> ReadPageTemplate() {
   const fs::path path = fs::path(ProgramFolder()).parent_path() / kTemplateFile;
   std::error_code error;
   const uintmax_t size = fs::file_size(path, error);
-  if (error || size > kMostTemplateBytes) {
+  if (error || size > kMaxTemplateBytes) {
     return absl::NotFoundError(absl::StrCat(
         "the page for files that move is not at ", path.string(),
         "; deploy/build_web.sh builds it, and the package tissueform-gateway brings it"));

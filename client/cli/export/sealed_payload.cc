@@ -29,11 +29,11 @@ constexpr size_t kNonceBytes = 12;
 constexpr size_t kKeyBytes = 32;
 constexpr size_t kTagBytes = 16;
 constexpr int kGzipWindow = 15 + 16;  // zlib's largest, and a head of gzip
-constexpr int kMostMemory = 9;
+constexpr int kMaxMemory = 9;
 
 absl::StatusOr<std::string> Gzip(absl::string_view data) {
   z_stream stream = {};
-  if (deflateInit2(&stream, Z_BEST_COMPRESSION, Z_DEFLATED, kGzipWindow, kMostMemory,
+  if (deflateInit2(&stream, Z_BEST_COMPRESSION, Z_DEFLATED, kGzipWindow, kMaxMemory,
                    Z_DEFAULT_STRATEGY) != Z_OK) {
     return absl::InternalError("zlib does not begin");
   }
@@ -118,10 +118,10 @@ size_t CountLetters(const std::string& text) {
 }  // namespace
 
 absl::StatusOr<SealedPayload> SealPayload(absl::string_view data, const std::string& password) {
-  if (data.size() > kMostMovingDataBytes) {
+  if (data.size() > kMaxMovingDataBytes) {
     return absl::ResourceExhaustedError(
         absl::StrCat("surfaces and prepared answers have ", data.size(),
-                     " bytes, and a file that moves at most ", kMostMovingDataBytes,
+                     " bytes, and a file that moves at most ", kMaxMovingDataBytes,
                      "; show fewer triangles, or choose another model"));
   }
   SealedPayload sealed;
@@ -150,7 +150,7 @@ absl::StatusOr<SealedPayload> SealPayload(absl::string_view data, const std::str
 
 absl::StatusOr<std::string> ReadPasswordFile(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
-  std::string text(kMostPasswordBytes + 3, '\0');
+  std::string text(kMaxPasswordBytes + 3, '\0');
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<size_t>(file.gcount()));
   if (!file && !file.eof()) {
@@ -158,11 +158,11 @@ absl::StatusOr<std::string> ReadPasswordFile(const std::string& path) {
   }
   if (!text.empty() && text.back() == '\n') text.pop_back();
   if (!text.empty() && text.back() == '\r') text.pop_back();
-  if (text.size() > kMostPasswordBytes || text.find_first_of("\n\r") != std::string::npos ||
+  if (text.size() > kMaxPasswordBytes || text.find_first_of("\n\r") != std::string::npos ||
       !IsUtf8(text) || CountLetters(text) < kLeastPasswordLetters) {
     return absl::InvalidArgumentError(
         absl::StrCat("--password-file ", path, ": a password is one line of UTF-8 with at least ",
-                     kLeastPasswordLetters, " letters and at most ", kMostPasswordBytes, " bytes"));
+                     kLeastPasswordLetters, " letters and at most ", kMaxPasswordBytes, " bytes"));
   }
   return text;
 }

@@ -12,9 +12,9 @@ namespace tissueform {
 
 inline constexpr int kMovingFileKeyRounds = 600'000;
 // Before they are compressed; the page refuses more.
-inline constexpr size_t kMostMovingDataBytes = size_t{256} << 20;
+inline constexpr size_t kMaxMovingDataBytes = size_t{256} << 20;
 inline constexpr size_t kLeastPasswordLetters = 8;
-inline constexpr size_t kMostPasswordBytes = 1024;
+inline constexpr size_t kMaxPasswordBytes = 1024;
 
 // What a file that moves carries, as it stands in it.
 struct SealedPayload {
@@ -24,11 +24,11 @@ struct SealedPayload {
 
 // Compressed (gzip) and, unless the password is empty, encrypted: AES-256 in GCM with a key by
 // PBKDF2 (SHA-256, kMovingFileKeyRounds), salt and nonce new every time. Errors:
-// ResourceExhausted (over kMostMovingDataBytes); Internal, when a library fails.
+// ResourceExhausted (over kMaxMovingDataBytes); Internal, when a library fails.
 absl::StatusOr<SealedPayload> SealPayload(absl::string_view data, const std::string& password);
 
 // The first line of the file, which may end in CR LF. Errors: NotFound (cannot be read),
-// InvalidArgument (shorter than kLeastPasswordLetters or longer than kMostPasswordBytes, not UTF-8,
+// InvalidArgument (shorter than kLeastPasswordLetters or longer than kMaxPasswordBytes, not UTF-8,
 // or more than one line); no message tells a letter of it.
 absl::StatusOr<std::string> ReadPasswordFile(const std::string& path);
 

@@ -21,7 +21,7 @@ namespace {
 using Eigen::Vector3d;
 
 // Directions that are printed; JSON has all.
-constexpr size_t kMostPrinted = 6;
+constexpr size_t kMaxPrinted = 6;
 // A direction of which the targets decide less than half is decided by moving least.
 constexpr double kDecided = 0.5;
 
@@ -109,11 +109,11 @@ std::string UndeterminedText(const FitReport& report) {
       "move least.\nSuch a combination is, for 1 mm of movement of bone:\n",
       report.problem->unknowns.size(), report.problem->num_equations(),
       too_few ? ", more freedoms than targets" : "", undecided.size());
-  for (size_t k = 0; k < std::min(kMostPrinted, undecided.size()); ++k) {
+  for (size_t k = 0; k < std::min(kMaxPrinted, undecided.size()); ++k) {
     absl::StrAppend(&text, "  ", DirectionName(report, *undecided[k]), "\n");
   }
-  if (undecided.size() > kMostPrinted) {
-    absl::StrAppend(&text, "  and ", undecided.size() - kMostPrinted, " more (--json)\n");
+  if (undecided.size() > kMaxPrinted) {
+    absl::StrAppend(&text, "  and ", undecided.size() - kMaxPrinted, " more (--json)\n");
   }
   return text;
 }

@@ -196,7 +196,7 @@ OrderedJson ProvenanceJson(const v1::Prediction& prediction) {
                    {"residual", summary.residual()},
                    {"newton_steps", summary.newton_steps()},
                    {"load", summary.load()},
-                   {"gave_up", GaveUpName(ToSolveSummary(summary).gave_up)},
+                   {"gave_up", TerminationName(ToSolveSummary(summary).gave_up)},
                    {"obstacle", summary.obstacle()},
                    {"second_factor_bytes", summary.second_factor_bytes()}};
   const v1::DeformationQuality& quality = prediction.quality();

@@ -30,7 +30,7 @@ constexpr PictureSize kWithBone{1024, 467};
 const Colour kFixedBone{0.90, 0.87, 0.78};
 const Colour kTeeth{0.97, 0.96, 0.92};
 // What a title has room for, in bytes; beyond that it counts the segments.
-constexpr size_t kMostMoveText = 45;
+constexpr size_t kMaxMoveText = 45;
 
 // Axes of the head: x to the patient's left, y to the back, z up.
 struct NamedView {
@@ -129,7 +129,7 @@ std::string MovesInTitle(const CaseFile& contents, const std::map<std::string, H
     moves.push_back(MoveInTitle(handle, pose->second));
   }
   std::string text = absl::StrJoin(moves, "; ");
-  if (text.size() <= kMostMoveText) return text;
+  if (text.size() <= kMaxMoveText) return text;
   return absl::StrCat(moves.size(), moves.size() == 1 ? " segment moved" : " segments moved");
 }
 

@@ -250,7 +250,7 @@ void AddDragCommand(CLI::App& app, CommandWork* work) {
       ->check(CLI::Range(0.1, 1000.0))
       ->capture_default_str();
   command
-      ->add_option("--give-up-seconds", options->give_up_seconds,
+      ->add_option("--reconnect-timeout", options->give_up_seconds,
                    "how long to wait for a server that is away")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();

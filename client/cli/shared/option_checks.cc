@@ -37,14 +37,14 @@ void AddAllowOutside(CLI::App* command, PlanReadOptions* options) {
 }
 
 void AddSolverThreads(CLI::App* command, const std::string& when, int* threads) {
-  constexpr int kMostOfOpenBlas = 64;  // as Debian builds it
+  constexpr int kMaxOfOpenBlas = 64;  // as Debian builds it
   command
       ->add_option("--solver-threads", *threads,
                    when +
                        "threads that a factorisation's dense kernels use; more than one is "
                        "faster for large meshes on an idle machine only, and the last digits of "
                        "the answer then depend on their number and on the machine")
-      ->check(CLI::Range(1, kMostOfOpenBlas))
+      ->check(CLI::Range(1, kMaxOfOpenBlas))
       ->capture_default_str();
 }
 

@@ -52,16 +52,16 @@ OrderedJson QualityToJson(const PredictionStats& stats) {
 std::string WhyItGaveUp(const SolveSummary& solve) {
   std::string why;
   switch (solve.gave_up) {
-    case GaveUp::kNo:
-    case GaveUp::kBlocked:  // the obstacle says it all
+    case Termination::kConverged:
+    case Termination::kBlocked:  // the obstacle says it all
       break;
-    case GaveUp::kIterations:
+    case Termination::kIterations:
       why = ": the iterations ran out";
       break;
-    case GaveUp::kNoRoom:
+    case Termination::kNoRoom:
       why = ": no memory for the second factor that it needs";
       break;
-    case GaveUp::kArithmetic:
+    case Termination::kArithmetic:
       why = ": no step makes it better";
       break;
   }
@@ -101,7 +101,7 @@ OrderedJson StatsToJson(const PredictionStats& stats) {
                       {"changes_mm", stats.solve.changes_mm},
                       {"energies_nj", stats.solve.energies_nj},
                       {"load", stats.solve.load},
-                      {"gave_up", GaveUpName(stats.solve.gave_up)},
+                      {"gave_up", TerminationName(stats.solve.gave_up)},
                       {"obstacle", stats.solve.obstacle},
                       {"second_factor_bytes", stats.solve.second_factor_bytes},
                       {"solver_threads", stats.solver_threads},

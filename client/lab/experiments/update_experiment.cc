@@ -21,7 +21,7 @@ namespace {
 
 // More than any scheme needs to its fixed point: the one without a blend creeps for 375 updates,
 // the blended one for 93 (docs/experiments.md).
-constexpr int kMostUpdates = 2000;
+constexpr int kMaxUpdates = 2000;
 constexpr double kFixedPointMm = 1e-6;
 
 // One row of the table: how far an answer is from the plain one.
@@ -98,8 +98,8 @@ Scene GradientScene(std::string title, const TranslationProblem& problem,
 }  // namespace
 
 absl::StatusOr<UpdateSchemes> CompareUpdateSchemes(const TranslationProblem& problem) {
-  const IterationScheme not_blended{BlendMap::kUnblended, 0, kMostUpdates, kFixedPointMm};
-  const IterationScheme blended{BlendMap::kCosine, 0, kMostUpdates, kFixedPointMm};
+  const IterationScheme not_blended{BlendMap::kUnblended, 0, kMaxUpdates, kFixedPointMm};
+  const IterationScheme blended{BlendMap::kCosine, 0, kMaxUpdates, kFixedPointMm};
   UpdateSchemes schemes;
   TF_ASSIGN_OR_RETURN(schemes.plain, TranslatePlainly(problem));
   TF_ASSIGN_OR_RETURN(schemes.not_blended, TranslateByIteration(problem, not_blended, {1}));

@@ -20,7 +20,7 @@ namespace {
 constexpr char kEscape = '\x1B';
 constexpr unsigned char kHighBit = 0x80;
 // No set's character has more bytes in UTF-8 than this for each of its own.
-constexpr size_t kMostGrowth = 4;
+constexpr size_t kMaxGrowth = 4;
 
 constexpr int kAsciiSet = 6;
 constexpr int kJisX0201 = 13;
@@ -95,7 +95,7 @@ const CodeElement* UpperOf(int set) {
 std::optional<std::string> Convert(const std::string& encoding, absl::string_view raw) {
   const iconv_t converter = iconv_open("UTF-8", encoding.c_str());
   if (converter == reinterpret_cast<iconv_t>(-1)) return {};
-  std::string text(kMostGrowth * raw.size(), '\0');
+  std::string text(kMaxGrowth * raw.size(), '\0');
   std::string bytes(raw);
   char* from = bytes.data();
   size_t from_left = bytes.size();

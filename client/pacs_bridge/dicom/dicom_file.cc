@@ -96,7 +96,7 @@ class FileConsumer final : public DcmConsumer {
   OFBool good() const override { return OFTrue; }
   OFCondition status() const override { return EC_Normal; }
   OFBool isFlushed() const override { return OFTrue; }
-  offile_off_t avail() const override { return kMostAtOnceBytes; }
+  offile_off_t avail() const override { return kMaxAtOnceBytes; }
   void flush() override {}
   offile_off_t write(const void* bytes, offile_off_t count) override {
     const auto* next = static_cast<const char*>(bytes);
@@ -123,7 +123,7 @@ class FileConsumer final : public DcmConsumer {
   }
 
  private:
-  static constexpr offile_off_t kMostAtOnceBytes = 1 << 30;
+  static constexpr offile_off_t kMaxAtOnceBytes = 1 << 30;
 
   const std::string path_;
   int descriptor_;

@@ -16,10 +16,10 @@ namespace tissueform {
 namespace {
 
 // Beyond this a value is not even taken from the file.
-constexpr Uint32 kMostRawBytes = 1 << 20;
+constexpr Uint32 kMaxRawBytes = 1 << 20;
 // Converted, of a name of 100,000 characters, before it is cut.
 constexpr size_t kConvertedBytes = 8192;
-constexpr size_t kMostCharacterBytes = 4;  // of any set, and of an escape sequence
+constexpr size_t kMaxCharacterBytes = 4;  // of any set, and of an escape sequence
 
 bool IsAscii(absl::string_view text) {
   return std::all_of(text.begin(), text.end(),
@@ -86,7 +86,7 @@ std::string DicomTexts::ToUtf8(const DcmTagKey& tag, const std::string& raw, boo
 // A character or escape sequence that would end beyond the cut is left out whole.
 void DicomTexts::CutRaw(bool is_name, std::string* raw) const {
   raw->resize(kConvertedBytes);
-  for (size_t cut = 0; cut < kMostCharacterBytes; ++cut) {
+  for (size_t cut = 0; cut < kMaxCharacterBytes; ++cut) {
     const absl::string_view shorter = absl::string_view(*raw).substr(0, raw->size() - cut);
     if (!set_.ToUtf8(shorter, is_name).has_value()) continue;
     return raw->resize(shorter.size());
@@ -96,8 +96,8 @@ void DicomTexts::CutRaw(bool is_name, std::string* raw) const {
 std::string DicomTexts::Get(const DcmTagKey& tag) {
   DcmElement* element = nullptr;
   if (dataset_->findAndGetElement(tag, element).bad() || element == nullptr) return {};
-  if (element->getLength() > kMostRawBytes) {
-    Tell(absl::StrCat("the attribute ", tag.toString().c_str(), " has more than ", kMostRawBytes,
+  if (element->getLength() > kMaxRawBytes) {
+    Tell(absl::StrCat("the attribute ", tag.toString().c_str(), " has more than ", kMaxRawBytes,
                       " bytes and is not read"));
     return {};
   }
@@ -106,9 +106,9 @@ std::string DicomTexts::Get(const DcmTagKey& tag) {
   const bool long_before = raw.size() > kConvertedBytes;
   if (long_before) CutRaw(is_name, &raw);
   std::string text = Tidy(ToUtf8(tag, raw, is_name));
-  if (text.size() > kMostBytes) CutUtf8(kMostBytes, &text);
-  if (long_before || text.size() + 3 >= kMostBytes) {
-    Tell(absl::StrCat("the attribute ", tag.toString().c_str(), " is longer than ", kMostBytes,
+  if (text.size() > kMaxBytes) CutUtf8(kMaxBytes, &text);
+  if (long_before || text.size() + 3 >= kMaxBytes) {
+    Tell(absl::StrCat("the attribute ", tag.toString().c_str(), " is longer than ", kMaxBytes,
                       " bytes and is cut"));
   }
   return text;

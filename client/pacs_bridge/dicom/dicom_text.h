@@ -20,7 +20,7 @@ namespace tissueform {
 class DicomTexts {
  public:
   // No value is longer; by the standard a name has 64 characters a group.
-  static constexpr size_t kMostBytes = 1024;
+  static constexpr size_t kMaxBytes = 1024;
 
   explicit DicomTexts(DcmItem* dataset);
   DicomTexts(const DicomTexts&) = delete;
@@ -28,7 +28,7 @@ class DicomTexts {
 
   // The whole value (all of several, with "\\" between), without padding and control characters;
   // empty where there is none. What cannot be converted has "?" for every byte that is not ASCII;
-  // what is longer than kMostBytes is cut at a character. Both are told by `problem`.
+  // what is longer than kMaxBytes is cut at a character. Both are told by `problem`.
   std::string Get(const DcmTagKey& tag);
 
   // What was wrong first, in one line without a value; empty: nothing.

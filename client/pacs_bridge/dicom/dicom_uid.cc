@@ -16,7 +16,7 @@
 namespace tissueform {
 namespace {
 
-constexpr size_t kMostUidCharacters = 64;
+constexpr size_t kMaxUidCharacters = 64;
 
 uint64_t RandomWord() {
   thread_local std::random_device device;
@@ -39,7 +39,7 @@ std::string NewDicomUid() {
 }
 
 bool IsDicomUid(absl::string_view text) {
-  if (text.empty() || text.size() > kMostUidCharacters) return false;
+  if (text.empty() || text.size() > kMaxUidCharacters) return false;
   const std::vector<absl::string_view> components = absl::StrSplit(text, '.');
   return std::all_of(components.begin(), components.end(), IsComponent);
 }

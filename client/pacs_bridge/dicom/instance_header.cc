@@ -21,11 +21,11 @@ namespace {
 
 // Decimal and integer strings and binary numbers alike.
 std::optional<double> NumberOf(DcmItem* dataset, const DcmTagKey& tag, unsigned long at = 0) {
-  constexpr Uint32 kMostNumberBytes = 1024;
+  constexpr Uint32 kMaxNumberBytes = 1024;
   DcmElement* element = nullptr;
   if (dataset->findAndGetElement(tag, element).bad()) return {};
   OFString text;
-  if (element->getLength() > kMostNumberBytes || element->getOFString(text, at).bad()) return {};
+  if (element->getLength() > kMaxNumberBytes || element->getOFString(text, at).bad()) return {};
   double number = 0;
   if (!absl::SimpleAtod(text.c_str(), &number) || !std::isfinite(number)) return {};
   return number;

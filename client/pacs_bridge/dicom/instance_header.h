@@ -15,7 +15,7 @@
 namespace tissueform {
 
 // What the bridge wants to know of one object. Texts are UTF-8, trimmed, at most
-// DicomTexts::kMostBytes; empty where the object says nothing. Several values have "\\" between.
+// DicomTexts::kMaxBytes; empty where the object says nothing. Several values have "\\" between.
 struct InstanceHeader {
   std::string study_uid = {};  // UIDs: as IsDicomUid wants them, or empty
   std::string series_uid = {};

@@ -16,9 +16,9 @@
 #include <nlohmann/json.hpp>
 
 #include "client/pacs_bridge/dicom/dicom_uid.h"
-#include "client/pacs_bridge/network/coming_objects.h"
 #include "client/pacs_bridge/network/dicom_web_answers.h"
 #include "client/pacs_bridge/network/http_exchange.h"
+#include "client/pacs_bridge/network/incoming_instances.h"
 #include "client/pacs_bridge/network/one_header.h"
 #include "core/base/certificates.h"
 #include "core/base/status_macros.h"
@@ -28,8 +28,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr size_t kMostJsonBytes = 32 << 20;
-constexpr int64_t kMostSentBytes = int64_t{1} << 30;
+constexpr size_t kMaxJsonBytes = 32 << 20;
+constexpr int64_t kMaxSentBytes = int64_t{1} << 30;
 constexpr int kBadRequest = 400;
 // Answers of STOW-RS that say what became of the object.
 constexpr std::array<int, 3> kStowAnswers = {200, 202, 409};
@@ -121,10 +121,10 @@ class DicomWebClient : public PacsClient {
         const PacsHttpAnswer answer,
         Exchange(peer_, {.path = path, .headers = {"Accept: application/dicom+json"}},
                  [&](const std::string& /*type*/, absl::string_view piece) -> absl::Status {
-                   if (text.size() + piece.size() > kMostJsonBytes) {
+                   if (text.size() + piece.size() > kMaxJsonBytes) {
                      return absl::InternalError(absl::StrCat("the PACS '", peer_.name,
                                                              "' answers a query with more than ",
-                                                             kMostJsonBytes, " bytes"));
+                                                             kMaxJsonBytes, " bytes"));
                    }
                    text.append(piece.data(), piece.size());
                    return absl::OkStatus();
@@ -172,7 +172,7 @@ class DicomWebClient : public PacsClient {
   // WADO-RS, every object in the transfer syntax that it has.
   absl::StatusOr<FetchCounts> Retrieve(const std::string& path, const InstanceFolder& folder,
                                        InstanceSink* sink) {
-    ComingObjects objects(peer_.name, folder, sink);
+    IncomingInstances objects(peer_.name, folder, sink);
     TF_ASSIGN_OR_RETURN(
         const PacsHttpAnswer answer,
         Exchange(peer_,
@@ -188,7 +188,7 @@ class DicomWebClient : public PacsClient {
 
   absl::Status StoreOne(const std::string& path, const InstanceHeader& header) {
     std::error_code error;
-    if (std::filesystem::file_size(path, error) > kMostSentBytes || error) {
+    if (std::filesystem::file_size(path, error) > kMaxSentBytes || error) {
       return absl::InvalidArgumentError(absl::StrCat(path, ": too large to be sent"));
     }
     std::ifstream file(path, std::ios::binary);
@@ -220,7 +220,7 @@ class DicomWebClient : public PacsClient {
                                  "Accept: application/dicom+json", "Expect:"},
                      .body = &body},
                     [text](const std::string& /*type*/, absl::string_view piece) {
-                      if (text->size() < kMostJsonBytes) text->append(piece.data(), piece.size());
+                      if (text->size() < kMaxJsonBytes) text->append(piece.data(), piece.size());
                       return absl::OkStatus();
                     });
   }

@@ -64,9 +64,9 @@ absl::Status NotReached(const PacsPeer& peer, const OFCondition& condition, bool
 }  // namespace
 
 absl::Status CheckAeTitle(const std::string& title) {
-  constexpr size_t kMostCharacters = 16;
+  constexpr size_t kMaxCharacters = 16;
   const bool is_good =
-      !title.empty() && title.size() <= kMostCharacters &&
+      !title.empty() && title.size() <= kMaxCharacters &&
       std::all_of(title.begin(), title.end(), [](char letter) {
         return absl::ascii_isprint(static_cast<unsigned char>(letter)) && letter != '\\';
       });

@@ -24,7 +24,7 @@
 namespace tissueform {
 namespace {
 
-constexpr size_t kMostContexts = 128;
+constexpr size_t kMaxContexts = 128;
 constexpr DIC_US kWarningClass = 0xB000;
 
 int Whole(const std::string& text) {
@@ -185,7 +185,7 @@ class DimseClient : public PacsClient {
     }
     if (objects.empty()) return std::vector<StoredObject>();
     std::vector<ProposedContext> contexts = StoreContexts(objects);
-    if (contexts.size() > kMostContexts) {
+    if (contexts.size() > kMaxContexts) {
       return absl::InvalidArgumentError("more than 128 kinds of objects are sent at once");
     }
     TF_ASSIGN_OR_RETURN(const auto association, Associate(contexts));

@@ -46,7 +46,7 @@ struct FindAnswers {
 
 void OnFindAnswer(void* data, T_DIMSE_C_FindRQ* /*request*/, int count, T_DIMSE_C_FindRSP* /*head*/,
                   DcmDataset* answer) {
-  if (answer != nullptr && count <= kMostAnswers) (*static_cast<FindAnswers*>(data)->take)(answer);
+  if (answer != nullptr && count <= kMaxAnswers) (*static_cast<FindAnswers*>(data)->take)(answer);
 }
 
 // The messages of one C-GET, until its last answer.

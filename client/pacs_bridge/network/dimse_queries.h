@@ -26,7 +26,7 @@ struct StudyRootQuery {
 };
 
 // Answers beyond these are not looked at.
-inline constexpr int kMostAnswers = 10'000;
+inline constexpr int kMaxAnswers = 10'000;
 
 // Errors: those of PacsClient.
 absl::Status FindByDimse(const std::string& peer_name, DimseAssociation* association,

@@ -15,7 +15,7 @@ namespace tissueform {
 namespace {
 
 constexpr std::array<absl::string_view, 3> kThisMachine = {"localhost", "127.0.0.1", "[::1]"};
-constexpr size_t kMostErrorBytes = 64 << 10;
+constexpr size_t kMaxErrorBytes = 64 << 10;
 constexpr int kHttpOk = 200;
 
 struct FreeUrl {
@@ -58,7 +58,7 @@ size_t OnBody(const char* bytes, size_t /*one*/, size_t size, void* data) {
     return transfer->status.ok() ? size : 0;
   }
   std::string& body = transfer->answer.body;
-  body.append(bytes, std::min(size, kMostErrorBytes - std::min(kMostErrorBytes, body.size())));
+  body.append(bytes, std::min(size, kMaxErrorBytes - std::min(kMaxErrorBytes, body.size())));
   return size;
 }
 

@@ -13,7 +13,7 @@
 #include <openssl/sha.h>
 
 #include "client/pacs_bridge/dicom/dicom_uid.h"
-#include "client/pacs_bridge/network/same_data_set.h"
+#include "client/pacs_bridge/network/dataset_equality.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -84,7 +84,7 @@ absl::StatusOr<ReceivedInstance> InstanceFolder::Take(PartialFile partial,
   const std::string name = NameOf(instance.header.instance_uid);
   instance.path = absl::StrCat(name, ".dcm");
   if (fs::exists(instance.path, error)) {
-    instance.novelty = SameDataSet(partial.path(), instance.path)
+    instance.novelty = DatasetsAreEqual(partial.path(), instance.path)
                            ? ReceivedInstance::Novelty::kReplayed
                            : ReceivedInstance::Novelty::kChanged;
   }

@@ -16,7 +16,7 @@
 namespace tissueform {
 namespace {
 
-constexpr size_t kMostBoundaryCharacters = 70;  // RFC 2046
+constexpr size_t kMaxBoundaryCharacters = 70;  // RFC 2046
 
 absl::Status NotMultipart(absl::string_view why) {
   return absl::InvalidArgumentError(
@@ -46,7 +46,7 @@ absl::StatusOr<MultipartSplitter> MultipartSplitter::Create(absl::string_view co
     return NotMultipart("it is of another type");
   }
   const std::string boundary = BoundaryOf(content_type);
-  if (boundary.empty() || boundary.size() > kMostBoundaryCharacters) {
+  if (boundary.empty() || boundary.size() > kMaxBoundaryCharacters) {
     return NotMultipart("it has no boundary of 1 to 70 characters");
   }
   return MultipartSplitter(boundary, std::move(events));
@@ -79,7 +79,7 @@ absl::StatusOr<bool> MultipartSplitter::Step() {
       }
       const size_t line = buffer_.find("\r\n");
       if (line == std::string::npos) {
-        if (buffer_.size() > kMostHeaderBytes) return NotMultipart("a boundary's line is endless");
+        if (buffer_.size() > kMaxHeaderBytes) return NotMultipart("a boundary's line is endless");
         return false;
       }
       buffer_.erase(0, line);  // the headers may be none: an empty line follows then
@@ -89,7 +89,7 @@ absl::StatusOr<bool> MultipartSplitter::Step() {
     case State::kHeaders: {
       const size_t end = buffer_.find("\r\n\r\n");
       if (end == std::string::npos) {
-        if (buffer_.size() > kMostHeaderBytes) return NotMultipart("a part has endless headers");
+        if (buffer_.size() > kMaxHeaderBytes) return NotMultipart("a part has endless headers");
         return false;
       }
       buffer_.erase(0, end + 4);

@@ -24,7 +24,7 @@ class MultipartSplitter {
   };
 
   // A part's headers are no longer.
-  static constexpr size_t kMostHeaderBytes = 16 << 10;
+  static constexpr size_t kMaxHeaderBytes = 16 << 10;
 
   // `content_type` is that of the answer. Errors: InvalidArgument (no multipart/related, or a
   // boundary that is none).

@@ -36,8 +36,8 @@ absl::Status AppendPicture(const std::string& path, CaptureFrames* frames) {
   if (png_image_begin_read_from_file(&image, path.c_str()) == 0) {
     return absl::InvalidArgumentError(absl::StrCat(path, ": it is no PNG that can be read"));
   }
-  if (image.width > kMostPicturePixels || image.height > kMostPicturePixels) {
-    return absl::InvalidArgumentError(absl::StrCat(path, ": it has more than ", kMostPicturePixels,
+  if (image.width > kMaxPicturePixels || image.height > kMaxPicturePixels) {
+    return absl::InvalidArgumentError(absl::StrCat(path, ": it has more than ", kMaxPicturePixels,
                                                    " pixels in a row or a column"));
   }
   if (frames->rgb.empty()) {

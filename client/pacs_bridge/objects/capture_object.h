@@ -15,7 +15,7 @@
 namespace tissueform {
 
 // Of one picture, each way.
-inline constexpr uint32_t kMostPicturePixels = 2048;
+inline constexpr uint32_t kMaxPicturePixels = 2048;
 
 // Pictures of one size, one after the other: 3 bytes a pixel (red, green, blue), row by row from
 // the top.
@@ -25,7 +25,7 @@ struct CaptureFrames {
   std::vector<uint8_t> rgb = {};
 };
 
-// Errors: NotFound, InvalidArgument: no PNG, larger than kMostPicturePixels, or not of the first
+// Errors: NotFound, InvalidArgument: no PNG, larger than kMaxPicturePixels, or not of the first
 // one's size; with the path.
 absl::StatusOr<CaptureFrames> ReadCaptureFrames(const std::vector<std::string>& paths);
 

@@ -18,8 +18,8 @@ namespace tissueform {
 namespace {
 
 // Of a value with a length of 16 bits, which is even.
-constexpr Uint32 kMostShortBytes = 65'534;
-constexpr size_t kMostLongString = 64;
+constexpr Uint32 kMaxShortBytes = 65'534;
+constexpr size_t kMaxLongString = 64;
 
 std::string ValueOf(DcmItem* item, const DcmTagKey& tag) {
   OFString value;
@@ -43,7 +43,7 @@ absl::Status CheckTextLengths(DcmItem* item) {
     DcmObject* object = stack.top();
     const DcmVR vr(object->getVR());
     if (object->isLeaf() && !vr.usesExtendedLengthEncoding() &&
-        object->getLength() > kMostShortBytes) {
+        object->getLength() > kMaxShortBytes) {
       return absl::InvalidArgumentError(absl::StrCat(
           "the attribute ", object->getTag().toString().c_str(), " of the source has ",
           object->getLength(), " bytes, which no object can hold; mend it in the PACS"));
@@ -59,9 +59,8 @@ void WriteSeries(const PredictionObjectsInput& input, const ObjectIdentity& iden
   writer->Text(DCM_SeriesNumber, absl::StrCat(identity.series_number));
   writer->Text(DCM_SeriesDate, times.date);
   writer->Text(DCM_SeriesTime, times.time);
-  writer->Text(
-      DCM_SeriesDescription,
-      absl::StrCat(identity.description, ". ", kResearchNotice).substr(0, kMostLongString));
+  writer->Text(DCM_SeriesDescription,
+               absl::StrCat(identity.description, ". ", kResearchNotice).substr(0, kMaxLongString));
   writer->Text(DCM_SOPClassUID, std::string(identity.class_uid));
   writer->Text(DCM_SOPInstanceUID, input.uids.at(identity.key));
   writer->Text(DCM_InstanceNumber, absl::StrCat(identity.instance_number));
@@ -74,13 +73,13 @@ void WriteSeries(const PredictionObjectsInput& input, const ObjectIdentity& iden
 void WriteEquipment(const PredictionObjectsInput& input, ItemWriter* writer) {
   writer->Text(DCM_Manufacturer, "The Tissueform Authors");
   writer->Text(DCM_ManufacturerModelName, "Tissueform");
-  writer->Text(DCM_DeviceSerialNumber, PlainDicomText(input.device_serial, kMostLongString));
+  writer->Text(DCM_DeviceSerialNumber, PlainDicomText(input.device_serial, kMaxLongString));
   const std::string server =
       PlainDicomText(absl::StrCat("tissueform-server ", input.prediction.software_version(), " ",
                                   input.prediction.software_commit()),
-                     kMostLongString);
+                     kMaxLongString);
   const std::string bridge = PlainDicomText(
-      absl::StrCat("tissueform-pacs ", SoftwareVersion(), " ", SoftwareCommit()), kMostLongString);
+      absl::StrCat("tissueform-pacs ", SoftwareVersion(), " ", SoftwareCommit()), kMaxLongString);
   writer->Text(DCM_SoftwareVersions, absl::StrCat(server, "\\", bridge));
 }
 

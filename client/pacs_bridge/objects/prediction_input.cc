@@ -47,9 +47,9 @@ bool IsNumber(const v1::Measure& measure) {
 }
 
 absl::Status CheckMeasures(const std::vector<v1::Measure>& measures) {
-  if (measures.size() > kMostReportedMeasures) {
+  if (measures.size() > kMaxReportedMeasures) {
     return absl::InvalidArgumentError(absl::StrCat(measures.size(), " measures are more than the ",
-                                                   kMostReportedMeasures, " that are taken"));
+                                                   kMaxReportedMeasures, " that are taken"));
   }
   for (const v1::Measure& measure : measures) {
     if (IsNumber(measure) && (measure.unit() == "mm" || measure.unit() == "deg")) continue;
@@ -92,14 +92,14 @@ std::string SeriesKeyOf(const std::string& object_key) {
 }
 
 absl::Status CheckPredictionInput(const PredictionObjectsInput& input) {
-  if (input.source_images.empty() || input.source_images.size() > kMostSourceImages) {
+  if (input.source_images.empty() || input.source_images.size() > kMaxSourceImages) {
     return absl::InvalidArgumentError(
         absl::StrCat("the case has ", input.source_images.size(), " source images, and 1 to ",
-                     kMostSourceImages, " are taken; name those that it was built from"));
+                     kMaxSourceImages, " are taken; name those that it was built from"));
   }
-  if (input.pictures.empty() || input.pictures.size() > kMostPictures) {
+  if (input.pictures.empty() || input.pictures.size() > kMaxPictures) {
     return absl::InvalidArgumentError(
-        absl::StrCat("there are ", input.pictures.size(), " pictures, and 1 to ", kMostPictures,
+        absl::StrCat("there are ", input.pictures.size(), " pictures, and 1 to ", kMaxPictures,
                      " are taken; `tissueform case render` makes them"));
   }
   const auto is_distance = [](double mm) { return std::isfinite(mm) && mm >= 0; };

@@ -19,9 +19,9 @@
 namespace tissueform {
 
 // Largest sizes that are taken.
-inline constexpr size_t kMostSourceImages = 20'000;
-inline constexpr size_t kMostPictures = 8;
-inline constexpr int kMostReportedMeasures = 64;
+inline constexpr size_t kMaxSourceImages = 20'000;
+inline constexpr size_t kMaxPictures = 8;
+inline constexpr int kMaxReportedMeasures = 64;
 
 // Said in every object.
 inline constexpr char kResearchNotice[] = "Research, not a medical device";

@@ -18,7 +18,7 @@ namespace {
 
 // Of the program as an observer, made once for all.
 constexpr char kDeviceUid[] = "2.25.197327460839218345127709846123045587331";
-constexpr size_t kMostText = 256;
+constexpr size_t kMaxText = 256;
 
 const CodedTerm& Mean() {
   static const CodedTerm term = {"373098007", "SCT", "Mean"};
@@ -32,7 +32,7 @@ const CodedTerm& Largest() {
 CodedTerm NameTerm() { return OwnTerm("NAME", "Name"); }
 
 void AddPlain(const CodedTerm& name, const std::string& text, ReportTree* tree) {
-  if (!text.empty()) tree->AddText(name, PlainDicomText(text, kMostText));
+  if (!text.empty()) tree->AddText(name, PlainDicomText(text, kMaxText));
 }
 
 // "neo_hookean", as plans have it.

@@ -104,9 +104,9 @@ std::vector<uint8_t> BinaryStl(const ModelSurface& surface) {
 
 absl::Status WriteStlModules(const PredictionObjectsInput& input, const ModelSurface& surface,
                              DcmDataset* object) {
-  if (surface.triangles.rows() > kMostSurfaceTriangles) {
+  if (surface.triangles.rows() > kMaxSurfaceTriangles) {
     return absl::ResourceExhaustedError(absl::StrCat("a model has ", surface.triangles.rows(),
-                                                     " triangles; at most ", kMostSurfaceTriangles,
+                                                     " triangles; at most ", kMaxSurfaceTriangles,
                                                      " are written"));
   }
   ItemWriter writer(object);

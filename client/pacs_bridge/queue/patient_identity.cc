@@ -10,7 +10,7 @@
 namespace tissueform {
 
 PatientIdentity IdentityOf(const InstanceHeader& image) {
-  const auto cut = [](const std::string& text) { return text.substr(0, kMostIdentityBytes); };
+  const auto cut = [](const std::string& text) { return text.substr(0, kMaxIdentityBytes); };
   return {.id = cut(image.patient_id),
           .issuer = cut(image.issuer_of_patient_id),
           .name = cut(image.patient_name),

@@ -10,8 +10,8 @@
 
 namespace tissueform {
 
-// Whose a study is, as the images say it: UTF-8, cut to kMostIdentityBytes each.
-inline constexpr size_t kMostIdentityBytes = 1024;
+// Whose a study is, as the images say it: UTF-8, cut to kMaxIdentityBytes each.
+inline constexpr size_t kMaxIdentityBytes = 1024;
 struct PatientIdentity {
   std::string id = {};
   std::string issuer = {};

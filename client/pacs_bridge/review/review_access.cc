@@ -17,7 +17,7 @@ namespace tissueform {
 namespace {
 
 constexpr size_t kLeastPasswordCharacters = 16;
-constexpr size_t kMostPasswordBytes = 4096;
+constexpr size_t kMaxPasswordBytes = 4096;
 
 }  // namespace
 
@@ -34,7 +34,7 @@ bool IsLoopbackAddress(const std::string& address) {
   return absl::StartsWith(address, "127.") || address == "::1" || address == "localhost";
 }
 
-absl::StatusOr<std::string> ReadWorkListPassword(const std::string& path) {
+absl::StatusOr<std::string> ReadReviewPassword(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
@@ -46,7 +46,7 @@ absl::StatusOr<std::string> ReadWorkListPassword(const std::string& path) {
     return absl::InvalidArgumentError(absl::StrCat(path, " may be read by others; chmod 600 it"));
   }
   std::ifstream file(path);
-  std::string password(kMostPasswordBytes, '\0');
+  std::string password(kMaxPasswordBytes, '\0');
   file.read(password.data(), static_cast<std::streamsize>(password.size()));
   password.resize(static_cast<size_t>(file.gcount()));
   absl::StripAsciiWhitespace(&password);

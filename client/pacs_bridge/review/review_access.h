@@ -20,7 +20,7 @@ bool IsBasicPassword(const std::string& authorization, const std::string& passwo
 // The first line's worth of a password file, without blanks around it.
 //
 // Errors: InvalidArgument: it cannot be read, others may read it, or it is too short.
-absl::StatusOr<std::string> ReadWorkListPassword(const std::string& path);
+absl::StatusOr<std::string> ReadReviewPassword(const std::string& path);
 
 // Whether it is an address of this machine alone.
 bool IsLoopbackAddress(const std::string& address);

@@ -13,7 +13,7 @@
 namespace tissueform {
 namespace {
 
-constexpr size_t kMostPicturesShown = 8;
+constexpr size_t kMaxPicturesShown = 8;
 std::string Cell(const std::string& text) {
   return absl::StrCat("<td>", text.empty() ? "&ndash;" : EscapedHtml(text), "</td>");
 }
@@ -78,9 +78,9 @@ std::string PatientList(const QueuedStudy& study) {
                       item("Study", study.description), "</dl>");
 }
 
-std::string Pictures(const WorkListExport& waiting) {
+std::string Pictures(const ReviewExport& waiting) {
   std::string html;
-  for (size_t i = 0; i < std::min(waiting.pictures.size(), kMostPicturesShown); ++i) {
+  for (size_t i = 0; i < std::min(waiting.pictures.size(), kMaxPicturesShown); ++i) {
     absl::StrAppend(&html, "<img src=\"/pictures/", waiting.queued.key, "/",
                     EscapedHtml(waiting.pictures[i]), "\" alt=\"", "The predicted face, picture ",
                     i + 1, "\" loading=\"lazy\">");
@@ -88,7 +88,7 @@ std::string Pictures(const WorkListExport& waiting) {
   return html.empty() ? html : absl::StrCat("<div class=\"pictures\">", html, "</div>");
 }
 
-std::string ConfirmForm(const WorkListExport& waiting, const std::string& form_token) {
+std::string ConfirmForm(const ReviewExport& waiting, const std::string& form_token) {
   return absl::StrCat(
       "<form method=\"post\" action=\"/store\"><input type=\"hidden\" name=\"token\" value=\"",
       EscapedHtml(form_token), "\"><input type=\"hidden\" name=\"export\" value=\"",
@@ -97,7 +97,7 @@ std::string ConfirmForm(const WorkListExport& waiting, const std::string& form_t
       "\"><button type=\"submit\">Store in the PACS of this patient</button></form>");
 }
 
-std::string ExportArticle(const WorkListExport& waiting, const WorkListPageOptions& options) {
+std::string ExportArticle(const ReviewExport& waiting, const ReviewPageOptions& options) {
   const bool asked = waiting.queued.state == BridgeExportState::kAsked;
   std::string html = absl::StrCat("<article class=\"", asked ? "waits" : "", "\"><h3>Prediction ",
                                   WordsOf(waiting.queued.state), "</h3>");
@@ -121,7 +121,7 @@ std::string ExportArticle(const WorkListExport& waiting, const WorkListPageOptio
   return absl::StrCat(html, "</article>");
 }
 
-std::string SeriesRow(const WorkListSeries& row, const WorkListPageOptions& options) {
+std::string SeriesRow(const ReviewSeries& row, const ReviewPageOptions& options) {
   const std::string& why =
       row.series.last_error.empty() ? row.series.reason : row.series.last_error;
   return absl::StrCat("<tr><th scope=\"row\">", EscapedHtml(ShownName(row.study.patient.name)),
@@ -138,7 +138,7 @@ std::string SeriesRow(const WorkListSeries& row, const WorkListPageOptions& opti
 
 }  // namespace
 
-std::string WorkListPage(const WorkList& list, const WorkListPageOptions& options) {
+std::string ReviewPage(const ReviewQueue& list, const ReviewPageOptions& options) {
   std::string html =
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">"
@@ -154,7 +154,7 @@ std::string WorkListPage(const WorkList& list, const WorkListPageOptions& option
                   "<section aria-labelledby=\"exports\"><h2 id=\"exports\">Predictions for "
                   "the PACS</h2>");
   if (list.exports.empty()) absl::StrAppend(&html, "<p class=\"quiet\">None waits.</p>");
-  for (const WorkListExport& waiting : list.exports) {
+  for (const ReviewExport& waiting : list.exports) {
     absl::StrAppend(&html, ExportArticle(waiting, options));
   }
   absl::StrAppend(&html,
@@ -168,7 +168,7 @@ std::string WorkListPage(const WorkList& list, const WorkListPageOptions& option
                     "<th scope=\"col\">Born</th><th scope=\"col\">Patient ID</th>"
                     "<th scope=\"col\">Study of</th><th scope=\"col\">Study</th>"
                     "<th scope=\"col\">State</th><th scope=\"col\">Plan</th></tr></thead><tbody>");
-    for (const WorkListSeries& row : list.series) absl::StrAppend(&html, SeriesRow(row, options));
+    for (const ReviewSeries& row : list.series) absl::StrAppend(&html, SeriesRow(row, options));
     absl::StrAppend(&html, "</tbody></table></div>");
   }
   if (list.passed_over > 0) {

@@ -11,7 +11,7 @@
 
 namespace tissueform {
 
-struct WorkListPageOptions {
+struct ReviewPageOptions {
   std::string planner_url = {};  // "https://planner.example.org/"; empty: no links
   std::string form_token = {};   // that a form must send back
   std::string notice = {};       // one line over the lists, of what has just happened; may be empty
@@ -19,9 +19,9 @@ struct WorkListPageOptions {
 };
 
 // The page as HTML. Everything that comes from images is escaped: nothing in a name is markup.
-std::string WorkListPage(const WorkList& list, const WorkListPageOptions& options);
+std::string ReviewPage(const ReviewQueue& list, const ReviewPageOptions& options);
 
 // Its style sheet.
-absl::string_view WorkListStyle();
+absl::string_view ReviewStyle();
 
 }  // namespace tissueform

@@ -26,26 +26,26 @@ std::vector<std::string> PicturesIn(const std::string& folder) {
 
 }  // namespace
 
-absl::StatusOr<WorkList> ReadWorkList(BridgeQueue* queue) {
+absl::StatusOr<ReviewQueue> ReadReviewQueue(BridgeQueue* queue) {
   ReceivedRows received(queue);
   ExportRows exports(queue);
-  WorkList list;
+  ReviewQueue list;
   TF_ASSIGN_OR_RETURN(std::vector<QueuedSeries> all, received.List());
   std::reverse(all.begin(), all.end());
-  std::map<std::string, WorkListSeries> by_case;
+  std::map<std::string, ReviewSeries> by_case;
   for (const QueuedSeries& series : all) {
     if (series.state == SeriesState::kPassedOver) {
       ++list.passed_over;
       continue;
     }
     TF_ASSIGN_OR_RETURN(const QueuedStudy study, received.GetStudy(series.study_uid));
-    const WorkListSeries row = {series, study};
+    const ReviewSeries row = {series, study};
     if (!series.case_name.empty()) by_case[series.case_name] = row;
-    if (list.series.size() < kMostWorkListRows) list.series.push_back(row);
+    if (list.series.size() < kMaxReviewRows) list.series.push_back(row);
   }
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedExport> asked, exports.List());
   for (const QueuedExport& queued : asked) {
-    if (queued.state == BridgeExportState::kTold || list.exports.size() >= kMostWorkListRows) {
+    if (queued.state == BridgeExportState::kTold || list.exports.size() >= kMaxReviewRows) {
       continue;
     }
     const auto found = by_case.find(queued.case_name);
@@ -53,10 +53,9 @@ absl::StatusOr<WorkList> ReadWorkList(BridgeQueue* queue) {
     list.exports.push_back(
         {queued, found->second, PicturesIn(queue->object_folder(queued.key) + "/pictures")});
   }
-  std::stable_sort(list.exports.begin(), list.exports.end(),
-                   [](const WorkListExport& a, const WorkListExport& b) {
-                     return a.queued.state < b.queued.state;
-                   });
+  std::stable_sort(
+      list.exports.begin(), list.exports.end(),
+      [](const ReviewExport& a, const ReviewExport& b) { return a.queued.state < b.queued.state; });
   return list;
 }
 

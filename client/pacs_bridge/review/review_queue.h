@@ -15,27 +15,27 @@
 namespace tissueform {
 
 // One series with whose it is.
-struct WorkListSeries {
+struct ReviewSeries {
   QueuedSeries series = {};
   QueuedStudy study = {};
 };
 
 // One export that waits for a person, or is under way.
-struct WorkListExport {
+struct ReviewExport {
   QueuedExport queued = {};
-  WorkListSeries of = {};
+  ReviewSeries of = {};
   std::vector<std::string> pictures = {};  // file names in the export's folder of pictures
 };
 
 // What the page shows: names of patients, for those who may see them alone.
-struct WorkList {
-  std::vector<WorkListExport> exports = {};  // those that are not done first
-  std::vector<WorkListSeries> series = {};   // of which a case is made or will be; newest first
-  size_t passed_over = 0;                    // others of these studies
+struct ReviewQueue {
+  std::vector<ReviewExport> exports = {};  // those that are not done first
+  std::vector<ReviewSeries> series = {};   // of which a case is made or will be; newest first
+  size_t passed_over = 0;                  // others of these studies
 };
 
-// As the queue is now. At most kMostWorkListRows of each. Errors: those of the queue.
-inline constexpr size_t kMostWorkListRows = 500;
-absl::StatusOr<WorkList> ReadWorkList(BridgeQueue* queue);
+// As the queue is now. At most kMaxReviewRows of each. Errors: those of the queue.
+inline constexpr size_t kMaxReviewRows = 500;
+absl::StatusOr<ReviewQueue> ReadReviewQueue(BridgeQueue* queue);
 
 }  // namespace tissueform

@@ -21,18 +21,18 @@
 namespace tissueform {
 namespace {
 
-constexpr size_t kMostRequestBytes = 16 << 10;
+constexpr size_t kMaxRequestBytes = 16 << 10;
 constexpr size_t kServingThreads = 4;
 constexpr int kIdleSeconds = 10;
-constexpr uintmax_t kMostPictureBytes = 16 << 20;
+constexpr uintmax_t kMaxPictureBytes = 16 << 20;
 
 constexpr char kHtml[] = "text/html; charset=utf-8";
 constexpr char kText[] = "text/plain; charset=utf-8";
 
-class HttpWorkListServer final : public WorkListServer {
+class HttpReviewServer final : public ReviewServer {
  public:
-  HttpWorkListServer(WorkListOptions options, std::string password, BridgeQueue* queue,
-                     std::function<void()> confirmed)
+  HttpReviewServer(ReviewOptions options, std::string password, BridgeQueue* queue,
+                   std::function<void()> confirmed)
       : options_(std::move(options)),
         password_(std::move(password)),
         form_token_(NewQueueKey()),
@@ -45,7 +45,7 @@ class HttpWorkListServer final : public WorkListServer {
     SetRoutes();
   }
 
-  ~HttpWorkListServer() override {
+  ~HttpReviewServer() override {
     server_.stop();
     if (thread_.joinable()) thread_.join();
   }
@@ -64,7 +64,7 @@ class HttpWorkListServer final : public WorkListServer {
     if (port_ <= 0) {
       return absl::UnavailableError(absl::StrCat("the work list cannot listen on ",
                                                  options_.address, ":", options_.port,
-                                                 "; name another --worklist-listen"));
+                                                 "; name another --review-listen"));
     }
     thread_ = std::thread([this] { server_.listen_after_bind(); });
     // What is stopped before it runs would never end (httplib 0.11).
@@ -80,7 +80,7 @@ class HttpWorkListServer final : public WorkListServer {
 
   void SetLimits() {
     server_.new_task_queue = [] { return new httplib::ThreadPool(kServingThreads); };
-    server_.set_payload_max_length(kMostRequestBytes);
+    server_.set_payload_max_length(kMaxRequestBytes);
     server_.set_read_timeout(kIdleSeconds);
     server_.set_write_timeout(kIdleSeconds);
     server_.set_keep_alive_timeout(kIdleSeconds);
@@ -108,7 +108,7 @@ class HttpWorkListServer final : public WorkListServer {
       Show(confirmed ? "Confirmed: it is being stored." : "", false, &response);
     });
     server_.Get("/style.css", [](const Request&, Response& response) {
-      response.set_content(std::string(WorkListStyle()), "text/css; charset=utf-8");
+      response.set_content(std::string(ReviewStyle()), "text/css; charset=utf-8");
     });
     server_.Get(R"(/pictures/([0-9a-f]{32})/([a-z0-9_-]{1,64}\.png))",
                 [this](const Request& request, Response& response) {
@@ -126,7 +126,7 @@ class HttpWorkListServer final : public WorkListServer {
 
   bool MayCome(const Request& request, Response* response) const {
     if (!hosts_.contains(HostWithoutPort(request.get_header_value("Host")))) {
-      Refuse(response, 421, "this is not the host that was asked for; see --worklist-host");
+      Refuse(response, 421, "this is not the host that was asked for; see --review-host");
       return false;
     }
     if (password_.empty() || IsBasicPassword(request.get_header_value("Authorization"), password_))
@@ -145,12 +145,12 @@ class HttpWorkListServer final : public WorkListServer {
   }
 
   void Show(const std::string& notice, bool is_problem, Response* response) {
-    const absl::StatusOr<WorkList> list = ReadWorkList(queue_);
+    const absl::StatusOr<ReviewQueue> list = ReadReviewQueue(queue_);
     if (!list.ok()) return Refuse(response, 503, "the queue cannot be read; see the log");
-    response->set_content(WorkListPage(*list, {.planner_url = options_.planner_url,
-                                               .form_token = form_token_,
-                                               .notice = notice,
-                                               .notice_is_problem = is_problem}),
+    response->set_content(ReviewPage(*list, {.planner_url = options_.planner_url,
+                                             .form_token = form_token_,
+                                             .notice = notice,
+                                             .notice_is_problem = is_problem}),
                           kHtml);
   }
 
@@ -190,7 +190,7 @@ class HttpWorkListServer final : public WorkListServer {
     const std::string path = absl::StrCat(queue_->object_folder(export_key), "/pictures/", name);
     std::error_code error;
     const uintmax_t size = std::filesystem::file_size(path, error);
-    if (error || size > kMostPictureBytes) return Refuse(response, 404, "there is no such picture");
+    if (error || size > kMaxPictureBytes) return Refuse(response, 404, "there is no such picture");
     std::ifstream file(path, std::ios::binary);
     std::ostringstream bytes;
     bytes << file.rdbuf();
@@ -198,7 +198,7 @@ class HttpWorkListServer final : public WorkListServer {
   }
 
   // Constant.
-  const WorkListOptions options_;
+  const ReviewOptions options_;
   const std::string password_;    // empty: none
   const std::string form_token_;  // of this process
   BridgeQueue* const queue_;
@@ -212,20 +212,21 @@ class HttpWorkListServer final : public WorkListServer {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<WorkListServer>> WorkListServer::Start(
-    const WorkListOptions& options, BridgeQueue* queue, std::function<void()> confirmed) {
+absl::StatusOr<std::unique_ptr<ReviewServer>> ReviewServer::Start(const ReviewOptions& options,
+                                                                  BridgeQueue* queue,
+                                                                  std::function<void()> confirmed) {
   std::string password;
   if (!options.token_file.empty()) {
-    TF_ASSIGN_OR_RETURN(password, ReadWorkListPassword(options.token_file));
+    TF_ASSIGN_OR_RETURN(password, ReadReviewPassword(options.token_file));
   } else if (!IsLoopbackAddress(options.address)) {
     return absl::InvalidArgumentError(
         absl::StrCat("the work list shows names of patients: at ", options.address,
-                     " it needs --worklist-token-file, or listen on 127.0.0.1"));
+                     " it needs --review-token-file, or listen on 127.0.0.1"));
   }
-  auto server = std::make_unique<HttpWorkListServer>(options, std::move(password), queue,
-                                                     std::move(confirmed));
+  auto server =
+      std::make_unique<HttpReviewServer>(options, std::move(password), queue, std::move(confirmed));
   TF_RETURN_IF_ERROR(server->Listen());
-  return std::unique_ptr<WorkListServer>(std::move(server));
+  return std::unique_ptr<ReviewServer>(std::move(server));
 }
 
 }  // namespace tissueform

@@ -14,7 +14,7 @@
 
 namespace tissueform {
 
-struct WorkListOptions {
+struct ReviewOptions {
   std::string address = "127.0.0.1";
   int port = 8043;  // 0: any free one
   // Names by which browsers reach it, beside its address and those of loopback: behind a proxy.
@@ -32,16 +32,16 @@ struct WorkListOptions {
 // (401); a form only when it comes from a page of ours (403): by the token in it, and by Origin
 // where a browser says that. Nothing is cached, nothing from elsewhere is loaded, nothing is a
 // script. Threads of its own.
-class WorkListServer {
+class ReviewServer {
  public:
   // `queue` must outlive it; `confirmed` is called after each confirmation, on any thread.
   //
   // Errors: InvalidArgument (other addresses than loopback without a token file; a password that is
   // too short), those of ReadSecretFile, Unavailable (the port is taken).
-  static absl::StatusOr<std::unique_ptr<WorkListServer>> Start(const WorkListOptions& options,
-                                                               BridgeQueue* queue,
-                                                               std::function<void()> confirmed);
-  virtual ~WorkListServer() = default;
+  static absl::StatusOr<std::unique_ptr<ReviewServer>> Start(const ReviewOptions& options,
+                                                             BridgeQueue* queue,
+                                                             std::function<void()> confirmed);
+  virtual ~ReviewServer() = default;
 
   virtual int port() const = 0;
 };

@@ -6,7 +6,7 @@
 namespace tissueform {
 
 // The planner's colours and type (client/web/src/styles).
-absl::string_view WorkListStyle() {
+absl::string_view ReviewStyle() {
   return R"css(
 :root { color-scheme: light dark; --ground: #e9ebee; --panel: #fbfbfc; --raised: #ffffff; --line: #d8dce1;
   --text: #1d2126; --quiet: #59616b; --accent: #0b6f8a; --on-accent: #ffffff; --problem: #a8201a;

@@ -75,7 +75,7 @@ absl::StatusOr<std::vector<SeriesRule>> ParseSeriesRules(const std::string& json
 absl::Status CheckRecipes(const std::vector<SeriesRule>& rules) {
   for (const SeriesRule& rule : rules) {
     TF_ASSIGN_OR_RETURN(const std::string text,
-                        ReadJsonText(rule.recipe, "recipe", kMostRulesBytes));
+                        ReadJsonText(rule.recipe, "recipe", kMaxRulesBytes));
     if (const absl::Status read = ParseJsonStrictly(text).status(); !read.ok()) {
       return {read.code(), absl::StrCat("recipe ", rule.recipe, ": ", read.message())};
     }
@@ -84,7 +84,7 @@ absl::Status CheckRecipes(const std::vector<SeriesRule>& rules) {
 }
 
 absl::StatusOr<std::vector<SeriesRule>> ReadSeriesRules(const std::string& path) {
-  TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(path, "series rules", kMostRulesBytes));
+  TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(path, "series rules", kMaxRulesBytes));
   return ParseSeriesRules(text, std::filesystem::path(path).parent_path().string());
 }
 

@@ -12,7 +12,7 @@
 
 namespace tissueform {
 
-inline constexpr size_t kMostRulesBytes = size_t{1} << 20;
+inline constexpr size_t kMaxRulesBytes = size_t{1} << 20;
 
 // What is preferred among series that the same rule takes; the first that differs decides.
 enum class SeriesPreference { kSoftKernel, kBoneKernel, kThinSlices, kNoContrast, kMoreCoverage };

@@ -21,7 +21,7 @@ constexpr std::chrono::hours kDeletionPause{1};
 // Whether exports that wait were taken back, which no watch tells.
 constexpr std::chrono::minutes kLookPause{5};
 // What a server may tell of before it is taken; each is told again by the next watch.
-constexpr size_t kMostHeard = 4096;
+constexpr size_t kMaxHeard = 4096;
 // Of the threads; the last is also among the keys of what is tried again.
 constexpr char kIntake[] = "intake";
 constexpr char kPlans[] = "plans";
@@ -54,9 +54,9 @@ bool HasExportStep(const QueuedExport& queued) {
 
 BridgeService::BridgeService(BridgeServiceParts parts)
     : parts_(std::move(parts)), threads_(parts_.now) {
-  constexpr std::chrono::minutes kMostTime{30};
+  constexpr std::chrono::minutes kMaxTime{30};
   if (parts_.intake != nullptr) {
-    threads_.Start({.name = kIntake, .pause = kIntakePause, .most_time = kMostTime},
+    threads_.Start({.name = kIntake, .pause = kIntakePause, .most_time = kMaxTime},
                    [this] { TakeIn(); });
   }
   if (parts_.plans != nullptr) {
@@ -64,9 +64,9 @@ BridgeService::BridgeService(BridgeServiceParts parts)
                    [this] { WorkOnPlans(); });
   }
   if (parts_.exports != nullptr) {
-    threads_.Start({.name = kExports, .pause = kStepPause, .most_time = 2 * kMostTime},
+    threads_.Start({.name = kExports, .pause = kStepPause, .most_time = 2 * kMaxTime},
                    [this] { WorkOnExports(); });
-    threads_.Start({.name = kPictures, .pause = kStepPause, .most_time = kMostTime},
+    threads_.Start({.name = kPictures, .pause = kStepPause, .most_time = kMaxTime},
                    [this] { WorkOnPictures(); });
     threads_.Start({.name = kWatch, .pause = kStepPause, .most_time = std::chrono::minutes(3)},
                    [this] { WatchServer(); });
@@ -139,7 +139,7 @@ void BridgeService::TakeHeard() {
     const bool is_told_anew =
         std::any_of(heard_.begin(), heard_.end(),
                     [&told](const v1::Export& newer) { return newer.name() == told.name(); });
-    if (!is_told_anew && heard_.size() < kMostHeard) heard_.push_back(std::move(told));
+    if (!is_told_anew && heard_.size() < kMaxHeard) heard_.push_back(std::move(told));
   }
 }
 
@@ -230,7 +230,7 @@ void BridgeService::WatchServer() {
       [this](const v1::Export& told) {
         {
           MutexLock lock(mutex_);
-          if (heard_.size() < kMostHeard) heard_.push_back(told);
+          if (heard_.size() < kMaxHeard) heard_.push_back(told);
         }
         watch_retries_.Succeeded(kWatch);
         Wake();

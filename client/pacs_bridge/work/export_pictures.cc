@@ -21,9 +21,9 @@ namespace {
 namespace fs = std::filesystem;
 
 // A report without a band is better than none: a server that has no room for it is asked so often.
-constexpr int64_t kMostBandAttempts = 5;
+constexpr int64_t kMaxBandAttempts = 5;
 // The program that draws does not say whether it fails for good.
-constexpr int64_t kMostDrawAttempts = 20;
+constexpr int64_t kMaxDrawAttempts = 20;
 constexpr char kBandFile[] = "band.f64";
 
 }  // namespace
@@ -52,7 +52,7 @@ absl::StatusOr<std::vector<double>> ExportPictures::Make(const QueuedExport& que
   if (!fs::exists(material.pictures, failed)) {
     const absl::Status drawn = writer_->Draw(material, material.pictures);
     if (!drawn.ok() && (!MayCome(drawn) || absl::IsDeadlineExceeded(drawn))) {
-      const bool again = queued.attempts < kMostDrawAttempts;
+      const bool again = queued.attempts < kMaxDrawAttempts;
       return again ? absl::UnavailableError(drawn.message())
                    : absl::FailedPreconditionError(drawn.message());
     }
@@ -69,7 +69,7 @@ absl::StatusOr<std::vector<double>> ExportPictures::AskBand(const QueuedExport& 
       band.ok() &&
       (band->empty() || band->size() == static_cast<size_t>(material.prediction.positions.rows()));
   if (fits) return band;
-  if (!band.ok() && MayCome(band.status()) && queued.attempts < kMostBandAttempts) return band;
+  if (!band.ok() && MayCome(band.status()) && queued.attempts < kMaxBandAttempts) return band;
   if (warn_) {
     warn_(
         absl::StrCat(queued.name, " is written without its band of uncertainty: ",

@@ -26,15 +26,15 @@ namespace {
 namespace fs = std::filesystem;
 
 // Of UpdateExportRequest.detail.
-constexpr size_t kMostDetailBytes = 256;
+constexpr size_t kMaxDetailBytes = 256;
 // Once a minute: a PACS may be down for a day.
-constexpr int64_t kMostExportAttempts = 1440;
+constexpr int64_t kMaxExportAttempts = 1440;
 constexpr char kSeriesKey[] = "series:";
 
 bool IsSeriesKey(const std::string& key) { return absl::StartsWith(key, kSeriesKey); }
 
 std::string DetailOf(const std::string& text) {
-  std::string line = text.substr(0, kMostDetailBytes);
+  std::string line = text.substr(0, kMaxDetailBytes);
   std::replace_if(
       line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7F; }, '?');
   return line;
@@ -124,7 +124,7 @@ absl::Status ExportWork::Step(QueuedExport* queued) {
     queued->state = before;
     ++queued->attempts;
     queued->last_error = DetailOf(std::string(status.message()));
-    if (!MayCome(status) || queued->attempts >= kMostExportAttempts) {
+    if (!MayCome(status) || queued->attempts >= kMaxExportAttempts) {
       if (before == BridgeExportState::kFailed) {
         queued->done_s = std::time(nullptr);
       } else {

@@ -10,7 +10,7 @@
 
 namespace tissueform {
 
-absl::StatusOr<FoundPatient> FetchPatientHeader(PacsClient* pacs, const KeptHeader& known,
+absl::StatusOr<FoundPatient> FetchPatientHeader(PacsClient* pacs, const CachedHeader& known,
                                                 const std::string& path) {
   const QueuedSeries& series = known.series;
   std::error_code ignored;

@@ -8,7 +8,7 @@
 #include "absl/status/statusor.h"
 
 #include "client/pacs_bridge/network/pacs_client.h"
-#include "client/pacs_bridge/work/kept_header.h"
+#include "client/pacs_bridge/work/cached_header.h"
 
 namespace tissueform {
 
@@ -20,7 +20,7 @@ namespace tissueform {
 //
 // Errors: FailedPrecondition: the PACS has the series no longer, or offers no header and none is
 // kept; Unavailable: it refuses to answer, which it may do again or not; those of PacsClient.
-absl::StatusOr<FoundPatient> FetchPatientHeader(PacsClient* pacs, const KeptHeader& known,
+absl::StatusOr<FoundPatient> FetchPatientHeader(PacsClient* pacs, const CachedHeader& known,
                                                 const std::string& path);
 
 // What a person is told of a patient who is not the one that was seen; says of neither who it is.

@@ -33,8 +33,8 @@ namespace fs = std::filesystem;
 
 // For `case pack`, which takes seconds.
 constexpr std::chrono::minutes kPackTime{10};
-constexpr int64_t kMostPackAttempts = 20;
-constexpr size_t kMostErrorBytes = 512;
+constexpr int64_t kMaxPackAttempts = 20;
+constexpr size_t kMaxErrorBytes = 512;
 constexpr size_t kCaseTitleDigits = 8;
 constexpr char kCases[] = "cases/";
 
@@ -57,7 +57,7 @@ absl::Status LinkImages(const std::vector<QueuedImage>& images, const std::strin
 absl::StatusOr<std::string> ReadCaseFile(const std::string& path) {
   std::string bytes;
   TF_RETURN_IF_ERROR(ReadInPieces(path, [&bytes](absl::string_view piece) {
-    if (bytes.size() + piece.size() > kMostCaseBytes) {
+    if (bytes.size() + piece.size() > kMaxCaseBytes) {
       return absl::ResourceExhaustedError("a case is larger than any that is read");
     }
     absl::StrAppend(&bytes, piece);
@@ -70,7 +70,7 @@ absl::StatusOr<std::string> ReadCaseFile(const std::string& path) {
 // want of room, too, but its program does not say so; publishing waits for the server.
 bool MayRetry(SeriesState step, const absl::Status& status, int64_t attempts) {
   if (HasReason(status, ErrorReason::kDiskFull)) return true;
-  if (step == SeriesState::kBuilt) return attempts < kMostPackAttempts;
+  if (step == SeriesState::kBuilt) return attempts < kMaxPackAttempts;
   return step == SeriesState::kPacked && IsTransient(status);
 }
 
@@ -111,7 +111,7 @@ absl::Status PlanWork::Step(QueuedSeries* series) {
   } else {
     series->state = before;
     ++series->attempts;
-    series->last_error = std::string(status.message()).substr(0, kMostErrorBytes);
+    series->last_error = std::string(status.message()).substr(0, kMaxErrorBytes);
     if (!MayRetry(before, status, series->attempts)) {
       series->state = SeriesState::kFailed;
       series->done_s = std::time(nullptr);

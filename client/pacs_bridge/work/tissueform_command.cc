@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr std::chrono::seconds kCommandGrace{2};
 constexpr std::chrono::milliseconds kCancelPause{100};
-constexpr size_t kMostLineBytes = 400;
+constexpr size_t kMaxLineBytes = 400;
 constexpr int kSignalled = 128;  // exit codes beyond: GuardedProgram
 // Less is no room for pictures and a case.
 constexpr uint64_t kLeastRoomBytes = 64 << 20;
@@ -33,7 +33,7 @@ std::string LastLine(const std::string& path) {
   std::ifstream file(path);
   std::string last;
   for (std::string line; std::getline(file, line);) {
-    if (!line.empty()) last = line.substr(0, kMostLineBytes);
+    if (!line.empty()) last = line.substr(0, kMaxLineBytes);
   }
   for (char& c : last) {
     if (static_cast<unsigned char>(c) < 0x20) c = ' ';

@@ -55,7 +55,7 @@ std::vector<std::string> WorkThreads::Stuck() {
 }
 
 void WorkThreads::Loop(const Work& work, const std::function<void()>& step) {
-  constexpr std::chrono::minutes kMostLateness{1};  // back from its rest
+  constexpr std::chrono::minutes kMaxLateness{1};  // back from its rest
   int64_t seen = 0;
   while (!stopping()) {
     BeginStep(work.name);
@@ -66,7 +66,7 @@ void WorkThreads::Loop(const Work& work, const std::function<void()>& step) {
     step();
     const Clock::time_point until = Clock::now() + work.pause;
     MutexLock lock(mutex_);
-    limits_[work.name].latest = now_() + work.pause + kMostLateness;
+    limits_[work.name].latest = now_() + work.pause + kMaxLateness;
     while (!stopping_ && wakes_ == seen && changed_.WaitUntil(mutex_, until)) {
     }
   }

@@ -7,7 +7,7 @@ import "./styles/planner.css";
 import "./styles/panel.css";
 import "./styles/report.css";
 import { Bearer } from "./calls/bearer";
-import { Code, sentenceOf, toCallError } from "./calls/call_error";
+import { Code, messageOf, toCallError } from "./calls/call_error";
 import { Gateway, baseOf } from "./calls/gateway";
 import { type CaseFile, openCase } from "./case/case_file";
 import { serverSource } from "./case/case_sources";
@@ -171,7 +171,7 @@ function waitingPage(title: string, ...below: HTMLElement[]): HTMLElement {
 }
 
 function showProblem(title: string, thrown: unknown, buttons: HTMLElement[]): void {
-  const text = sentenceOf(thrown);
+  const text = messageOf(thrown);
   const sheet = [
     el("h1", { text: title }),
     el("p", { class: "problem", text, attributes: { role: "alert" } }),

@@ -32,7 +32,7 @@ constexpr bool kLimitsMemory = true;
 #endif
 
 constexpr int kFirstWord = 5;  // of the program, among ours
-constexpr long long kMostGraceMs = 3600 * 1000;
+constexpr long long kMaxGraceMs = 3600 * 1000;
 constexpr int kWrongUse = 2;
 constexpr int kCannotStart = 126;
 constexpr int kNoSuchProgram = 127;
@@ -135,7 +135,7 @@ int main(int argc, char** argv) {
   const long long grace_ms = enough ? NumberOf(argv[1]) : -1;
   const Limits limits = {enough ? NumberOf(argv[2]) : -1, enough ? NumberOf(argv[3]) : -1,
                          enough ? NumberOf(argv[4]) : -1};
-  if (grace_ms < 0 || grace_ms > kMostGraceMs || limits.memory_bytes < 0 || limits.seconds < 0 ||
+  if (grace_ms < 0 || grace_ms > kMaxGraceMs || limits.memory_bytes < 0 || limits.seconds < 0 ||
       limits.file_bytes < 0) {
     std::fprintf(stderr,
                  "use: tissueform-guard GRACE_MS MEMORY_BYTES SECONDS FILE_BYTES PROGRAM "

@@ -30,7 +30,7 @@ constexpr bool kLimitsMemory = true;
 
 constexpr int kUsageError = 2;
 constexpr int kEndedByCaller = 128 + SIGKILL;
-constexpr int64_t kMostSeconds = INT32_MAX;
+constexpr int64_t kMaxSeconds = INT32_MAX;
 
 void SetLimit(int resource, int64_t value) {
   const rlimit limit{static_cast<rlim_t>(value), static_cast<rlim_t>(value)};
@@ -64,7 +64,7 @@ absl::StatusOr<IsolationLimits> ReceiveLimits(PipeReceiver* request) {
         "a helper program is of another version; install all programs of one build");
   }
   TF_ASSIGN_OR_RETURN(limits.max_memory_bytes, request->Number(INT64_MAX));
-  TF_ASSIGN_OR_RETURN(const int64_t seconds, request->Number(kMostSeconds));
+  TF_ASSIGN_OR_RETURN(const int64_t seconds, request->Number(kMaxSeconds));
   limits.max_seconds = static_cast<int>(seconds);
   TF_ASSIGN_OR_RETURN(limits.max_file_bytes, request->Number(INT64_MAX));
   return limits;

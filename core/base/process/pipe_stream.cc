@@ -37,7 +37,7 @@ void PipeSender::Bytes(const void* data, size_t size) {
 void PipeSender::Number(int64_t number) { Bytes(&number, sizeof(number)); }
 
 void PipeSender::Text(absl::string_view text) {
-  text = text.substr(0, kMostTextBytes);
+  text = text.substr(0, kMaxTextBytes);
   Number(static_cast<int64_t>(text.size()));
   Bytes(text.data(), text.size());
 }
@@ -71,7 +71,7 @@ absl::StatusOr<int64_t> PipeReceiver::Number(int64_t most) {
 }
 
 absl::StatusOr<std::string> PipeReceiver::Text() {
-  TF_ASSIGN_OR_RETURN(const int64_t size, Number(PipeSender::kMostTextBytes));
+  TF_ASSIGN_OR_RETURN(const int64_t size, Number(PipeSender::kMaxTextBytes));
   TF_RETURN_IF_ERROR(Reserve(size, 1));
   std::string text(static_cast<size_t>(size), '\0');
   TF_RETURN_IF_ERROR(Bytes(text.data(), text.size()));

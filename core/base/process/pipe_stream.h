@@ -24,7 +24,7 @@ class PipeSender {
 
   void Bytes(const void* data, size_t size);
   void Number(int64_t number);
-  void Text(absl::string_view text);  // its first kMostTextBytes
+  void Text(absl::string_view text);  // its first kMaxTextBytes
   void Outcome(const absl::Status& status);
 
   // An Eigen matrix: rows, columns, entries as they lie.
@@ -35,7 +35,7 @@ class PipeSender {
     Bytes(matrix.data(), static_cast<size_t>(matrix.size()) * sizeof(typename Matrix::Scalar));
   }
 
-  static constexpr int64_t kMostTextBytes = 1 << 16;
+  static constexpr int64_t kMaxTextBytes = 1 << 16;
 
  private:
   int descriptor_;

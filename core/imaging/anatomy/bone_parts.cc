@@ -59,17 +59,17 @@ absl::Status NoLowerJaw() {
 }
 
 // A chin that lacks a little is planned on with a caution: its lower rim is not what a plan moves.
-constexpr double kMostCutOffMm = 3;
+constexpr double kMaxCutOffMm = 3;
 
 absl::Status CheckInView(const BoneParts& parts) {
-  if (parts.cut_off_mm.value_or(0) <= kMostCutOffMm) return absl::OkStatus();
+  if (parts.cut_off_mm.value_or(0) <= kMaxCutOffMm) return absl::OkStatus();
   const bool known = std::isfinite(*parts.cut_off_mm);
   return absl::InvalidArgumentError(
       absl::StrFormat("about %s mm of the lower jaw are cut off by the lower border of the image "
                       "at z = %.1f mm; the "
                       "CT must reach below the chin (up to %g mm may be missing)",
                       known ? absl::StrFormat("%.0f", *parts.cut_off_mm) : "many",
-                      parts.labels.geometry.origin_mm.z(), kMostCutOffMm));
+                      parts.labels.geometry.origin_mm.z(), kMaxCutOffMm));
 }
 
 // `chin_z_mm` is the lowest, `front_mm` the foremost of the lower jaw. The box is a generous one

@@ -149,13 +149,13 @@ absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
   TF_RETURN_IF_ERROR(CheckTissue(ct, thick.near, options));
   const LabelGrid air = MaskWhere(tissue, [](uint8_t value) { return value == 0; });
   const LabelGrid outside = AirReachedByBall(air, kNostrilMm);
-  HeadWithoutObjects parted = PartObjects({.hu = ct,
-                                           .tissue = tissue,
-                                           .to_core = thick.to_core,
-                                           .radius_mm = options.opening_radius_mm,
-                                           .thick = thick.near,
-                                           .outside = outside,
-                                           .beyond_hull = BeyondHull(outside)});
+  CleanedHead parted = PartObjects({.hu = ct,
+                                    .tissue = tissue,
+                                    .to_core = thick.to_core,
+                                    .radius_mm = options.opening_radius_mm,
+                                    .thick = thick.near,
+                                    .outside = outside,
+                                    .beyond_hull = BeyondHull(outside)});
   const VoxelBox box = Grown(BoundingBox(parted.head), kMarginVoxels, ct.geometry);
 
   HeadSegmentation result;

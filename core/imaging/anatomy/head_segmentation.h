@@ -8,7 +8,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/imaging/anatomy/attached_objects.h"
+#include "core/imaging/anatomy/foreign_objects.h"
 #include "core/imaging/anatomy/grid_operations.h"
 #include "core/imaging/ct/voxel_grid.h"
 
@@ -19,7 +19,7 @@ struct HeadSegmentationOptions {
   int16_t tissue_above_hu = -500;
   int16_t bone_above_hu = 250;
   // What is thicker than twice this and hangs together is head; of what is thinner, what hangs on
-  // it and is no object (core/imaging/anatomy/attached_objects.h).
+  // it and is no object (core/imaging/anatomy/foreign_objects.h).
   double opening_radius_mm = 4;
   double smallest_bone_mm3 = 150;
 };

@@ -16,9 +16,9 @@
 #include <Eigen/Geometry>
 
 #include "core/base/status_macros.h"
-#include "core/imaging/anatomy/farthest_bone.h"
 #include "core/imaging/anatomy/grid_operations.h"
 #include "core/imaging/anatomy/itk_filters.h"
+#include "core/imaging/anatomy/remote_bone.h"
 
 namespace tissueform {
 namespace {

@@ -23,7 +23,7 @@ struct LeftAndRight {
 struct Landmarks {
   Plane midsagittal;  // normal to the left
 
-  // Bone and teeth: ends of what the labels hold (core/imaging/anatomy/farthest_bone.h).
+  // Bone and teeth: ends of what the labels hold (core/imaging/anatomy/remote_bone.h).
   Eigen::Vector3d menton = Eigen::Vector3d::Zero();         // lowest of the chin in the midline
   Eigen::Vector3d pogonion = Eigen::Vector3d::Zero();       // foremost of the chin in the midline
   Eigen::Vector3d lower_incisor = Eigen::Vector3d::Zero();  // highest of the lower front teeth

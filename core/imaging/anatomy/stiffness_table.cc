@@ -31,10 +31,10 @@ StiffnessTable DefaultStiffnessTable() {
 
 absl::Status CheckStiffnessTable(const StiffnessTable& table) {
   if (table.empty()) return absl::InvalidArgumentError("the stiffness table is empty");
-  if (table.front().factor_95 != 0 && table.size() > kMostTissuesWithFactors) {
+  if (table.front().factor_95 != 0 && table.size() > kMaxTissuesWithFactors) {
     return absl::InvalidArgumentError(absl::StrCat(
         "stiffness table: ", table.size(), " tissues have \"youngs_modulus_factor_95\"; at most ",
-        kMostTissuesWithFactors, " may, so leave it out of all or take fewer tissues"));
+        kMaxTissuesWithFactors, " may, so leave it out of all or take fewer tissues"));
   }
   double last = -kNoLimit;
   for (const TissueClass& tissue : table) {

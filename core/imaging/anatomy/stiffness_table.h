@@ -22,7 +22,7 @@ struct TissueClass {
 };
 
 // Most classes of a table with factors: as many ranges as a plan takes (kMaxTissues).
-inline constexpr size_t kMostTissuesWithFactors = 16;
+inline constexpr size_t kMaxTissuesWithFactors = 16;
 
 // Classes in ascending order of hu_below; the last one's is infinite.
 using StiffnessTable = std::vector<TissueClass>;

@@ -16,7 +16,7 @@ namespace {
 
 // Of the cube about a barycentre, in voxels. Where it holds no pure voxel a tet lies deep in bone,
 // and muscle some mm away says nothing of it.
-constexpr int kMostRadius = 3;
+constexpr int kMaxRadius = 3;
 
 struct Mean {
   double sum = 0;
@@ -64,7 +64,7 @@ class CtNumbers {
   Mean Surroundings(const Eigen::Vector3d& place) const {
     const Eigen::Vector3i centre = place.array().round().cast<int>();
     Mean mean;
-    for (int radius = 1; radius <= kMostRadius && mean.empty(); ++radius) {
+    for (int radius = 1; radius <= kMaxRadius && mean.empty(); ++radius) {
       AnyWithin(radius, centre, [this, &mean](int x, int y, int z) {
         if (!IsMixed(x, y, z)) mean.Add(At(x, y, z));
         return false;

@@ -14,8 +14,8 @@ namespace tissueform {
 namespace {
 
 constexpr char kWhat[] = "reading the CT";
-constexpr int64_t kMostNotes = 1000;
-constexpr int64_t kMostOtherBytes = int64_t{1} << 26;  // everything but the voxels
+constexpr int64_t kMaxNotes = 1000;
+constexpr int64_t kMaxOtherBytes = int64_t{1} << 26;  // everything but the voxels
 
 void SendProvenance(const CtProvenance& provenance, PipeSender* sender) {
   sender->Text(provenance.format);
@@ -33,7 +33,7 @@ absl::Status ReceiveProvenance(PipeReceiver* receiver, CtProvenance* provenance)
   TF_ASSIGN_OR_RETURN(provenance->sha256, receiver->Text());
   TF_RETURN_IF_ERROR(
       receiver->Bytes(&provenance->gantry_tilt_deg, sizeof(provenance->gantry_tilt_deg)));
-  TF_ASSIGN_OR_RETURN(const int64_t num_notes, receiver->Number(kMostNotes));
+  TF_ASSIGN_OR_RETURN(const int64_t num_notes, receiver->Number(kMaxNotes));
   for (int64_t i = 0; i < num_notes; ++i) {
     TF_ASSIGN_OR_RETURN(std::string note, receiver->Text());
     provenance->notes.push_back(std::move(note));
@@ -80,7 +80,7 @@ void SendVolume(const absl::StatusOr<CtVolume>& volume, PipeSender* sender) {
 
 absl::StatusOr<CtVolume> ReceiveVolume(int descriptor, int64_t max_voxels) {
   constexpr auto kVoxelBytes = static_cast<int64_t>(sizeof(int16_t));
-  PipeReceiver receiver(descriptor, kMostOtherBytes);
+  PipeReceiver receiver(descriptor, kMaxOtherBytes);
   TF_RETURN_IF_ERROR(receiver.Outcome());
   CtVolume volume;
   TF_RETURN_IF_ERROR(ReceiveSize(&receiver, max_voxels, &volume));

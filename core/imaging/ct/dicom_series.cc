@@ -48,9 +48,9 @@ std::string Describe(const SliceGroup& group) {
 
 // All of a few; of many how many there are, and the largest.
 std::string DescribeAll(std::vector<SliceGroup> groups) {
-  constexpr size_t kMostListed = 3;
+  constexpr size_t kMaxListed = 3;
   std::string text;
-  if (groups.size() > kMostListed) {
+  if (groups.size() > kMaxListed) {
     size_t images = 0;
     for (const SliceGroup& group : groups) images += group.slices.size();
     if (images == groups.size()) return absl::StrCat(images, " series of one image each");
@@ -58,7 +58,7 @@ std::string DescribeAll(std::vector<SliceGroup> groups) {
     std::stable_sort(groups.begin(), groups.end(), [](const SliceGroup& a, const SliceGroup& b) {
       return a.slices.size() > b.slices.size();
     });
-    groups.resize(kMostListed);
+    groups.resize(kMaxListed);
   }
   return text + absl::StrJoin(groups, ", ", [](std::string* out, const SliceGroup& group) {
            absl::StrAppend(out, Describe(group));
@@ -67,11 +67,11 @@ std::string DescribeAll(std::vector<SliceGroup> groups) {
 
 // "files 3, 14 and 15 of the folder", of many the first few.
 std::string FilesOf(const std::vector<DicomHeader>& slices) {
-  constexpr size_t kMostListed = 8;
+  constexpr size_t kMaxListed = 8;
   std::set<int> numbers;
   for (const DicomHeader& slice : slices) numbers.insert(slice.file_number);
   std::vector<int> listed(numbers.begin(), numbers.end());
-  const size_t more = listed.size() - std::min(listed.size(), kMostListed);
+  const size_t more = listed.size() - std::min(listed.size(), kMaxListed);
   listed.resize(listed.size() - more);
   return absl::StrCat(listed.size() > 1 ? "files " : "file ", absl::StrJoin(listed, ", "),
                       more > 0 ? absl::StrCat(" and ", more, " more") : "", " of the folder");

@@ -20,16 +20,16 @@ namespace {
 constexpr double kSameDirection = 1e-3;
 constexpr double kSamePositionMm = 0.01;
 constexpr double kPositionToleranceMm = 0.1;  // positions are rounded when they are written
-constexpr double kMostPositionMm = 1e5;       // beyond any scanner's table; sums stay finite
+constexpr double kMaxPositionMm = 1e5;        // beyond any scanner's table; sums stay finite
 constexpr double kLeastSpacingMm = 0.05;
-constexpr double kMostSpacingMm = 10;
+constexpr double kMaxSpacingMm = 10;
 // Longer than any protocol of the head leaves out: then it is two scans.
-constexpr double kMostGapMm = 30;
-constexpr double kMostTiltDeg = 35;
+constexpr double kMaxGapMm = 30;
+constexpr double kMaxTiltDeg = 35;
 constexpr double kUprightDeg = 0.05;
 
 const char* MissingTag(const DicomHeader& slice) {
-  if (!slice.position_mm || !(slice.position_mm->cwiseAbs().maxCoeff() <= kMostPositionMm)) {
+  if (!slice.position_mm || !(slice.position_mm->cwiseAbs().maxCoeff() <= kMaxPositionMm)) {
     return "position (ImagePositionPatient)";
   }
   if (!slice.row_direction) return "orientation (ImageOrientationPatient)";
@@ -97,10 +97,10 @@ absl::Status CheckPlane(const DicomHeader& slice) {
         NameOf(slice), " has an orientation that is not two directions square to each other"));
   }
   const Eigen::Vector2d& spacing = *slice.pixel_spacing_mm;
-  if (!(spacing.minCoeff() >= kLeastSpacingMm && spacing.maxCoeff() <= kMostSpacingMm)) {
+  if (!(spacing.minCoeff() >= kLeastSpacingMm && spacing.maxCoeff() <= kMaxSpacingMm)) {
     return absl::InvalidArgumentError(
         absl::StrCat(NameOf(slice), " has pixels of ", spacing[1], " x ", spacing[0],
-                     " mm; between ", kLeastSpacingMm, " and ", kMostSpacingMm, " mm are read"));
+                     " mm; between ", kLeastSpacingMm, " and ", kMaxSpacingMm, " mm are read"));
   }
   return absl::OkStatus();
 }
@@ -151,7 +151,7 @@ absl::Status CheckGaps(const std::vector<DicomHeader>& slices, const std::vector
           " lie at the same place, and nothing in their headers tells two scans apart: leave the "
           "files of one scan in the folder"));
     }
-    if (gaps[i] > kMostGapMm) {
+    if (gaps[i] > kMaxGapMm) {
       return absl::InvalidArgumentError(absl::StrFormat(
           "there is no slice for %.0f mm between %s and %s: leave the files of one scan in the "
           "folder",
@@ -218,13 +218,13 @@ double TiltDeg(const Eigen::Vector3d& row, const Eigen::Vector3d& normal,
 }
 
 absl::Status CheckStep(const Eigen::Vector3d& step, const Eigen::Vector3d& normal) {
-  if (!(step.norm() >= kLeastSpacingMm && step.norm() <= kMostSpacingMm)) {
+  if (!(step.norm() >= kLeastSpacingMm && step.norm() <= kMaxSpacingMm)) {
     return absl::InvalidArgumentError(
         absl::StrFormat("the slices are %.3f mm apart; between %.2f and %.0f mm are read",
-                        step.norm(), kLeastSpacingMm, kMostSpacingMm));
+                        step.norm(), kLeastSpacingMm, kMaxSpacingMm));
   }
   const double angle_deg = std::acos(std::min(1.0, step.normalized().dot(normal))) * 180 / M_PI;
-  if (angle_deg > kMostTiltDeg) {
+  if (angle_deg > kMaxTiltDeg) {
     return absl::InvalidArgumentError(absl::StrFormat(
         "the slices are stacked %.1f degrees off their normal, which no gantry tilt explains",
         angle_deg));

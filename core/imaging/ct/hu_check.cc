@@ -56,10 +56,10 @@ int MostFrequent(const HuHistogram& histogram, int low, int high) {
 // because a guess of a unit must be the user's.
 absl::Status WithoutAir(const HuHistogram& histogram, std::optional<double> hu_offset) {
   constexpr int kLeastTissueMode = 900;
-  constexpr int kMostTissueMode = 1200;
+  constexpr int kMaxTissueMode = 1200;
   const int mode = MostFrequent(histogram, 500, 2000);
   const bool air_at_zero = ShareBetween(histogram, -100, 300) > kLeastShare;
-  if (!hu_offset && air_at_zero && mode >= kLeastTissueMode && mode <= kMostTissueMode) {
+  if (!hu_offset && air_at_zero && mode >= kLeastTissueMode && mode <= kMaxTissueMode) {
     return absl::InvalidArgumentError(
         absl::StrCat("the values are not HU: air lies near 0 and soft tissue near ", mode,
                      ", which looks like HU + 1024; add \"hu_offset\": -1024 to the recipe"));

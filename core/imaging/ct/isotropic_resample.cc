@@ -19,9 +19,9 @@ namespace {
 
 constexpr int16_t kAir = -1024;
 constexpr double kLeastSpacingMm = 0.1;
-constexpr double kMostSpacingMm = 10;
+constexpr double kMaxSpacingMm = 10;
 // Along an axis: 512 samples a voxel bound the time; beyond that more would hardly change a mean.
-constexpr int kMostSamples = 8;
+constexpr int kMaxSamples = 8;
 constexpr double kRounding = 1e-6;  // of a voxel
 
 using Samples = std::array<int, 3>;
@@ -71,7 +71,7 @@ Samples SamplesPerVoxel(const Eigen::Matrix3d& to_index, double spacing_mm) {
   for (int axis = 0; axis < 3; ++axis) {
     const double source_voxels = to_index.col(axis).cwiseAbs().maxCoeff() * spacing_mm;
     samples[static_cast<size_t>(axis)] =
-        std::clamp(static_cast<int>(std::ceil(source_voxels - kRounding)), 1, kMostSamples);
+        std::clamp(static_cast<int>(std::ceil(source_voxels - kRounding)), 1, kMaxSamples);
   }
   return samples;
 }
@@ -144,9 +144,9 @@ class Sampler {
 };
 
 absl::Status CheckRequest(const Eigen::AlignedBox3d& box, double spacing_mm, int64_t max_bytes) {
-  if (!(spacing_mm >= kLeastSpacingMm && spacing_mm <= kMostSpacingMm)) {
+  if (!(spacing_mm >= kLeastSpacingMm && spacing_mm <= kMaxSpacingMm)) {
     return absl::InvalidArgumentError(absl::StrCat("a spacing of ", spacing_mm, " mm is not in [",
-                                                   kLeastSpacingMm, ", ", kMostSpacingMm, "] mm"));
+                                                   kLeastSpacingMm, ", ", kMaxSpacingMm, "] mm"));
   }
   const Eigen::Vector3d counts = (box.sizes() / spacing_mm).array().round().max(1.0);
   const double bytes = counts.prod() * sizeof(int16_t);

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kSamePlaceMm = 0.01;
 // One chain may pass over so many slices at once; four of a later scan in one gap are many.
-constexpr size_t kMostPassedOver = 8;
+constexpr size_t kMaxPassedOver = 8;
 // What a change of step costs, in slices. One slice off its place makes three changes and is passed
 // over (3 x 0.45 > 1); steps that all differ cost less than the slices are worth (0.45 < 1), so
 // that uneven slices stay together; and so do thin slices between thick ones.
@@ -32,7 +32,7 @@ class RegularChain {
  public:
   explicit RegularChain(const Stack& stack) : stack_(stack), best_(stack.size()) {
     for (size_t end = 0; end < stack.size(); ++end) {
-      for (size_t back = 1; back <= std::min(end, kMostPassedOver); ++back) Extend(end, back);
+      for (size_t back = 1; back <= std::min(end, kMaxPassedOver); ++back) Extend(end, back);
     }
   }
 
@@ -41,7 +41,7 @@ class RegularChain {
     size_t end = 0;
     size_t back = 0;
     for (size_t e = 0; e < stack_.size(); ++e) {
-      for (size_t b = 1; b <= kMostPassedOver; ++b) {
+      for (size_t b = 1; b <= kMaxPassedOver; ++b) {
         if (best_[e][b].score > best_[end][back].score) std::tie(end, back) = std::pair(e, b);
       }
     }
@@ -68,7 +68,7 @@ class RegularChain {
     if (Step(end, back) < kSamePlaceMm) return;
     const size_t middle = end - back;
     Best best{2, 0};
-    for (size_t before = 1; before <= std::min(middle, kMostPassedOver); ++before) {
+    for (size_t before = 1; before <= std::min(middle, kMaxPassedOver); ++before) {
       if (best_[middle][before].score == 0) continue;
       const bool same = IsSameStep(Step(end, back), Step(middle, before));
       const double score = best_[middle][before].score + 1 - (same ? 0 : kChangeOfStep);
@@ -78,7 +78,7 @@ class RegularChain {
   }
 
   const Stack& stack_;
-  std::vector<std::array<Best, kMostPassedOver + 1>> best_;
+  std::vector<std::array<Best, kMaxPassedOver + 1>> best_;
 };
 
 // Whether a place is free in a stack: outside of it, or in a hole.

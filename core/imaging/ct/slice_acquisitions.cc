@@ -16,8 +16,8 @@
 namespace tissueform {
 namespace {
 
-constexpr double kMostOffPlace = 0.25;  // of the slices, for places alone to tell
-constexpr size_t kMostScans = 8;
+constexpr double kMaxOffPlace = 0.25;  // of the slices, for places alone to tell
+constexpr size_t kMaxScans = 8;
 // Interleaved slices of one scan are taken within some seconds.
 constexpr double kLaterS = 60;
 
@@ -79,7 +79,7 @@ std::optional<Labels> LabelsOfJumps(const std::vector<DicomHeader>& slices, Time
     label += times[i].first - times[i - 1].first > jump_s ? 1 : 0;
     labels[times[i].second] = label;
   }
-  if (label == 0 || label + 1 > static_cast<int>(kMostScans)) return std::nullopt;
+  if (label == 0 || label + 1 > static_cast<int>(kMaxScans)) return std::nullopt;
   return labels;
 }
 
@@ -150,7 +150,7 @@ class Separator {
   void Try(const std::optional<Labels>& labels, const std::string& told_by) {
     if (found_ || !labels) return;
     std::vector<Stack> scans = Assemble(stack_, *labels);
-    if (scans.size() < 2 || scans.size() > kMostScans || !IsRegular(scans.front())) return;
+    if (scans.size() < 2 || scans.size() > kMaxScans || !IsRegular(scans.front())) return;
     found_ = Parting{std::move(scans), told_by};
   }
 
@@ -163,7 +163,7 @@ class Separator {
       scans[in_it[i] ? 0 : 1].push_back(stack_[i]);
     }
     const auto off = static_cast<double>(scans[1].size());
-    if (off > kMostOffPlace * static_cast<double>(stack_.size())) return;
+    if (off > kMaxOffPlace * static_cast<double>(stack_.size())) return;
     found_ = Parting{std::move(scans), "place, off the even steps"};
   }
 

@@ -30,7 +30,7 @@ using Image = itk::Image<float, 3>;
 
 constexpr int kLeastVoxels = 8;
 constexpr double kLeastSpacingMm = 0.05;
-constexpr double kMostSpacingMm = 10;
+constexpr double kMaxSpacingMm = 10;
 
 const char* NameOf(VolumeFormat format) {
   switch (format) {
@@ -215,10 +215,10 @@ absl::Status CheckShape(const itk::ImageIOBase& io, const CtReadLimits& limits) 
 absl::Status TakeGeometry(const Image& image, CtVolume* volume) {
   for (unsigned axis = 0; axis < 3; ++axis) {
     const double spacing = image.GetSpacing()[axis];
-    if (!(spacing >= kLeastSpacingMm && spacing <= kMostSpacingMm)) {
+    if (!(spacing >= kLeastSpacingMm && spacing <= kMaxSpacingMm)) {
       return absl::InvalidArgumentError(
           absl::StrCat("the voxels are ", spacing, " mm apart along axis ", axis + 1, "; between ",
-                       kLeastSpacingMm, " and ", kMostSpacingMm, " mm are read"));
+                       kLeastSpacingMm, " and ", kMaxSpacingMm, " mm are read"));
     }
     volume->size[axis] = static_cast<int>(image.GetLargestPossibleRegion().GetSize()[axis]);
     volume->spacing_mm[axis] = spacing;

@@ -22,8 +22,8 @@
 namespace tissueform {
 namespace {
 
-constexpr int kMostLines = 1000;
-constexpr size_t kMostLineBytes = 1 << 16;
+constexpr int kMaxLines = 1000;
+constexpr size_t kMaxLineBytes = 1 << 16;
 
 // Splits "key: value"; key in lower case. NRRD's own "key:=value" is no field of the format.
 bool SplitField(absl::string_view line, char separator, std::string* key, std::string* value) {
@@ -49,9 +49,9 @@ absl::Status AddDataFile(const std::string& path, const std::string& value, Volu
         "the header names a data file in another folder; put it beside the header and name it "
         "without a folder");
   }
-  if (static_cast<int>(header->data_paths.size()) >= kMostDataFiles) {
+  if (static_cast<int>(header->data_paths.size()) >= kMaxDataFiles) {
     return absl::ResourceExhaustedError(
-        absl::StrCat("the header names more than ", kMostDataFiles, " data files"));
+        absl::StrCat("the header names more than ", kMaxDataFiles, " data files"));
   }
   header->data_paths.push_back((std::filesystem::path(path).parent_path() / name).string());
   return absl::OkStatus();
@@ -127,7 +127,7 @@ absl::Status AddNumbered(const std::string& path, const std::string& value, Volu
 absl::Status AddListed(std::istream& stream, const std::string& path, VolumeHeader* header) {
   std::string line;
   while (std::getline(stream, line)) {
-    if (line.size() > kMostLineBytes) return NotOfItsFormat("NRRD");
+    if (line.size() > kMaxLineBytes) return NotOfItsFormat("NRRD");
     absl::StripAsciiWhitespace(&line);
     if (!line.empty()) TF_RETURN_IF_ERROR(AddDataFile(path, line, header));
   }
@@ -161,9 +161,9 @@ absl::Status ReadNrrd(std::istream& stream, const std::string& path, VolumeHeade
   if (!std::getline(stream, line) || !absl::StartsWith(line, "NRRD000")) {
     return NotOfItsFormat("NRRD");
   }
-  for (int count = 0; count < kMostLines && std::getline(stream, line); ++count) {
+  for (int count = 0; count < kMaxLines && std::getline(stream, line); ++count) {
     absl::StripTrailingAsciiWhitespace(&line);
-    if (line.empty() || line.size() > kMostLineBytes) break;
+    if (line.empty() || line.size() > kMaxLineBytes) break;
     std::string key;
     std::string value;
     if (!SplitField(line, ':', &key, &value)) continue;
@@ -177,10 +177,10 @@ absl::Status ReadNrrd(std::istream& stream, const std::string& path, VolumeHeade
 
 absl::Status ReadMetaImage(std::istream& stream, const std::string& path, VolumeHeader* header) {
   std::string line;
-  for (int count = 0; count < kMostLines && std::getline(stream, line); ++count) {
+  for (int count = 0; count < kMaxLines && std::getline(stream, line); ++count) {
     std::string key;
     std::string value;
-    if (line.empty() || line.size() > kMostLineBytes || !SplitField(line, '=', &key, &value)) {
+    if (line.empty() || line.size() > kMaxLineBytes || !SplitField(line, '=', &key, &value)) {
       break;
     }
     if (key == "anatomicalorientation") header->orientation = value;

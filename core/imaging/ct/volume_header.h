@@ -31,14 +31,14 @@ struct VolumeHeader {
 };
 
 // Files that one NRRD header may name.
-inline constexpr int kMostDataFiles = 20000;
+inline constexpr int kMaxDataFiles = 20000;
 
 // Reads the text at the head of a file of NRRD or MetaImage. Voxels may be spread over several
 // files in NRRD: numbered ("slice%03d.raw 1 93 1") or listed ("LIST").
 //
 // Errors: InvalidArgument when the file does not begin as its ending says; when voxels lie in
 // another folder (a header from outside must not choose what is read); when a MetaImage's are
-// spread over several files. ResourceExhausted beyond kMostDataFiles.
+// spread over several files. ResourceExhausted beyond kMaxDataFiles.
 absl::StatusOr<VolumeHeader> ReadVolumeHeader(const std::string& path, VolumeFormat format);
 
 }  // namespace tissueform

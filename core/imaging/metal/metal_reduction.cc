@@ -171,7 +171,7 @@ class VolumeCorrection {
 
 }  // namespace
 
-MetalReport LessenStreaks(const MetalFindings& findings, int threads, CtVolume* volume) {
+MetalReport ReduceMetalArtifacts(const MetalFindings& findings, int threads, CtVolume* volume) {
   MetalReport report;
   report.threshold_hu = findings.threshold_hu;
   if (!findings.any()) return report;
@@ -212,7 +212,7 @@ absl::StatusOr<CtWithMetal> ResampleWithoutStreaks(CtVolume volume, double spaci
   const ResampleOptions resample = {.threads = threads};
   if (findings.any()) {
     TF_ASSIGN_OR_RETURN(ct.before, ResampleIsotropic(volume, spacing_mm, resample));
-    ct.report = LessenStreaks(findings, threads, &volume);
+    ct.report = ReduceMetalArtifacts(findings, threads, &volume);
     ct.before = SlicesBetween(ct.before, ct.report.low_z_mm - kShownBesideMm,
                               ct.report.high_z_mm + kShownBesideMm);
   }

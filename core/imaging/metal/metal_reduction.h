@@ -38,7 +38,7 @@ struct MetalReport {
 // HU.
 //
 // The result does not depend on `threads`.
-MetalReport LessenStreaks(const MetalFindings& findings, int threads, CtVolume* volume);
+MetalReport ReduceMetalArtifacts(const MetalFindings& findings, int threads, CtVolume* volume);
 
 // A CT on upright cubic voxels, its metal found and its streaks lessened.
 struct CtWithMetal {

@@ -11,11 +11,11 @@ namespace tissueform {
 namespace {
 
 constexpr int kLeastSoftHu = -300;
-constexpr int kMostSoftHu = 300;
+constexpr int kMaxSoftHu = 300;
 constexpr double kBesideMm = 2;
 constexpr int kLeastSamples = 50;
 
-bool IsSoft(int16_t hu) { return hu > kLeastSoftHu && hu < kMostSoftHu; }
+bool IsSoft(int16_t hu) { return hu > kLeastSoftHu && hu < kMaxSoftHu; }
 
 }  // namespace
 

@@ -23,7 +23,7 @@ constexpr char kMagic[] = "TFANSWER";
 constexpr size_t kMagicBytes = sizeof(kMagic) - 1;
 constexpr size_t kAlignment = 16;
 constexpr uint32_t kNumbersSection = 1;
-constexpr uint32_t kMostSections = 1000;
+constexpr uint32_t kMaxSections = 1000;
 
 struct Head {
   char magic[kMagicBytes];
@@ -71,7 +71,7 @@ AnswerReading Failed(AnswerError error, std::string message) {
 // The table by the sections' numbers. False where one does not lie behind the other.
 bool ReadTable(std::string_view bytes, uint32_t num_sections, std::map<uint32_t, Entry>* table) {
   size_t end = sizeof(Head) + num_sections * sizeof(Entry);
-  if (num_sections > kMostSections || bytes.size() < end) return false;
+  if (num_sections > kMaxSections || bytes.size() < end) return false;
   for (uint32_t i = 0; i < num_sections; ++i) {
     Entry entry;
     std::memcpy(&entry, bytes.data() + sizeof(Head) + i * sizeof(Entry), sizeof(Entry));

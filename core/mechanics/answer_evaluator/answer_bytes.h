@@ -15,7 +15,7 @@ namespace tissueform {
 // The newest that is read. Written is the lowest that has what is there: 2 with a third order,
 // which readers of 1 would pass over.
 inline constexpr uint32_t kAnswerFormatVersion = 2;
-inline constexpr size_t kMostAnswerBytes = size_t{256} << 20;
+inline constexpr size_t kMaxAnswerBytes = size_t{256} << 20;
 
 enum class AnswerError {
   kNone,
@@ -37,6 +37,6 @@ std::string WriteAnswers(const PortableAnswers& answers);
 
 // Takes any bytes; what comes without an error keeps CheckAnswers, and may be evaluated. Allocates
 // no more than the bytes hold, and a little. Sections that it does not know are passed over.
-AnswerReading ReadAnswers(std::string_view bytes, size_t most_bytes = kMostAnswerBytes);
+AnswerReading ReadAnswers(std::string_view bytes, size_t most_bytes = kMaxAnswerBytes);
 
 }  // namespace tissueform

@@ -15,10 +15,10 @@
 namespace tissueform {
 namespace {
 
-constexpr double kMostOfAnything = 1 << 28;  // fits into int32_t, and products of two into size_t
-constexpr double kMostHandles = 10000;
-constexpr double kMostDegree = 1000;
-constexpr size_t kMostBandVariables = 17;  // 16 tissues and Poisson's ratio
+constexpr double kMaxOfAnything = 1 << 28;  // fits into int32_t, and products of two into size_t
+constexpr double kMaxHandles = 10000;
+constexpr double kMaxDegree = 1000;
+constexpr size_t kMaxBandVariables = 17;  // 16 tissues and Poisson's ratio
 
 bool IsCount(double value, double least, double most) {
   return value >= least && value <= most && value == std::floor(value);
@@ -30,10 +30,10 @@ bool NumbersAreInRange(const AnswerNumbers& numbers) {
   using List = std::array<double, sizeof(AnswerNumbers) / sizeof(double)>;
   const List list = std::bit_cast<List>(numbers);
   return std::all_of(list.begin(), list.end(), IsFiniteAndNotNegative) &&
-         IsCount(numbers.model, 1, 3) && IsCount(numbers.num_vertices, 1, kMostOfAnything) &&
-         IsCount(numbers.num_handles, 1, kMostHandles) &&
-         IsCount(numbers.num_polynomials, 0, kMostOfAnything) &&
-         IsCount(numbers.degree, 0, kMostDegree) && numbers.tolerance_mm > 0;
+         IsCount(numbers.model, 1, 3) && IsCount(numbers.num_vertices, 1, kMaxOfAnything) &&
+         IsCount(numbers.num_handles, 1, kMaxHandles) &&
+         IsCount(numbers.num_polynomials, 0, kMaxOfAnything) &&
+         IsCount(numbers.degree, 0, kMaxDegree) && numbers.tolerance_mm > 0;
 }
 
 bool AllAreFinite(const PortableAnswers& answers) {
@@ -91,7 +91,7 @@ bool HasNothingElse(const PortableAnswers& answers, bool is_gradient, bool is_ne
 // coefficient (dimension + degree) over dimension. Of more than are possible, too many.
 double NumPolynomials(double dimension, double degree) {
   double count = 1;
-  for (int i = 1; i <= degree && count < kMostOfAnything; ++i) count *= (dimension + i) / i;
+  for (int i = 1; i <= degree && count < kMaxOfAnything; ++i) count *= (dimension + i) / i;
   return std::round(count);
 }
 
@@ -166,7 +166,7 @@ bool BandFits(const PortableAnswers& answers, const AnswerSizes& sizes, bool is_
   const PackedColumns& band = answers.band;
   if (band.steps.empty()) return answers.band_map.empty() && band.upper.empty();
   return !is_gradient && answers.band_map.size() == band.steps.size() * 12 * sizes.handles &&
-         sizes.band_variables <= kMostBandVariables && (sizes.free == 0 || !band.upper.empty()) &&
+         sizes.band_variables <= kMaxBandVariables && (sizes.free == 0 || !band.upper.empty()) &&
          IsPacked(band, 3 * sizes.free * sizes.band_variables, band.steps.size());
 }
 

@@ -5,17 +5,17 @@
 
 namespace tissueform {
 
-absl::string_view GaveUpName(GaveUp gave_up) {
+absl::string_view TerminationName(Termination gave_up) {
   switch (gave_up) {
-    case GaveUp::kNo:
+    case Termination::kConverged:
       break;
-    case GaveUp::kIterations:
+    case Termination::kIterations:
       return "iterations";
-    case GaveUp::kNoRoom:
+    case Termination::kNoRoom:
       return "no_room";
-    case GaveUp::kArithmetic:
+    case Termination::kArithmetic:
       return "arithmetic";
-    case GaveUp::kBlocked:
+    case Termination::kBlocked:
       return "blocked";
   }
   return "";

@@ -18,17 +18,17 @@
 
 namespace tissueform {
 
-// Why an iteration ended before it had converged.
-enum class GaveUp {
-  kNo,          // it has converged, or was cancelled
+// Why an iteration ended.
+enum class Termination {
+  kConverged,   // it has converged, or was cancelled
   kIterations,  // as many as the options allow
   kNoRoom,      // the memory for a second factor, which it needs, was refused
   kArithmetic,  // no step makes it better: rounding is all that is left
   kBlocked,     // parts of the body would have to pass through each other
 };
 
-// "iterations", "no_room", "arithmetic", "blocked"; empty for kNo.
-absl::string_view GaveUpName(GaveUp gave_up);
+// "iterations", "no_room", "arithmetic", "blocked"; empty for kConverged.
+absl::string_view TerminationName(Termination gave_up);
 
 // How an answer was found. Not reaching a tolerance is told here; it is not an error.
 struct SolveSummary {
@@ -45,7 +45,7 @@ struct SolveSummary {
   // Share of the poses' motion that was reached; below 1 when a model that loads in steps came no
   // further.
   double load = 1;
-  GaveUp gave_up = GaveUp::kNo;
+  Termination gave_up = Termination::kConverged;
   // What stands in the way, a sentence without its full stop that names handles; empty where
   // nothing does.
   std::string obstacle;

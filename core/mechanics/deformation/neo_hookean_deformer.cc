@@ -16,10 +16,10 @@
 
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
+#include "core/mechanics/deformation/contact_blocker.h"
 #include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/deformation/equilibrium_search.h"
 #include "core/mechanics/deformation/handle_targets.h"
-#include "core/mechanics/deformation/load_obstacle.h"
 #include "core/mechanics/deformation/load_path.h"
 #include "core/mechanics/deformation/newton_fallback.h"
 #include "core/mechanics/elasticity/neo_hookean_energy.h"
@@ -212,7 +212,7 @@ class NeoHookeanDeformer : public Deformer {
     return remaining < 1.01 * run.step ? 1.0 : run.deformation.summary.load + run.step;
   }
 
-  std::optional<LoadObstacle> Crossing(const Run& run, double end) const {
+  std::optional<ContactBlocker> Crossing(const Run& run, double end) const {
     return FindCrossing(*preparation_, run.path.PosesAt(run.deformation.summary.load),
                         run.path.PosesAt(end));
   }
@@ -309,30 +309,30 @@ class NeoHookeanDeformer : public Deformer {
   void ExplainGivingUp(Run* run) const {
     SolveSummary& summary = run->summary();
     if (summary.load < 1.0 && IsBlocked(*run)) {
-      summary.gave_up = GaveUp::kBlocked;
+      summary.gave_up = Termination::kBlocked;
     } else if (newton_.had_no_room()) {
-      summary.gave_up = GaveUp::kNoRoom;
+      summary.gave_up = Termination::kNoRoom;
     } else if (summary.iterations >= options_.max_iterations) {
-      summary.gave_up = GaveUp::kIterations;
+      summary.gave_up = Termination::kIterations;
     } else {
-      summary.gave_up = GaveUp::kArithmetic;
+      summary.gave_up = Termination::kArithmetic;
     }
-    if (summary.gave_up == GaveUp::kBlocked) {
+    if (summary.gave_up == Termination::kBlocked) {
       // The smallest step that was tried shows what is in the way.
       const double end = std::min(1.0, summary.load + 2 * run->step);
-      const std::optional<LoadObstacle> crossing = Crossing(*run, end);
+      const std::optional<ContactBlocker> crossing = Crossing(*run, end);
       summary.obstacle =
           Say(crossing.has_value() ? *crossing
                                    : FindObstacle(*preparation_, rest() + Carried(*run, end)));
       return;
     }
-    const LoadObstacle worst = FindObstacle(*preparation_, run->deformation.positions);
+    const ContactBlocker worst = FindObstacle(*preparation_, run->deformation.positions);
     if (worst.volume_ratio < kCrushed) {
       summary.obstacle = Say(worst);
     }
   }
 
-  std::string Say(const LoadObstacle& obstacle) const {
+  std::string Say(const ContactBlocker& obstacle) const {
     return tissueform::Describe(obstacle, preparation_->constraints());
   }
 

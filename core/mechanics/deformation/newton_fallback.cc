@@ -39,7 +39,7 @@ void NewtonFallback::Restart() { watch_.Restart(system_ != nullptr ? kPatience :
 bool NewtonFallback::Consider(int iterations) {
   // A way of many load steps may take an age without stalling at any of them.
   const bool is_late =
-      system_ == nullptr && iterations >= int64_t{kMostPatiences} * int64_t{patience_};
+      system_ == nullptr && iterations >= int64_t{kMaxPatiences} * int64_t{patience_};
   return (watch_.HasStalled(search_.residual()) || is_late) && Take();
 }
 

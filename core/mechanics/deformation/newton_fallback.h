@@ -18,12 +18,12 @@ namespace tissueform {
 
 // Watches the residual of a search and says when it has stopped falling: it has not halved within
 // `patience` iterations.
-class StallWatch {
+class StagnationDetector {
  public:
-  explicit StallWatch(int patience) : patience_(patience) {}
+  explicit StagnationDetector(int patience) : patience_(patience) {}
 
   // Begins anew: at another state, or with another patience.
-  void Restart(int patience) { *this = StallWatch(patience); }
+  void Restart(int patience) { *this = StagnationDetector(patience); }
 
   // To be told the residual before every iteration.
   bool HasStalled(double residual) {
@@ -50,7 +50,7 @@ class StallWatch {
 // look for and it is as large. It goes at the end of an answer. One thread at a time.
 class NewtonFallback {
  public:
-  static constexpr int kMostPatiences = 8;
+  static constexpr int kMaxPatiences = 8;
 
   // All must outlive it. `elastic` is of `preparation`. `patience`: iterations in which the
   // residual has not halved before the first Newton step. `blas_threads` factorise.
@@ -72,7 +72,7 @@ class NewtonFallback {
   void Restart();
 
   // To be called before every step of the search: makes it Newton's when the residual has stopped
-  // falling, or when the answer has taken kMostPatiences as many `iterations` and still had none.
+  // falling, or when the answer has taken kMaxPatiences as many `iterations` and still had none.
   // True when it did.
   bool Consider(int iterations);
   // Makes the next step Newton's. False where that cannot be: no room, or tissue so crushed that
@@ -95,7 +95,7 @@ class NewtonFallback {
 
   // Of one answer.
   FactorAdmission admission_;
-  StallWatch watch_{0};
+  StagnationDetector watch_{0};
   bool is_possible_ = true;
   bool had_no_room_ = false;
   std::unique_ptr<DirichletSystem> system_;  // null without a Newton step

@@ -23,7 +23,7 @@ namespace {
 
 // So many released unknowns are about as dear as a new factor without them. (Measured with heads of
 // 25,000 and 36,000 vertices.)
-constexpr Eigen::Index kMostReleased = 120;
+constexpr Eigen::Index kMaxReleased = 120;
 
 absl::Status Prepare(const std::vector<int32_t>& prescribed, int unknowns_per_node,
                      absl::FunctionRef<SparseMatrix()> assemble,
@@ -31,7 +31,7 @@ absl::Status Prepare(const std::vector<int32_t>& prescribed, int unknowns_per_no
   if (*system != nullptr) {
     const Eigen::Index ever = (*system)->num_released() + (*system)->num_prescribed();
     const auto kept = static_cast<Eigen::Index>(prescribed.size());
-    if (ever - kept <= kMostReleased) return (*system)->KeepOnly(prescribed);
+    if (ever - kept <= kMaxReleased) return (*system)->KeepOnly(prescribed);
     system->reset();
   }
   TF_ASSIGN_OR_RETURN(*system, ReleasableSystem::Create(assemble(), prescribed,

@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 
 constexpr double kFirstDamping = 1e-6;
 constexpr double kLeastDamping = 1e-12;
-constexpr double kMostDamping = 1e12;
+constexpr double kMaxDamping = 1e12;
 
 // Of the steps of differences: shorter ones drown in what residuals are rounded to.
 constexpr double kTellingOfSlopes = 0.1;
@@ -116,7 +116,7 @@ class Search {
     const VectorXd lower = problem_.lower - at_.x;
     const VectorXd upper = problem_.upper - at_.x;
     const bool slopes_are_of_here = SlopesAreOfHere();
-    for (; damping_ < kMostDamping; damping_ *= 10) {
+    for (; damping_ < kMaxDamping; damping_ *= 10) {
       const MatrixXd model = curvature_.AddedTo(normal_);
       MatrixXd H = model;
       // The unknowns have one scale, so the plain form: Marquardt's would not hold those that

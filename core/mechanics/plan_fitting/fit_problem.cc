@@ -73,9 +73,9 @@ class Resolver {
                              : "nothing may move; give a handle bounds for a rotation or a "
                                "translation");
     }
-    if (problem_.unknowns.size() > kMostFitUnknowns) {
+    if (problem_.unknowns.size() > kMaxFitUnknowns) {
       return absl::InvalidArgumentError(
-          absl::StrCat(problem_.unknowns.size(), " numbers may move; at most ", kMostFitUnknowns,
+          absl::StrCat(problem_.unknowns.size(), " numbers may move; at most ", kMaxFitUnknowns,
                        " are fitted (18 for three segments); let fewer move"));
     }
     return absl::OkStatus();
@@ -139,7 +139,7 @@ class Resolver {
     const SkinFacets& skin = *skin_;
     if (skin.empty()) return Refuse(what, "the mesh has no skin: all of its boundary is held");
     const NearestSkin nearest = skin.Nearest(signs_.cwiseProduct(*request.point_mm));
-    if (nearest.distance_mm > kMostOffSkinMm) {
+    if (nearest.distance_mm > kMaxOffSkinMm) {
       return Refuse(
           what,
           absl::StrFormat("point_mm %s lies %.2f mm off the skin (%s; at most %g mm are taken); "
@@ -148,7 +148,7 @@ class Resolver {
                           skin.IsInTissue(signs_.cwiseProduct(*request.point_mm))
                               ? "in the tissue"
                               : "in the air or in bone",
-                          kMostOffSkinMm, PointText(signs_.cwiseProduct(nearest.position))));
+                          kMaxOffSkinMm, PointText(signs_.cwiseProduct(nearest.position))));
     }
     target->point = nearest.point;
     target->off_skin_mm = nearest.distance_mm;

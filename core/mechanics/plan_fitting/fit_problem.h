@@ -69,7 +69,7 @@ std::string UnknownName(const FitProblem& problem, const FitUnknown& unknown);
 // Errors: those of CheckFitRequest; InvalidArgument, in one line that names the target or the
 // handle: a point off the skin (by how much, in the tissue or outside it, and where the nearest
 // skin is); a vertex or a handle that does not exist; nothing that may move, or more than
-// kMostFitUnknowns.
+// kMaxFitUnknowns.
 absl::StatusOr<FitProblem> ResolveFit(const FitRequest& request, const TetMesh& mesh,
                                       const TriangleIndices& boundary,
                                       const ConstraintSet& constraints,

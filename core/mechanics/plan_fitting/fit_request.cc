@@ -49,10 +49,10 @@ absl::Status CheckTarget(const FitTargetRequest& target) {
       !std::isfinite(target.movement_mm)) {
     return Refuse(what, "a number is NaN or infinite; give finite ones");
   }
-  if (!(target.weight > 0 && target.weight <= kMostTargetWeight)) {
+  if (!(target.weight > 0 && target.weight <= kMaxTargetWeight)) {
     return Refuse(what,
                   absl::StrCat("its weight is ", target.weight, "; it must be above 0 and at most ",
-                               kMostTargetWeight, "; leave out a target that does not count"));
+                               kMaxTargetWeight, "; leave out a target that does not count"));
   }
   return CheckWish(target, what);
 }
@@ -63,8 +63,8 @@ struct RangeKind {
   double most;
   absl::string_view most_in_words;
 };
-constexpr RangeKind kRotation = {"rotation about ", kMostFitRotation, "90 degrees"};
-constexpr RangeKind kTranslation = {"translation along ", kMostFitTranslationMm, "1000 mm"};
+constexpr RangeKind kRotation = {"rotation about ", kMaxFitRotation, "90 degrees"};
+constexpr RangeKind kTranslation = {"translation along ", kMaxFitTranslationMm, "1000 mm"};
 
 absl::Status CheckRanges(const std::array<FitFreedom::Range, 3>& ranges, const RangeKind& kind,
                          const std::string& what) {
@@ -113,18 +113,18 @@ absl::Status CheckFitRequest(const FitRequest& request) {
   if (request.targets.empty()) {
     return absl::InvalidArgumentError("there is no target; say what the skin is to do");
   }
-  if (request.targets.size() > kMostFitTargets) {
+  if (request.targets.size() > kMaxFitTargets) {
     return absl::InvalidArgumentError(absl::StrCat(
-        "there are ", request.targets.size(), " targets; at most ", kMostFitTargets, " are read"));
+        "there are ", request.targets.size(), " targets; at most ", kMaxFitTargets, " are read"));
   }
   TF_RETURN_IF_ERROR(CheckSettings(request));
   std::set<std::string> names;
   size_t num_vertices = 0;
   for (const FitTargetRequest& target : request.targets) {
     num_vertices += target.vertices.size();
-    if (num_vertices > kMostFitVertices) {
+    if (num_vertices > kMaxFitVertices) {
       return Refuse(absl::StrCat("target \"", target.name, "\""),
-                    absl::StrCat("the targets name more than ", kMostFitVertices,
+                    absl::StrCat("the targets name more than ", kMaxFitVertices,
                                  " vertices together; name fewer, or points"));
     }
     TF_RETURN_IF_ERROR(CheckTarget(target));

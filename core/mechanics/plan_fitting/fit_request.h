@@ -19,16 +19,16 @@
 namespace tissueform {
 
 // Most unknowns of a fit: six a segment, for four of them. The usual most is 18.
-inline constexpr size_t kMostFitUnknowns = 24;
-inline constexpr size_t kMostFitTargets = 256;
+inline constexpr size_t kMaxFitUnknowns = 24;
+inline constexpr size_t kMaxFitTargets = 256;
 // That targets name, all together.
-inline constexpr size_t kMostFitVertices = 20000;
+inline constexpr size_t kMaxFitVertices = 20000;
 // How far from the skin a point may be given: what a mesh of a face is off its CT.
-inline constexpr double kMostOffSkinMm = 2.0;
+inline constexpr double kMaxOffSkinMm = 2.0;
 // Farther than any segment turns, and than answers can be prepared for.
-inline constexpr double kMostFitRotation = std::numbers::pi / 2;
-inline constexpr double kMostFitTranslationMm = 1000;
-inline constexpr double kMostTargetWeight = 1e6;
+inline constexpr double kMaxFitRotation = std::numbers::pi / 2;
+inline constexpr double kMaxFitTranslationMm = 1000;
+inline constexpr double kMaxTargetWeight = 1e6;
 
 // What is wanted of one point, in the axes of the request.
 struct FitTargetRequest {
@@ -70,10 +70,10 @@ struct FitRequest {
 // What can be told of a request without mesh and plan.
 //
 // Errors: InvalidArgument, in one line that names the target or the handle: no target, more of them
-// than kMostFitTargets or of vertices than kMostFitVertices, a name twice; a number that is not
+// than kMaxFitTargets or of vertices than kMaxFitVertices, a name twice; a number that is not
 // finite; a weight that is not positive; a direction without length; none or several of the forms
-// of a point and of what is wanted; bounds that cross or lie beyond kMostFitRotation or
-// kMostFitTranslationMm; a handle twice.
+// of a point and of what is wanted; bounds that cross or lie beyond kMaxFitRotation or
+// kMaxFitTranslationMm; a handle twice.
 absl::Status CheckFitRequest(const FitRequest& request);
 
 }  // namespace tissueform

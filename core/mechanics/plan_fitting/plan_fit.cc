@@ -24,7 +24,7 @@ using Eigen::VectorXd;
 
 // Numbers of the targets that change by less when the full model is asked again end the search.
 constexpr double kModelSettledMm = 2e-4;
-constexpr int kMostModelAnswers = 8;
+constexpr int kMaxModelAnswers = 8;
 class Fitting {
  public:
   Fitting(const FitProblem& problem, const TetMesh& mesh, const ConstraintSet& constraints,
@@ -52,7 +52,7 @@ class Fitting {
       const double change = (measured - correction).cwiseAbs().maxCoeff();
       correction = measured;
       fit.prepared_error_mm = correction.cwiseAbs().maxCoeff();
-      if (change <= kModelSettledMm || fit.model_answers >= kMostModelAnswers) break;
+      if (change <= kModelSettledMm || fit.model_answers >= kMaxModelAnswers) break;
       const Stopwatch again;
       solution = Search(solution.x, correction, &fit);
       fit.search_seconds += again.Seconds();

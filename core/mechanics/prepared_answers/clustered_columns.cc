@@ -137,7 +137,7 @@ ClusteredColumns::Turned ClusteredColumns::Turn(const std::vector<Eigen::Index>&
 void ClusteredColumns::Store(const Turned& turned, const std::vector<Eigen::Index>& ends,
                              const Digits& digits) {
   const auto store = [](const Eigen::MatrixXd& values, bool all_digits) {
-    PanelMatrix panels(values.rows(), values.cols(), all_digits ? values.cols() : 0);
+    QuantizedMatrix panels(values.rows(), values.cols(), all_digits ? values.cols() : 0);
     for (Eigen::Index c = 0; c < values.cols(); ++c) panels.SetColumn(c, values.col(c));
     return panels;
   };
@@ -152,9 +152,9 @@ void ClusteredColumns::Store(const Turned& turned, const std::vector<Eigen::Inde
 }
 
 bool ClusteredColumns::HasDigitsEnough(const Turned& turned, const Uses& uses) const {
-  constexpr Eigen::Index kMost = 20;  // what digits do hardly differs from one use to the other
+  constexpr Eigen::Index kMax = 20;  // what digits do hardly differs from one use to the other
   FloatPositions answer;
-  for (Eigen::Index s = 0; s < std::min(kMost, uses.tried.cols()); ++s) {
+  for (Eigen::Index s = 0; s < std::min(kMax, uses.tried.cols()); ++s) {
     Evaluate(uses.tried.col(s), &answer);
     const Eigen::VectorXd coefficients = turned.map * uses.tried.col(s);
     for (size_t k = 0; k < clusters_.size(); ++k) {
@@ -176,8 +176,9 @@ bool ClusteredColumns::HasDigitsEnough(const Turned& turned, const Uses& uses) c
 void ClusteredColumns::Evaluate(const Eigen::VectorXd& factors, FloatPositions* positions) const {
   if (positions->rows() < rest_.rows()) positions->resize(rest_.rows(), 3);
   Eigen::VectorXf coefficients(map_.rows());
-  const auto all_of = [](const PanelMatrix& panels) {
-    return PanelMatrix::Reading{.first = 0, .first_full = panels.cols() - panels.full_cols()};
+  const auto all_of = [](const QuantizedMatrix& panels) {
+    return QuantizedMatrix::EvaluationPlan{.first = 0,
+                                           .first_full = panels.cols() - panels.full_cols()};
   };
   map_.Multiply(factors, all_of(map_), coefficients.data());
   FloatPositions moves(std::min<Eigen::Index>(kClusterVertices, rest_.rows()), 3);
@@ -228,8 +229,8 @@ int64_t ClusteredColumns::BytesNeeded(Eigen::Index num_vertices, Eigen::Index co
   return (3 * num_vertices * (columns + per_cluster) + clusters * per_cluster * columns * 2 +
           kSquares * columns * columns) *
              static_cast<int64_t>(sizeof(double)) +
-         PanelMatrix::BytesNeeded(clusters * per_cluster, columns, columns) +
-         clusters * PanelMatrix::BytesNeeded(3 * kClusterVertices, columns, columns) +
+         QuantizedMatrix::BytesNeeded(clusters * per_cluster, columns, columns) +
+         clusters * QuantizedMatrix::BytesNeeded(3 * kClusterVertices, columns, columns) +
          4 * num_vertices * static_cast<int64_t>(sizeof(float));
 }
 

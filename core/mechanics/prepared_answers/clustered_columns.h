@@ -8,7 +8,7 @@
 
 #include "core/base/types.h"
 #include "core/mechanics/answer_evaluator/portable_answers.h"
-#include "core/mechanics/prepared_answers/panel_matrix.h"
+#include "core/mechanics/prepared_answers/quantized_matrix.h"
 
 namespace tissueform {
 
@@ -63,7 +63,7 @@ class ClusteredColumns {
   struct Cluster {
     Eigen::Index first_vertex;  // in vertices_; the next one's is its end
     Eigen::Index first_row;     // of its part of the map
-    PanelMatrix columns;
+    QuantizedMatrix columns;
   };
 
   Turned Turn(const std::vector<Eigen::Index>& ends, const Eigen::MatrixXd& columns,
@@ -74,7 +74,7 @@ class ClusteredColumns {
 
   FloatPositions rest_;
   std::vector<int32_t> vertices_;  // of the clusters in turn: their numbers in the answer
-  PanelMatrix map_;
+  QuantizedMatrix map_;
   std::vector<Cluster> clusters_;
 };
 

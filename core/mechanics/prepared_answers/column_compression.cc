@@ -68,7 +68,7 @@ Eigen::Index CountBelow(const Eigen::MatrixXd& moves, double limit) {
 
 }  // namespace
 
-Eigen::MatrixXd UsesRoot(const ColumnUses& uses) {
+Eigen::MatrixXd UsesRoot(const ColumnWeights& uses) {
   constexpr double kOfWidest = 1e-3;
   const Eigen::MatrixXd& typical = uses.typical;
   const Eigen::Index columns = typical.rows();
@@ -83,7 +83,7 @@ Eigen::MatrixXd UsesRoot(const ColumnUses& uses) {
 }
 
 ColumnCompression::ColumnCompression(const Eigen::MatrixXd& columns, int rows_per_vertex,
-                                     const ColumnUses& uses, double tolerance_mm) {
+                                     const ColumnWeights& uses, double tolerance_mm) {
   const Eigen::Index count = columns.cols();
   const Eigen::MatrixXd root = UsesRoot(uses);
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(count, count);

@@ -15,7 +15,7 @@ namespace tissueform {
 // What columns are multiplied with: `factors` numbers a column and pose (3 where a column is a
 // scalar field that moves vertices along x, y and z, 1 where it holds coordinates). #columns by
 // factors * #poses, those of a pose side by side.
-struct ColumnUses {
+struct ColumnWeights {
   int factors = 1;
   Eigen::MatrixXd typical;  // what the columns are turned for
   Eigen::MatrixXd widest;   // what they must answer within the tolerance
@@ -23,7 +23,7 @@ struct ColumnUses {
 
 // Lower L with L L^T the uses' covariance: typical uses are white in L^-1 f. What no typical use
 // needs counts for a thousandth of its widest use: so that the turning can be undone.
-Eigen::MatrixXd UsesRoot(const ColumnUses& uses);
+Eigen::MatrixXd UsesRoot(const ColumnWeights& uses);
 
 // Columns that hardly differ, or that poses use together only, said by fewer:
 //   columns * f = kept * (map * f) + cut * (cut_map * f)   for every f, to rounding,
@@ -34,7 +34,7 @@ class ColumnCompression {
  public:
   // As few columns as keep the cut part of the widest uses below `tolerance_mm`. `columns`: #rows
   // by #columns in mm, of which `rows_per_vertex` (1 or 3) rows in turn belong to one vertex.
-  ColumnCompression(const Eigen::MatrixXd& columns, int rows_per_vertex, const ColumnUses& uses,
+  ColumnCompression(const Eigen::MatrixXd& columns, int rows_per_vertex, const ColumnWeights& uses,
                     double tolerance_mm);
 
   // #rows by #kept, those that matter least first.

@@ -12,7 +12,7 @@
 #include "core/base/status_macros.h"
 #include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/prepared_answers/chosen_vertices.h"
-#include "core/mechanics/prepared_answers/panel_response.h"
+#include "core/mechanics/prepared_answers/compressed_response.h"
 #include "core/mechanics/prepared_answers/pose_samples.h"
 
 namespace tissueform {
@@ -44,7 +44,8 @@ class LinearElasticResponse : public VertexResponse {
         max_rotation_rad_(options.max_rotation_rad),
         chosen_(std::move(chosen)),
         panel_(preparation_->mesh().positions()(free, Eigen::all),
-               PanelResponse::Rows::kCoordinates, RowsOfVertices(elastic_.response_columns(), free),
+               CompressedResponse::Rows::kCoordinates,
+               RowsOfVertices(elastic_.response_columns(), free),
                ElasticUses(*preparation_, elastic_, options.max_rotation_rad),
                options.tolerance_mm) {}
 
@@ -62,7 +63,7 @@ class LinearElasticResponse : public VertexResponse {
 
   std::optional<double> Answer(absl::Span<const HandlePose> poses,
                                FloatPositions* positions) const override {
-    const PanelResponse::Reading reading = Choose(poses);
+    const CompressedResponse::EvaluationPlan reading = Choose(poses);
     const double bound_mm = BoundMm(poses, reading);
     if (!(bound_mm <= tolerance_mm_)) return std::nullopt;
     Write(poses, reading, positions);
@@ -87,13 +88,14 @@ class LinearElasticResponse : public VertexResponse {
 
  private:
   // Nothing is truncated: 12 columns make every affine motion of a handle.
-  PanelResponse::Reading Choose(absl::Span<const HandlePose> poses) const {
+  CompressedResponse::EvaluationPlan Choose(absl::Span<const HandlePose> poses) const {
     return panel_.Choose(elastic_.Coefficients(poses), tolerance_mm_);
   }
-  double BoundMm(absl::Span<const HandlePose> poses, const PanelResponse::Reading& reading) const {
+  double BoundMm(absl::Span<const HandlePose> poses,
+                 const CompressedResponse::EvaluationPlan& reading) const {
     return std::max(reading.bound_mm, chosen_.RoundingBoundMm(poses));
   }
-  void Write(absl::Span<const HandlePose> poses, const PanelResponse::Reading& reading,
+  void Write(absl::Span<const HandlePose> poses, const CompressedResponse::EvaluationPlan& reading,
              FloatPositions* positions) const {
     positions->resize(chosen_.size(), 3);
     panel_.Evaluate(reading, positions);
@@ -105,13 +107,13 @@ class LinearElasticResponse : public VertexResponse {
   const double tolerance_mm_;
   const double max_rotation_rad_;
   const ChosenVertices chosen_;
-  const PanelResponse panel_;  // of the free ones
+  const CompressedResponse panel_;  // of the free ones
 };
 
 }  // namespace
 
-ColumnUses ElasticUses(const MeshPreparation& preparation, const ElasticSystem& elastic,
-                       double max_rotation_rad) {
+ColumnWeights ElasticUses(const MeshPreparation& preparation, const ElasticSystem& elastic,
+                          double max_rotation_rad) {
   constexpr int kSamples = 400;
   const double size_mm = preparation.mesh().BoundingBoxDiagonal();
   const std::vector<Eigen::Vector3d> centroids = HandleCentroids(preparation);
@@ -129,8 +131,8 @@ ColumnUses ElasticUses(const MeshPreparation& preparation, const ElasticSystem& 
 }
 
 int64_t LinearElasticResponseBytes(const MeshPreparation& preparation, Eigen::Index num_vertices) {
-  return PanelResponse::BytesNeeded(num_vertices, PanelResponse::Rows::kCoordinates,
-                                    NumColumns(preparation));
+  return CompressedResponse::BytesNeeded(num_vertices, CompressedResponse::Rows::kCoordinates,
+                                         NumColumns(preparation));
 }
 
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateLinearElasticResponse(

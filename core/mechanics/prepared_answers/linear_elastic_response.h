@@ -31,8 +31,8 @@ struct LinearElasticResponseOptions {
 // What poses do with the 12 columns a handle. Moves have no range: a sixth of the mesh, which is 3
 // cm on a head, beside those of turns about a far pivot. What is wider is covered as far as the
 // digits go that these need.
-ColumnUses ElasticUses(const MeshPreparation& preparation, const ElasticSystem& elastic,
-                       double max_rotation_rad);
+ColumnWeights ElasticUses(const MeshPreparation& preparation, const ElasticSystem& elastic,
+                          double max_rotation_rad);
 
 // Bytes that a response of so many vertices needs at most, while it is made; 12 columns a handle.
 int64_t LinearElasticResponseBytes(const MeshPreparation& preparation, Eigen::Index num_vertices);

@@ -27,7 +27,7 @@ namespace {
 // Of the converged answers that the estimate is measured by, and what is put on top of their
 // median: the 99th percentile of random poses. (The worst of a few says less: one pose of the
 // bundled head had 4 times the median.)
-constexpr int kMostCalibrationIterations = 60;
+constexpr int kMaxCalibrationIterations = 60;
 constexpr double kEstimateAllowance = 2.5;
 // More for every handle beside the first: what lies between two of them differs more from pose to
 // pose. Bars with one, two and three handles need 1.9, 2.4 and 3.7.
@@ -254,7 +254,7 @@ class NeoHookeanResponse : public VertexResponse {
                          const Cancellation& cancellation) {
     if (free.empty()) return absl::OkStatus();  // handles are where their poses put them
     NeoHookeanOptions options;
-    options.max_iterations = kMostCalibrationIterations;
+    options.max_iterations = kMaxCalibrationIterations;
     TF_ASSIGN_OR_RETURN(const std::unique_ptr<Deformer> deformer,
                         CreateNeoHookeanDeformer(preparation_, options, cancellation));
     DeformControl control;

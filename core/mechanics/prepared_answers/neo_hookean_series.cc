@@ -7,7 +7,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/mechanics/elasticity/neo_hookean_expansion.h"
-#include "core/mechanics/prepared_answers/panel_response.h"
+#include "core/mechanics/prepared_answers/compressed_response.h"
 #include "core/mechanics/prepared_answers/pose_numbers.h"
 #include "core/mechanics/prepared_answers/pose_samples.h"
 

@@ -14,7 +14,7 @@
 #include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/deformation/harmonic_fields.h"
 #include "core/mechanics/prepared_answers/chosen_vertices.h"
-#include "core/mechanics/prepared_answers/panel_response.h"
+#include "core/mechanics/prepared_answers/compressed_response.h"
 #include "core/mechanics/prepared_answers/pose_samples.h"
 #include "core/mechanics/prepared_answers/rotation_expansion.h"
 #include "core/mechanics/prepared_answers/term_responses.h"
@@ -81,10 +81,10 @@ ResponseBasisPlan PlanOfDegree(int degree, const MeshPreparation& preparation,
   plan.degree = degree;
   plan.num_terms =
       static_cast<int>(3 * SimplexPolynomials::NumTerms(k, degree)) + kColumnsPerHandle * k;
-  plan.bytes =
-      PanelResponse::BytesNeeded(num_vertices, PanelResponse::Rows::kVertices, plan.num_terms) +
-      RotationExpansion::BytesNeeded(k, degree + kGuardDegrees) +
-      BytesOfPass(preparation, k, degree);
+  plan.bytes = CompressedResponse::BytesNeeded(num_vertices, CompressedResponse::Rows::kVertices,
+                                               plan.num_terms) +
+               RotationExpansion::BytesNeeded(k, degree + kGuardDegrees) +
+               BytesOfPass(preparation, k, degree);
   return plan;
 }
 
@@ -108,7 +108,7 @@ class ResponseBasis : public VertexResponse {
     TF_RETURN_IF_ERROR(PreparePolynomials(free, preparation, cancellation));
     TF_RETURN_IF_ERROR(cancellation.Check());
     panel_.emplace(preparation->mesh().positions()(free, Eigen::all),
-                   PanelResponse::Rows::kVertices, columns_, UsesOf(*preparation),
+                   CompressedResponse::Rows::kVertices, columns_, UsesOf(*preparation),
                    options_.tolerance_mm);
     columns_.resize(0, 0);
     return absl::OkStatus();
@@ -166,7 +166,7 @@ class ResponseBasis : public VertexResponse {
  private:
   // Of poses.
   struct PlannedAnswer {
-    PanelResponse::Reading reading;
+    CompressedResponse::EvaluationPlan reading;
     double bound_mm = 0;  // with what the expansion leaves out
   };
 
@@ -243,7 +243,7 @@ class ResponseBasis : public VertexResponse {
     });
   }
 
-  ColumnUses UsesOf(const MeshPreparation& preparation) const {
+  ColumnWeights UsesOf(const MeshPreparation& preparation) const {
     constexpr int kSamples = 300;
     const double size_mm = preparation.mesh().BoundingBoxDiagonal();
     PoseRange range{.rotation_rad = options_.max_rotation_rad,
@@ -251,7 +251,7 @@ class ResponseBasis : public VertexResponse {
                     .translation_mm = 0.05 * size_mm,
                     .pivot_offset_mm = 0.1 * size_mm};
     const std::vector<Eigen::Vector3d> centroids = HandleCentroids(preparation);
-    ColumnUses uses{.factors = 3, .typical = {}, .widest = {}};
+    ColumnWeights uses{.factors = 3, .typical = {}, .widest = {}};
     uses.typical = FactorsOf(SamplePoses(centroids, range, kSamples));
     // Moves have no range: a sixth of the mesh, which is 3 cm on a head, beside those of turns
     // about a far pivot. Farther ones are covered as far as the digits go that these need.
@@ -327,7 +327,7 @@ class ResponseBasis : public VertexResponse {
   const RotationExpansion expansion_;  // with the guard degrees
   const ChosenVertices chosen_;
   Eigen::MatrixXd columns_;  // of the free ones; empty after Prepare
-  std::optional<PanelResponse> panel_;
+  std::optional<CompressedResponse> panel_;
   std::vector<Eigen::Vector3d> origins_;  // o_h
   // Largest displacement that a polynomial of degree degree_ + 1 gives one of the free ones, each;
   // and that any one does, mm.
@@ -345,11 +345,11 @@ absl::StatusOr<ResponseBasisPlan> PlanResponseBasis(const MeshPreparation& prepa
   const double size_mm = preparation.mesh().BoundingBoxDiagonal();
   for (int degree = 1;; ++degree) {
     if (SimplexPolynomials::NumTerms(static_cast<int>(num_handles), degree) >
-        kMostResponsePolynomials) {
+        kMaxResponsePolynomials) {
       return absl::InvalidArgumentError(
           absl::StrCat("a response basis for ", num_handles, " handles, ", options.max_rotation_rad,
                        " rad and ", options.tolerance_mm, " mm would need more than ",
-                       kMostResponsePolynomials, " polynomials; prepare a smaller range"));
+                       kMaxResponsePolynomials, " polynomials; prepare a smaller range"));
     }
     if (PlannedErrorMm(size_mm, num_handles, degree, options) <= options.tolerance_mm) {
       return PlanOfDegree(degree, preparation, num_vertices);

@@ -36,10 +36,10 @@ struct ResponseBasisPlan {
 };
 
 // A basis of more polynomials than this is refused: it would be slower than the direct solve.
-inline constexpr int kMostResponsePolynomials = 500;
+inline constexpr int kMaxResponsePolynomials = 500;
 
 // Errors: InvalidArgument (an option that is not a positive number or, for the scale, outside [0,
-// 1); a range so wide or a tolerance so small that kMostResponsePolynomials are not enough).
+// 1); a range so wide or a tolerance so small that kMaxResponsePolynomials are not enough).
 absl::StatusOr<ResponseBasisPlan> PlanResponseBasis(const MeshPreparation& preparation,
                                                     Eigen::Index num_vertices,
                                                     const ResponseBasisOptions& options);

@@ -11,7 +11,7 @@
 #include "core/mechanics/answer_evaluator/pose_range.h"
 #include "core/mechanics/prepared_answers/column_compression.h"
 #include "core/mechanics/prepared_answers/linear_elastic_response.h"
-#include "core/mechanics/prepared_answers/panel_matrix.h"
+#include "core/mechanics/prepared_answers/quantized_matrix.h"
 #include "core/mechanics/uncertainty/material_expansion.h"
 #include "core/mechanics/uncertainty/uncertainty_band.h"
 
@@ -81,7 +81,7 @@ void BandColumns::Describe(PortableAnswers* answers) const {
   PortableAnswers compressed;
   compression.Describe(&compressed);
   answers->band_map = std::move(compressed.map);
-  PanelMatrix packed(stacked.rows(), compression.num_kept(), 0);
+  QuantizedMatrix packed(stacked.rows(), compression.num_kept(), 0);
   for (Eigen::Index c = 0; c < compression.num_kept(); ++c) {
     packed.SetColumn(c, compression.kept().col(c));
   }

@@ -22,7 +22,7 @@ using Corners = std::array<Vector3d, 3>;
 
 // From how many triangles of its wall a cavity is looked at. A ray looks at every triangle, without
 // a search tree; the number keeps that linear in the size of the surface.
-constexpr size_t kMostViews = 24;
+constexpr size_t kMaxViews = 24;
 
 Corners CornersOf(const TriangleMesh& surface, Eigen::Index triangle) {
   Corners corners;
@@ -61,7 +61,7 @@ std::vector<Eigen::Index> Views(const TriangleMesh& surface, const SurfaceParts&
   const auto area = [&](Eigen::Index f) { return NormalOf(CornersOf(surface, f)).squaredNorm(); };
   std::stable_sort(views.begin(), views.end(),
                    [&](Eigen::Index a, Eigen::Index b) { return area(a) > area(b); });
-  views.resize(std::min(views.size(), kMostViews));
+  views.resize(std::min(views.size(), kMaxViews));
   return views;
 }
 

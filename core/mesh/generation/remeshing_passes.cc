@@ -29,9 +29,9 @@ constexpr double kShort = 4.0 / 5.0;
 
 // A triangle may turn by less than this when a corner of it moves, as cosine. With 0.3 walls went
 // through each other twice as often.
-constexpr double kMostTurn = 0.6;
+constexpr double kMaxTurn = 0.6;
 // Two triangles whose diagonal is flipped may bend by less than this, as cosine.
-constexpr double kMostBend = 0.7;
+constexpr double kMaxBend = 0.7;
 
 // A flip may make the worse of two triangles so much worse, where it brings the numbers of
 // neighbours nearer to six; elsewhere it has to make it better by so much.
@@ -41,7 +41,7 @@ constexpr double kBetterShape = 1.1;
 // A collapse may leave what it takes away so far from the surface, as part of the wanted length:
 // tips of thin parts stay. Without it up to 11 mm of them were lost on heads, with less than a
 // fifth the edges become shorter than is asked for.
-constexpr double kMostLost = 0.25;
+constexpr double kMaxLost = 0.25;
 
 constexpr Eigen::Index kGrain = 1024;
 
@@ -156,9 +156,9 @@ class Passes {
       const double longest = kLong * Wanted(end, to);
       may = (surface_.Place(end) - place).squaredNorm() <= longest * longest &&
             (surface_.Opposite(out) == to ||
-             TurnsLittle(surface_.Normal(out), surface_.NormalWith(out, place), kMostTurn));
+             TurnsLittle(surface_.Normal(out), surface_.NormalWith(out, place), kMaxTurn));
     });
-    return may && surface_.CanCollapse(h) && DepthLost(h) <= kMostLost * Wanted(from, to);
+    return may && surface_.CanCollapse(h) && DepthLost(h) <= kMaxLost * Wanted(from, to);
   }
 
   // How far the start of a half-edge will lie from the surface once it is drawn into the end.
@@ -211,9 +211,9 @@ class Passes {
     const Vector3d abc = surface_.Normal(h);
     const Vector3d bad = surface_.Normal(surface_.Twin(h));
     const Vector3d both = abc + bad;
-    return TurnsLittle(abc, bad, kMostBend) &&
-           TurnsLittle(both, (pc - pd).cross(pa - pd), kMostBend) &&
-           TurnsLittle(both, (pd - pc).cross(pb - pc), kMostBend);
+    return TurnsLittle(abc, bad, kMaxBend) &&
+           TurnsLittle(both, (pc - pd).cross(pa - pd), kMaxBend) &&
+           TurnsLittle(both, (pd - pc).cross(pb - pc), kMaxBend);
   }
 
   // Every vertex towards the mean of its neighbours as they lay before, along the surface, and back
@@ -257,7 +257,7 @@ class Passes {
     bool turns = false;
     surface_.ForEachOut(v, [&](int32_t out) {
       turns = turns ||
-              !TurnsLittle(surface_.Normal(out), surface_.NormalWith(out, hit.place), kMostTurn);
+              !TurnsLittle(surface_.Normal(out), surface_.NormalWith(out, hit.place), kMaxTurn);
     });
     return turns ? place : hit.place;
   }

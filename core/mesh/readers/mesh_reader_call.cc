@@ -14,7 +14,7 @@ namespace tissueform {
 namespace {
 
 constexpr char kWhat[] = "reading it";
-constexpr int64_t kMostArrays = 1 << 16;
+constexpr int64_t kMaxArrays = 1 << 16;
 constexpr int64_t kNumTypes = std::variant_size_v<Attribute::Values>;
 
 void SendAttributes(const std::vector<Attribute>& attributes, PipeSender* sender) {
@@ -55,7 +55,7 @@ absl::Status ReceiveValues(PipeReceiver* receiver, Attribute::Values* values) {
 }
 
 absl::Status ReceiveAttributes(PipeReceiver* receiver, std::vector<Attribute>* attributes) {
-  TF_ASSIGN_OR_RETURN(const int64_t count, receiver->Number(kMostArrays));
+  TF_ASSIGN_OR_RETURN(const int64_t count, receiver->Number(kMaxArrays));
   for (int64_t i = 0; i < count; ++i) {
     Attribute attribute;
     TF_ASSIGN_OR_RETURN(attribute.name, receiver->Text());

@@ -18,9 +18,9 @@
 namespace tissueform {
 
 // Largest sizes that are read.
-inline constexpr size_t kMostCaseBytes = size_t{512} << 20;
-inline constexpr size_t kMostCaseJsonBytes = size_t{4} << 20;
-inline constexpr int64_t kMostSurfaceTriangles = 4'000'000;
+inline constexpr size_t kMaxCaseBytes = size_t{512} << 20;
+inline constexpr size_t kMaxCaseJsonBytes = size_t{4} << 20;
+inline constexpr int64_t kMaxSurfaceTriangles = 4'000'000;
 
 // What names the tet mesh and the bytes in which it is uploaded (core/mesh/payload).
 struct CaseMesh {

@@ -129,11 +129,11 @@ absl::Status CheckNames(const CaseFile& contents) {
 }  // namespace
 
 absl::StatusOr<CaseFile> ParseCase(absl::string_view bytes) {
-  if (bytes.size() > kMostCaseBytes) {
+  if (bytes.size() > kMaxCaseBytes) {
     return absl::ResourceExhaustedError(
-        absl::StrCat("it has ", bytes.size(), " bytes; at most ", kMostCaseBytes, " are read"));
+        absl::StrCat("it has ", bytes.size(), " bytes; at most ", kMaxCaseBytes, " are read"));
   }
-  TF_ASSIGN_OR_RETURN(const Glb glb, ParseGlb(bytes, kMostCaseJsonBytes));
+  TF_ASSIGN_OR_RETURN(const Glb glb, ParseGlb(bytes, kMaxCaseJsonBytes));
   TF_ASSIGN_OR_RETURN(const Json ours, ParseExtension(glb, kCaseExtension, CaseSchema()));
   CaseFile contents;
   ParsePlainKeys(ours, &contents);
@@ -144,7 +144,7 @@ absl::StatusOr<CaseFile> ParseCase(absl::string_view bytes) {
 }
 
 absl::StatusOr<CaseFile> ReadCase(const std::string& path) {
-  TF_ASSIGN_OR_RETURN(const std::string bytes, ReadJsonText(path, "case", kMostCaseBytes));
+  TF_ASSIGN_OR_RETURN(const std::string bytes, ReadJsonText(path, "case", kMaxCaseBytes));
   absl::StatusOr<CaseFile> contents = ParseCase(bytes);
   if (contents.ok()) return contents;
   return absl::Status(contents.status().code(),

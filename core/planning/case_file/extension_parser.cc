@@ -91,9 +91,9 @@ absl::StatusOr<std::vector<CaseSurface>> ParseSurfaces(const Glb& glb, const Jso
     TF_ASSIGN_OR_RETURN(CaseSurface surface,
                         ParseSurface(glb, json[s], mesh_vertices, absl::StrCat("/surfaces/", s)));
     bytes += static_cast<size_t>(surface.positions.size() + surface.triangles.size()) * 4;
-    if (bytes > kMostCaseBytes) {
+    if (bytes > kMaxCaseBytes) {
       return absl::ResourceExhaustedError(
-          absl::StrCat("the surfaces have more than ", kMostCaseBytes, " bytes together"));
+          absl::StrCat("the surfaces have more than ", kMaxCaseBytes, " bytes together"));
     }
     surfaces.push_back(std::move(surface));
   }

@@ -33,7 +33,7 @@ std::vector<CaseLandmark> ParseLandmarks(const nlohmann::json& json);
 HeadFrame ParseHeadFrame(const nlohmann::json& json);
 
 // Every one of "surfaces". Errors: those of ParseSurface; ResourceExhausted: more than
-// kMostCaseBytes together.
+// kMaxCaseBytes together.
 absl::StatusOr<std::vector<CaseSurface>> ParseSurfaces(const Glb& glb, const nlohmann::json& json,
                                                        int64_t mesh_vertices);
 

@@ -26,7 +26,7 @@ constexpr uint32_t kJsonChunk = 0x4E4F534A;  // "JSON"
 constexpr uint32_t kBinChunk = 0x004E4942;   // "BIN\0"
 constexpr size_t kHeadBytes = 12;
 constexpr size_t kChunkHeadBytes = 8;
-constexpr size_t kMostViews = 1024;
+constexpr size_t kMaxViews = 1024;
 
 absl::Status Refused(absl::string_view what) {
   return absl::InvalidArgumentError(absl::StrCat("not a usable glTF file: ", what));
@@ -70,7 +70,7 @@ absl::Status CutIntoViews(absl::string_view bin, Glb* glb) {
                       WholeNumber(buffers[0], "byteLength", 1, chunk_bytes, "/buffers/0"));
   if (chunk_bytes - buffer_bytes >= 4) return Refused("its buffer is shorter than its BIN chunk");
   TF_ASSIGN_OR_RETURN(const std::vector<Json> views,
-                      Objects(glb->root, "bufferViews", kMostViews, ""));
+                      Objects(glb->root, "bufferViews", kMaxViews, ""));
   for (size_t v = 0; v < views.size(); ++v) {
     const std::string where = absl::StrCat("/bufferViews/", v);
     TF_RETURN_IF_ERROR(WholeNumber(views[v], "buffer", 0, 0, where).status());

@@ -25,7 +25,7 @@ constexpr int kIndexComponents = 5125;
 constexpr int kTriangles = 4;
 // Rounding of three float32 that sum to one.
 constexpr float kWeightTolerance = 1e-5F;
-constexpr size_t kMostAccessors = 256;
+constexpr size_t kMaxAccessors = 256;
 
 // All rows that the view holds. `rows`: how many there must be.
 template <typename Scalar>
@@ -50,7 +50,7 @@ absl::StatusOr<Numbers> ParseAccessor(const Glb& glb, const Json& holder, const 
                                       int component_type, const char* type,
                                       const std::string& where) {
   TF_ASSIGN_OR_RETURN(const std::vector<Json> all,
-                      Objects(glb.root, "accessors", kMostAccessors, ""));
+                      Objects(glb.root, "accessors", kMaxAccessors, ""));
   TF_ASSIGN_OR_RETURN(const int64_t number,
                       WholeNumber(holder, key, 0, static_cast<int64_t>(all.size()) - 1, where));
   const Json& accessor = all[static_cast<size_t>(number)];
@@ -92,9 +92,9 @@ absl::Status ParseTriangles(const Glb& glb, size_t mesh, const std::string& wher
       ParseAccessor(glb, primitive["attributes"], "POSITION", kFloatComponents, "VEC3", at));
   TF_ASSIGN_OR_RETURN(const Numbers indices,
                       ParseAccessor(glb, primitive, "indices", kIndexComponents, "SCALAR", at));
-  if (indices.count > 3 * kMostSurfaceTriangles) {
+  if (indices.count > 3 * kMaxSurfaceTriangles) {
     return absl::ResourceExhaustedError(absl::StrCat(where, " has ", indices.count / 3,
-                                                     " triangles; at most ", kMostSurfaceTriangles,
+                                                     " triangles; at most ", kMaxSurfaceTriangles,
                                                      " are read"));
   }
   if (indices.count % 3 != 0) return BrokenCase(at, "has indices that are no triangles");

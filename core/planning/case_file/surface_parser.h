@@ -20,7 +20,7 @@ namespace tissueform {
 //
 // REQUIRES: `json` has passed the schema. Errors: InvalidArgument, naming the place: a piece that
 // is missing or has another size than is said, NaN or infinity, a vertex that there is not, weights
-// below 0 or over 1 together; ResourceExhausted: over kMostSurfaceTriangles.
+// below 0 or over 1 together; ResourceExhausted: over kMaxSurfaceTriangles.
 absl::StatusOr<CaseSurface> ParseSurface(const Glb& glb, const nlohmann::json& json,
                                          int64_t mesh_vertices, const std::string& where);
 

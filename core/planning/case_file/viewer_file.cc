@@ -69,7 +69,7 @@ absl::StatusOr<std::string> SerializeViewer(const ViewerFile& contents) {
 }
 
 absl::StatusOr<ViewerFile> ParseViewer(absl::string_view bytes) {
-  TF_ASSIGN_OR_RETURN(const Glb glb, ParseGlb(bytes, kMostCaseJsonBytes));
+  TF_ASSIGN_OR_RETURN(const Glb glb, ParseGlb(bytes, kMaxCaseJsonBytes));
   TF_ASSIGN_OR_RETURN(const Json ours, ParseExtension(glb, kViewerExtension, ViewerSchema()));
   ViewerFile contents{.mesh_file_sha256 = TextIn(ours, "mesh_file_sha256"),
                       .landmarks = ParseLandmarks(ours["landmarks"]),
@@ -82,7 +82,7 @@ absl::StatusOr<ViewerFile> ParseViewer(absl::string_view bytes) {
 }
 
 absl::StatusOr<ViewerFile> ReadViewer(const std::string& path) {
-  TF_ASSIGN_OR_RETURN(const std::string bytes, ReadJsonText(path, "viewer", kMostCaseBytes));
+  TF_ASSIGN_OR_RETURN(const std::string bytes, ReadJsonText(path, "viewer", kMaxCaseBytes));
   absl::StatusOr<ViewerFile> contents = ParseViewer(bytes);
   if (contents.ok()) return contents;
   return absl::Status(contents.status().code(),

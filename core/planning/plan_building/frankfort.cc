@@ -27,7 +27,7 @@ constexpr double kPitMm = 14;
 constexpr double kRimMm = 8;
 constexpr double kDeepestCheekMm = 40;
 constexpr int kLeastSocketMm = 15;
-constexpr int kMostSocketMm = 55;
+constexpr int kMaxSocketMm = 55;
 constexpr int kLeastColumns = 6;
 
 // The canal lies behind the top of the joint and opens to the side of it; farther behind are the
@@ -42,8 +42,8 @@ constexpr double kCanalHu = -350;  // narrow, so that its air is blurred
 constexpr int kLeastCanalMm = 2;
 
 constexpr double kLeastDepthMm = 55;
-constexpr double kMostDepthMm = 100;
-constexpr double kMostOverTeethDeg = 25;
+constexpr double kMaxDepthMm = 100;
+constexpr double kMaxOverTeethDeg = 25;
 
 double MiddleOf(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -151,7 +151,7 @@ class FrankfortFinder {
       longest = run;
       below = k + 1;
     }
-    if (longest < kLeastSocketMm || longest > kMostSocketMm) return std::nullopt;
+    if (longest < kLeastSocketMm || longest > kMaxSocketMm) return std::nullopt;
     while (below < depths.size() && depths[below] > cheek_mm + kRimMm) ++below;
     if (below >= depths.size()) return std::nullopt;
     *depth = depths[below];
@@ -187,8 +187,8 @@ class FrankfortFinder {
 
 bool SidesAgree(const LeftAndRight& points, const FrankfortFinder& finder) {
   return std::abs(finder.Height(points.left) - finder.Height(points.right)) <=
-             kMostSideDifferenceMm &&
-         std::abs(finder.Front(points.left) - finder.Front(points.right)) <= kMostSideDifferenceMm;
+             kMaxSideDifferenceMm &&
+         std::abs(finder.Front(points.left) - finder.Front(points.right)) <= kMaxSideDifferenceMm;
 }
 
 }  // namespace
@@ -207,8 +207,8 @@ std::optional<FrankfortLandmarks> FindFrankfort(const HuGrid& hu, int16_t bone_a
   const double over_teeth_deg =
       std::atan2(forward.dot(landmarks.upper_teeth.normal), depth_mm) * (180 / M_PI);
   const bool is_head = SidesAgree(found.porion, finder) && SidesAgree(found.orbitale, finder) &&
-                       depth_mm >= kLeastDepthMm && depth_mm <= kMostDepthMm &&
-                       over_teeth_deg >= 0 && over_teeth_deg <= kMostOverTeethDeg;
+                       depth_mm >= kLeastDepthMm && depth_mm <= kMaxDepthMm &&
+                       over_teeth_deg >= 0 && over_teeth_deg <= kMaxOverTeethDeg;
   return is_head ? std::make_optional(found) : std::nullopt;
 }
 

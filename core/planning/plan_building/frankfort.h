@@ -25,11 +25,11 @@ struct FrankfortLandmarks {
 // comes forward below a pit.
 //
 // Nothing where one of the four is not in view, or where they do not agree with each other as those
-// of a head do: both sides within kMostSideDifferenceMm, ears 55 to 100 mm behind the eyes, and the
+// of a head do: both sides within kMaxSideDifferenceMm, ears 55 to 100 mm behind the eyes, and the
 // horizontal up to 25 degrees over the upper teeth. Who gets nothing says so and does without.
 std::optional<FrankfortLandmarks> FindFrankfort(const HuGrid& hu, int16_t bone_above_hu,
                                                 const Landmarks& landmarks);
-inline constexpr double kMostSideDifferenceMm = 6;
+inline constexpr double kMaxSideDifferenceMm = 6;
 
 // Through the middle of the porions and of the orbitalia, square to the midsagittal plane: a cant
 // of one side is not taken over. Normal up.

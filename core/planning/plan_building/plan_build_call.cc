@@ -19,7 +19,7 @@ namespace tissueform {
 namespace {
 
 constexpr char kProgram[] = "tissueform-plan-build";
-constexpr int64_t kMostThreads = 4096;
+constexpr int64_t kMaxThreads = 4096;
 
 // An answer is stages, each after kStage, and at the end the outcome after kOutcome.
 constexpr int64_t kOutcome = 0;
@@ -40,7 +40,7 @@ absl::StatusOr<PlanBuildRequest> ReceiveRequest(PipeReceiver* from) {
   for (std::string* text : {&request.ct, &request.recipe, &request.folder, &request.folder_name}) {
     TF_ASSIGN_OR_RETURN(*text, from->Text());
   }
-  TF_ASSIGN_OR_RETURN(const int64_t threads, from->Number(kMostThreads));
+  TF_ASSIGN_OR_RETURN(const int64_t threads, from->Number(kMaxThreads));
   TF_ASSIGN_OR_RETURN(const int64_t pictures, from->Number(1));
   request.threads = static_cast<int>(threads);
   request.pictures = pictures != 0;

@@ -14,7 +14,7 @@
 #include "core/imaging/anatomy/itk_filters.h"
 #include "core/imaging/anatomy/surface_extraction.h"
 #include "core/imaging/ct/unscanned.h"
-#include "core/planning/plan_building/contact_trial.h"
+#include "core/planning/plan_building/trial_solve.h"
 #include "core/planning/plan_building/viewer_surfaces.h"
 
 namespace tissueform {
@@ -81,7 +81,7 @@ struct DividedBone {
 struct Description {
   TetStiffness stiffness;
   double contact_band_mm = 0;
-  ReleasedContacts released;
+  ContactRelaxation released;
   SkinDistance skin_distance;
 };
 
@@ -136,11 +136,11 @@ absl::StatusOr<TriangleMesh> SegmentSurface(const LabelGrid& bone, uint8_t label
 }
 
 absl::Status CheckMove(const std::string& segment, double largest_move_mm) {
-  if (largest_move_mm <= kMostMoveMm) return absl::OkStatus();
+  if (largest_move_mm <= kMaxMoveMm) return absl::OkStatus();
   return absl::InvalidArgumentError(
       absl::StrFormat("the \"pose\" of segment \"%s\" moves some of its bone by %.1f mm; a plan "
                       "moves bone by at most %g mm (is the pivot where the bone is, in mm, LPS?)",
-                      segment, largest_move_mm, kMostMoveMm));
+                      segment, largest_move_mm, kMaxMoveMm));
 }
 
 absl::StatusOr<BuiltSegment> BuildSegment(const LabelGrid& bone, uint8_t label,
@@ -249,7 +249,7 @@ absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTiss
       PlanningRegions regions,
       AssignRegions(built.mesh, built.surface.num_vertices(), soft_tissue, NamesOf(segments),
                     contact_band_mm, anatomy.landmarks, {head.hu, tissue_above_hu, &head.cut}));
-  TF_ASSIGN_OR_RETURN(ReleasedContacts released,
+  TF_ASSIGN_OR_RETURN(ContactRelaxation released,
                       ReleaseTornContacts({.mesh = built.mesh,
                                            .youngs_modulus_pa = stiffness.youngs_modulus_pa,
                                            .poisson_ratio = recipe.poisson_ratio,
@@ -314,8 +314,8 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                    .mesh = std::move(mesh),
                    .stiffness = std::move(description.stiffness),
                    .regions = std::move(description.released.regions),
-                   .freed_by_trial = description.released.freed,
-                   .still_torn = description.released.still_torn,
+                   .num_released_by_trial = description.released.freed,
+                   .num_inverted = description.released.num_inverted,
                    .skin_distance = std::move(description.skin_distance),
                    .coverage = std::move(coverage),
                    .frankfort = anatomy.frankfort,

@@ -33,13 +33,13 @@
 namespace tissueform {
 
 // More than any jaw is moved: what is above comes from a slip in the recipe.
-inline constexpr double kMostMoveMm = 50;
+inline constexpr double kMaxMoveMm = 50;
 
 // A piece of bone that moves.
 struct BuiltSegment {
   OsteotomySegment cut;  // with the planes that were used
   HandlePose pose;
-  double largest_move_mm = 0;  // of the voxel that the pose moves farthest; at most kMostMoveMm
+  double largest_move_mm = 0;  // of the voxel that the pose moves farthest; at most kMaxMoveMm
   double volume_mm3 = 0;
   TriangleMesh surface;  // closed, LPS
 };
@@ -63,8 +63,8 @@ struct PlanBuild {
   SoftTissueMesh mesh;
   TetStiffness stiffness;
   PlanningRegions regions;
-  int64_t freed_by_trial = 0;  // of regions.freed_by_contact, by ReleaseTornContacts
-  int64_t still_torn = 0;      // tets that it could not keep from turning inside out
+  int64_t num_released_by_trial = 0;  // of regions.freed_by_contact, by ReleaseTornContacts
+  int64_t num_inverted = 0;           // tets that it could not keep from turning inside out
   SkinDistance skin_distance;
   SkinCoverage coverage;
   std::optional<FrankfortLandmarks> frankfort = {};  // where they were found

@@ -29,7 +29,7 @@ using Eigen::Vector3d;
 // the CT that it was resampled from, and at most.
 constexpr double kSmoothVoxels = 0.7;
 constexpr double kSmoothCtVoxels = 0.6;
-constexpr double kMostSmoothMm = 2;
+constexpr double kMaxSmoothMm = 2;
 // So many HU above the threshold count as one voxel inside: what a scanner's blur makes of the edge
 // of a bone.
 constexpr double kBoneEdgeHu = 400;
@@ -92,7 +92,7 @@ absl::StatusOr<TriangleMesh> SkinSurface(const ViewerSources& sources) {
                                              2 * level - kAirHu);
   }
   const double smooth_mm = std::max(kSmoothVoxels * hu.geometry.spacing_mm,
-                                    std::min(kMostSmoothMm, kSmoothCtVoxels * sources.ct_voxel_mm));
+                                    std::min(kMaxSmoothMm, kSmoothCtVoxels * sources.ct_voxel_mm));
   return ExtractSurface(GaussianSmooth(hu, smooth_mm),
                         {.level = level,
                          .clearance = 20,

@@ -61,11 +61,11 @@ std::vector<std::string> Cautions(const PlanBuild& build) {
                         "skin there, is missing, and the skin under the chin may move too much.",
                         under_chin_mm));
   }
-  if (build.still_torn > 0) {
+  if (build.num_inverted > 0) {
     cautions.push_back(absl::StrFormat(
         "%d tets turn inside out at the planned move, or a third beyond it, in some model, and no "
         "bone near by could be let go: plan a smaller move, or give a wider \"contact_band_mm\".",
-        build.still_torn));
+        build.num_inverted));
   }
   if (build.parts.separation == JawSeparation::kAutomaticCut) {
     cautions.push_back(

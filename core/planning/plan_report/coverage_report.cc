@@ -21,7 +21,7 @@ using Json = nlohmann::ordered_json;
 // Bone comes to the skin where streaks of metal were taken for it, or where tissue is thinner than
 // the CT shows: a sound head has next to none.
 constexpr double kMuchBoneInSkin = 0.01;
-constexpr size_t kMostGapsTold = 5;
+constexpr size_t kMaxGapsTold = 5;
 // Fat has -130 to -70 HU.
 constexpr double kLooserThanSkinHu = -180;
 
@@ -186,7 +186,7 @@ std::vector<std::string> CoverageCautions(const SkinCoverage& coverage) {
   }
   size_t told = 0;
   for (const SkinGap& hole : coverage.holes) {
-    if (hole.area_mm2 <= kLargestHoleMm2 || told++ == kMostGapsTold) break;
+    if (hole.area_mm2 <= kLargestHoleMm2 || told++ == kMaxGapsTold) break;
     cautions.push_back(GapText(hole, coverage.hole_mm));
   }
   if (BoneShare(coverage) > kMuchBoneInSkin) {

@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr size_t kMostSlices = 3;
+constexpr size_t kMaxSlices = 3;
 constexpr double kSlicesApartMm = 3;
 // A filling of 200 mm3 is a small crown's; from a few of them on rays are left through no
 // direction.
@@ -31,7 +31,7 @@ std::vector<double> HeightsToShow(const MetalReport& metal) {
       return std::abs(other - z) < kSlicesApartMm;
     });
     if (!beside) heights.push_back(z);
-    if (heights.size() == kMostSlices) break;
+    if (heights.size() == kMaxSlices) break;
   }
   return heights;
 }

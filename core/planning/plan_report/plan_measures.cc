@@ -22,9 +22,9 @@ namespace {
 
 constexpr double kDegenerateDeg = 3;
 constexpr double kLeastShare = 0.999;
-constexpr double kMostVolumeError = 0.03;
-constexpr double kMostMeanVoxels = 0.6;
-constexpr double kMostP99Voxels = 2;
+constexpr double kMaxVolumeError = 0.03;
+constexpr double kMaxMeanVoxels = 0.6;
+constexpr double kMaxP99Voxels = 2;
 
 std::vector<double> SmallestDihedrals(const TetMesh& mesh) {
   const auto angles = DihedralAnglesDeg(mesh.positions(), mesh.tets());
@@ -61,7 +61,7 @@ double ShareOver(const std::vector<double>& values, double limit) {
 QualityCheck CheckVolume(const PlanMeasures& measures) {
   const double error = measures.ratio_to_voxels - 1;
   return {"Volume of the mesh against the voxels of the soft tissue", "within 3 %",
-          absl::StrFormat("%+.2f %%", 100 * error), std::abs(error) <= kMostVolumeError};
+          absl::StrFormat("%+.2f %%", 100 * error), std::abs(error) <= kMaxVolumeError};
 }
 
 QualityCheck CheckSkin(const std::string& what, double voxels, double limit_voxels,
@@ -121,8 +121,8 @@ std::vector<QualityCheck> CheckQuality(const PlanBuild& build, const PlanMeasure
       {"Connected components of the mesh", "one", absl::StrCat(measures.components),
        measures.components == 1},
       CheckVolume(measures),
-      CheckSkin("mean", measures.skin_mean_voxels, kMostMeanVoxels, spacing_mm),
-      CheckSkin("99 % of the vertices", measures.skin_p99_voxels, kMostP99Voxels, spacing_mm),
+      CheckSkin("mean", measures.skin_mean_voxels, kMaxMeanVoxels, spacing_mm),
+      CheckSkin("99 % of the vertices", measures.skin_p99_voxels, kMaxP99Voxels, spacing_mm),
       CheckSliceGaps(build)};
   for (QualityCheck& check : CheckCoverage(build.coverage)) checks.push_back(std::move(check));
   checks.push_back(CheckObjects(build));

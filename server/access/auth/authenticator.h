@@ -44,7 +44,7 @@ class Authenticator {
   virtual absl::StatusOr<Authenticated> Authenticate(const Credentials& credentials) = 0;
 
   // Whether a stream that has begun with this may go on: neither expired nor revoked.
-  virtual absl::Status StillGood(const Authenticated& authenticated) = 0;
+  virtual absl::Status IsStillAuthorized(const Authenticated& authenticated) = 0;
 };
 
 }  // namespace tissueform

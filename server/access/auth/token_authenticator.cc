@@ -140,7 +140,7 @@ absl::Status TokenAuthenticator::Check(const Authenticated& authenticated) const
   return absl::OkStatus();
 }
 
-absl::Status TokenAuthenticator::StillGood(const Authenticated& authenticated) {
+absl::Status TokenAuthenticator::IsStillAuthorized(const Authenticated& authenticated) {
   absl::Status good = Check(authenticated);
   if (!good.ok()) Tell(good);
   return good;

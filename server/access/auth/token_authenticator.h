@@ -43,7 +43,7 @@ class TokenAuthenticator : public Authenticator {
   // Errors: RefuseToken's.
   absl::StatusOr<Authenticated> Authenticate(const Credentials& credentials) override;
   // Until the leeway after its end, as for new calls.
-  absl::Status StillGood(const Authenticated& authenticated) override;
+  absl::Status IsStillAuthorized(const Authenticated& authenticated) override;
 
   // What was refused. Of streams, those that were ended count as well.
   const TokenFailures& failures() const { return failures_; }

@@ -15,9 +15,9 @@ namespace tissueform {
 
 // What a call asks for.
 enum class CallKind {
-  kNewWork,  // refused while the server drains
-  kUpkeep,   // looks or tidies up: always welcome
-  kStream,   // new work for as long as its client likes: a drag, a watch
+  kNewWork,   // refused while the server drains
+  kMetadata,  // looks or tidies up: always welcome
+  kStream,    // new work for as long as its client likes: a drag, a watch
 };
 
 // What is known of a call. Views and references live as long as the call of the observer.

@@ -86,7 +86,7 @@ std::shared_ptr<const Principal> Nobody() {
 
 }  // namespace
 
-bool ServiceGate::WaitUntilIdle(std::chrono::steady_clock::time_point deadline) {
+bool AdmissionControl::WaitUntilIdle(std::chrono::steady_clock::time_point deadline) {
   MutexLock lock(mutex_);
   while (open_calls_ > 0) {
     if (!idle_.WaitUntil(mutex_, deadline)) {
@@ -96,12 +96,12 @@ bool ServiceGate::WaitUntilIdle(std::chrono::steady_clock::time_point deadline) 
   return true;
 }
 
-void ServiceGate::Enter() {
+void AdmissionControl::Enter() {
   MutexLock lock(mutex_);
   ++open_calls_;
 }
 
-void ServiceGate::Leave() {
+void AdmissionControl::Leave() {
   MutexLock lock(mutex_);
   if (--open_calls_ == 0) {
     idle_.NotifyAll();
@@ -117,7 +117,7 @@ std::string RequestIdOr(std::string_view from_client) {
 }
 
 CallScope::CallScope(grpc::CallbackServerContext* context, std::string_view method, CallKind kind,
-                     ServiceGate* gate)
+                     AdmissionControl* gate)
     : method_(method),
       kind_(kind),
       gate_(gate),
@@ -137,7 +137,7 @@ absl::Status CallScope::Admit(grpc::CallbackServerContext* context) {
     if (gate_->checks().may_call)
       TF_RETURN_IF_ERROR(gate_->checks().may_call(principal(), method_));
   }
-  if (kind_ != CallKind::kUpkeep && gate_->draining()) {
+  if (kind_ != CallKind::kMetadata && gate_->draining()) {
     return WithReason(
         absl::UnavailableError(
             "the server is draining and takes no new work; try another one, or again in a minute"),
@@ -198,9 +198,9 @@ void CallScope::RenewFrom(const Authenticated& other) {
   }
 }
 
-absl::Status CallScope::StillGood() const {
+absl::Status CallScope::IsStillAuthorized() const {
   if (!may_end_early()) return absl::OkStatus();
-  return gate_->checks().authenticator->StillGood(authenticated_);
+  return gate_->checks().authenticator->IsStillAuthorized(authenticated_);
 }
 
 void CallScope::SetResource(std::string resource) {
@@ -241,12 +241,12 @@ grpc::Status CallScope::End(const absl::Status& outcome) {
   return ToGrpcStatus(outcome);
 }
 
-grpc::ServerUnaryReactor* RunUpkeep(
-    grpc::CallbackServerContext* context, std::string_view method, ServiceGate* gate,
-    const std::function<absl::Status(CallScope& scope, const EndCall& end)>& start) {
-  auto scope = std::make_shared<CallScope>(context, method, CallKind::kUpkeep, gate);
+grpc::ServerUnaryReactor* HandleUnaryCall(
+    grpc::CallbackServerContext* context, std::string_view method, AdmissionControl* gate,
+    const std::function<absl::Status(CallScope& scope, const FinishCall& end)>& start) {
+  auto scope = std::make_shared<CallScope>(context, method, CallKind::kMetadata, gate);
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const EndCall end = [scope, reactor](const absl::Status& outcome) {
+  const FinishCall end = [scope, reactor](const absl::Status& outcome) {
     reactor->Finish(scope->End(outcome));
   };
   const absl::Status started = scope->admission().ok() ? start(*scope, end) : scope->admission();

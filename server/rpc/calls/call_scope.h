@@ -36,10 +36,10 @@ struct CallChecks {
 
 // What stands before every call: who makes it, who is told of it, how many a principal may make,
 // whether the server takes new work; and how many calls are open. Thread-safe.
-class ServiceGate {
+class AdmissionControl {
  public:
-  explicit ServiceGate(CallChecks checks) : checks_(std::move(checks)) {}
-  ServiceGate() : ServiceGate(CallChecks{}) {}
+  explicit AdmissionControl(CallChecks checks) : checks_(std::move(checks)) {}
+  AdmissionControl() : AdmissionControl(CallChecks{}) {}
 
   const CallChecks& checks() const { return checks_; }
 
@@ -73,7 +73,7 @@ std::string RequestIdOr(std::string_view from_client);
 
 // How often a call that lasts asks whether its caller is still good: what is revoked ends within a
 // second.
-inline constexpr std::chrono::milliseconds kStandingPeriod{500};
+inline constexpr std::chrono::milliseconds kReauthorizePeriod{500};
 
 // The common beginning and end of every rpc: made first, asked for its admission, ended once with
 // the outcome. The place where a caller is authenticated and observers are told.
@@ -88,7 +88,7 @@ class CallScope {
   // `method` ("MeshService.GetMesh") and `gate` must outlive the scope. `context` is read and given
   // metadata here and not kept; null where there is no network: a call without headers.
   CallScope(grpc::CallbackServerContext* context, std::string_view method, CallKind kind,
-            ServiceGate* gate);
+            AdmissionControl* gate);
   // Of a scope that was not ended: the call is over all the same, and the log says so.
   ~CallScope();
   CallScope(CallScope&& other) noexcept;
@@ -107,12 +107,12 @@ class CallScope {
   // On that of another call, where it is the same caller's and ends later.
   void RenewFrom(const Authenticated& other);
 
-  // For calls that last: whether this one may go on. Asked again every kStandingPeriod; not where
-  // nobody logs in.
+  // For calls that last: whether this one may go on. Asked again every kReauthorizePeriod; not
+  // where nobody logs in.
   bool may_end_early() const {
     return gate_ != nullptr && gate_->checks().authenticator != nullptr;
   }
-  absl::Status StillGood() const;
+  absl::Status IsStillAuthorized() const;
 
   // Says what the call is about ("sessions/{id}"), once it is known that its caller may use it.
   void SetResource(std::string resource);
@@ -127,7 +127,7 @@ class CallScope {
 
   std::string_view method_;
   CallKind kind_;
-  ServiceGate* gate_;  // null once ended, or moved from
+  AdmissionControl* gate_;  // null once ended, or moved from
   std::chrono::steady_clock::time_point start_;
   Authenticated authenticated_;
   bool counted_ = false;  // by the quotas
@@ -139,11 +139,11 @@ class CallScope {
   absl::Status admission_;
 };
 
-// A unary call of CallKind::kUpkeep. `start` gets its scope, which lives until the end, and what
+// A unary call of CallKind::kMetadata. `start` gets its scope, which lives until the end, and what
 // ends it; it returns why the call fails, or OK and ends it once, now or later, on any thread.
-using EndCall = std::function<void(const absl::Status& outcome)>;
-grpc::ServerUnaryReactor* RunUpkeep(
-    grpc::CallbackServerContext* context, std::string_view method, ServiceGate* gate,
-    const std::function<absl::Status(CallScope& scope, const EndCall& end)>& start);
+using FinishCall = std::function<void(const absl::Status& outcome)>;
+grpc::ServerUnaryReactor* HandleUnaryCall(
+    grpc::CallbackServerContext* context, std::string_view method, AdmissionControl* gate,
+    const std::function<absl::Status(CallScope& scope, const FinishCall& end)>& start);
 
 }  // namespace tissueform

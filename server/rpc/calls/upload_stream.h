@@ -22,7 +22,7 @@ namespace tissueform {
 // it.
 //
 // A good answer waits for the client to end its stream, or to send nothing for kEndPatience, for
-// kMostEndPatience in all, and what it still sends is dropped: HAProxy resets the stream of a call
+// kMaxEndPatience in all, and what it still sends is dropped: HAProxy resets the stream of a call
 // that is answered before, and clients may lose the answer to that. Errors are not waited with: who
 // is refused is to stop sending, and code and words arrive in the details (docs/scaling.md).
 //
@@ -103,7 +103,7 @@ class UploadStream : public grpc::ServerReadReactor<Request> {
  private:
   enum class State { kReading, kWorking, kAnswered, kEnded };
   static constexpr std::chrono::milliseconds kEndPatience{1000};
-  static constexpr std::chrono::milliseconds kMostEndPatience{5000};
+  static constexpr std::chrono::milliseconds kMaxEndPatience{5000};
 
   void Read() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     last_heard_ = std::chrono::steady_clock::now();
@@ -130,7 +130,7 @@ class UploadStream : public grpc::ServerReadReactor<Request> {
     MutexLock lock(mutex_);
     if (outcome.ok()) {
       state_ = State::kAnswered;
-      last_end_ = std::chrono::steady_clock::now() + std::min(silence_, kMostEndPatience);
+      last_end_ = std::chrono::steady_clock::now() + std::min(silence_, kMaxEndPatience);
       Read();
       WaitForEnd();
     } else {

@@ -9,7 +9,7 @@
 #include "google/protobuf/util/time_util.h"
 
 #include "core/base/error_reason.h"
-#include "server/session/session_refusals.h"
+#include "server/session/session_errors.h"
 
 namespace tissueform {
 namespace {
@@ -134,9 +134,9 @@ void SessionWatches::NotifyDraining(std::chrono::system_clock::time_point end) {
   }
 }
 
-void SessionWatches::AskAgain() {
+void SessionWatches::RecheckAccess() {
   MutexLock lock(mutex_);
-  for (const auto& [name, watch] : watches_) watch.watcher->AskAgain();
+  for (const auto& [name, watch] : watches_) watch.watcher->RecheckAccess();
 }
 
 std::map<std::string, int64_t> SessionWatches::CountByPrincipal() const {

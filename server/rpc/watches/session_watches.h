@@ -31,7 +31,7 @@ class CreditedWatcher : public Watcher {
   // (a frame that was not sent).
   virtual absl::Status Acknowledge(uint64_t number, const Authenticated& by) = 0;
   // Ends where it may not watch any more.
-  virtual void AskAgain() = 0;
+  virtual void RecheckAccess() = 0;
 
  protected:
   ~CreditedWatcher() = default;
@@ -69,7 +69,7 @@ class SessionWatches {
   void NotifyDraining(std::chrono::system_clock::time_point end);
 
   // Each whether it may still watch.
-  void AskAgain();
+  void RecheckAccess();
 
   std::map<std::string, int64_t> CountByPrincipal() const;
   int size() const;

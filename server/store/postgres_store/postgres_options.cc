@@ -32,7 +32,7 @@ constexpr int kIdleSeconds = 5;
 constexpr int kProbeSeconds = 2;
 constexpr int kProbes = 3;
 constexpr int kUnansweredMilliseconds = 10'000;
-constexpr int64_t kMostPasswordBytes = 4096;
+constexpr int64_t kMaxPasswordBytes = 4096;
 
 absl::StatusOr<Keywords> ParseUrl(const std::string& url) {
   if (!absl::StartsWith(url, "postgresql://") && !absl::StartsWith(url, "postgres://")) {
@@ -144,7 +144,7 @@ absl::StatusOr<std::string> ReadPostgresPassword(const std::string& file) {
     return absl::FailedPreconditionError(
         absl::StrCat("password file ", file, ": anybody may read it; chmod o-rwx it"));
   }
-  TF_ASSIGN_OR_RETURN(std::string password, opened.ReadAt(0, kMostPasswordBytes));
+  TF_ASSIGN_OR_RETURN(std::string password, opened.ReadAt(0, kMaxPasswordBytes));
   return std::string(absl::StripSuffix(absl::StripSuffix(password, "\n"), "\r"));
 }
 

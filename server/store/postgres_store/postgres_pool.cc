@@ -83,12 +83,13 @@ PostgresPool::Clock::duration PostgresPool::Patience() {
   MutexLock lock(mutex_);
   if (failed_ <= answered_) return options_.patience;
   // Nobody may have asked since: then one try.
-  return Clock::now() - failed_ < kLeastAnswer ? left : std::max<Clock::duration>(left, kMostLate);
+  return Clock::now() - failed_ < kLeastAnswer ? left : std::max<Clock::duration>(left, kMaxLate);
 }
 
-absl::Status PostgresPool::Run(const Work& work, Clock::time_point deadline, Twice twice) {
+absl::Status PostgresPool::Run(const Work& work, Clock::time_point deadline,
+                               Idempotent idempotent) {
   const Clock::time_point begin = Clock::now();
-  absl::Status status = TryUntil(work, deadline, twice);
+  absl::Status status = TryUntil(work, deadline, idempotent);
   latency_.Observe(Clock::now() - begin);
   if (TellsClientsOtherwise(status)) Tell(status);
   return status;
@@ -103,7 +104,8 @@ void PostgresPool::Tell(const absl::Status& failure) {
   spdlog::warn("{}", std::string(failure.message()));
 }
 
-absl::Status PostgresPool::TryUntil(const Work& work, Clock::time_point deadline, Twice twice) {
+absl::Status PostgresPool::TryUntil(const Work& work, Clock::time_point deadline,
+                                    Idempotent idempotent) {
   {
     MutexLock lock(mutex_);
     deadline = std::min(deadline, latest_);
@@ -121,7 +123,7 @@ absl::Status PostgresPool::TryUntil(const Work& work, Clock::time_point deadline
     const bool unknown = outcome == PostgresOutcome::kUnknown;
     if (unknown) lost.Update(status);
     const bool again =
-        outcome == PostgresOutcome::kTransient || (unknown && twice == Twice::kIsOnce);
+        outcome == PostgresOutcome::kTransient || (unknown && idempotent == Idempotent::kNo);
     if (!again) return status;
     if (!Pause(pause, tried, deadline)) return lost.ok() ? status : lost;
   }
@@ -217,7 +219,7 @@ void PostgresPool::Watch() {
     for (const auto& [connection, deadline] : busy_) {
       std::chrono::milliseconds unanswered = options_.unanswered_timeout;
       if (now >= deadline) unanswered = std::min(unanswered, kLeastAnswer);
-      if (now >= latest_) unanswered = std::min(unanswered, kMostLate);
+      if (now >= latest_) unanswered = std::min(unanswered, kMaxLate);
       connection->GiveUp(unanswered);
     }
   }
@@ -229,7 +231,7 @@ bool PostgresPool::Pause(std::chrono::milliseconds pause, Clock::time_point trie
   const Clock::time_point end = now + pause;
   if (end > deadline) return false;
   // What has taken long may do so again.
-  if (now - tried >= kMostLate && end + kMostLate > deadline) return false;
+  if (now - tried >= kMaxLate && end + kMaxLate > deadline) return false;
   MutexLock lock(mutex_);
   while (!ending_ && Clock::now() < std::min(end, latest_)) {
     changed_.WaitUntil(mutex_, std::min(end, latest_));

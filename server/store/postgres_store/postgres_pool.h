@@ -29,8 +29,8 @@ class PostgresPool {
   // Reads and writes rows. Called again when another try may do better, so what it leaves outside
   // the database must be what its last call left.
   using Work = std::function<absl::Status(PostgresTransaction&)>;
-  // What a work is that is committed twice.
-  enum class Twice { kIsTwice, kIsOnce };
+  // Whether a second commit of the same work changes nothing.
+  enum class Idempotent { kYes, kNo };
 
   // Connects once, so that what an operator must change is told at the start: errors are those of
   // TargetOf and PostgresConnection; FailedPrecondition when the database is a read-only replica,
@@ -39,21 +39,22 @@ class PostgresPool {
   // Calls that wait are answered UNAVAILABLE.
   ~PostgresPool();
 
-  // Runs `work` in a transaction. A database that is not there is tried again until `deadline`; a
-  // commit of which nobody knows whether it was kept is where twice is once.
+  // Runs `work` in a transaction. A database that is not there is tried again until `deadline`. A
+  // commit with an unknown outcome is tried again only where the work is idempotent.
   //
-  // A database that says nothing at all costs kMostLate more; one that falls silent within a
+  // A database that says nothing at all costs kMaxLate more; one that falls silent within a
   // statement at most kLeastAnswer.
   //
   // Errors: what `work` says, those of PostgresConnection, and Unavailable (all connections are in
   // use until then; the database is not there until then, for whatever reason). Those of the
   // database are logged, and have a sentence for clients (store_errors.h).
-  absl::Status Run(const Work& work, Twice twice = Twice::kIsTwice) {
-    return Run(work, Clock::now() + Patience(), twice);
+  absl::Status Run(const Work& work, Idempotent idempotent = Idempotent::kYes) {
+    return Run(work, Clock::now() + Patience(), idempotent);
   }
-  absl::Status Run(const Work& work, Clock::time_point deadline, Twice twice = Twice::kIsTwice);
+  absl::Status Run(const Work& work, Clock::time_point deadline,
+                   Idempotent idempotent = Idempotent::kYes);
 
-  static constexpr std::chrono::milliseconds kMostLate{1'000};
+  static constexpr std::chrono::milliseconds kMaxLate{1'000};
   static constexpr std::chrono::milliseconds kLeastAnswer{5'000};
 
   // No call waits for the database any longer than until then: the server ends.
@@ -71,7 +72,7 @@ class PostgresPool {
   // What is left of the options' for this thread's call while the database is away: a queue or a
   // job that was slow uses nothing up.
   Clock::duration Patience();
-  absl::Status TryUntil(const Work& work, Clock::time_point deadline, Twice twice);
+  absl::Status TryUntil(const Work& work, Clock::time_point deadline, Idempotent idempotent);
   absl::Status Try(const Work& work, Clock::time_point deadline, PostgresOutcome* outcome);
   // A place, with a connection or none.
   absl::StatusOr<std::unique_ptr<PostgresConnection>> Take(Clock::time_point deadline);
@@ -103,18 +104,18 @@ class PostgresPool {
   std::thread watch_;  // last: it uses the others
 };
 
-// What `work` finds, which only reads unless twice is said to be twice.
+// The result of `work`. Say kYes where it only reads or a second commit changes nothing.
 template <typename Result>
 absl::StatusOr<Result> AskPool(
     PostgresPool* pool, const std::function<absl::StatusOr<Result>(PostgresTransaction&)>& work,
-    PostgresPool::Twice twice = PostgresPool::Twice::kIsOnce) {
+    PostgresPool::Idempotent idempotent = PostgresPool::Idempotent::kNo) {
   absl::StatusOr<Result> result;
   const absl::Status status = pool->Run(
       [&](PostgresTransaction& transaction) {
         result = work(transaction);
         return result.status();
       },
-      twice);
+      idempotent);
   return status.ok() ? std::move(result) : status;
 }
 

@@ -12,7 +12,7 @@
 namespace tissueform {
 namespace {
 
-constexpr size_t kMostSeen = 10'000;
+constexpr size_t kMaxSeen = 10'000;
 
 }  // namespace
 
@@ -35,7 +35,7 @@ SessionLease PostgresSessionLeases::LeaseFrom(std::chrono::steady_clock::time_po
 absl::Status PostgresSessionLeases::Run(const PostgresPool::Work& work) {
   // Who holds a session already keeps its epoch, and releases what it holds under that alone.
   return pool_->Run(work, PostgresPool::Clock::now() + options_.patience,
-                    PostgresPool::Twice::kIsOnce);
+                    PostgresPool::Idempotent::kNo);
 }
 
 std::string PostgresSessionLeases::SeenTooLong(const std::string& session) {
@@ -51,7 +51,7 @@ void PostgresSessionLeases::NoteSeen(const std::string& session, const std::stri
     seen_.erase(session);
     return;
   }
-  if (seen_.size() >= kMostSeen) seen_.clear();
+  if (seen_.size() >= kMaxSeen) seen_.clear();
   Seen& seen = seen_[session];
   if (seen.lease_until != too_late) seen = {.lease_until = too_late, .since = clock_()};
 }

@@ -23,18 +23,19 @@ PostgresSessionStore::PostgresSessionStore(PostgresPool* pool, UnixClock clock)
       jobs_((pool->options().max_connections + 1) / 2),
       peeks_((pool->options().max_connections + 1) / 2) {}
 
-void PostgresSessionStore::Submit(const std::string& key, PostgresPool::Work work, Twice twice,
-                                  StatusCallback done) {
+void PostgresSessionStore::Submit(const std::string& key, PostgresPool::Work work,
+                                  Idempotent idempotent, StatusCallback done) {
   const auto deadline = PostgresPool::Clock::now() + pool_->options().patience;
-  jobs_.Submit(key, [this, deadline, work = std::move(work), twice, done = std::move(done)] {
-    done(pool_->Run(work, deadline, twice));
+  jobs_.Submit(key, [this, deadline, work = std::move(work), idempotent, done = std::move(done)] {
+    done(pool_->Run(work, deadline, idempotent));
   });
 }
 
 template <typename Result>
 void PostgresSessionStore::Ask(const std::string& key,
                                std::function<absl::StatusOr<Result>(PostgresTransaction&)> work,
-                               Twice twice, std::function<void(absl::StatusOr<Result>)> done) {
+                               Idempotent idempotent,
+                               std::function<void(absl::StatusOr<Result>)> done) {
   auto result = std::make_shared<absl::StatusOr<Result>>();
   Submit(
       key,
@@ -42,7 +43,7 @@ void PostgresSessionStore::Ask(const std::string& key,
         *result = work(transaction);
         return result->status();
       },
-      twice,
+      idempotent,
       [result, done = std::move(done)](absl::Status status) {
         done(status.ok() ? *std::move(result) : std::move(status));
       });
@@ -67,7 +68,7 @@ void PostgresSessionStore::Create(SessionRecord record, int64_t epoch, RecordCal
         TF_ASSIGN_OR_RETURN(kept.epoch, InsertSession(transaction, record));
         return kept;
       },
-      Twice::kIsTwice, std::move(done));
+      Idempotent::kYes, std::move(done));
 }
 
 namespace {
@@ -85,13 +86,13 @@ absl::StatusOr<SessionRecord> SelectSession(PostgresTransaction& transaction,
 void PostgresSessionStore::Get(const std::string& id, RecordCallback done) {
   Ask<SessionRecord>(
       id, [id](PostgresTransaction& transaction) { return SelectSession(transaction, id); },
-      Twice::kIsOnce, std::move(done));
+      Idempotent::kNo, std::move(done));
 }
 
 void PostgresSessionStore::Peek(const std::string& id, RecordCallback done) {
-  constexpr std::chrono::milliseconds kMostPatience{2'000};
+  constexpr std::chrono::milliseconds kMaxPatience{2'000};
   const auto deadline =
-      PostgresPool::Clock::now() + std::min(pool_->options().patience, kMostPatience);
+      PostgresPool::Clock::now() + std::min(pool_->options().patience, kMaxPatience);
   peeks_.Submit(id, [this, id, deadline, done = std::move(done)] {
     absl::StatusOr<SessionRecord> found;
     const absl::Status status = pool_->Run(
@@ -99,7 +100,7 @@ void PostgresSessionStore::Peek(const std::string& id, RecordCallback done) {
           found = SelectSession(transaction, id);
           return found.status();
         },
-        deadline, Twice::kIsOnce);
+        deadline, Idempotent::kNo);
     done(status.ok() ? std::move(found) : status);
   });
 }
@@ -122,7 +123,7 @@ void PostgresSessionStore::Update(SessionRecord record, int64_t epoch, RecordCal
         TF_RETURN_IF_ERROR(ReplaceSession(transaction, state.key, next));
         return next;
       },
-      Twice::kIsTwice, std::move(done));
+      Idempotent::kYes, std::move(done));
 }
 
 // Under one epoch nobody else writes meanwhile, and later calls for this session wait: the same
@@ -135,7 +136,7 @@ void PostgresSessionStore::CommitPoses(const std::string& id, std::vector<Handle
        now_s = clock_()](PostgresTransaction& transaction) {
         return CommitRow(transaction, id, count, bytes, epoch, now_s);
       },
-      Twice::kIsOnce, std::move(done));
+      Idempotent::kNo, std::move(done));
 }
 
 void PostgresSessionStore::Delete(const std::string& id, const std::string& etag, int64_t epoch,
@@ -147,7 +148,7 @@ void PostgresSessionStore::Delete(const std::string& id, const std::string& etag
         TF_RETURN_IF_ERROR(CheckSessionWrite(id, etag, epoch, state.etag, state.epoch));
         return transaction.Run("DELETE FROM sessions WHERE key = $1", {state.key});
       },
-      Twice::kIsTwice, std::move(done));
+      Idempotent::kYes, std::move(done));
 }
 
 void PostgresSessionStore::List(const ListRequest& request, PageCallback done) {
@@ -169,7 +170,7 @@ void PostgresSessionStore::List(const ListRequest& request, PageCallback done) {
                                RowsOfPage(request.limit)}));
         return ReadPostgresPage<Page>(rows, request.limit, 0, ReadSessionColumns);
       },
-      Twice::kIsOnce, std::move(done));
+      Idempotent::kNo, std::move(done));
 }
 
 void PostgresSessionStore::Touch(std::vector<std::string> ids, int64_t now_s, StatusCallback done) {
@@ -184,7 +185,7 @@ void PostgresSessionStore::Touch(std::vector<std::string> ids, int64_t now_s, St
             "session_states.key FOR UPDATE OF session_states)",
             {now_s, names});
       },
-      Twice::kIsOnce, std::move(done));
+      Idempotent::kNo, std::move(done));
 }
 
 void PostgresSessionStore::ListUnused(int64_t before_s, int limit, PageCallback done) {
@@ -202,7 +203,7 @@ void PostgresSessionStore::ListUnused(int64_t before_s, int limit, PageCallback 
                               {before_s, int64_t{limit}}));
         return ReadPostgresPage<Page>(rows, limit, 0, ReadSessionColumns);
       },
-      Twice::kIsOnce, std::move(done));
+      Idempotent::kNo, std::move(done));
 }
 
 }  // namespace tissueform

@@ -40,12 +40,13 @@ class PostgresSessionStore final : public SessionStore {
   void ListUnused(int64_t before_s, int limit, PageCallback done) override;
 
  private:
-  using Twice = PostgresPool::Twice;
+  using Idempotent = PostgresPool::Idempotent;
 
-  void Submit(const std::string& key, PostgresPool::Work work, Twice twice, StatusCallback done);
+  void Submit(const std::string& key, PostgresPool::Work work, Idempotent idempotent,
+              StatusCallback done);
   template <typename Result>
   void Ask(const std::string& key, std::function<absl::StatusOr<Result>(PostgresTransaction&)> work,
-           Twice twice, std::function<void(absl::StatusOr<Result>)> done);
+           Idempotent idempotent, std::function<void(absl::StatusOr<Result>)> done);
 
   PostgresPool* const pool_;
   const UnixClock clock_;

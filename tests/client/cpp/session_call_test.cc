@@ -49,7 +49,7 @@ TEST_F(SessionAttemptsTest, AServerAloneIsAskedOnce) {
 TEST_F(SessionAttemptsTest, TheServerThatIsNamedIsAskedAtOnceAFewTimes) {
   for (const absl::Status& error : {Moved("two"), Full("two")}) {
     SessionAttempts attempts = Attempts(CallRepeat::kIfNothingWasDone);
-    for (int hop = 0; hop < kMostHops; ++hop) {
+    for (int hop = 0; hop < kMaxHops; ++hop) {
       EXPECT_EQ(attempts.AfterError(error), kAtOnce);
       EXPECT_EQ(routes_.NodeOf("sessions/a"), "two");
     }

@@ -81,7 +81,7 @@ TEST(FitTargetsTest, NumbersBecomeRadiansAndDefaultsAreThoseOfTheSchema) {
   const Json schema = Json::parse(FitTargetsSchemaText());
   EXPECT_EQ(request.less_movement, schema["properties"]["less_movement"]["default"]);
   EXPECT_EQ(request.tolerance_mm, schema["properties"]["tolerance_mm"]["default"]);
-  EXPECT_EQ(kMostFitTargets, schema["properties"]["targets"]["maxItems"]);
+  EXPECT_EQ(kMaxFitTargets, schema["properties"]["targets"]["maxItems"]);
 }
 
 TEST(FitTargetsTest, PlacesAreTheirVerticesOrTheForemostOne) {
@@ -167,7 +167,7 @@ TEST(FitTargetsTest, FilesThatAreMissingOrTooLargeAreRefused) {
   EXPECT_THAT(ReadFitTargets("/nowhere/t.json", problem),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("targets file /nowhere/t.json")));
   const std::string path = ::testing::TempDir() + "/large_targets.json";
-  std::ofstream(path) << std::string(kMostTargetsBytes + 1, ' ');
+  std::ofstream(path) << std::string(kMaxTargetsBytes + 1, ' ');
   EXPECT_THAT(ReadFitTargets(path, problem), StatusIs(absl::StatusCode::kResourceExhausted));
   std::filesystem::remove(path);
 }

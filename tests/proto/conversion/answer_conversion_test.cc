@@ -45,18 +45,19 @@ TEST(AnswerConversionTest, ASummarySurvivesTheJourney) {
 }
 
 TEST(AnswerConversionTest, EveryReasonToGiveUpSurvivesTheJourney) {
-  for (const GaveUp reason :
-       {GaveUp::kNo, GaveUp::kIterations, GaveUp::kNoRoom, GaveUp::kArithmetic, GaveUp::kBlocked}) {
+  for (const Termination reason :
+       {Termination::kConverged, Termination::kIterations, Termination::kNoRoom,
+        Termination::kArithmetic, Termination::kBlocked}) {
     SolveSummary summary;
     summary.gave_up = reason;
-    EXPECT_EQ(ToSolveSummary(ToProto(summary)).gave_up, reason) << GaveUpName(reason);
+    EXPECT_EQ(ToSolveSummary(ToProto(summary)).gave_up, reason) << TerminationName(reason);
   }
 }
 
 TEST(AnswerConversionTest, AReasonOfALaterServerIsNone) {
   v1::SolveSummary proto;
   proto.set_gave_up(static_cast<v1::GaveUp>(99));
-  EXPECT_EQ(ToSolveSummary(proto).gave_up, GaveUp::kNo);
+  EXPECT_EQ(ToSolveSummary(proto).gave_up, Termination::kConverged);
 }
 
 TEST(AnswerConversionTest, QualitySurvivesTheJourney) {

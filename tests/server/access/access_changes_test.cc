@@ -97,7 +97,7 @@ TEST_F(AccessChangesTest, AShareThatIsTakenBackIsAwayAtOnceAndStreamsAreAsked) {
   EXPECT_EQ(revoked_, 0);
   ASSERT_THAT(Unshare(ann_, "sessions/s", "bob"), IsOk());
   EXPECT_EQ(revoked_, 1);
-  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kRead), StatusIs(Code::kNotFound));
   EXPECT_THAT(store_.Load()->shares, IsEmpty());
   EXPECT_THAT(Unshare(ann_, "sessions/s", "bob"), StatusIs(Code::kNotFound));
 }
@@ -120,7 +120,7 @@ TEST_F(AccessChangesTest, ASessionTakesItsSharesAndLinksWithIt) {
   ASSERT_THAT(Link(ann_, "1"), IsOk());
   changes_.SessionRemoved("s");
   AddSession("s", "ann");
-  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kRead), StatusIs(Code::kNotFound));
   EXPECT_THAT(access_.FindLink("1").status(), StatusIs(Code::kUnauthenticated));
   EXPECT_THAT(store_.Load()->shares, IsEmpty());
   EXPECT_THAT(store_.Load()->links, IsEmpty());
@@ -143,26 +143,26 @@ TEST_F(AccessChangesTest, WhatWasLearntCountsAfterARestart) {
   ASSERT_THAT(Share(ann_, "sessions/s", "bob"), IsOk());
   Access access([this] { return now_s_; });
   AccessChanges changes({}, &store_, &access);
-  ASSERT_THAT(changes.Learn(), IsOk());
+  ASSERT_THAT(changes.LoadAll(), IsOk());
   SessionRecord session;
   session.id = "s";
   session.owner = "ann";
   changes.Added(session);
-  EXPECT_THAT(access.MaySession(bob_, "s", Need::kLook), IsOk());
+  EXPECT_THAT(access.CheckSessionAccess(bob_, "s", Permission::kRead), IsOk());
 }
 
 TEST_F(AccessChangesTest, AMeshIsOfWhoHasSentItUntilItGoes) {
   const std::string mesh(64, 'b');
   ASSERT_THAT(changes_.GrantMesh(bob_, mesh, 100), IsOk());
-  EXPECT_THAT(access_.MayMesh(bob_, mesh, Need::kOwn), IsOk());
-  EXPECT_THAT(access_.MayMesh(ann_, mesh, Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckMeshAccess(bob_, mesh, Permission::kOwner), IsOk());
+  EXPECT_THAT(access_.CheckMeshAccess(ann_, mesh, Permission::kRead), StatusIs(Code::kNotFound));
   EXPECT_FALSE(access_.OthersHoldMesh(bob_, mesh));
   ASSERT_THAT(changes_.GrantMesh(ann_, mesh, 100), IsOk());
   EXPECT_TRUE(access_.OthersHoldMesh(bob_, mesh));
-  ASSERT_THAT(changes_.ForsakeMesh(ann_, mesh), IsOk());
+  ASSERT_THAT(changes_.ReleaseMesh(ann_, mesh), IsOk());
   EXPECT_FALSE(access_.OthersHoldMesh(bob_, mesh));
   changes_.MeshRemoved(mesh);
-  EXPECT_THAT(access_.MayMesh(bob_, mesh, Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckMeshAccess(bob_, mesh, Permission::kRead), StatusIs(Code::kNotFound));
   EXPECT_THAT(store_.Load()->mesh_rights, IsEmpty());
 }
 
@@ -203,7 +203,7 @@ class HeldAccessStore final : public AccessStore {
 class FollowingAccessChangesTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    changes_.FollowOthers();
+    changes_.EnableClusterMode();
     changes_.set_on_revoked([this] { ++revoked_; });
     SessionRecord session;
     session.id = "s";
@@ -219,7 +219,7 @@ class FollowingAccessChangesTest : public ::testing::Test {
         ann_, {.digest = digest, .session = "s", .expires_s = std::numeric_limits<int64_t>::max()},
         [](const absl::Status& status) { EXPECT_THAT(status, IsOk()); });
   }
-  bool BobMayLook() { return access_.MaySession(bob_, "s", Need::kLook).ok(); }
+  bool BobMayLook() { return access_.CheckSessionAccess(bob_, "s", Permission::kRead).ok(); }
 
   const Principal ann_{.name = "ann"};
   const Principal bob_{.name = "bob"};
@@ -233,15 +233,15 @@ class FollowingAccessChangesTest : public ::testing::Test {
 TEST_F(FollowingAccessChangesTest, WhatOthersGiveAndTakeIsLearnt) {
   store_.rows().Change({}, {.shares = {share_}}, [](const absl::Status&) {});
   EXPECT_FALSE(BobMayLook());
-  ASSERT_THAT(changes_.LearnAgain(), IsOk());
+  ASSERT_THAT(changes_.ReloadRows(), IsOk());
   EXPECT_TRUE(BobMayLook());
   store_.rows().Change({.shares = {share_}}, {}, [](const absl::Status&) {});
   revoked_ = 0;
-  ASSERT_THAT(changes_.LearnAgain(), IsOk());
+  ASSERT_THAT(changes_.ReloadRows(), IsOk());
   EXPECT_FALSE(BobMayLook());
   EXPECT_EQ(revoked_, 1) << "streams ask again";
   changes_.SessionGone("s");
-  EXPECT_THAT(access_.MaySession(ann_, "s", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckSessionAccess(ann_, "s", Permission::kRead), StatusIs(Code::kNotFound));
 }
 
 TEST_F(FollowingAccessChangesTest, WhatIsBeingTakenAwayDoesNotComeBackMeanwhile) {
@@ -249,19 +249,19 @@ TEST_F(FollowingAccessChangesTest, WhatIsBeingTakenAwayDoesNotComeBackMeanwhile)
   store_.Hold();
   changes_.Unshare(ann_, "sessions/s", "bob", [](const absl::Status&) {});
   EXPECT_FALSE(BobMayLook());
-  ASSERT_THAT(changes_.LearnAgain(), IsOk());
+  ASSERT_THAT(changes_.ReloadRows(), IsOk());
   EXPECT_FALSE(BobMayLook()) << "though the store has it still";
   store_.Release();
-  ASSERT_THAT(changes_.LearnAgain(), IsOk());
+  ASSERT_THAT(changes_.ReloadRows(), IsOk());
   EXPECT_FALSE(BobMayLook());
-  ASSERT_THAT(changes_.LearnAgain(), IsOk());
+  ASSERT_THAT(changes_.ReloadRows(), IsOk());
   Share();
   EXPECT_TRUE(BobMayLook()) << "and it may be given again";
 }
 
 TEST_F(FollowingAccessChangesTest, WhatIsGivenWhileAllIsReadStays) {
   store_.AfterReading([this] { Share(); });
-  ASSERT_THAT(changes_.LearnAgain(), IsOk());
+  ASSERT_THAT(changes_.ReloadRows(), IsOk());
   EXPECT_TRUE(BobMayLook());
 }
 
@@ -286,9 +286,9 @@ TEST_F(FollowingAccessChangesTest, WhatOneServerGivesWhileAnotherDeletesTheSessi
   EXPECT_THAT(store_.Load()->links, IsEmpty());
   EXPECT_THAT(store_.Load()->shares, IsEmpty());
   add(&there);
-  ASSERT_THAT(there.LearnAgain(), IsOk());
+  ASSERT_THAT(there.ReloadRows(), IsOk());
   add(&changes_);
-  ASSERT_THAT(changes_.LearnAgain(), IsOk());
+  ASSERT_THAT(changes_.ReloadRows(), IsOk());
   for (const char* digest : {"1", "2"}) {
     EXPECT_THAT(access_there.FindLink(digest).status(), StatusIs(Code::kUnauthenticated));
     EXPECT_THAT(access_.FindLink(digest).status(), StatusIs(Code::kUnauthenticated));
@@ -308,17 +308,20 @@ TEST_F(FollowingAccessChangesTest, WhatACallNamesAndNobodyKnowsIsLookedForBefore
     changes_.Added(session);
     return absl::OkStatus();
   });
-  EXPECT_THAT(access_.MaySession(ann_, "t", Need::kOwn), IsOk());
-  EXPECT_THAT(access_.MaySession(ann_, "t", Need::kOwn), IsOk());
-  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckSessionAccess(ann_, "t", Permission::kOwner), IsOk());
+  EXPECT_THAT(access_.CheckSessionAccess(ann_, "t", Permission::kOwner), IsOk());
+  EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kRead), StatusIs(Code::kNotFound));
   EXPECT_THAT(asked, SizeIs(1)) << "what is known is not looked for";
-  EXPECT_THAT(access_.MayPrediction(ann_, "p", Need::kLook), StatusIs(Code::kNotFound));
-  EXPECT_THAT(access_.MayCase(ann_, kMesh, Need::kLook).status(), StatusIs(Code::kNotFound));
-  EXPECT_THAT(access_.MayMesh(ann_, kMesh, Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckPredictionAccess(ann_, "p", Permission::kRead),
+              StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckCaseAccess(ann_, kMesh, Permission::kRead).status(),
+              StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckMeshAccess(ann_, kMesh, Permission::kRead), StatusIs(Code::kNotFound));
   EXPECT_THAT(access_.FindLink(kMesh).status(), StatusIs(Code::kUnauthenticated));
   ASSERT_THAT(asked, SizeIs(5));
   EXPECT_EQ(asked[2].owner, "ann") << "a case is somebody's";
-  EXPECT_THAT(access_.MaySession(ann_, "away", Need::kLook), StatusIs(Code::kUnavailable))
+  EXPECT_THAT(access_.CheckSessionAccess(ann_, "away", Permission::kRead),
+              StatusIs(Code::kUnavailable))
       << "nobody knows that it is not there";
 }
 

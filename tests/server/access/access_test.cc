@@ -63,18 +63,21 @@ class AccessTest : public ::testing::Test {
 TEST_F(AccessTest, ABridgeLooksAtWhatAnExportHoldsAndAtNothingElse) {
   const Principal bridge{.name = "bridge", .roles = {"bridge"}};
   const auto looks = [&](const Principal& caller) {
-    return access_.MayPrediction(caller, "q", Need::kLook).ok() &&
-           access_.MayCase(caller, kCase, Need::kLook).ok() &&
-           access_.MayMesh(caller, kMesh, Need::kLook).ok();
+    return access_.CheckPredictionAccess(caller, "q", Permission::kRead).ok() &&
+           access_.CheckCaseAccess(caller, kCase, Permission::kRead).ok() &&
+           access_.CheckMeshAccess(caller, kMesh, Permission::kRead).ok();
   };
-  EXPECT_THAT(access_.MayPrediction(bridge, "q", Need::kLook), StatusIs(Code::kNotFound));
-  EXPECT_THAT(access_.MayCase(bridge, kCase, Need::kLook), StatusIs(Code::kNotFound));
-  EXPECT_THAT(access_.MayMesh(bridge, kMesh, Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckPredictionAccess(bridge, "q", Permission::kRead),
+              StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckCaseAccess(bridge, kCase, Permission::kRead), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckMeshAccess(bridge, kMesh, Permission::kRead), StatusIs(Code::kNotFound));
   changes_.SetExported("q", true);
   EXPECT_TRUE(looks(bridge));
   EXPECT_FALSE(looks(bob_));
-  EXPECT_THAT(access_.MayPrediction(bridge, "q", Need::kOwn), StatusIs(Code::kPermissionDenied));
-  EXPECT_THAT(access_.MaySession(bridge, "s", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckPredictionAccess(bridge, "q", Permission::kOwner),
+              StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(access_.CheckSessionAccess(bridge, "s", Permission::kRead),
+              StatusIs(Code::kNotFound));
   EXPECT_THAT(access_.SharedPredictions(bridge), ElementsAre("q"));
   ASSERT_EQ(access_.SharedCases(bridge).size(), 1U);
   changes_.SetExported("q", false);
@@ -82,7 +85,7 @@ TEST_F(AccessTest, ABridgeLooksAtWhatAnExportHoldsAndAtNothingElse) {
   EXPECT_THAT(access_.SharedPredictions(bridge), IsEmpty());
   changes_.SetExported("q", true);
   changes_.PredictionRemoved("q");
-  EXPECT_THAT(access_.MayCase(bridge, kCase, Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckCaseAccess(bridge, kCase, Permission::kRead), StatusIs(Code::kNotFound));
 }
 
 // Whose prediction it is must be let look at the case.
@@ -94,33 +97,33 @@ TEST_F(AccessTest, WhoNamesAnothersCaseDoesNotOpenItToABridge) {
   foreign.case_sha256 = kCase;
   changes_.Added(foreign);
   changes_.SetExported("b", true);
-  EXPECT_THAT(access_.MayPrediction(bridge, "b", Need::kLook), IsOk());
-  EXPECT_THAT(access_.MayCase(bridge, kCase, Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckPredictionAccess(bridge, "b", Permission::kRead), IsOk());
+  EXPECT_THAT(access_.CheckCaseAccess(bridge, kCase, Permission::kRead), StatusIs(Code::kNotFound));
   ASSERT_THAT(Share("cases/" + kCase, "bob"), IsOk());
-  EXPECT_THAT(access_.MayCase(bridge, kCase, Need::kLook), IsOk());
+  EXPECT_THAT(access_.CheckCaseAccess(bridge, kCase, Permission::kRead), IsOk());
 }
 
 TEST_F(AccessTest, ExportsAreAnsweredByBridgesAlone) {
   const Principal bridge{.name = "bridge", .roles = {"bridge"}};
-  EXPECT_THAT(Access::MayCall(bridge, "ExportService.UpdateExport"), IsOk());
-  EXPECT_THAT(Access::MayCall(nobody_, "ExportService.UpdateExport"), IsOk());
-  EXPECT_THAT(Access::MayCall(ann_, "ExportService.UpdateExport"),
+  EXPECT_THAT(Access::CheckMethodAccess(bridge, "ExportService.UpdateExport"), IsOk());
+  EXPECT_THAT(Access::CheckMethodAccess(nobody_, "ExportService.UpdateExport"), IsOk());
+  EXPECT_THAT(Access::CheckMethodAccess(ann_, "ExportService.UpdateExport"),
               StatusIs(Code::kPermissionDenied));
   EXPECT_EQ(Access::ExportsSeenBy(bridge), std::nullopt);
   EXPECT_EQ(Access::ExportsSeenBy(ann_), "ann");
   const absl::Status none = absl::NotFoundError("none");
-  EXPECT_THAT(Access::MayExport(ann_, "ann", none, Need::kOwn), IsOk());
-  EXPECT_THAT(Access::MayExport(bridge, "ann", none, Need::kLook), IsOk());
-  EXPECT_THAT(Access::MayExport(bridge, "ann", none, Need::kOwn),
+  EXPECT_THAT(Access::CheckExportAccess(ann_, "ann", none, Permission::kOwner), IsOk());
+  EXPECT_THAT(Access::CheckExportAccess(bridge, "ann", none, Permission::kRead), IsOk());
+  EXPECT_THAT(Access::CheckExportAccess(bridge, "ann", none, Permission::kOwner),
               StatusIs(Code::kPermissionDenied));
-  EXPECT_EQ(Access::MayExport(bob_, "ann", none, Need::kLook), none);
+  EXPECT_EQ(Access::CheckExportAccess(bob_, "ann", none, Permission::kRead), none);
 }
 
 TEST_F(AccessTest, OnesOwnIsOnesOwn) {
-  EXPECT_THAT(access_.MaySession(ann_, "s", Need::kOwn), IsOk());
-  EXPECT_THAT(access_.MayPrediction(ann_, "q", Need::kOwn), IsOk());
-  EXPECT_THAT(access_.MayCase(ann_, kCase, Need::kOwn), IsOk());
-  EXPECT_THAT(access_.MayMesh(ann_, kMesh, Need::kLook), IsOk());
+  EXPECT_THAT(access_.CheckSessionAccess(ann_, "s", Permission::kOwner), IsOk());
+  EXPECT_THAT(access_.CheckPredictionAccess(ann_, "q", Permission::kOwner), IsOk());
+  EXPECT_THAT(access_.CheckCaseAccess(ann_, kCase, Permission::kOwner), IsOk());
+  EXPECT_THAT(access_.CheckMeshAccess(ann_, kMesh, Permission::kRead), IsOk());
 }
 
 TEST_F(AccessTest, AnothersAnswersAsWhatIsNotThere) {
@@ -134,20 +137,23 @@ TEST_F(AccessTest, AnothersAnswersAsWhatIsNotThere) {
     return foreign.code() == Code::kNotFound && missing.code() == Code::kNotFound &&
            message == missing.message();
   };
-  for (const Need need : {Need::kLook, Need::kDrag, Need::kOwn}) {
-    EXPECT_EQ(access_.MaySession(bob_, "s", need).code(), Code::kNotFound);
-    EXPECT_EQ(access_.MayPrediction(bob_, "q", need).code(), Code::kNotFound);
-    EXPECT_TRUE(same_but_for_the_name(access_.MayCase(bob_, kCase, need).status(),
-                                      access_.MayCase(bob_, none, need).status(), kCase, none));
-    EXPECT_TRUE(same_but_for_the_name(access_.MayMesh(bob_, kMesh, need),
-                                      access_.MayMesh(bob_, none, need), kMesh, none));
+  for (const Permission need : {Permission::kRead, Permission::kWrite, Permission::kOwner}) {
+    EXPECT_EQ(access_.CheckSessionAccess(bob_, "s", need).code(), Code::kNotFound);
+    EXPECT_EQ(access_.CheckPredictionAccess(bob_, "q", need).code(), Code::kNotFound);
+    EXPECT_TRUE(same_but_for_the_name(access_.CheckCaseAccess(bob_, kCase, need).status(),
+                                      access_.CheckCaseAccess(bob_, none, need).status(), kCase,
+                                      none));
+    EXPECT_TRUE(same_but_for_the_name(access_.CheckMeshAccess(bob_, kMesh, need),
+                                      access_.CheckMeshAccess(bob_, none, need), kMesh, none));
   }
 }
 
 TEST_F(AccessTest, WhatSomebodyHasIsNothingForThoseWithoutAName) {
-  EXPECT_THAT(access_.MaySession(nobody_, "s", Need::kLook), StatusIs(Code::kNotFound));
-  EXPECT_THAT(access_.MayPrediction(nobody_, "q", Need::kLook), StatusIs(Code::kNotFound));
-  EXPECT_EQ(access_.MayCase(nobody_, kCase, Need::kLook)->owner, "");
+  EXPECT_THAT(access_.CheckSessionAccess(nobody_, "s", Permission::kRead),
+              StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckPredictionAccess(nobody_, "q", Permission::kRead),
+              StatusIs(Code::kNotFound));
+  EXPECT_EQ(access_.CheckCaseAccess(nobody_, kCase, Permission::kRead)->owner, "");
 }
 
 TEST_F(AccessTest, WithoutLoginsWhatNobodyHasIsEverybodys) {
@@ -155,23 +161,27 @@ TEST_F(AccessTest, WithoutLoginsWhatNobodyHasIsEverybodys) {
   session.id = "t";
   session.mesh_sha256 = std::string(64, 'a');
   changes_.Added(session);
-  EXPECT_THAT(access_.MaySession(nobody_, "t", Need::kOwn), IsOk());
-  EXPECT_THAT(access_.MaySession(bob_, "t", Need::kLook), StatusIs(Code::kNotFound));
-  EXPECT_THAT(access_.MayMesh(nobody_, session.mesh_sha256, Need::kOwn), IsOk());
-  EXPECT_THAT(access_.MayMesh(bob_, session.mesh_sha256, Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckSessionAccess(nobody_, "t", Permission::kOwner), IsOk());
+  EXPECT_THAT(access_.CheckSessionAccess(bob_, "t", Permission::kRead), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckMeshAccess(nobody_, session.mesh_sha256, Permission::kOwner), IsOk());
+  EXPECT_THAT(access_.CheckMeshAccess(bob_, session.mesh_sha256, Permission::kRead),
+              StatusIs(Code::kNotFound));
 }
 
 TEST_F(AccessTest, AViewerLooksAndAPlannerDrags) {
   ASSERT_THAT(Share("sessions/s", "bob", ShareRole::kViewer), IsOk());
-  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kLook), IsOk());
-  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kDrag), StatusIs(Code::kPermissionDenied));
-  EXPECT_THAT(access_.MayPrediction(bob_, "q", Need::kLook), IsOk());
-  EXPECT_THAT(access_.MayPrediction(bob_, "q", Need::kOwn), StatusIs(Code::kPermissionDenied));
-  EXPECT_THAT(access_.MayMesh(bob_, kMesh, Need::kLook), IsOk());
-  EXPECT_THAT(access_.MayCase(bob_, kCase, Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kRead), IsOk());
+  EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kWrite),
+              StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(access_.CheckPredictionAccess(bob_, "q", Permission::kRead), IsOk());
+  EXPECT_THAT(access_.CheckPredictionAccess(bob_, "q", Permission::kOwner),
+              StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(access_.CheckMeshAccess(bob_, kMesh, Permission::kRead), IsOk());
+  EXPECT_THAT(access_.CheckCaseAccess(bob_, kCase, Permission::kRead), StatusIs(Code::kNotFound));
   ASSERT_THAT(Share("sessions/s", "bob", ShareRole::kPlanner), IsOk());
-  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kDrag), IsOk());
-  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kOwn), StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kWrite), IsOk());
+  EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kOwner),
+              StatusIs(Code::kPermissionDenied));
   EXPECT_THAT(access_.SharedSessions(bob_), ElementsAre("s"));
   EXPECT_THAT(access_.SharedPredictions(bob_), ElementsAre("q"));
   EXPECT_THAT(access_.SharedSessions(ann_), IsEmpty()) << "they are her own";
@@ -179,8 +189,9 @@ TEST_F(AccessTest, AViewerLooksAndAPlannerDrags) {
 
 TEST_F(AccessTest, AShareOfAProjectIsOneOfAllThatItsOwnerHasInIt) {
   ASSERT_THAT(Share("projects/p", "bob", ShareRole::kPlanner), IsOk());
-  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kDrag), IsOk());
-  ASSERT_OK_AND_ASSIGN(const CaseKey found, access_.MayCase(bob_, kCase, Need::kLook));
+  EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kWrite), IsOk());
+  ASSERT_OK_AND_ASSIGN(const CaseKey found,
+                       access_.CheckCaseAccess(bob_, kCase, Permission::kRead));
   EXPECT_EQ(found.owner, "ann");
   EXPECT_THAT(access_.SharedCases(bob_), ElementsAre(CaseKey{kCase, "ann"}));
   SessionRecord others;
@@ -188,16 +199,17 @@ TEST_F(AccessTest, AShareOfAProjectIsOneOfAllThatItsOwnerHasInIt) {
   others.owner = "cid";
   others.project = "p";
   changes_.Added(others);
-  EXPECT_THAT(access_.MaySession(bob_, "o", Need::kLook), StatusIs(Code::kNotFound))
+  EXPECT_THAT(access_.CheckSessionAccess(bob_, "o", Permission::kRead), StatusIs(Code::kNotFound))
       << "another's project of this name";
 }
 
 TEST_F(AccessTest, ACaseOfOnesOwnComesBeforeOneThatIsShared) {
   ASSERT_THAT(Share("cases/" + kCase, "bob"), IsOk());
-  EXPECT_EQ(access_.MayCase(bob_, kCase, Need::kLook)->owner, "ann");
-  EXPECT_THAT(access_.MayCase(bob_, kCase, Need::kOwn), StatusIs(Code::kPermissionDenied));
+  EXPECT_EQ(access_.CheckCaseAccess(bob_, kCase, Permission::kRead)->owner, "ann");
+  EXPECT_THAT(access_.CheckCaseAccess(bob_, kCase, Permission::kOwner),
+              StatusIs(Code::kPermissionDenied));
   changes_.Added(CaseRecord{.sha256 = kCase, .owner = "bob"});
-  EXPECT_EQ(access_.MayCase(bob_, kCase, Need::kOwn)->owner, "bob");
+  EXPECT_EQ(access_.CheckCaseAccess(bob_, kCase, Permission::kOwner)->owner, "bob");
   EXPECT_THAT(access_.SharedCases(bob_), IsEmpty()) << "one a name";
 }
 
@@ -207,26 +219,31 @@ TEST_F(AccessTest, AnIdThatAnotherTakesAgainOpensNoPredictionOfItsFirstOwner) {
   session.id = "s";
   session.owner = "bob";
   changes_.Added(session);
-  EXPECT_THAT(access_.MaySession(bob_, "s", Need::kOwn), IsOk());
-  EXPECT_THAT(access_.MayPrediction(bob_, "q", Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kOwner), IsOk());
+  EXPECT_THAT(access_.CheckPredictionAccess(bob_, "q", Permission::kRead),
+              StatusIs(Code::kNotFound));
 }
 
 TEST_F(AccessTest, ALinkFollowsItsSessionReadsItsCaseAndNothingElse) {
   const Principal link{.name = "link:s", .only_session = "sessions/s"};
-  EXPECT_THAT(access_.MaySession(link, "s", Need::kLook), StatusIs(Code::kUnauthenticated))
+  EXPECT_THAT(access_.CheckSessionAccess(link, "s", Permission::kRead),
+              StatusIs(Code::kUnauthenticated))
       << "nobody has made one";
   changes_.AddLink(ann_,
                    {.digest = "d", .session = "s", .case_sha256 = kCase, .expires_s = now_s_ + 1},
                    [](const absl::Status& status) { EXPECT_THAT(status, IsOk()); });
-  EXPECT_THAT(access_.MaySession(link, "s", Need::kLook), IsOk());
-  EXPECT_THAT(access_.MaySession(link, "s", Need::kDrag), StatusIs(Code::kPermissionDenied));
-  EXPECT_THAT(access_.MaySession(link, "t", Need::kLook), StatusIs(Code::kNotFound));
-  EXPECT_THAT(access_.MayPrediction(link, "q", Need::kLook), StatusIs(Code::kNotFound));
-  EXPECT_THAT(access_.MayMesh(link, kMesh, Need::kLook), IsOk());
-  EXPECT_EQ(access_.MayCase(link, kCase, Need::kLook)->owner, "ann");
-  EXPECT_THAT(access_.MayCase(link, kMesh, Need::kLook), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckSessionAccess(link, "s", Permission::kRead), IsOk());
+  EXPECT_THAT(access_.CheckSessionAccess(link, "s", Permission::kWrite),
+              StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(access_.CheckSessionAccess(link, "t", Permission::kRead), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckPredictionAccess(link, "q", Permission::kRead),
+              StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.CheckMeshAccess(link, kMesh, Permission::kRead), IsOk());
+  EXPECT_EQ(access_.CheckCaseAccess(link, kCase, Permission::kRead)->owner, "ann");
+  EXPECT_THAT(access_.CheckCaseAccess(link, kMesh, Permission::kRead), StatusIs(Code::kNotFound));
   now_s_ += 1;
-  EXPECT_THAT(access_.MaySession(link, "s", Need::kLook), StatusIs(Code::kUnauthenticated));
+  EXPECT_THAT(access_.CheckSessionAccess(link, "s", Permission::kRead),
+              StatusIs(Code::kUnauthenticated));
   EXPECT_THAT(access_.FindLink("d").status(), StatusIs(Code::kUnauthenticated));
 }
 
@@ -241,23 +258,28 @@ TEST_F(AccessTest, ALinkEndsWhenItsMakerMayDragNoMore) {
 
 TEST_F(AccessTest, ALinkCallsWhatAFollowerNeedsAndAPublisherUploadsCases) {
   const Principal link{.name = "link:s", .only_session = "sessions/s"};
-  EXPECT_THAT(Access::MayCall(link, "DeformService.Watch"), IsOk());
-  EXPECT_THAT(Access::MayCall(link, "CaseService.ReadCase"), IsOk());
-  EXPECT_THAT(Access::MayCall(link, "DeformService.Deform"), StatusIs(Code::kPermissionDenied));
-  EXPECT_THAT(Access::MayCall(link, "MeshService.UploadMesh"), StatusIs(Code::kPermissionDenied));
-  EXPECT_THAT(Access::MayCall(ann_, "CaseService.UploadCase"), StatusIs(Code::kPermissionDenied));
-  EXPECT_THAT(Access::MayCall(nobody_, "CaseService.UploadCase"), IsOk());
-  EXPECT_THAT(Access::MayCall({.name = "ann", .roles = {"publisher"}}, "CaseService.UploadCase"),
-              IsOk());
+  EXPECT_THAT(Access::CheckMethodAccess(link, "DeformService.Watch"), IsOk());
+  EXPECT_THAT(Access::CheckMethodAccess(link, "CaseService.ReadCase"), IsOk());
+  EXPECT_THAT(Access::CheckMethodAccess(link, "DeformService.Deform"),
+              StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(Access::CheckMethodAccess(link, "MeshService.UploadMesh"),
+              StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(Access::CheckMethodAccess(ann_, "CaseService.UploadCase"),
+              StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(Access::CheckMethodAccess(nobody_, "CaseService.UploadCase"), IsOk());
+  EXPECT_THAT(
+      Access::CheckMethodAccess({.name = "ann", .roles = {"publisher"}}, "CaseService.UploadCase"),
+      IsOk());
 }
 
 TEST_F(AccessTest, OnlyAProjectOfTheTokenTakesNewResources) {
-  EXPECT_THAT(Access::MayPutInto(ann_, ""), IsOk());
-  EXPECT_THAT(Access::MayPutInto(ann_, "p"), StatusIs(Code::kPermissionDenied));
-  EXPECT_THAT(Access::MayPutInto({.name = "ann", .projects = {"p"}}, "p"), IsOk());
-  EXPECT_THAT(Access::MayPutInto(nobody_, "p"), IsOk());
-  EXPECT_THAT(Access::MayPutInto(nobody_, "p\n"), StatusIs(Code::kInvalidArgument));
-  EXPECT_THAT(Access::MayPutInto(nobody_, std::string(129, 'p')), StatusIs(Code::kInvalidArgument));
+  EXPECT_THAT(Access::CheckProjectAccess(ann_, ""), IsOk());
+  EXPECT_THAT(Access::CheckProjectAccess(ann_, "p"), StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(Access::CheckProjectAccess({.name = "ann", .projects = {"p"}}, "p"), IsOk());
+  EXPECT_THAT(Access::CheckProjectAccess(nobody_, "p"), IsOk());
+  EXPECT_THAT(Access::CheckProjectAccess(nobody_, "p\n"), StatusIs(Code::kInvalidArgument));
+  EXPECT_THAT(Access::CheckProjectAccess(nobody_, std::string(129, 'p')),
+              StatusIs(Code::kInvalidArgument));
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ class Everybody final : public Authenticator {
   absl::StatusOr<Authenticated> Authenticate(const Credentials& /*credentials*/) override {
     return Authenticated{.principal = std::make_shared<const Principal>(Principal{.name = "ann"})};
   }
-  absl::Status StillGood(const Authenticated& /*authenticated*/) override {
+  absl::Status IsStillAuthorized(const Authenticated& /*authenticated*/) override {
     return absl::OkStatus();
   }
 };
@@ -69,16 +69,16 @@ TEST_F(LinkAuthenticatorTest, AGoodLinkIsItsSessionsAndEndsInTime) {
   EXPECT_EQ(link.principal->only_session, "sessions/s");
   EXPECT_EQ(link.token_id, DigestOfLinkToken(token_));
   EXPECT_EQ(link.expires, std::chrono::system_clock::time_point(std::chrono::seconds(1010)));
-  EXPECT_THAT(links_.StillGood(link), IsOk());
+  EXPECT_THAT(links_.IsStillAuthorized(link), IsOk());
   now_s_ = 1010;
-  EXPECT_THAT(links_.StillGood(link), StatusIs(Code::kUnauthenticated));
+  EXPECT_THAT(links_.IsStillAuthorized(link), StatusIs(Code::kUnauthenticated));
   EXPECT_THAT(Come("Bearer " + token_), StatusIs(Code::kUnauthenticated));
 }
 
 TEST_F(LinkAuthenticatorTest, ALinkThatWasTakenBackIsNoMoreGood) {
   ASSERT_OK_AND_ASSIGN(const Authenticated link, Come("bearer " + token_));
   changes_.RemoveLinks({.name = "ann"}, "s", [](const absl::Status& /*status*/) {});
-  EXPECT_THAT(links_.StillGood(link), StatusIs(Code::kUnauthenticated));
+  EXPECT_THAT(links_.IsStillAuthorized(link), StatusIs(Code::kUnauthenticated));
 }
 
 TEST_F(LinkAuthenticatorTest, WhatLooksLikeALinkIsOneOrNothing) {

@@ -95,7 +95,7 @@ class CaseUploadStreamTest : public ::testing::Test {
   const std::string bytes_ = Sample(10'000);
   const std::string sha256_ = Sha256Hex({bytes_});
   ServiceLimits limits_{.max_case_bytes = 20'000, .max_cases = 2};
-  ServiceGate gate_;
+  AdmissionControl gate_;
   InMemoryCaseStore store_;
   std::unique_ptr<WorkerPool> workers_ = std::make_unique<WorkerPool>(kStoreWorkers);
   DeadlineTimer timer_;

@@ -112,7 +112,7 @@ class ReactorsTest : public ::testing::Test {
 
   const SampleMesh sample_{Bar({2, 2, 3})};
   ServiceLimits limits_;
-  ServiceGate gate_;
+  AdmissionControl gate_;
   MemoryBudget budget_{64 << 20};
   MeshCatalog catalog_{limits_, &budget_};
   const std::unique_ptr<UploadStore> upload_store_ = *UploadStore::OpenTemporary();

@@ -141,7 +141,7 @@ TEST_F(HeldSessionsTest, WhatIsLostLeavesMemoryAndStaysKnown) {
   EXPECT_LT(a_.reserved_bytes(), bytes) << "though somebody has the session";
   EXPECT_TRUE(session->moved());
   EXPECT_FALSE(session->evicted()) << "no stream may open it again and go on";
-  EXPECT_TRUE(IsMoved(session->Deform(session->model(), {HandlePose()}, {}).status()));
+  EXPECT_TRUE(IsMoved(session->Solve(session->model(), {HandlePose()}, {}).status()));
   EXPECT_THAT(a_.Open("s"), IsOk()) << "nobody else has taken it";
 }
 
@@ -243,7 +243,7 @@ TEST_F(HeldSessionsTest, AnEvictedSessionIsOthersUnlessSomebodyHasIt) {
 
 TEST_F(HeldSessionsTest, AWatchersHoldOutlivesTheSessionInMemory) {
   ASSERT_OK_AND_ASSIGN(std::shared_ptr<Session> session, a_.Create("s"));
-  SessionHoldPtr hold = session->hold();
+  SessionLeaseHandlePtr hold = session->hold();
   session.reset();
   a_.EvictAll();
   a_.Settle();
@@ -270,12 +270,12 @@ TEST_F(HeldSessionsTest, WhatCannotBeMadeIsOthersBeforeAnybodyHearsOfIt) {
 TEST_F(HeldSessionsTest, NewsOfOthersAreLearntAndThoseOfOwnDoingPassedOver) {
   ASSERT_THAT(a_.Create("s", "request"), IsOk());
   SessionRecord record = a_.Look("s")->record;
-  a_.registry.Learn(record);
+  a_.registry.OnCreated(record);
   a_.registry.Changed(record);
   a_.registry.Forget("s");
   EXPECT_EQ(a_.registry.size(), 1) << "it is held: whoever deletes it takes it first";
   b_.registry.Changed(record);
-  b_.registry.Learn(record);
+  b_.registry.OnCreated(record);
   EXPECT_EQ(b_.registry.CountMadeFrom(record.mesh_sha256), 1);
   EXPECT_TRUE(IsMoved(b_.Create("", "request").status())) << "the same request, to be called at a";
   record.mesh_sha256 = std::string(64, 'f');

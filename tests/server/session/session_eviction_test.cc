@@ -113,7 +113,7 @@ class SessionEvictionTest : public ::testing::Test {
   static Positions Answer(Session& session) {
     HandlePose pose;
     pose.translation_mm = {1, 2, 3};
-    const auto answer = session.Deform(session.model(), {pose}, {});
+    const auto answer = session.Solve(session.model(), {pose}, {});
     EXPECT_THAT(answer, IsOk());
     return answer.ok() ? answer->positions : Positions();
   }
@@ -154,7 +154,7 @@ TEST_F(SessionEvictionTest, WhatIsNotInUseGivesItsMemoryAndComesBackWithTheSameA
   EXPECT_EQ(registry_->size(), 0);
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_) << "though somebody holds it";
   EXPECT_TRUE(before->evicted());
-  EXPECT_THAT(before->Deform(before->model(), {HandlePose()}, {}),
+  EXPECT_THAT(before->Solve(before->model(), {HandlePose()}, {}),
               StatusIs(absl::StatusCode::kNotFound));
 
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> after, Open("bar").get());

@@ -145,7 +145,7 @@ TEST_F(SessionRegistryTest, ADeletedSessionAnswersNoMorePoses) {
   ASSERT_THAT(Delete(session->id()), IsOk());
   std::promise<absl::Status> status;
   session->strand().Post(Lane::kSolves, [&] {
-    status.set_value(session->Deform(session->model(), {HandlePose{}}, DeformControl{}).status());
+    status.set_value(session->Solve(session->model(), {HandlePose{}}, DeformControl{}).status());
   });
   EXPECT_THAT(status.get_future().get(),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("delete")));

@@ -54,7 +54,7 @@ class SessionTest : public ::testing::Test {
   static absl::StatusOr<std::optional<PreparedAnswer>> Respond(Session* session,
                                                                const ResponseRequest& request,
                                                                const HandlePose& pose) {
-    TF_ASSIGN_OR_RETURN(const std::shared_ptr<ResponseClaim> claim,
+    TF_ASSIGN_OR_RETURN(const std::shared_ptr<PreparedAnswersRef> claim,
                         session->PrepareResponse(request, {}));
     return session->Respond(*claim, {pose});
   }
@@ -91,7 +91,7 @@ TEST_F(SessionTest, AnswersAsTheModelDoes) {
     SessionRecord record = BarRecord(*bar_);
     record.model = model;
     ASSERT_OK_AND_ASSIGN(const auto session, Create(record));
-    ASSERT_OK_AND_ASSIGN(const Deformation answer, session->Deform(model, {Turn(10)}, {}));
+    ASSERT_OK_AND_ASSIGN(const Deformation answer, session->Solve(model, {Turn(10)}, {}));
     DeformerOptions options;
     options.model = model;
     ASSERT_OK_AND_ASSIGN(
@@ -115,10 +115,10 @@ TEST_F(SessionTest, TheSecondFactorOfASearchIsOfTheBudgetAndGivenBackWithTheAnsw
   {
     ASSERT_OK_AND_ASSIGN(const MemoryReservation rest,
                          budget_.Reserve(budget_.limit_bytes() - reserved, "all the rest"));
-    ASSERT_OK_AND_ASSIGN(const Deformation without, session->Deform(record.model, {pose}, {}));
+    ASSERT_OK_AND_ASSIGN(const Deformation without, session->Solve(record.model, {pose}, {}));
     EXPECT_EQ(without.summary.newton_steps, 0);
   }
-  ASSERT_OK_AND_ASSIGN(const Deformation answer, session->Deform(record.model, {pose}, {}));
+  ASSERT_OK_AND_ASSIGN(const Deformation answer, session->Solve(record.model, {pose}, {}));
   EXPECT_GT(answer.summary.newton_steps, 0);
   EXPECT_EQ(budget_.reserved_bytes(), reserved);
 }
@@ -128,8 +128,8 @@ TEST_F(SessionTest, AUniformStiffnessIsAnArrayOfIt) {
   ASSERT_OK_AND_ASSIGN(const auto by_array, Create(record));
   record.stiffness = 1000.0;  // what the array of the sample holds
   ASSERT_OK_AND_ASSIGN(const auto uniform, Create(record));
-  ASSERT_OK_AND_ASSIGN(const Deformation a, by_array->Deform(record.model, {Turn(10)}, {}));
-  ASSERT_OK_AND_ASSIGN(const Deformation b, uniform->Deform(record.model, {Turn(10)}, {}));
+  ASSERT_OK_AND_ASSIGN(const Deformation a, by_array->Solve(record.model, {Turn(10)}, {}));
+  ASSERT_OK_AND_ASSIGN(const Deformation b, uniform->Solve(record.model, {Turn(10)}, {}));
   EXPECT_EQ(a.positions, b.positions);
 }
 
@@ -173,7 +173,7 @@ TEST_F(SessionTest, AnotherModelIsMadeWhenItIsFirstAskedForAndKept) {
   EXPECT_GT(both, own);
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_ + both);
   EXPECT_THAT(session->PrepareModel(DeformationModel::kLinearElastic, {}), IsOk());
-  EXPECT_THAT(session->Deform(DeformationModel::kGradientField, {Turn(1)}, {}), IsOk());
+  EXPECT_THAT(session->Solve(DeformationModel::kGradientField, {Turn(1)}, {}), IsOk());
   EXPECT_EQ(session->bytes_held(), both) << "nothing is made twice";
   EXPECT_EQ(session->model(), DeformationModel::kGradientField) << "its own model stays";
 }
@@ -189,7 +189,7 @@ TEST_F(SessionTest, PreparedAnswersAreNearTheDirectOnesOrNone) {
   EXPECT_TRUE(answer->summary.prepared);
   EXPECT_LE(answer->summary.error_bound_mm, 1e-3);
   ASSERT_OK_AND_ASSIGN(const Deformation direct,
-                       session->Deform(DeformationModel::kGradientField, {Turn(10)}, {}));
+                       session->Solve(DeformationModel::kGradientField, {Turn(10)}, {}));
   const Positions expected = direct.positions(bar_->skin, Eigen::all);
   EXPECT_LE((answer->positions.cast<double>() - expected).rowwise().norm().maxCoeff(), 1e-3);
   ASSERT_OK_AND_ASSIGN(const std::optional<PreparedAnswer> too_far,
@@ -201,8 +201,8 @@ TEST_F(SessionTest, IllegalPosesAreRefused) {
   ASSERT_OK_AND_ASSIGN(const auto session, Create(BarRecord(*bar_)));
   HandlePose bad;
   bad.scale = -1;
-  EXPECT_THAT(session->Deform(session->model(), {bad}, {}), StatusIs(kInvalid, HasSubstr("scale")));
-  EXPECT_THAT(session->Deform(session->model(), {}, {}), StatusIs(kInvalid, HasSubstr("pose")));
+  EXPECT_THAT(session->Solve(session->model(), {bad}, {}), StatusIs(kInvalid, HasSubstr("scale")));
+  EXPECT_THAT(session->Solve(session->model(), {}, {}), StatusIs(kInvalid, HasSubstr("pose")));
 }
 
 TEST_F(SessionTest, AClosedSessionHoldsNothingAndAnswersNothing) {
@@ -210,7 +210,7 @@ TEST_F(SessionTest, AClosedSessionHoldsNothingAndAnswersNothing) {
   session->Close(Session::CloseReason::kDeleted);
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
   const auto closed = StatusIs(absl::StatusCode::kNotFound, HasSubstr("sessions/id"));
-  EXPECT_THAT(session->Deform(session->model(), {Turn(1)}, {}), closed);
+  EXPECT_THAT(session->Solve(session->model(), {Turn(1)}, {}), closed);
   EXPECT_THAT(session->PrepareModel(DeformationModel::kArap, {}), closed);
   EXPECT_THAT(Respond(session.get(), {.vertices = {0}}, Turn(1)), closed);
   session->Close(Session::CloseReason::kDeleted);  // does no harm
@@ -225,9 +225,9 @@ TEST_F(SessionTest, ASecondSessionOfTheSameTakesATenthAndAnswersAlike) {
   const int64_t more = budget_.reserved_bytes() - mesh_bytes_ - reserved;
   EXPECT_EQ(more, second->bytes_held() - second->shared_bytes());
   EXPECT_LE(10 * more, reserved);
-  ASSERT_OK_AND_ASSIGN(const Deformation a, first->Deform(record.model, {Turn(10)}, {}));
+  ASSERT_OK_AND_ASSIGN(const Deformation a, first->Solve(record.model, {Turn(10)}, {}));
   first->Close(Session::CloseReason::kDeleted);
-  ASSERT_OK_AND_ASSIGN(const Deformation b, second->Deform(record.model, {Turn(10)}, {}));
+  ASSERT_OK_AND_ASSIGN(const Deformation b, second->Solve(record.model, {Turn(10)}, {}));
   EXPECT_EQ(a.positions, b.positions);
   second->Close(Session::CloseReason::kDeleted);
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
@@ -235,7 +235,7 @@ TEST_F(SessionTest, ASecondSessionOfTheSameTakesATenthAndAnswersAlike) {
 
 TEST_F(SessionTest, AClosedSessionTakesThePreparedAnswersFromItsStreams) {
   ASSERT_OK_AND_ASSIGN(const auto session, Create(BarRecord(*bar_)));
-  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<ResponseClaim> claim,
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<PreparedAnswersRef> claim,
                        session->PrepareResponse({.vertices = {0}}, {}));
   session->Close(Session::CloseReason::kDeleted);
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
@@ -246,7 +246,7 @@ TEST_F(SessionTest, AClosedSessionTakesThePreparedAnswersFromItsStreams) {
 TEST_F(SessionTest, AModelThatWasNotPreparedIsNotMadeOnTheWay) {
   ASSERT_OK_AND_ASSIGN(const auto session, Create(BarRecord(*bar_)));
   EXPECT_FALSE(session->HasModel(DeformationModel::kArap));
-  EXPECT_THAT(session->Deform(DeformationModel::kArap, {Turn(1)}, {}),
+  EXPECT_THAT(session->Solve(DeformationModel::kArap, {Turn(1)}, {}),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("prepared")));
   EXPECT_THAT(session->PrepareModel(DeformationModel::kArap, {}), IsOk());
   EXPECT_TRUE(session->HasModel(DeformationModel::kArap));
@@ -257,7 +257,7 @@ TEST_F(SessionTest, EveryUseIsRemembered) {
   EXPECT_EQ(session->last_used(), clock_.Now());
   clock_.Advance(std::chrono::seconds(5));
   EXPECT_LT(session->last_used(), clock_.Now());
-  EXPECT_THAT(session->Deform(session->model(), {Turn(1)}, {}), IsOk());
+  EXPECT_THAT(session->Solve(session->model(), {Turn(1)}, {}), IsOk());
   EXPECT_EQ(session->last_used(), clock_.Now());
   clock_.Advance(std::chrono::seconds(5));
   EXPECT_THAT(Respond(session.get(), {.vertices = {0}}, Turn(1)), IsOk());

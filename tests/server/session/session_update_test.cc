@@ -122,7 +122,7 @@ TEST_F(SessionUpdateTest, TheNameStaysAndTheRestIsWhatIsAskedFor) {
   EXPECT_TRUE(first_->evicted());
   EXPECT_TRUE(first_->updated());
   EXPECT_FALSE(first_->outdated());
-  EXPECT_TRUE(HasReason(first_->Deform(first_->model(), {HandlePose()}, {}).status(),
+  EXPECT_TRUE(HasReason(first_->Solve(first_->model(), {HandlePose()}, {}).status(),
                         ErrorReason::kSessionUpdated));
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_ + view.session->bytes_held());
 }
@@ -163,7 +163,7 @@ TEST_F(SessionUpdateTest, WhatCannotBeMadeLeavesTheSessionAsItWas) {
               StatusIs(absl::StatusCode::kInvalidArgument));
   EXPECT_EQ(Record().etag, before.etag);
   EXPECT_EQ(Open(), first_);
-  EXPECT_THAT(first_->Deform(first_->model(), {HandlePose()}, {}), IsOk());
+  EXPECT_THAT(first_->Solve(first_->model(), {HandlePose()}, {}), IsOk());
   EXPECT_EQ(budget_.reserved_bytes(), bytes);
 }
 

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/base/duration_histogram.h"
-#include "server/session/frame_flow.h"
+#include "server/session/frame_scheduler.h"
 #include "server/telemetry/call_metrics.h"
 
 // What metrics cost a frame and a call: tissueform-metrics-benchmark.
@@ -35,7 +35,7 @@ double NanosecondsOf(const Work& work) {
 // Poses in lockstep, all that a frame does to its flow.
 double FrameNanoseconds(FrameMeasures* measures) {
   return NanosecondsOf([measures] {
-    FrameFlow flow(2, measures);
+    FrameScheduler flow(2, measures);
     for (int i = 1; i <= kRepetitions; ++i) {
       flow.Put(i, {}).IgnoreError();
       flow.StartSolve();
@@ -67,7 +67,7 @@ double CallNanoseconds() {
   CallMetrics metrics;
   const Principal nobody = {};
   const ObservedCall call{.method = "DeformService.AcknowledgeWatch",
-                          .kind = CallKind::kUpkeep,
+                          .kind = CallKind::kMetadata,
                           .principal = nobody,
                           .resource = {},
                           .address = {},

@@ -85,7 +85,7 @@ export function toCallError(thrown: unknown): CallError {
 }
 
 /** As a sentence that begins upper case and ends with a full stop: what a person reads. */
-export function sentenceOf(thrown: unknown): string {
+export function messageOf(thrown: unknown): string {
   const text = thrown instanceof Error ? thrown.message : String(thrown);
   const sentence = text.charAt(0).toUpperCase() + text.slice(1);
   return /[.!?]$/.test(sentence) ? sentence : `${sentence}.`;

@@ -19,7 +19,7 @@ import type { HandlePose } from "../generated/tissueform/v1/geometry_pb";
 import { Backoff, type Timer, browserTimer } from "../calls/backoff";
 
 /** A frame as the page shows it. */
-export interface Picture {
+export interface DisplayedFrame {
   frame: DeformFrame;
   /** Three of each vertex of the configuration, mm. */
   positions: Float32Array;
@@ -35,7 +35,7 @@ export interface Picture {
 export interface DragListener {
   onStarted(started: DeformStarted): void;
   /** `used` is to be called once the picture was shown: the server waits for it. */
-  onPicture(picture: Picture, used: () => void): void;
+  onPicture(picture: DisplayedFrame, used: () => void): void;
   onNotice(notice: DeformNotice): void;
   /** The newest poses or their commit have had no answer for 2 s, or the gateway gives no sign of life; then, that they have. */
   onWaiting(isWaiting: boolean): void;

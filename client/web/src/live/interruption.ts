@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { type CallError, sentenceOf } from "../calls/call_error";
+import { type CallError, messageOf } from "../calls/call_error";
 import { BLOCKED } from "../calls/call_socket";
 import type { SessionRoutes } from "../calls/session_routes";
 
@@ -38,6 +38,6 @@ export class Interruption {
     this.since ??= this.now();
     const isLong = this.now() - this.since > MOVING_MS;
     if (!isLong && error.reason !== BLOCKED && (error.isElsewhere || this.routes.isCluster)) return { kind: "moving" };
-    return { kind: "broken", text: sentenceOf(error) };
+    return { kind: "broken", text: messageOf(error) };
   }
 }

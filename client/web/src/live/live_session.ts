@@ -1,14 +1,14 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { type CallError, Code, sentenceOf, toCallError } from "../calls/call_error";
+import { type CallError, Code, messageOf, toCallError } from "../calls/call_error";
 import type { Gateway } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
 import type { DeformConfiguration, DeformNotice } from "../generated/tissueform/v1/deform_service_pb";
 import type { DeformationModel, Session } from "../generated/tissueform/v1/session_pb";
 import type { Pose } from "../geometry/pose";
 import { Backoff } from "../calls/backoff";
-import { DragSession, type Picture } from "./drag_session";
+import { DragSession, type DisplayedFrame } from "./drag_session";
 import { type Connection, Interruption } from "./interruption";
 import { fromMessages, toMessages } from "./pose_messages";
 import { claimSession, forgetAbandoned, forgetSession, newSession } from "./session_memory";
@@ -18,7 +18,7 @@ export type { Connection } from "./interruption";
 
 export interface LiveListener {
   onConnection(connection: Connection): void;
-  onPicture(picture: Picture, used: () => void): void;
+  onPicture(picture: DisplayedFrame, used: () => void): void;
   /** Poses that the session had before, when it is opened again. */
   onCommittedPoses(poses: Map<string, Pose>): void;
   onFollowers(count: number): void;
@@ -133,7 +133,7 @@ export class LiveSession {
   }
 
   private fail(error: CallError): null {
-    this.listener.onConnection({ kind: "failed", text: sentenceOf(error) });
+    this.listener.onConnection({ kind: "failed", text: messageOf(error) });
     return null;
   }
 
@@ -178,7 +178,7 @@ export class LiveSession {
       this.listener.onNotice("The server has lost the session; it is being made again.");
       void this.connect(false);
     } else if (error.reason === "SESSION_UPDATED") void this.startAnew();
-    else this.listener.onConnection({ kind: "failed", text: sentenceOf(error) });
+    else this.listener.onConnection({ kind: "failed", text: messageOf(error) });
   }
 
   private async startAnew(): Promise<void> {
@@ -197,7 +197,7 @@ export class LiveSession {
       this.listener.onNotice("Somebody has updated the session: the face is that of the new one.");
       this.listener.onUpdated();
     }
-    if (notice.case === "committed" && notice.value.failure !== "") this.listener.onNotice(`The server could not keep the poses: ${sentenceOf(notice.value.failure)}`);
+    if (notice.case === "committed" && notice.value.failure !== "") this.listener.onNotice(`The server could not keep the poses: ${messageOf(notice.value.failure)}`);
   }
 
   private async deleteAbandoned(): Promise<void> {

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { Code, sentenceOf, toCallError } from "../calls/call_error";
+import { Code, messageOf, toCallError } from "../calls/call_error";
 import type { Gateway } from "../calls/gateway";
 import type { Evaluation } from "../evaluation/answer_evaluator";
 import { type EvaluationHost, makeHost } from "../evaluation/evaluation_host";
@@ -61,7 +61,7 @@ export class LocalAnswers {
       // What it has stays good while the server is away: the next start of the drag asks again.
       if (error.isPassing && this.host !== null) return this.tell("covered");
       this.drop();
-      this.listener.onState({ kind: "failed", text: sentenceOf(thrown) });
+      this.listener.onState({ kind: "failed", text: messageOf(thrown) });
     }
   }
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Bearer } from "../calls/bearer";
-import { sentenceOf } from "../calls/call_error";
+import { messageOf } from "../calls/call_error";
 import { type LoginPage, type Redirect, browserPage, isSignedOut, keepRedirect, markSignedOut, redirectUri, takeAnswer, takeRedirect } from "./redirect";
 import { type Provider, type Tokens, type User, isRefusal, loginSentence, needsUser, newSecrets } from "./provider";
 
@@ -171,7 +171,7 @@ export class Login {
   private async replace(why: string): Promise<boolean> {
     if (this.tokens === null) return false;
     const isRenewed = !this.isReplacement && (await this.renew(true));
-    if (!isRenewed && this.tokens !== null) this.end(`The server does not accept your login. ${sentenceOf(why)}`);
+    if (!isRenewed && this.tokens !== null) this.end(`The server does not accept your login. ${messageOf(why)}`);
     return isRenewed;
   }
 

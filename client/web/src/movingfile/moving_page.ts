@@ -3,7 +3,7 @@
 
 import { VIRIDIS } from "../geometry/color_map";
 import type { MoveKey } from "../geometry/pose";
-import { button, el, newId, onceAPicture, section, slider } from "../panels/dom";
+import { button, el, newId, throttleToFrame, section, slider } from "../panels/dom";
 import { PictureBox } from "../panels/picture_box";
 import { viewBar } from "../panels/view_bar";
 import { formatNumber, formatWithUnit } from "../planning/numbers";
@@ -92,7 +92,7 @@ function moveRow({ plan }: MovingHead, index: number, key: MoveKey): HTMLElement
     number.title = Math.abs(value) >= limit - 1e-9 ? "As far as this file goes" : "";
     control.setAttribute("aria-valuetext", number.textContent);
   };
-  plan.onChange(onceAPicture(show));
+  plan.onChange(throttleToFrame(show));
   show();
   return el("div", { class: "move" }, [el("label", { text: LABELS[key], attributes: { for: id } }), control, number]);
 }
@@ -136,7 +136,7 @@ function describeError({ errorBoundMm, isEstimate }: Shown): string {
 /** Shows the newest of what it is given before the browser's next picture. */
 function onceAPictureWith<T>(show: (value: T) => void): (value: T) => void {
   let newest: T | null = null;
-  const update = onceAPicture(() => {
+  const update = throttleToFrame(() => {
     if (newest !== null) show(newest);
   });
   return (value) => {

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { Code, sentenceOf, toCallError } from "../calls/call_error";
+import { Code, messageOf, toCallError } from "../calls/call_error";
 import type { Gateway } from "../calls/gateway";
 import { openCase } from "../case/case_file";
 import { fileSource, listCases, sha256Of } from "../case/case_sources";
@@ -23,7 +23,7 @@ export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void, accou
       list.replaceChildren(...(await listCases(gateway)).map((entry) => caseItem(entry, onOpen)));
       told.textContent = list.childElementCount === 0 ? "The server has no case yet." : "";
     } catch (thrown) {
-      problem.textContent = `The cases cannot be listed. ${sentenceOf(thrown)}`;
+      problem.textContent = `The cases cannot be listed. ${messageOf(thrown)}`;
     }
   };
   const take = async (file: File) => {
@@ -35,7 +35,7 @@ export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void, accou
         progress.value = share;
       }));
     } catch (thrown) {
-      problem.textContent = sentenceOf(thrown);
+      problem.textContent = messageOf(thrown);
       told.textContent = "";
     } finally {
       progress.hidden = true;

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { type CallError, Code, sentenceOf, toCallError } from "../calls/call_error";
+import { type CallError, Code, messageOf, toCallError } from "../calls/call_error";
 import { type Gateway, sessionMetadata } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
 import { WatchOrigin } from "../generated/tissueform/v1/deform_service_pb";
@@ -40,7 +40,7 @@ export function followerPage(gateway: Gateway, file: CaseFile, session: string, 
 /** Why there is nothing more to see, as a sentence. */
 export function endOfWatch(error: CallError): string {
   if (error.code === Code.Unauthenticated) return LINK_HAS_ENDED;
-  return error.reason === "SESSION_NOT_FOUND" ? "The session that you followed has ended." : sentenceOf(error);
+  return error.reason === "SESSION_NOT_FOUND" ? "The session that you followed has ended." : messageOf(error);
 }
 
 export const LINK_HAS_ENDED = "The link has expired, or was ended. Ask whoever sent it for another one.";
@@ -126,7 +126,7 @@ export class Follower {
       const session = await this.gateway.sessions.getSession({ name: this.session }, { headers: sessionMetadata(this.session) });
       this.view.setPoses(fromMessages(session.committedPoses));
     } catch (thrown) {
-      this.listener.onNotice(`Where the bone is cannot be told. ${sentenceOf(toCallError(thrown))}`);
+      this.listener.onNotice(`Where the bone is cannot be told. ${messageOf(toCallError(thrown))}`);
     }
   }
 }

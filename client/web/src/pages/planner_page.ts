@@ -4,7 +4,7 @@
 import type { Gateway } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
 import { FollowLinks } from "../live/follow_links";
-import { button, el, onceAPicture } from "../panels/dom";
+import { button, el, throttleToFrame } from "../panels/dom";
 import { exportPanel } from "../panels/export_panel";
 import { jawPanel } from "../panels/jaw_panel";
 import { bindKeys, helpDialog } from "../panels/keyboard";
@@ -19,7 +19,7 @@ import { reportPanel } from "../panels/report_panel";
 import { segmentsPanel } from "../panels/segments_panel";
 import { noticeBox, statusBar } from "../panels/status_bar";
 import { viewBar } from "../panels/view_bar";
-import { wishPanel } from "../panels/wish_panel";
+import { targetPanel } from "../panels/target_panel";
 import { HeadView } from "../scene/head_view";
 import { Workbench } from "../workbench/workbench";
 import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
@@ -66,7 +66,7 @@ export function plannerPage(
     if (bench.waitingMs > LATE_MS) status.waiting(bench.waitingMs);
     else if (bench.picture.value !== null) status.answered(bench.picture.value.roundTripMs);
   };
-  bench.picture.watch(onceAPicture(showAge));
+  bench.picture.watch(throttleToFrame(showAge));
   setInterval(showAge, LATE_MS);
   bench.notice.watch(notice.show);
 
@@ -79,7 +79,7 @@ export function plannerPage(
     movementsPanel(bench),
     measuresPanel(bench),
     profilePanel(bench),
-    wishPanel(bench),
+    targetPanel(bench),
     jawPanel(bench),
     modelPanel(bench),
     mapPanel(bench),

@@ -46,7 +46,7 @@ export function collapsible(title: string, children: Child[], onOpen: (isOpen: b
  * Calls `update` once before the browser's next picture, however often the result is called before: what is written at every step
  * of a drag would cost more than the step.
  */
-export function onceAPicture(update: () => void): () => void {
+export function throttleToFrame(update: () => void): () => void {
   let isWaiting = false;
   return () => {
     if (isWaiting) return;

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { sentenceOf } from "../calls/call_error";
+import { messageOf } from "../calls/call_error";
 import { download, toPly, toPng, toStl } from "../exports/files";
 import { CASE_FILE, plannedRanges } from "../exports/case_plan";
 import { exportedSurfaces, planDocument, provenanceLines } from "../exports/plan_export";
@@ -15,7 +15,7 @@ export function exportPanel(bench: Workbench): HTMLElement {
     try {
       await run();
     } catch (thrown) {
-      bench.notice.value = sentenceOf(thrown);
+      bench.notice.value = messageOf(thrown);
     }
   };
   const save = (name: string, type: string, content: BlobPart) => download(name, new Blob([content], { type }));
@@ -48,6 +48,6 @@ export function exportPanel(bench: Workbench): HTMLElement {
 function caseButton(bench: Workbench): HTMLElement {
   const { source } = bench.file;
   const run = async () => download(CASE_FILE, new Blob([await source.read(0, source.totalBytes)], { type: "model/gltf-binary" }));
-  const control = button("Case file", () => void whileBusy(control, run, (thrown) => (bench.notice.value = sentenceOf(thrown))));
+  const control = button("Case file", () => void whileBusy(control, run, (thrown) => (bench.notice.value = messageOf(thrown))));
   return control;
 }

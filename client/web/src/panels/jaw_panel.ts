@@ -9,7 +9,7 @@ import { formatNumber } from "../planning/numbers";
 import type { DrawnSurface } from "../scene/head";
 import type { ShownLegend } from "../workbench/face_colors";
 import type { Workbench } from "../workbench/workbench";
-import { button, collapsible, el, onceAPicture, slider } from "./dom";
+import { button, collapsible, el, throttleToFrame, slider } from "./dom";
 
 /** The jaw that opens about its condyles, and how the teeth meet. */
 export function jawPanel(bench: Workbench): HTMLElement {
@@ -43,7 +43,7 @@ function openingPart(bench: Workbench): HTMLElement {
     control.value = String(degrees);
     control.setAttribute("aria-valuetext", `${formatNumber(degrees)} degrees`);
   };
-  bench.shown.watch(onceAPicture(show));
+  bench.shown.watch(throttleToFrame(show));
   show();
   const how = hinge.source === "landmarks" ? "the case’s landmarks of the condyles" : "the upper back ends of the lower jaw, for the case names no condyles";
   return el("div", { class: "landmark-part" }, [

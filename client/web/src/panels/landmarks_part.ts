@@ -4,7 +4,7 @@
 import type { FaceLandmark } from "../measures/face_landmarks";
 import { shownPoint } from "../measures/face_measures";
 import type { Workbench } from "../workbench/workbench";
-import { button, collapsible, el, onceAPicture } from "./dom";
+import { button, collapsible, el, throttleToFrame } from "./dom";
 
 /** The list of landmarks: what is placed, what is suggested, and how to place one. `show`: whether their points are drawn. */
 export function landmarksPart(bench: Workbench): { element: HTMLElement; show(isShown: boolean): void } {
@@ -31,7 +31,7 @@ export function landmarksPart(bench: Workbench): { element: HTMLElement; show(is
     drawPoints();
   };
   book.onChange(update);
-  bench.shown.watch(onceAPicture(() => isShown && drawPoints()));
+  bench.shown.watch(throttleToFrame(() => isShown && drawPoints()));
   update();
   const element = el("div", { class: "landmark-part" }, [
     state,

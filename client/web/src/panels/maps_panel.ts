@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { sentenceOf } from "../calls/call_error";
+import { messageOf } from "../calls/call_error";
 import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
 import { VIRIDIS, colorTable } from "../geometry/color_map";
 import { formatNumber } from "../planning/numbers";
@@ -10,7 +10,7 @@ import type { MapLegend, ShownLegend } from "../workbench/face_colors";
 import type { MapChoice } from "../workbench/face_map";
 import { describeFace } from "../workbench/shown_answer";
 import type { Workbench } from "../workbench/workbench";
-import { type Choice, button, el, newId, onceAPicture, section, select } from "./dom";
+import { type Choice, button, el, newId, throttleToFrame, section, select } from "./dom";
 
 interface ModelText {
   label: string;
@@ -42,8 +42,8 @@ export function modelPanel(bench: Workbench): HTMLElement {
     const text = describeFace(bench.answer.value, bench.comparison.value);
     if (answer.textContent !== text) answer.textContent = text;
   };
-  bench.answer.watch(onceAPicture(show));
-  bench.comparison.watch(onceAPicture(show));
+  bench.answer.watch(throttleToFrame(show));
+  bench.comparison.watch(throttleToFrame(show));
   return section("Model", [el("div", { attributes: { role: "radiogroup", "aria-label": "Model" } }, items), answer, localAnswers(bench)]);
 }
 
@@ -60,7 +60,7 @@ function localAnswers(bench: Workbench): HTMLElement {
     stop.hidden = state.kind !== "fetching" && state.kind !== "ready";
     start.hidden = state.kind !== "stopped" && state.kind !== "failed";
   };
-  bench.localState.watch(onceAPicture(show));
+  bench.localState.watch(throttleToFrame(show));
   show();
   return el("p", { class: "quiet local" }, [text, " ", stop, start]);
 }
@@ -87,7 +87,7 @@ export function describeLocal(state: LocalState): string {
 /** Which map lies on the skin, and what its colours mean. */
 export function mapPanel(bench: Workbench): HTMLElement {
   const choose = (choice: MapChoice) => {
-    bench.chooseMap(choice).catch((thrown) => (bench.notice.value = sentenceOf(thrown)));
+    bench.chooseMap(choice).catch((thrown) => (bench.notice.value = messageOf(thrown)));
   };
   const field = select<MapChoice>("Colours show", mapChoices(bench), choose);
   const show = () => {

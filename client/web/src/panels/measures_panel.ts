@@ -6,7 +6,7 @@ import { labelOf, measureFace } from "../measures/face_measures";
 import type { MeasureResult } from "../measures/evaluation";
 import { bandText, normText, unitText, valueTexts, whyNot } from "../measures/texts";
 import type { Workbench } from "../workbench/workbench";
-import { collapsible, el, onceAPicture } from "./dom";
+import { collapsible, el, throttleToFrame } from "./dom";
 import { landmarksPart } from "./landmarks_part";
 import { ownMeasuresPart } from "./own_measures_part";
 
@@ -27,8 +27,8 @@ export function measuresPanel(bench: Workbench): HTMLElement {
     landmarks.show(isOpen);
     show();
   });
-  bench.shown.watch(onceAPicture(show));
-  bench.landmarks.onChange(onceAPicture(show));
+  bench.shown.watch(throttleToFrame(show));
+  bench.landmarks.onChange(throttleToFrame(show));
   return panel;
 }
 

@@ -6,7 +6,7 @@ import { cell, describeMovement } from "../planning/landmarks";
 import { formatNumber } from "../planning/numbers";
 import { lengthBand } from "../measures/texts";
 import type { Workbench } from "../workbench/workbench";
-import { el, onceAPicture, section } from "./dom";
+import { el, throttleToFrame, section } from "./dom";
 
 function captionOf(source: string): string {
   const frame = source === "scanner" ? " Directions are the scanner’s: no head frame was found." : "";
@@ -39,7 +39,7 @@ export function movementsPanel(bench: Workbench): HTMLElement {
       row.title = `${describeMovement(movement)}${bandMm === null ? "" : `, ${plusMinus} mm in 95 of 100 cases`}`;
     });
   };
-  bench.shown.watch(onceAPicture(show));
+  bench.shown.watch(throttleToFrame(show));
   const heads = ["Landmark", "Forward", "Left", "Up", "In all"].map((text) => el("th", { text, attributes: { scope: "col" } }));
   const table = el("table", {}, [caption, el("thead", {}, [el("tr", {}, heads)]), el("tbody", {}, rows.map(({ row }) => row))]);
   return section("Movements", [landmarks.length === 0 ? el("p", { class: "quiet", text: "The case has no landmarks." }) : table]);

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { sentenceOf } from "../calls/call_error";
+import { messageOf } from "../calls/call_error";
 import { download } from "../exports/files";
 import { LEAST_PASSWORD_LETTERS, movingFile } from "../exports/moving_export";
 import type { Workbench } from "../workbench/workbench";
@@ -23,7 +23,7 @@ export function movingFilePart(bench: Workbench): HTMLElement {
     password.value = "";
   };
   const save: HTMLButtonElement = button("File that moves", () => {
-    void whileBusy(save, make, (thrown) => (bench.notice.value = sentenceOf(thrown)));
+    void whileBusy(save, make, (thrown) => (bench.notice.value = messageOf(thrown)));
   });
   return el("div", { class: "moving-part" }, [
     el("div", { class: "field" }, [el("label", { text: "Password", attributes: { for: id } }), password]),

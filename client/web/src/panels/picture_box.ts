@@ -1,10 +1,10 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { sentenceOf } from "../calls/call_error";
+import { messageOf } from "../calls/call_error";
 import type { HeadView } from "../scene/head_view";
 import type { Stage, StageListener } from "../scene/stage";
-import { button, el, onceAPicture, whileBusy } from "./dom";
+import { button, el, throttleToFrame, whileBusy } from "./dom";
 import { pictureMarks } from "./view_bar";
 
 const LOST = "The browser took the graphics card away, so the picture is not drawn. Numbers and sliders still work.";
@@ -32,7 +32,7 @@ export class PictureBox {
     stage.surface.setAttribute("aria-label", label);
     stage.surface.setAttribute("role", "application");
     const marks = pictureMarks(stage);
-    this.update = onceAPicture(marks.update);
+    this.update = throttleToFrame(marks.update);
     const lost = lostBox(stage);
     this.showLost = lost.show;
     this.element.append(marks.element, lost.element);
@@ -47,7 +47,7 @@ export class PictureBox {
 /** Over a picture that the browser has stopped: why, and the way to go on. */
 function lostBox(stage: Stage): { element: HTMLElement; show(isLost: boolean): void } {
   const text = el("span");
-  const restore = button("Restore picture", () => void whileBusy(restore, () => stage.restore(), (thrown) => (text.textContent = sentenceOf(thrown))));
+  const restore = button("Restore picture", () => void whileBusy(restore, () => stage.restore(), (thrown) => (text.textContent = messageOf(thrown))));
   const element = el("div", { class: "no-picture", attributes: { role: "alert" } }, [el("p", {}, [text]), restore]);
   element.hidden = true;
   return {

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { sentenceOf } from "../calls/call_error";
+import { messageOf } from "../calls/call_error";
 import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
 import type { Comparison } from "../workbench/comparison";
 import { exportText, maySend, mayTakeBack } from "../workbench/pacs_exports";
@@ -29,7 +29,7 @@ function storeForm(bench: Workbench): HTMLElement {
       title.value = "";
       bench.notice.value = `Stored “${prediction.title}”.`;
     };
-    void whileBusy(store, run, (thrown) => (bench.notice.value = sentenceOf(thrown)));
+    void whileBusy(store, run, (thrown) => (bench.notice.value = messageOf(thrown)));
   });
   return form;
 }
@@ -61,7 +61,7 @@ function predictionItem(bench: Workbench, prediction: Prediction, isCompared: bo
   const seconds = Number(prediction.createTime?.seconds ?? 0n);
   const facts = [info === undefined ? "" : modelText(info.name).label, seconds === 0 ? "" : new Date(1000 * seconds).toLocaleString()];
   const text = el("span", {}, [el("strong", { text: prediction.title || "Without a name" }), el("small", { text: facts.filter((fact) => fact !== "").join(" · ") })]);
-  const onError = (thrown: unknown) => (bench.notice.value = sentenceOf(thrown));
+  const onError = (thrown: unknown) => (bench.notice.value = messageOf(thrown));
   const toggle = async () => bench.compare(isCompared ? null : { from: "plan", to: prediction, share: 1 });
   const compare = button("Compare", () => void whileBusy(compare, toggle, onError), {
     attributes: { "aria-pressed": String(isCompared), "data-name": prediction.name, "aria-label": `Compare ${prediction.title}` },
@@ -77,7 +77,7 @@ function pacsLine(bench: Workbench, prediction: Prediction): HTMLElement | null 
   const all = bench.pacs.byPrediction.value;
   if (all === null) return null;
   const entry = all.get(prediction.name);
-  const onError = (thrown: unknown) => (bench.notice.value = sentenceOf(thrown));
+  const onError = (thrown: unknown) => (bench.notice.value = messageOf(thrown));
   const send = button("Send to PACS", () => void whileBusy(send, () => bench.stored.send(prediction), onError), {
     attributes: { "aria-label": `Send ${prediction.title} to the PACS` },
   });
@@ -95,7 +95,7 @@ function pacsLine(bench: Workbench, prediction: Prediction): HTMLElement | null 
 function comparisonBox(bench: Workbench): HTMLElement {
   const update = (part: Partial<Comparison>) => {
     const now = bench.comparison.value;
-    if (now !== null) bench.compare({ ...now, ...part }).catch((thrown) => (bench.notice.value = sentenceOf(thrown)));
+    if (now !== null) bench.compare({ ...now, ...part }).catch((thrown) => (bench.notice.value = messageOf(thrown)));
   };
   const from = select<Comparison["from"]>("From", [], (value) => update({ from: value }));
   const share = slider("From one to the other", { least: 0, most: 1, step: 0.01, value: 1 }, (value) => update({ share: value }));

@@ -1,11 +1,11 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { sentenceOf } from "../calls/call_error";
+import { messageOf } from "../calls/call_error";
 import { download } from "../exports/files";
 import { ProfileDrawing, svgText, toPicture } from "../exports/profile_svg";
 import type { Workbench } from "../workbench/workbench";
-import { button, collapsible, el, onceAPicture } from "./dom";
+import { button, collapsible, el, throttleToFrame } from "./dom";
 
 /** The midsagittal section before and after, drawn anew as the face moves while it is open. */
 export function profilePanel(bench: Workbench): HTMLElement {
@@ -25,7 +25,7 @@ export function profilePanel(bench: Workbench): HTMLElement {
   const drawn = () => (drawing ??= new ProfileDrawing(bench)).draw(isNoseLeft);
   const png = () => {
     const save = toPicture(drawn()).then((blob) => download("tissueform-profile.png", blob));
-    save.catch((thrown) => (bench.notice.value = sentenceOf(thrown)));
+    save.catch((thrown) => (bench.notice.value = messageOf(thrown)));
   };
   const panel: HTMLDetailsElement = collapsible("Profile", [
     sheet,
@@ -35,7 +35,7 @@ export function profilePanel(bench: Workbench): HTMLElement {
       button("Profile PNG", png),
     ]),
   ], show);
-  bench.shown.watch(onceAPicture(show));
-  bench.landmarks.onChange(onceAPicture(show));
+  bench.shown.watch(throttleToFrame(show));
+  bench.landmarks.onChange(throttleToFrame(show));
   return panel;
 }

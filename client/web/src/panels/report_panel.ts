@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { sentenceOf } from "../calls/call_error";
+import { messageOf } from "../calls/call_error";
 import { download } from "../exports/files";
 import { reportFile } from "../report/report_file";
 import { reportSheet } from "../report/report_sheet";
@@ -12,7 +12,7 @@ import { button, collapsible, el, whileBusy } from "./dom";
 export function reportPanel(bench: Workbench): HTMLElement {
   const open = button("Open the report", () => {
     const run = async () => showReport(await reportSheet(bench));
-    void whileBusy(open, run, (thrown) => (bench.notice.value = sentenceOf(thrown)));
+    void whileBusy(open, run, (thrown) => (bench.notice.value = messageOf(thrown)));
   });
   const text = "Plan, measures, profile, pictures and how they came about, as shown now. It names nobody; its pictures show the face.";
   return collapsible("Report", [el("p", { class: "quiet", text }), el("div", { class: "buttons" }, [open])]);
@@ -28,7 +28,7 @@ function showReport(sheet: HTMLElement): void {
   // The planner's own line of words lies below the report.
   const told = el("p", { attributes: { role: "alert" } });
   const save = async () => download("tissueform-report.html", new Blob([await reportFile(sheet)], { type: "text/html" }));
-  const html = button("Report HTML", () => void whileBusy(html, save, (thrown) => (told.textContent = sentenceOf(thrown))));
+  const html = button("Report HTML", () => void whileBusy(html, save, (thrown) => (told.textContent = messageOf(thrown))));
   const buttons = [button("Print or save as PDF", () => print()), html, button("Back to the plan", close)];
   const page = el("main", { class: "report-page", attributes: { "aria-label": "Report" } }, [el("div", { class: "buttons" }, [...buttons, told]), sheet]);
   page.addEventListener("keydown", (event) => event.key === "Escape" && close());

@@ -8,7 +8,7 @@ import { MOVE_KEYS } from "../planning/plan";
 import { cssColor, segmentColor } from "../scene/materials";
 import type { Workbench } from "../workbench/workbench";
 import { posesOfCase } from "../planning/plan";
-import { button, el, newId, onceAPicture, section, select } from "./dom";
+import { button, el, newId, throttleToFrame, section, select } from "./dom";
 
 interface RowText {
   label: string;
@@ -105,7 +105,7 @@ function moveRow(bench: Workbench, key: MoveKey): HTMLElement {
   slider.addEventListener("input", () => change(slider.valueAsNumber, false));
   slider.addEventListener("change", () => change(slider.valueAsNumber, true));
   bench.selected.watch(show);
-  bench.plan.onChange(onceAPicture(show));
+  bench.plan.onChange(throttleToFrame(show));
   const text = el("label", { attributes: { for: id } }, [label, el("small", { id: `${id}-hint`, text: hint })]);
   return el("div", { class: "move" }, [text, slider, number, el("span", { class: "unit", text: unit })]);
 }

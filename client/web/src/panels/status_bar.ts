@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { sentenceOf } from "../calls/call_error";
+import { messageOf } from "../calls/call_error";
 import type { Connection } from "../live/live_session";
 import type { FollowLinks } from "../live/follow_links";
 import { button, el, whileBusy } from "./dom";
@@ -97,7 +97,7 @@ function describe(connection: Connection): string {
 /** Makes links for who follows, and ends them where the server knows who calls. */
 function linkButtons(links: FollowLinks): HTMLElement {
   const told = el("span", { class: "quiet", attributes: { role: "status" } });
-  const fail = (thrown: unknown) => (told.textContent = sentenceOf(thrown));
+  const fail = (thrown: unknown) => (told.textContent = messageOf(thrown));
   const end = button("End links", () => {
     const run = async () => {
       await links.endAll();

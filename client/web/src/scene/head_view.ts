@@ -12,7 +12,7 @@ import { type PictureSize, Stage, type StageListener } from "./stage";
 import { type ViewName, viewDirection } from "./views";
 
 /** Points that are drawn over all else, by what they are. */
-const POINT_COLORS = { penetration: 0xff3b30, landmark: 0x18b6a4, suggestion: 0xf2c230, wish: 0xe0559b, axis: 0x3f8cff } as const;
+const POINT_COLORS = { penetration: 0xff3b30, landmark: 0x18b6a4, suggestion: 0xf2c230, target: 0xe0559b, axis: 0x3f8cff } as const;
 export type PointKind = keyof typeof POINT_COLORS;
 
 /** A head on a stage, and how it is looked at: what a planner's page and a follower's page have in common. */

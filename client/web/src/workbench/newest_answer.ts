@@ -3,7 +3,7 @@
 
 import type { Evaluation } from "../evaluation/answer_evaluator";
 import type { DeformFrame } from "../generated/tissueform/v1/deform_service_pb";
-import type { Picture } from "../live/drag_session";
+import type { DisplayedFrame } from "../live/drag_session";
 import { subtractInto } from "./face_colors";
 import type { ShownAnswer } from "./shown_answer";
 
@@ -35,7 +35,7 @@ export class NewestAnswer {
    * The server's. `posesSinceOwn`: how many poses the hand has sent since the one that the page itself has answered: the face never
    * goes back to older ones. Returns whether it was taken.
    */
-  takePicture(picture: Pick<Picture, "positions" | "uncertainty" | "posesBehind"> & { frame: Pick<DeformFrame, "refinement" | "refining" | "summary"> }, posesSinceOwn: number): boolean {
+  takePicture(picture: Pick<DisplayedFrame, "positions" | "uncertainty" | "posesBehind"> & { frame: Pick<DeformFrame, "refinement" | "refining" | "summary"> }, posesSinceOwn: number): boolean {
     if (picture.positions.length !== this.rest.length) throw new Error("a picture came that has other vertices than the case");
     if (picture.posesBehind > posesSinceOwn) return false;
     subtractInto(picture.positions, this.rest, this.displacements);

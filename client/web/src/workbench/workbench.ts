@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { sentenceOf } from "../calls/call_error";
+import { messageOf } from "../calls/call_error";
 import type { Gateway } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
 import type { SurfaceKind } from "../case/manifest";
@@ -12,7 +12,7 @@ import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
 import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
 import { BoneSolid, type Penetration, PenetrationTest } from "../geometry/penetration";
 import { type Pose, fromLps, toMove } from "../geometry/pose";
-import type { Picture } from "../live/drag_session";
+import type { DisplayedFrame } from "../live/drag_session";
 import { type Connection, LiveSession } from "../live/live_session";
 import { LocalAnswers, type LocalState } from "../live/local_answers";
 import type { Anchor } from "../measures/anchor";
@@ -32,8 +32,8 @@ import type { ShownAnswer } from "./shown_answer";
 import { Signal } from "./signal";
 import { storedMeasures } from "./stored_measures";
 import { StoredPredictions } from "./stored_predictions";
-import { type Wish, WishFit } from "./wish_fit";
-import { type WishPlace, shownMove } from "./wish_place";
+import { type Target, TargetFit } from "./target_fit";
+import { type TargetPlace, shownMove } from "./target_place";
 import { recallLandmarks, rememberLandmarks } from "./work";
 
 /** What the server's last picture was answered with, be it shown or not. */
@@ -63,7 +63,7 @@ export class Workbench implements ShownFace {
   readonly live: LiveSession;
   readonly landmarks: LandmarkBook;
   readonly jaw: JawOpening;
-  readonly wishes: WishFit;
+  readonly targets: TargetFit;
   readonly pacs: PacsExports;
   readonly stored: StoredPredictions;
   readonly local: LocalAnswers;
@@ -122,11 +122,11 @@ export class Workbench implements ShownFace {
       ofModel: (model) => this.answers.ofModel(this.live.session, model, this.plan.poses()),
       ofPrediction: (prediction) => this.answers.ofPrediction(prediction),
     });
-    this.wishes = new WishFit(
+    this.targets = new TargetFit(
       file,
       this.plan,
       (request) => this.answers.fit({ ...request, session: this.live.session, model: this.model.value }),
-      () => (this.notice.value = "The plan was changed otherwise: what was wished for has ended."),
+      () => (this.notice.value = "The plan changed; soft-tissue targets were cleared."),
     );
     const solids = file.surfaces.filter(({ entry }) => entry.kind === "bone" || entry.kind === "segment");
     const label = (handle: string) => file.manifest.handles.find(({ name }) => name === handle)?.label;
@@ -158,7 +158,7 @@ export class Workbench implements ShownFace {
     this.landmarks.onChange(() => rememberLandmarks(this.caseName, this.landmarks.save()));
     this.setPoses(this.plan.poses());
     this.pacs.start();
-    const noList = (thrown: unknown) => (this.notice.value = `The stored predictions cannot be listed: ${sentenceOf(thrown)}`);
+    const noList = (thrown: unknown) => (this.notice.value = `The stored predictions cannot be listed: ${messageOf(thrown)}`);
     await Promise.all([this.live.start(this.plan.poses()), this.stored.load().catch(noList)]);
   }
 
@@ -212,7 +212,7 @@ export class Workbench implements ShownFace {
   }
 
   /** How far the skin at a place is from rest by the plan's newest answer, in the head frame. */
-  readonly moveAt = (place: WishPlace): Wish["move"] => fromLps(shownMove(place, this.newest.displacements), this.file.manifest.headFrame);
+  readonly moveAt = (place: TargetPlace): Target["move"] => fromLps(shownMove(place, this.newest.displacements), this.file.manifest.headFrame);
 
   positionsOf(surface: number): Float32Array {
     return this.view.head.surfaces[surface].shape.positions;
@@ -288,7 +288,7 @@ export class Workbench implements ShownFace {
     if (this.map.choice.value.kind === "model") {
       this.map.refresh().then(
         () => this.redraw(),
-        (thrown) => (this.notice.value = sentenceOf(thrown)),
+        (thrown) => (this.notice.value = messageOf(thrown)),
       );
     }
   }
@@ -304,7 +304,7 @@ export class Workbench implements ShownFace {
     this.view.select(this.plan.handles[this.selected.value]?.name ?? "");
   }
 
-  private show(picture: Picture, used: () => void): void {
+  private show(picture: DisplayedFrame, used: () => void): void {
     const isTaken = this.newest.takePicture(picture, this.local.posesSinceTold);
     this.waitingFrom = null;
     this.picture.value = { roundTripMs: picture.roundTripMs, summary: picture.frame.summary ?? null };

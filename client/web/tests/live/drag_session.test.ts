@@ -11,7 +11,7 @@ import type { Gateway } from "../../src/calls/gateway";
 import { ErrorInfoSchema } from "../../src/generated/google/rpc/error_details_pb";
 import { StatusSchema } from "../../src/generated/google/rpc/status_pb";
 import { DeformConfigurationSchema } from "../../src/generated/tissueform/v1/deform_service_pb";
-import { DragSession, type Picture } from "../../src/live/drag_session";
+import { DragSession, type DisplayedFrame } from "../../src/live/drag_session";
 import { toMessages } from "../../src/live/pose_messages";
 import { Patience } from "../../src/calls/silence";
 import { FakeClock } from "../testing/fake_clock";
@@ -24,7 +24,7 @@ function drag() {
   const sockets: FakeSocket[] = [];
   const timers: { action: () => void; delayMs: number }[] = [];
   const told: string[] = [];
-  const pictures: { picture: Picture; used: () => void }[] = [];
+  const pictures: { picture: DisplayedFrame; used: () => void }[] = [];
   const errors: CallError[] = [];
   let now = 0;
   const bearer = new Bearer();
@@ -249,7 +249,7 @@ function timedDrag() {
   const gateway = { bearer: new Bearer(), open } as unknown as Pick<Gateway, "open" | "bearer">;
   const listener = {
     onStarted: () => told.push("started"),
-    onPicture: (_: Picture, wasUsed: () => void) => used.push(wasUsed),
+    onPicture: (_: DisplayedFrame, wasUsed: () => void) => used.push(wasUsed),
     onNotice: () => {},
     onWaiting: (isWaiting: boolean) => told.push(isWaiting ? "waiting" : "answered"),
     onBroken: (error: CallError) => told.push(`broken: ${error.message}`),

@@ -112,7 +112,7 @@ TEST(SealedPayloadTest, SaltAndNonceAreNewEveryTime) {
 }
 
 TEST(SealedPayloadTest, MoreThanAPageTakesIsRefused) {
-  EXPECT_THAT(SealPayload(std::string(kMostMovingDataBytes + 1, 'x'), ""),
+  EXPECT_THAT(SealPayload(std::string(kMaxMovingDataBytes + 1, 'x'), ""),
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("fewer triangles")));
 }
 
@@ -127,7 +127,7 @@ TEST_F(PasswordFileTest, ItsLineIsThePasswordHoweverItEnds) {
 
 TEST_F(PasswordFileTest, WhatIsNoPasswordIsRefusedWithoutALetterOfIt) {
   const std::string bad[] = {"", "secret!", "secret words\nmore", "secret \xff words",
-                             std::string(kMostPasswordBytes + 1, 's')};
+                             std::string(kMaxPasswordBytes + 1, 's')};
   for (const std::string& text : bad) {
     Write("password", text);
     EXPECT_THAT(ReadPasswordFile(Path("password")),

@@ -16,7 +16,7 @@ TEST(StatsJsonTest, WhatWasNotReachedNamesTheObstacle) {
   SolveSummary solve;
   solve.converged = false;
   solve.load = 0.25;
-  solve.gave_up = GaveUp::kBlocked;
+  solve.gave_up = Termination::kBlocked;
   solve.obstacle = "chin would have to pass through jaw";
   EXPECT_EQ(NotReachedText(solve),
             "only 25 % of the movement was reached: chin would have to pass through jaw");
@@ -27,7 +27,7 @@ TEST(StatsJsonTest, AnAnswerThatHasNotConvergedSaysWhy) {
   solve.converged = false;
   solve.iterations = 500;
   solve.residual = 0.5;
-  solve.gave_up = GaveUp::kNoRoom;
+  solve.gave_up = Termination::kNoRoom;
   EXPECT_EQ(NotReachedText(solve),
             "not converged after 500 iterations (residual 0.5): no memory for the second factor "
             "that it needs");

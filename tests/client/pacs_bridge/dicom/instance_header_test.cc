@@ -87,8 +87,8 @@ TEST(InstanceHeader, ANameOfAHundredThousandCharactersIsCutAndTold) {
   for (const char* before : {"", "x"}) {
     options.patient_name = before + options.patient_name;
     const InstanceHeader header = HeaderOf("long", options);
-    EXPECT_LE(header.patient_name.size(), DicomTexts::kMostBytes);
-    EXPECT_GE(header.patient_name.size(), DicomTexts::kMostBytes - 1);
+    EXPECT_LE(header.patient_name.size(), DicomTexts::kMaxBytes);
+    EXPECT_GE(header.patient_name.size(), DicomTexts::kMaxBytes - 1);
     EXPECT_THAT(header.patient_name, ::testing::EndsWith("é"));
     EXPECT_THAT(header.text_problem, HasSubstr("(0010,0010) is longer than 1024 bytes and is cut"));
   }

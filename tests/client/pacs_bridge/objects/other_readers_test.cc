@@ -40,7 +40,7 @@ class OtherReadersTest : public ObjectsFixture {
   int ReadByPydicom() const {
     return Run(absl::StrCat("/usr/bin/python3 ",
                             SourcePath("tests/client/pacs_bridge/objects/read_objects.py"), " ",
-                            (folder_ / "manifest.json").string(), " ", SourcePath("docs/pacs.md")));
+                            (folder_ / "manifest.json").string(), " ", SourcePath("docs/dicom-attributes.csv")));
   }
   // Of Debian, whatever comes first on the path.
   bool HasModule(const std::string& module) const {

@@ -1,16 +1,16 @@
 #!/usr/bin/python3
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""Reads with pydicom what WritePredictionObjects has written, and holds it against docs/pacs.md.
+"""Reads with pydicom what WritePredictionObjects has written, and holds it against docs/dicom-attributes.csv.
 
-read_objects.py MANIFEST DOCS: MANIFEST is JSON, {"source": FILE, "uids": {KEY: UID}, "objects": {KEY: FILE},
-"stl": FOLDER}. The tables of DOCS under "What is written" say what every attribute is to hold. Prints every difference
+read_objects.py MANIFEST TABLE: MANIFEST is JSON, {"source": FILE, "uids": {KEY: UID}, "objects": {KEY: FILE},
+"stl": FOLDER}. TABLE says what every attribute holds. Prints every difference
 and ends with 1 when there is one; writes the models as FOLDER/KEY.stl.
 """
 
+import csv
 import json
 import pathlib
-import re
 import sys
 
 import pydicom
@@ -19,13 +19,10 @@ import pydicom
 COLUMNS = {"stl": 2, "capture": 3, "report": 4}
 
 
-def table_rows(docs):
+def table_rows(table):
     """The cells of the attribute table: name, tag, models, capture, report."""
-    section = docs.read_text(encoding="utf-8").split("## What is written", 1)[1].split("\n## ", 1)[0]
-    for line in section.splitlines():
-        cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
-        if len(cells) == 5 and re.fullmatch(r"\([0-9A-F]{4},[0-9A-F]{4}\)", cells[1]):
-            yield cells
+    with table.open(encoding="utf-8", newline="") as lines:
+        return list(csv.reader(lines))[1:]
 
 
 def text_of(dataset, name):
@@ -71,7 +68,7 @@ def difference(cell, dataset, name, key, manifest, source):
 
 def main():
     manifest = json.loads(pathlib.Path(sys.argv[1]).read_text(encoding="utf-8"))
-    rows = list(table_rows(pathlib.Path(sys.argv[2])))
+    rows = table_rows(pathlib.Path(sys.argv[2]))
     problems = [] if len(rows) > 40 else [f"only {len(rows)} rows are found in the table"]
     source = pydicom.dcmread(manifest["source"], stop_before_pixels=True)
     for key, path in manifest["objects"].items():

@@ -32,10 +32,10 @@ using testing::StatusIs;
 
 constexpr char kHostileName[] = "<script>alert(1)</script>^\"'&\x01\xff";
 
-class WorkListTest : public ::testing::Test {
+class ReviewTest : public ::testing::Test {
  protected:
-  WorkListTest()
-      : root_(testing::EmptyTestFolder("worklist")),
+  ReviewTest()
+      : root_(testing::EmptyTestFolder("review")),
         queue_(*BridgeQueue::Open((root_ / "state").string())) {
     AddCase("1.2", {.id = "4711", .name = "Planted^Patricia", .birth_date = "19610203"}, "a");
     AddCase("1.3", {.id = "0815", .name = kHostileName, .birth_date = "19700101"}, "b");
@@ -63,10 +63,10 @@ class WorkListTest : public ::testing::Test {
     EXPECT_THAT(rows.Update(series), IsOk());
   }
 
-  void Start(WorkListOptions options = {}) {
+  void Start(ReviewOptions options = {}) {
     options.port = 0;
     options.planner_url = "https://planner.example.org/";
-    auto server = WorkListServer::Start(options, queue_.get(), [this] { ++confirmed_; });
+    auto server = ReviewServer::Start(options, queue_.get(), [this] { ++confirmed_; });
     ASSERT_THAT(server, IsOk());
     server_ = *std::move(server);
   }
@@ -102,10 +102,10 @@ class WorkListTest : public ::testing::Test {
   const std::unique_ptr<BridgeQueue> queue_;
   std::string picture_;
   std::atomic<int> confirmed_ = 0;
-  std::unique_ptr<WorkListServer> server_;
+  std::unique_ptr<ReviewServer> server_;
 };
 
-TEST_F(WorkListTest, ShowsWhoseItIsAndOpensThePlanner) {
+TEST_F(ReviewTest, ShowsWhoseItIsAndOpensThePlanner) {
   Start();
   const std::string page = Curl("");
   EXPECT_THAT(page, StartsWith("HTTP/1.1 200"));
@@ -116,7 +116,7 @@ TEST_F(WorkListTest, ShowsWhoseItIsAndOpensThePlanner) {
   EXPECT_THAT(Curl("", picture_), HasSubstr("a picture"));
 }
 
-TEST_F(WorkListTest, NothingInANameIsMarkup) {
+TEST_F(ReviewTest, NothingInANameIsMarkup) {
   Start();
   const std::string page = Curl("");
   EXPECT_THAT(page, Not(HasSubstr("<script")));
@@ -125,7 +125,7 @@ TEST_F(WorkListTest, NothingInANameIsMarkup) {
   EXPECT_EQ(EscapedHtml("\xff\xC3\xA9<"), "\xEF\xBF\xBD\xC3\xA9&lt;");
 }
 
-TEST_F(WorkListTest, NothingIsCachedOrLoadedFromElsewhere) {
+TEST_F(ReviewTest, NothingIsCachedOrLoadedFromElsewhere) {
   Start();
   const std::string page = Curl("");
   EXPECT_THAT(page, HasSubstr("Cache-Control: no-store"));
@@ -134,7 +134,7 @@ TEST_F(WorkListTest, NothingIsCachedOrLoadedFromElsewhere) {
   EXPECT_THAT(page, HasSubstr("X-Content-Type-Options: nosniff"));
 }
 
-TEST_F(WorkListTest, AFormOfThePageConfirms) {
+TEST_F(ReviewTest, AFormOfThePageConfirms) {
   Start();
   const std::string page = Curl("");
   EXPECT_THAT(Curl(FormOf(page), "/store"), StartsWith("HTTP/1.1 303"));
@@ -143,7 +143,7 @@ TEST_F(WorkListTest, AFormOfThePageConfirms) {
   EXPECT_THAT(Curl(FormOf(page), "/store"), StartsWith("HTTP/1.1 409")) << "once";
 }
 
-TEST_F(WorkListTest, AFormFromElsewhereIsRefused) {
+TEST_F(ReviewTest, AFormFromElsewhereIsRefused) {
   Start();
   const std::string page = Curl("");
   EXPECT_THAT(Curl(absl::StrCat(FormOf(page), " -H 'Origin: https://evil.example.org'"), "/store"),
@@ -153,7 +153,7 @@ TEST_F(WorkListTest, AFormFromElsewhereIsRefused) {
   EXPECT_EQ(State(), BridgeExportState::kAsked);
 }
 
-TEST_F(WorkListTest, APatientWhoChangedSinceThePageWasShownIsNotConfirmed) {
+TEST_F(ReviewTest, APatientWhoChangedSinceThePageWasShownIsNotConfirmed) {
   Start();
   const std::string page = Curl("");
   ExportRows rows(queue_.get());
@@ -163,14 +163,14 @@ TEST_F(WorkListTest, APatientWhoChangedSinceThePageWasShownIsNotConfirmed) {
   EXPECT_EQ(State(), BridgeExportState::kAsked);
 }
 
-TEST_F(WorkListTest, AnotherHostIsRefused) {
-  Start({.allowed_hosts = {"worklist.example.org"}});
+TEST_F(ReviewTest, AnotherHostIsRefused) {
+  Start({.allowed_hosts = {"review.example.org"}});
   EXPECT_THAT(Curl("-H 'Host: evil.example.org'"), StartsWith("HTTP/1.1 421"));
   EXPECT_THAT(Curl("-H 'Host: evil.example.org'"), Not(HasSubstr("Planted")));
-  EXPECT_THAT(Curl("-H 'Host: worklist.example.org'"), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(Curl("-H 'Host: review.example.org'"), StartsWith("HTTP/1.1 200"));
 }
 
-TEST_F(WorkListTest, ItsPasswordIsAskedForEverything) {
+TEST_F(ReviewTest, ItsPasswordIsAskedForEverything) {
   const std::string file = (root_ / "password").string();
   std::ofstream(file) << "correct horse battery staple\n";
   fs::permissions(file, fs::perms::owner_read | fs::perms::owner_write);
@@ -182,34 +182,33 @@ TEST_F(WorkListTest, ItsPasswordIsAskedForEverything) {
   }
 }
 
-TEST_F(WorkListTest, WithoutAPasswordItListensOnLoopbackOnly) {
+TEST_F(ReviewTest, WithoutAPasswordItListensOnLoopbackOnly) {
   EXPECT_THAT(
-      WorkListServer::Start({.address = "0.0.0.0", .port = 0}, queue_.get(), nullptr).status(),
+      ReviewServer::Start({.address = "0.0.0.0", .port = 0}, queue_.get(), nullptr).status(),
       StatusIs(absl::StatusCode::kInvalidArgument));
   const std::string file = (root_ / "password").string();
   std::ofstream(file) << "short";
   fs::permissions(file, fs::perms::owner_read | fs::perms::owner_write);
-  EXPECT_THAT(
-      WorkListServer::Start({.port = 0, .token_file = file}, queue_.get(), nullptr).status(),
-      StatusIs(absl::StatusCode::kInvalidArgument));
+  EXPECT_THAT(ReviewServer::Start({.port = 0, .token_file = file}, queue_.get(), nullptr).status(),
+              StatusIs(absl::StatusCode::kInvalidArgument));
 }
 
-TEST_F(WorkListTest, APathLeadsNowhereElse) {
+TEST_F(ReviewTest, APathLeadsNowhereElse) {
   Start();
   for (const char* path : {"/pictures/../../queue.db", "/pictures/a/front.png", "/queue.db"}) {
     EXPECT_THAT(Curl("--path-as-is", path), StartsWith("HTTP/1.1 404")) << path;
   }
 }
 
-TEST_F(WorkListTest, ALongBodyIsRefused) {
+TEST_F(ReviewTest, ALongBodyIsRefused) {
   Start();
   EXPECT_THAT(Curl(absl::StrCat("-d token=", std::string(40'000, 'x')), "/store"),
               StartsWith("HTTP/1.1 413"));
 }
 
-TEST_F(WorkListTest, ASecondServerDoesNotShareThePort) {
+TEST_F(ReviewTest, ASecondServerDoesNotShareThePort) {
   Start();
-  EXPECT_THAT(WorkListServer::Start({.port = server_->port()}, queue_.get(), nullptr).status(),
+  EXPECT_THAT(ReviewServer::Start({.port = server_->port()}, queue_.get(), nullptr).status(),
               StatusIs(absl::StatusCode::kUnavailable));
 }
 

@@ -32,7 +32,7 @@ using ::testing::IsEmpty;
 using testing::IsOk;
 using testing::StatusIs;
 
-constexpr int64_t kMostBytes = 1 << 20;
+constexpr int64_t kMaxBytes = 1 << 20;
 
 // The text that a helper gives back after it has behaved so.
 absl::StatusOr<std::string> Call(const std::string& behaviour, const IsolationLimits& limits = {},
@@ -42,7 +42,7 @@ absl::StatusOr<std::string> Call(const std::string& behaviour, const IsolationLi
       {program, "trying it", limits},
       [&behaviour](PipeSender* request) { request->Text(behaviour); },
       [&text](int descriptor) {
-        PipeReceiver receiver(descriptor, kMostBytes);
+        PipeReceiver receiver(descriptor, kMaxBytes);
         TF_RETURN_IF_ERROR(receiver.Outcome());
         TF_RETURN_IF_ERROR(receiver.Number(INT32_MAX).status());
         TF_ASSIGN_OR_RETURN(text, receiver.Text());
@@ -160,7 +160,7 @@ TEST(HelperCallTest, HelperOfAnotherVersionIsRefused) {
   options.output = ChildStream::Pipe();
   ASSERT_OK_AND_ASSIGN(const auto helper, ChildProcess::Start(options));
   PipeSender(helper->request()).Number(kHelperCallVersion + 1);
-  EXPECT_THAT(PipeReceiver(helper->answer(), kMostBytes).Outcome(),
+  EXPECT_THAT(PipeReceiver(helper->answer(), kMaxBytes).Outcome(),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("another version")));
 }
 

@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 using testing::IsOk;
 using testing::StatusIs;
 
-constexpr int64_t kMostBytes = 1 << 16;
+constexpr int64_t kMaxBytes = 1 << 16;
 
 class PipeStreamTest : public ::testing::Test {
  protected:
@@ -36,7 +36,7 @@ class PipeStreamTest : public ::testing::Test {
   }
 
   PipeSender Sender() const { return PipeSender(ends_[1]); }
-  PipeReceiver Receiver(int64_t most_bytes = kMostBytes) const { return {ends_[0], most_bytes}; }
+  PipeReceiver Receiver(int64_t most_bytes = kMaxBytes) const { return {ends_[0], most_bytes}; }
 
  private:
   int ends_[2] = {-1, -1};

@@ -21,7 +21,7 @@
 namespace tissueform {
 namespace {
 
-constexpr int64_t kMostBytes = 1 << 20;
+constexpr int64_t kMaxBytes = 1 << 20;
 
 absl::Status Behave(const std::string& behaviour) {
   if (behaviour == "be killed") raise(SIGKILL);
@@ -66,7 +66,7 @@ int CallAndWait() {
   const absl::Status status = CallHelper(
       call, [](PipeSender* request) { request->Text("tell and wait"); },
       [](int descriptor) -> absl::Status {
-        PipeReceiver receiver(descriptor, kMostBytes);
+        PipeReceiver receiver(descriptor, kMaxBytes);
         if (absl::Status outcome = receiver.Outcome(); !outcome.ok()) return outcome;
         std::cout << receiver.Number(INT32_MAX).value_or(-1) << std::endl;
         return receiver.Text().status().ok() ? receiver.Number(0).status() : absl::OkStatus();

@@ -90,12 +90,12 @@ TEST(LandmarksTest, WhereACrownsVoxelsEndDoesNotMoveIt) {
     RoughenSurface(seed, &rough.labels);
     ASSERT_OK_AND_ASSIGN(const Landmarks l, FindLandmarks(head, rough));
     constexpr double kVoxelMm = 2;
-    constexpr double kMostMm = 1.5 * kVoxelMm;
-    ExpectNear(l.lower_incisor, smooth.lower_incisor, kMostMm, "lower incisor");
-    ExpectNear(l.upper_incisor, smooth.upper_incisor, kMostMm, "upper incisor");
+    constexpr double kMaxMm = 1.5 * kVoxelMm;
+    ExpectNear(l.lower_incisor, smooth.lower_incisor, kMaxMm, "lower incisor");
+    ExpectNear(l.upper_incisor, smooth.upper_incisor, kMaxMm, "upper incisor");
     for (const auto member : {&LeftAndRight::left, &LeftAndRight::right}) {
       ExpectNear(l.lower_molar.*member, smooth.lower_molar.*member, kVoxelMm, "lower molar");
-      ExpectNear(l.upper_molar.*member, smooth.upper_molar.*member, kMostMm, "upper molar");
+      ExpectNear(l.upper_molar.*member, smooth.upper_molar.*member, kMaxMm, "upper molar");
       ExpectNear(l.last_upper_tooth.*member, smooth.last_upper_tooth.*member, kVoxelMm,
                  "last upper tooth");
     }

@@ -75,7 +75,7 @@ TEST(MetalPlanesTest, TheCutsOfAJawWithFillingsDoNotDependOnTheSpacing) {
   std::filesystem::remove_all(folder);
   ASSERT_TRUE(volume.ok()) << volume.status();
   const MetalFindings findings = FindMetal(*volume, {});
-  ASSERT_TRUE(LessenStreaks(findings, 2, &*volume).any());
+  ASSERT_TRUE(ReduceMetalArtifacts(findings, 2, &*volume).any());
   std::vector<CutJaw> jaws;
   for (const double spacing_mm : {1.0, 1.5, 2.0}) {
     ASSERT_OK_AND_ASSIGN(CutJaw jaw, CutAt(*volume, findings, spacing_mm));

@@ -121,7 +121,7 @@ TEST(MetalReductionTest, ACorrectedSliceIsNearerToTheTruth) {
   EXPECT_GT(before, 35);
   const MetalFindings findings = FindMetal(volume);
   ASSERT_EQ(findings.clusters.size(), 2U);
-  const MetalReport report = LessenStreaks(findings, 1, &volume);
+  const MetalReport report = ReduceMetalArtifacts(findings, 1, &volume);
   EXPECT_EQ(report.corrected_slices, 1);
   EXPECT_LT(ErrorHu(volume, truth), before / 1.6) << "before " << before;
 }
@@ -130,7 +130,7 @@ TEST(MetalReductionTest, MetalStaysAndSlicesWithoutItAreAsTheyWere) {
   const CtVolume before = Volume(true);
   CtVolume after = before;
   const MetalFindings findings = FindMetal(before);
-  LessenStreaks(findings, 1, &after);
+  ReduceMetalArtifacts(findings, 1, &after);
   const size_t slice = static_cast<size_t>(kSize) * kSize;
   for (size_t i = 0; i < before.hu.size(); ++i) {
     if (i / slice != kMetalSlice) {
@@ -146,8 +146,8 @@ TEST(MetalReductionTest, TheResultDoesNotDependOnTheNumberOfThreads) {
   CtVolume one = Volume(true);
   for (int slice = 0; slice < kSlices; slice += 2) PutSlice(Scanned(true), slice, &one);
   CtVolume four = one;
-  LessenStreaks(FindMetal(one), 1, &one);
-  LessenStreaks(FindMetal(four), 4, &four);
+  ReduceMetalArtifacts(FindMetal(one), 1, &one);
+  ReduceMetalArtifacts(FindMetal(four), 4, &four);
   EXPECT_EQ(one.hu, four.hu);
 }
 

@@ -34,7 +34,7 @@ using Json = nlohmann::json;
 constexpr double kToleranceMm = 5e-5;  // of a bound; positions agree to twice that
 constexpr double kAgreementMm = 1e-4;
 constexpr double kBandAgreementMm = 2e-3;
-constexpr double kMostRotationRad = 0.4;
+constexpr double kMaxRotationRad = 0.4;
 
 Json ToJson(const HandlePose& pose) {
   return {{"rotation_vector", pose.rotation_vector},
@@ -75,7 +75,7 @@ class GoldenAnswersTest : public ::testing::TestWithParam<Evaluated> {
     response_ = *CreateResponse(preparation_, vertices,
                                 {.model = GetParam().model,
                                  .tolerance_mm = kToleranceMm,
-                                 .max_rotation_rad = kMostRotationRad,
+                                 .max_rotation_rad = kMaxRotationRad,
                                  .max_estimate_mm = 1});
   }
 
@@ -181,7 +181,7 @@ class GoldenBandTest : public ::testing::Test {
     const auto response = *CreateResponse(preparation_, vertices_,
                                           {.model = DeformationModel::kLinearElastic,
                                            .tolerance_mm = kToleranceMm,
-                                           .max_rotation_rad = kMostRotationRad});
+                                           .max_rotation_rad = kMaxRotationRad});
     columns_ = *BandColumns::Create(preparation_, bar_.uncertainty, vertices_, {});
     answers_ = response->Describe();
     columns_->Describe(&answers_);
@@ -203,7 +203,7 @@ class GoldenBandTest : public ::testing::Test {
       one["error_mm"] = evaluator.ErrorMm(ToAnswerPoses(poses));
       one["positions_mm"] = Rounded(positions);
       Eigen::VectorXf band;
-      columns_->Evaluate(poses, kMostRotationRad, &band);
+      columns_->Evaluate(poses, kMaxRotationRad, &band);
       one["band_mm"] = Rounded({band.begin(), band.end()});
       cases.push_back(std::move(one));
     }

@@ -71,7 +71,7 @@ Deformation Solve(const std::shared_ptr<MeshPreparation>& preparation,
 void ExpectEquilibrium(const MeshPreparation& preparation, const Deformation& answer) {
   EXPECT_TRUE(answer.summary.converged);
   EXPECT_EQ(answer.summary.load, 1.0);
-  EXPECT_EQ(answer.summary.gave_up, GaveUp::kNo);
+  EXPECT_EQ(answer.summary.gave_up, Termination::kConverged);
   EXPECT_EQ(answer.summary.obstacle, "");
   EXPECT_EQ(MeasureDeformation(preparation.mesh(), answer.positions).inverted_tets, 0);
 }
@@ -83,27 +83,29 @@ void ExpectFallingEnergies(const SolveSummary& summary) {
 }
 
 TEST(StallWatchTest, StallsWhenTheResidualHasNotHalvedInTime) {
-  StallWatch watch(3);
+  StagnationDetector watch(3);
   for (const double residual : {1.0, 0.9, 0.8}) EXPECT_FALSE(watch.HasStalled(residual));
   EXPECT_TRUE(watch.HasStalled(0.7));
 }
 
 TEST(StallWatchTest, WaitsAnewWhereTheResidualHasHalved) {
-  StallWatch watch(3);
+  StagnationDetector watch(3);
   for (const double residual : {1.0, 0.9, 0.5, 0.4, 0.3}) {
     EXPECT_FALSE(watch.HasStalled(residual));
   }
   EXPECT_TRUE(watch.HasStalled(0.26));
 }
 
-TEST(StallWatchTest, WithoutPatienceItStallsAtOnce) { EXPECT_TRUE(StallWatch(0).HasStalled(1.0)); }
+TEST(StallWatchTest, WithoutPatienceItStallsAtOnce) {
+  EXPECT_TRUE(StagnationDetector(0).HasStalled(1.0));
+}
 
 TEST(NewtonFallbackTest, ThinLimbConvergesWhereLbfgsAloneDoesNot) {
   const auto preparation = PrepareLimb();
   const Deformation alone = Solve(preparation, {.newton_after = kNever}, {LimbPose()});
   EXPECT_FALSE(alone.summary.converged);
   EXPECT_EQ(alone.summary.newton_steps, 0);
-  EXPECT_EQ(alone.summary.gave_up, GaveUp::kIterations);
+  EXPECT_EQ(alone.summary.gave_up, Termination::kIterations);
   const Deformation answer = Solve(preparation, {}, {LimbPose()});
   ExpectEquilibrium(*preparation, answer);
   EXPECT_GT(answer.summary.newton_steps, 0);
@@ -125,7 +127,7 @@ TEST(NewtonFallbackTest, HandlesThatPassThroughEachOtherAreNamed) {
   const Deformation answer =
       Solve(preparation, {}, {rest, PoseAbout({0, 0, 0}, {2, 2, 5}, {0, 0, -4})});
   EXPECT_FALSE(answer.summary.converged);
-  EXPECT_EQ(answer.summary.gave_up, GaveUp::kBlocked);
+  EXPECT_EQ(answer.summary.gave_up, Termination::kBlocked);
   EXPECT_EQ(answer.summary.obstacle, "handle \"top\" would pass through handle \"base\"");
   // Two millimetres lie between them.
   EXPECT_LT(answer.summary.load, 0.5);
@@ -136,7 +138,7 @@ TEST(NewtonFallbackTest, HandlesThatPassThroughEachOtherAreNamed) {
 TEST(NewtonFallbackTest, AHandleThatPassesThroughFixedVerticesIsNamed) {
   const auto preparation = PrepareBlock({4, 4, 6}, 2);
   const Deformation answer = Solve(preparation, {}, {PoseAbout({0, 0, 0}, {2, 2, 5}, {0, 0, -4})});
-  EXPECT_EQ(answer.summary.gave_up, GaveUp::kBlocked);
+  EXPECT_EQ(answer.summary.gave_up, Termination::kBlocked);
   EXPECT_EQ(answer.summary.obstacle, "handle \"top\" would pass through the fixed vertices");
 }
 
@@ -145,7 +147,7 @@ TEST(NewtonFallbackTest, AHandleThatPassesThroughFixedVerticesIsNamed) {
 TEST(NewtonFallbackTest, AHandleDoesNotPassThroughAThinRegionAsAWhole) {
   const Deformation answer = Solve(PrepareBar().value(), {}, {Pose({0, 0, 0}, {0, 0, -20})});
   EXPECT_FALSE(answer.summary.converged);
-  EXPECT_EQ(answer.summary.gave_up, GaveUp::kBlocked);
+  EXPECT_EQ(answer.summary.gave_up, Termination::kBlocked);
   EXPECT_EQ(answer.summary.obstacle, "handle \"top\" would pass through the fixed vertices");
   // Eight millimetres lie between them.
   EXPECT_NEAR(answer.summary.load, 0.4, 0.01);
@@ -154,7 +156,7 @@ TEST(NewtonFallbackTest, AHandleDoesNotPassThroughAThinRegionAsAWhole) {
 TEST(NewtonFallbackTest, RunningOutOfIterationsIsSaid) {
   const Deformation answer =
       Solve(PrepareBar().value(), {.max_iterations = 2}, {Pose({0, 0, 0}, {1, 0, 2})});
-  EXPECT_EQ(answer.summary.gave_up, GaveUp::kIterations);
+  EXPECT_EQ(answer.summary.gave_up, Termination::kIterations);
   EXPECT_EQ(answer.summary.obstacle, "");
 }
 
@@ -245,7 +247,7 @@ TEST(NewtonFallbackTest, WithoutRoomForTheFactorTheSearchGoesOnAndSaysWhyItFaile
   EXPECT_FALSE(answer.summary.converged);
   EXPECT_EQ(answer.summary.iterations, 300);
   EXPECT_EQ(answer.summary.newton_steps, 0);
-  EXPECT_EQ(answer.summary.gave_up, GaveUp::kNoRoom);
+  EXPECT_EQ(answer.summary.gave_up, Termination::kNoRoom);
   EXPECT_EQ(answer.summary.second_factor_bytes, 0);
 }
 
@@ -260,7 +262,7 @@ TEST(NewtonFallbackTest, CallerMayStopBetweenNewtonSteps) {
   EXPECT_EQ(newton_steps, 2);
   EXPECT_TRUE(answer.summary.cancelled);
   EXPECT_EQ(answer.summary.newton_steps, 2);
-  EXPECT_EQ(answer.summary.gave_up, GaveUp::kNo);
+  EXPECT_EQ(answer.summary.gave_up, Termination::kConverged);
 }
 
 TEST(NewtonFallbackTest, WarmStartEndsAtTheSameAnswer) {

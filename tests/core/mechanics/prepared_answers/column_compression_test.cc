@@ -20,7 +20,7 @@ Eigen::MatrixXd FallingColumns(Eigen::Index columns, Eigen::Index rank) {
   return fields * Eigen::MatrixXd::Random(rank, columns);
 }
 
-ColumnUses RandomUses(Eigen::Index columns, int factors, double size = 1) {
+ColumnWeights RandomUses(Eigen::Index columns, int factors, double size = 1) {
   const Eigen::Index poses = 100;
   return {.factors = factors,
           .typical = size * Eigen::MatrixXd::Random(columns, factors * poses),
@@ -38,7 +38,7 @@ double ErrorOf(const ColumnCompression& compression, const Eigen::MatrixXd& colu
 
 TEST(ColumnCompressionTest, KeepsAsManyColumnsAsTheToleranceNeeds) {
   const Eigen::MatrixXd columns = FallingColumns(20, 7);
-  const ColumnUses uses = RandomUses(20, 1);
+  const ColumnWeights uses = RandomUses(20, 1);
   Eigen::Index before = 0;
   for (const double tolerance : {100.0, 1.0, 1e-2, 1e-4, 1e-7}) {
     const ColumnCompression compression(columns, 3, uses, tolerance);
@@ -81,7 +81,7 @@ TEST(ColumnCompressionTest, BoundHoldsForEveryUse) {
 // Two columns that are always used together are one.
 TEST(ColumnCompressionTest, WhatIsUsedTogetherIsSaidOnce) {
   const Eigen::MatrixXd columns = Eigen::MatrixXd::Random(kRows, 6);
-  ColumnUses uses = RandomUses(6, 1);
+  ColumnWeights uses = RandomUses(6, 1);
   for (Eigen::MatrixXd* some : {&uses.typical, &uses.widest}) {
     some->bottomRows(3) = 0.5 * some->topRows(3);
   }
@@ -95,7 +95,7 @@ TEST(ColumnCompressionTest, WhatIsUsedTogetherIsSaidOnce) {
 
 TEST(ColumnCompressionTest, WhatNoTypicalUseNeedsIsKeptForTheWidest) {
   const Eigen::MatrixXd columns = Eigen::MatrixXd::Random(kRows, 4);
-  ColumnUses uses = RandomUses(4, 1);
+  ColumnWeights uses = RandomUses(4, 1);
   uses.typical.row(2).setZero();
   const ColumnCompression compression(columns, 3, uses, 1e-6);
   EXPECT_EQ(compression.num_kept(), 4);
@@ -104,7 +104,7 @@ TEST(ColumnCompressionTest, WhatNoTypicalUseNeedsIsKeptForTheWidest) {
 
 TEST(ColumnCompressionTest, ColumnsThatMatterLeastComeFirst) {
   const Eigen::MatrixXd columns = FallingColumns(12, 6);
-  const ColumnUses uses = RandomUses(12, 1);
+  const ColumnWeights uses = RandomUses(12, 1);
   const ColumnCompression compression(columns, 3, uses, 1e-9);
   const Eigen::MatrixXd coefficients = compression.Map(uses.widest);
   double before = 0;

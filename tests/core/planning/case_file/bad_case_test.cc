@@ -61,7 +61,7 @@ Json& Ours(Json* json) { return (*json)["extensions"][kCaseExtension]; }
 // The case with other bytes in the buffer view of that number.
 std::string WithView(size_t view, const std::function<void(char*, size_t)>& change) {
   std::string changed = GoodCase();
-  const Glb glb = *ParseGlb(changed, kMostCaseJsonBytes);
+  const Glb glb = *ParseGlb(changed, kMaxCaseJsonBytes);
   change(changed.data() + (glb.views[view].data() - changed.data()), glb.views[view].size());
   return changed;
 }
@@ -171,7 +171,7 @@ TEST(BadCaseTest, OtherFilesAreNoCases) {
 }
 
 TEST(BadCaseTest, AMeshThatIsNotTheOneOfItsNameIsDamaged) {
-  const Glb glb = *ParseGlb(GoodCase(), kMostCaseJsonBytes);
+  const Glb glb = *ParseGlb(GoodCase(), kMaxCaseJsonBytes);
   const std::string changed =
       WithView(glb.views.size() - 1, [](char* bytes, size_t size) { bytes[size / 2] ^= 1; });
   EXPECT_THAT(ParseCase(changed), StatusIs(absl::StatusCode::kDataLoss));
@@ -179,7 +179,7 @@ TEST(BadCaseTest, AMeshThatIsNotTheOneOfItsNameIsDamaged) {
 
 TEST(BadCaseTest, JsonOverTheLimitIsNotRead) {
   const std::string changed =
-      WithJson([](Json* j) { (*j)["asset"]["copyright"] = std::string(kMostCaseJsonBytes, 'x'); });
+      WithJson([](Json* j) { (*j)["asset"]["copyright"] = std::string(kMaxCaseJsonBytes, 'x'); });
   EXPECT_THAT(ParseCase(changed), StatusIs(absl::StatusCode::kResourceExhausted));
 }
 

@@ -72,7 +72,7 @@ TEST(CaseRoundTripTest, WithoutRangesThereAreNone) {
 // A viewer reads the beginning of the file and fetches the mesh only when a server asks for it.
 TEST(CaseRoundTripTest, TheMeshComesLastAndPiecesLieAtMultiplesOf16) {
   ASSERT_OK_AND_ASSIGN(const std::string bytes, SerializeCase(SampleCase()));
-  ASSERT_OK_AND_ASSIGN(const Glb glb, ParseGlb(bytes, kMostCaseJsonBytes));
+  ASSERT_OK_AND_ASSIGN(const Glb glb, ParseGlb(bytes, kMaxCaseJsonBytes));
   const auto& ours = glb.root["extensions"][kCaseExtension];
   EXPECT_EQ(ours["mesh"]["payload"].get<size_t>(), glb.views.size() - 1);
   EXPECT_LT(ours["session_request"].get<size_t>(), ours["material_ranges"].get<size_t>());

@@ -81,7 +81,7 @@ absl::Status DrawSheet(const std::string& path) {
   Sheet sheet(4, 3);
   const auto draw = [&](const CtVolume& metal, const std::array<int, 2>& slices, int column) {
     CtVolume lessened = metal;
-    LessenStreaks(FindMetal(metal), threads, &lessened);
+    ReduceMetalArtifacts(FindMetal(metal), threads, &lessened);
     for (const int slice : slices) {
       sheet.Draw(heads.free, slice, column, 0);
       sheet.Draw(metal, slice, column, 1);

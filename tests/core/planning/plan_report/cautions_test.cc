@@ -44,7 +44,7 @@ TEST(CautionsTest, ChinThatTheBorderCutsIsTold) {
 
 TEST(CautionsTest, TetsThatStayTornAreTold) {
   PlanBuild build = WholeHead();
-  build.still_torn = 3;
+  build.num_inverted = 3;
   EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("3 tets turn inside out")));
 }
 

@@ -110,7 +110,7 @@ TEST(RevocationListTest, ATokenIsRevokedHoweverItsSignatureIsWritten) {
   ASSERT_THAT(authenticator->Authenticate({.authorization = {other}}), IsOk());
   Replace(files.revocations(), absl::StrCat(R"({"token_digests": [")", known.token_id, R"("]})"));
   ASSERT_TRUE(Soon([&] { return authenticator->standing().revocations > 0; }));
-  EXPECT_TRUE(absl::IsUnauthenticated(authenticator->StillGood(known)));
+  EXPECT_TRUE(absl::IsUnauthenticated(authenticator->IsStillAuthorized(known)));
   for (const std::string& header : {bearer, other}) {
     EXPECT_TRUE(
         absl::IsUnauthenticated(authenticator->Authenticate({.authorization = {header}}).status()));

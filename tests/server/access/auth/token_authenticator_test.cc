@@ -265,7 +265,7 @@ TEST_P(GoodTokenTest, IsTakenAgainAndAgain) {
     const absl::StatusOr<Authenticated> known = Ask(authenticator.get(), token);
     ASSERT_TRUE(known.ok()) << known.status();
     EXPECT_EQ(known->principal->name, "alice");
-    EXPECT_TRUE(authenticator->StillGood(*known).ok());
+    EXPECT_TRUE(authenticator->IsStillAuthorized(*known).ok());
   }
 }
 
@@ -330,9 +330,9 @@ TEST(TokenAuthenticatorTest, ATokenEndsByTheClockAlsoWhenItIsCached) {
   const absl::StatusOr<Authenticated> known = Ask(authenticator.get(), token);
   ASSERT_TRUE(known.ok()) << known.status();
   now += std::chrono::minutes(60);
-  EXPECT_TRUE(authenticator->StillGood(*known).ok());
+  EXPECT_TRUE(authenticator->IsStillAuthorized(*known).ok());
   now += std::chrono::seconds(61);
-  EXPECT_EQ(FailureIn(authenticator->StillGood(*known)), "expired");
+  EXPECT_EQ(FailureIn(authenticator->IsStillAuthorized(*known)), "expired");
   EXPECT_EQ(FailureIn(Ask(authenticator.get(), token).status()), "expired");
 }
 

@@ -27,8 +27,8 @@ class CallQuotasTest : public ::testing::Test {
   int LetIn(const std::string& principal, int tried) {
     int let_in = 0;
     for (int i = 0; i < tried; ++i) {
-      if (!quotas_.Begin(principal, CallKind::kUpkeep).ok()) continue;
-      quotas_.End(principal, CallKind::kUpkeep);
+      if (!quotas_.Begin(principal, CallKind::kMetadata).ok()) continue;
+      quotas_.End(principal, CallKind::kMetadata);
       ++let_in;
     }
     return let_in;
@@ -54,7 +54,7 @@ TEST_F(CallQuotasTest, OnePrincipalTakesNothingFromAnother) {
 
 TEST_F(CallQuotasTest, ARefusalSaysWhichQuotaAndWhenToTryAgain) {
   LetIn("a", 20);
-  const absl::Status status = quotas_.Begin("a", CallKind::kUpkeep);
+  const absl::Status status = quotas_.Begin("a", CallKind::kMetadata);
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
   const ErrorInfo info = ErrorInfoOf(status);
   EXPECT_EQ(info.reason, "QUOTA_EXCEEDED");
@@ -63,19 +63,19 @@ TEST_F(CallQuotasTest, ARefusalSaysWhichQuotaAndWhenToTryAgain) {
   EXPECT_EQ(info.metadata.at("retry_after_ms"), "100");
   EXPECT_THAT(std::string(status.message()), HasSubstr("--quota-calls-per-second"));
   clock_.Advance(std::chrono::milliseconds(100));
-  EXPECT_TRUE(quotas_.Begin("a", CallKind::kUpkeep).ok()) << "as it was told";
+  EXPECT_TRUE(quotas_.Begin("a", CallKind::kMetadata).ok()) << "as it was told";
 }
 
 TEST_F(CallQuotasTest, StreamsAndOtherCallsHavePlacesOfTheirOwn) {
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(quotas_.Begin("a", CallKind::kNewWork).ok());
-  EXPECT_FALSE(quotas_.Begin("a", CallKind::kUpkeep).ok());
+  EXPECT_FALSE(quotas_.Begin("a", CallKind::kMetadata).ok());
   for (int i = 0; i < 2; ++i) EXPECT_TRUE(quotas_.Begin("a", CallKind::kStream).ok());
   EXPECT_FALSE(quotas_.Begin("a", CallKind::kStream).ok());
   EXPECT_EQ(quotas_.open_streams("a"), 2);
   quotas_.End("a", CallKind::kStream);
   EXPECT_TRUE(quotas_.Begin("a", CallKind::kStream).ok());
   quotas_.End("a", CallKind::kNewWork);
-  EXPECT_TRUE(quotas_.Begin("a", CallKind::kUpkeep).ok());
+  EXPECT_TRUE(quotas_.Begin("a", CallKind::kMetadata).ok());
 }
 
 TEST_F(CallQuotasTest, WhoHasGoneIsForgottenButNotWhoHasACallOpen) {
@@ -94,14 +94,14 @@ class OnePrincipal : public Authenticator {
   absl::StatusOr<Authenticated> Authenticate(const Credentials& /*credentials*/) override {
     return Authenticated{.principal = std::make_shared<const Principal>(Principal{.name = "a"})};
   }
-  absl::Status StillGood(const Authenticated& /*authenticated*/) override {
+  absl::Status IsStillAuthorized(const Authenticated& /*authenticated*/) override {
     return absl::OkStatus();
   }
 };
 
 TEST_F(CallQuotasTest, ACallThatIsOverGivesItsPlaceBackOnce) {
   OnePrincipal authenticator;
-  ServiceGate gate({.authenticator = &authenticator, .quotas = &quotas_});
+  AdmissionControl gate({.authenticator = &authenticator, .quotas = &quotas_});
   {
     CallScope first(nullptr, "Test.Stream", CallKind::kStream, &gate);
     CallScope second(nullptr, "Test.Stream", CallKind::kStream, &gate);
@@ -117,9 +117,9 @@ TEST_F(CallQuotasTest, ACallThatIsOverGivesItsPlaceBackOnce) {
 }
 
 TEST_F(CallQuotasTest, NobodyWhoIsAnonymousHasAQuota) {
-  ServiceGate gate({.quotas = &quotas_});
+  AdmissionControl gate({.quotas = &quotas_});
   for (int i = 0; i < 100; ++i) {
-    CallScope scope(nullptr, "Test.Call", CallKind::kUpkeep, &gate);
+    CallScope scope(nullptr, "Test.Call", CallKind::kMetadata, &gate);
     EXPECT_TRUE(scope.End(scope.admission()).ok());
   }
   EXPECT_EQ(quotas_.num_principals(), 0);

@@ -22,7 +22,7 @@ namespace tissueform {
 namespace {
 
 // A call that is refused or served, and over.
-absl::StatusCode AdmissionOf(CallKind kind, ServiceGate* gate) {
+absl::StatusCode AdmissionOf(CallKind kind, AdmissionControl* gate) {
   CallScope scope(nullptr, "Test.Call", kind, gate);
   const absl::StatusCode code = scope.admission().code();
   EXPECT_EQ(scope.End(scope.admission()).ok(), code == absl::StatusCode::kOk);
@@ -30,21 +30,21 @@ absl::StatusCode AdmissionOf(CallKind kind, ServiceGate* gate) {
 }
 
 TEST(CallScopeTest, ADrainingServerRefusesOnlyNewWork) {
-  ServiceGate gate;
+  AdmissionControl gate;
   EXPECT_EQ(AdmissionOf(CallKind::kNewWork, &gate), absl::StatusCode::kOk);
   gate.StartDraining();
   EXPECT_EQ(AdmissionOf(CallKind::kNewWork, &gate), absl::StatusCode::kUnavailable);
-  EXPECT_EQ(AdmissionOf(CallKind::kUpkeep, &gate), absl::StatusCode::kOk);
+  EXPECT_EQ(AdmissionOf(CallKind::kMetadata, &gate), absl::StatusCode::kOk);
 }
 
 TEST(CallScopeTest, EndConvertsTheOutcome) {
-  ServiceGate gate;
+  AdmissionControl gate;
   CallScope scope(nullptr, "Test.Call", CallKind::kNewWork, &gate);
   EXPECT_EQ(scope.End(absl::NotFoundError("gone")).error_code(), grpc::StatusCode::NOT_FOUND);
 }
 
 TEST(CallScopeTest, TheGateIsIdleWhenTheLastCallHasEnded) {
-  ServiceGate gate;
+  AdmissionControl gate;
   const auto at_once = std::chrono::steady_clock::now();
   EXPECT_TRUE(gate.WaitUntilIdle(at_once));
   CallScope first(nullptr, "Test.First", CallKind::kNewWork, &gate);
@@ -57,7 +57,7 @@ TEST(CallScopeTest, TheGateIsIdleWhenTheLastCallHasEnded) {
 }
 
 TEST(CallScopeTest, AScopeThatIsLeftEndsItsCall) {
-  ServiceGate gate;
+  AdmissionControl gate;
   const auto at_once = std::chrono::steady_clock::now();
   {
     CallScope scope(nullptr, "Test.Call", CallKind::kNewWork, &gate);
@@ -68,7 +68,7 @@ TEST(CallScopeTest, AScopeThatIsLeftEndsItsCall) {
 }
 
 TEST(CallScopeTest, EverybodyIsAnonymous) {
-  ServiceGate gate;
+  AdmissionControl gate;
   const CallScope scope(nullptr, "Test.Call", CallKind::kNewWork, &gate);
   EXPECT_TRUE(scope.principal().anonymous());
 }
@@ -82,23 +82,23 @@ class TrustingAuthenticator : public Authenticator {
         .name = std::string(absl::StripPrefix(credentials.authorization[0], "Bearer "))};
     return Authenticated{.principal = std::make_shared<const Principal>(std::move(principal))};
   }
-  absl::Status StillGood(const Authenticated& /*authenticated*/) override {
+  absl::Status IsStillAuthorized(const Authenticated& /*authenticated*/) override {
     return absl::OkStatus();
   }
 };
 
 TEST(CallScopeTest, AServerWithLoginsServesNobodyElse) {
   TrustingAuthenticator authenticator;
-  ServiceGate gate({.authenticator = &authenticator});
-  EXPECT_EQ(AdmissionOf(CallKind::kUpkeep, &gate), absl::StatusCode::kUnauthenticated);
+  AdmissionControl gate({.authenticator = &authenticator});
+  EXPECT_EQ(AdmissionOf(CallKind::kMetadata, &gate), absl::StatusCode::kUnauthenticated);
 }
 
 TEST(CallScopeTest, AStreamGoesOnWithATokenOfTheSamePrincipalOnly) {
   TrustingAuthenticator authenticator;
-  ServiceGate gate({.authenticator = &authenticator});
+  AdmissionControl gate({.authenticator = &authenticator});
   CallScope scope(nullptr, "Test.Call", CallKind::kNewWork, &gate);
   EXPECT_TRUE(absl::IsUnauthenticated(scope.Renew("somebody")));
-  ServiceGate without_logins;
+  AdmissionControl without_logins;
   CallScope open(nullptr, "Test.Call", CallKind::kNewWork, &without_logins);
   EXPECT_TRUE(open.Renew("somebody").ok());
   EXPECT_TRUE(open.principal().anonymous());
@@ -127,7 +127,7 @@ class Notes : public CallObserver {
 
 TEST(CallScopeTest, AnObserverHearsOfEveryCallOnce) {
   Notes notes;
-  ServiceGate gate({.observer = &notes});
+  AdmissionControl gate({.observer = &notes});
   CallScope scope(nullptr, "Test.Call", CallKind::kNewWork, &gate);
   CallScope moved = std::move(scope);
   moved.SetResource("sessions/a");
@@ -139,13 +139,13 @@ TEST(CallScopeTest, AnObserverHearsOfEveryCallOnce) {
 TEST(CallScopeTest, AnObserverCanRefuseACall) {
   Notes notes;
   notes.refusal = absl::UnavailableError("the audit log cannot be written");
-  ServiceGate gate({.observer = &notes});
-  EXPECT_EQ(AdmissionOf(CallKind::kUpkeep, &gate), absl::StatusCode::kUnavailable);
+  AdmissionControl gate({.observer = &notes});
+  EXPECT_EQ(AdmissionOf(CallKind::kMetadata, &gate), absl::StatusCode::kUnavailable);
   EXPECT_EQ(notes.told.size(), 2);
 }
 
 TEST(CallScopeTest, ACallWithoutRequestIdGetsOneOfItsOwn) {
-  ServiceGate gate;
+  AdmissionControl gate;
   const CallScope one(nullptr, "Test.Call", CallKind::kNewWork, &gate);
   const CallScope other(nullptr, "Test.Call", CallKind::kNewWork, &gate);
   EXPECT_THAT(one.request_id(), ::testing::MatchesRegex("[0-9a-f]{32}"));
@@ -158,7 +158,7 @@ TEST(CallScopeTest, TheLogNamesTheRequest) {
   const auto logger = std::make_shared<spdlog::logger>(
       "test", std::make_shared<spdlog::sinks::ostream_sink_mt>(text));
   spdlog::set_default_logger(logger);
-  ServiceGate gate;
+  AdmissionControl gate;
   CallScope failed(nullptr, "Test.Call", CallKind::kNewWork, &gate);
   const std::string failed_id = failed.request_id();
   EXPECT_FALSE(failed.End(absl::NotFoundError("a name")).ok());

@@ -54,10 +54,11 @@ class ClientAddressTest : public ::testing::Test, public v1::ServerInfoService::
   grpc::ServerUnaryReactor* GetServerInfo(grpc::CallbackServerContext* context,
                                           const v1::GetServerInfoRequest* /*request*/,
                                           v1::ServerInfo* /*response*/) override {
-    return RunUpkeep(context, "Test.Call", &gate_, [](const CallScope&, const EndCall& end) {
-      end(absl::OkStatus());
-      return absl::OkStatus();
-    });
+    return HandleUnaryCall(context, "Test.Call", &gate_,
+                           [](const CallScope&, const FinishCall& end) {
+                             end(absl::OkStatus());
+                             return absl::OkStatus();
+                           });
   }
 
   // The address that is noted of a call with this certificate and these headers.
@@ -82,7 +83,7 @@ class ClientAddressTest : public ::testing::Test, public v1::ServerInfoService::
   const TestIdentity workstation_ =
       authority_.Issue({.name = "gateway.example.org", .alternatives = "DNS:workstation"});
   AddressNote note_;
-  ServiceGate gate_{{.observer = &note_, .gateway_name = "gateway.example.org"}};
+  AdmissionControl gate_{{.observer = &note_, .gateway_name = "gateway.example.org"}};
   int port_ = 0;
   std::unique_ptr<grpc::Server> server_;
 };

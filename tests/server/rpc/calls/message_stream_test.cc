@@ -92,7 +92,7 @@ class MessageStreamTest : public ::testing::Test {
  protected:
   MessageStream<Message>* NewStream(
       CancelCall cancel = [] {}, std::chrono::milliseconds patience = std::chrono::minutes(1)) {
-    return new MessageStream<Message>(CallScope(nullptr, "Test.Read", CallKind::kUpkeep, &gate_),
+    return new MessageStream<Message>(CallScope(nullptr, "Test.Read", CallKind::kMetadata, &gate_),
                                       std::move(cancel), &timer_, patience);
   }
 
@@ -106,7 +106,7 @@ class MessageStreamTest : public ::testing::Test {
   // No call is open any longer.
   bool Idle() { return gate_.WaitUntilIdle(std::chrono::steady_clock::now()); }
 
-  ServiceGate gate_;
+  AdmissionControl gate_;
   DeadlineTimer timer_;
   WorkerPool reactions_{4};
 };

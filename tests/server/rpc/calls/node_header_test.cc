@@ -40,7 +40,7 @@ class NobodyComesIn final : public Authenticator {
     ++asked;
     return absl::UnauthenticatedError("no token");
   }
-  absl::Status StillGood(const Authenticated& /*authenticated*/) override {
+  absl::Status IsStillAuthorized(const Authenticated& /*authenticated*/) override {
     return absl::OkStatus();
   }
 
@@ -79,11 +79,12 @@ class OneCallServer final : public v1::ServerInfoService::CallbackService {
   grpc::ServerUnaryReactor* GetServerInfo(grpc::CallbackServerContext* context,
                                           const v1::GetServerInfoRequest* /*request*/,
                                           v1::ServerInfo* /*response*/) override {
-    return RunUpkeep(context, "Test.Call", &gate_, [this](const CallScope&, const EndCall& end) {
-      ++served_;
-      end(absl::OkStatus());
-      return absl::OkStatus();
-    });
+    return HandleUnaryCall(context, "Test.Call", &gate_,
+                           [this](const CallScope&, const FinishCall& end) {
+                             ++served_;
+                             end(absl::OkStatus());
+                             return absl::OkStatus();
+                           });
   }
 
   // With one header for each of `nodes`.
@@ -101,7 +102,7 @@ class OneCallServer final : public v1::ServerInfoService::CallbackService {
   int served() const { return served_; }
 
  private:
-  ServiceGate gate_;
+  AdmissionControl gate_;
   std::atomic<int> served_ = 0;
   int port_ = 0;
   std::unique_ptr<grpc::Server> server_;

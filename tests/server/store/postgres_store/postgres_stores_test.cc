@@ -17,7 +17,7 @@
 #include "gtest/gtest.h"
 
 #include "core/base/error_reason.h"
-#include "server/exports/export_book.h"
+#include "server/exports/export_queue.h"
 #include "server/store/postgres_store/postgres_access_store.h"
 #include "server/store/postgres_store/postgres_blobs.h"
 #include "server/store/postgres_store/postgres_export_store.h"
@@ -361,12 +361,12 @@ TEST_F(PostgresStoresTest, AnExportThatAnotherServerHasChangedIsNotOverwritten) 
 TEST_F(PostgresStoresTest, OfTwoServersThatWriteTheSameWordsInTheSameSecondOneIsToldSo) {
   PostgresExportStore store(stores_->pool());
   const auto clock = [] { return int64_t{1'800'000'000}; };
-  ExportBook here({}, &store, clock);
-  ExportBook there({}, &store, clock);
+  ExportQueue here({}, &store, clock);
+  ExportQueue there({}, &store, clock);
   ASSERT_OK_AND_ASSIGN(const ExportRecord made, here.Create({.prediction = "p"}));
-  ASSERT_THAT(there.LearnAgain(), IsOk());
-  const ExportBook::Change change = {.etag = ExportBook::EtagOf(made),
-                                     .state = ExportState::kStoring};
+  ASSERT_THAT(there.ReloadRows(), IsOk());
+  const ExportQueue::Change change = {.etag = ExportQueue::EtagOf(made),
+                                      .state = ExportState::kStoring};
   ASSERT_THAT(there.Update(made.id, change), IsOk());
   EXPECT_TRUE(HasReason(here.Update(made.id, change).status(), ErrorReason::kStaleEtag));
 }

@@ -1,0 +1,40 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { create } from "@bufbuild/protobuf";
+import { expect, test } from "vitest";
+import { FitBound, FitResponseSchema } from "../../src/generated/tissueform/v1/plan_service_pb";
+import { targetSentences } from "../../src/workbench/target_sentences";
+
+const TARGETS = [{ label: "Chin" }, { label: "Lower lip" }, { label: "Upper lip" }];
+const HANDLES = [{ name: "mandible", label: "Lower jaw" }];
+
+test("targets that contradict each other are told by their names, as is what each of them misses", () => {
+  const response = create(FitResponseSchema, {
+    converged: true,
+    targets: [
+      { name: "target 1", reached: false, missedMm: 2.34 },
+      { name: "target 2", reached: false, missedMm: 1.5 },
+      { name: "target 3", reached: true, missedMm: 0.001 },
+    ],
+    contradictions: [{ first: "target 1", second: "target 2" }],
+  });
+  expect(targetSentences(response, TARGETS, HANDLES, 1)).toEqual([
+    "Chin: cannot be reached; 2.3 mm are missing.",
+    "Lower lip: cannot be reached; 1.5 mm are missing.",
+    "Upper lip: reached, within 0.01 mm.",
+    "Chin and Lower lip ask different things of the same bone.",
+  ]);
+});
+
+test("what is held by its limit, and a search that did not end, are told last", () => {
+  const response = create(FitResponseSchema, {
+    converged: false,
+    numbers: [
+      { handle: "mandible", isRotation: false, axis: 1, bound: FitBound.HIGHEST },
+      { handle: "mandible", isRotation: true, axis: 0, bound: FitBound.UNSPECIFIED },
+    ],
+  });
+  expect(targetSentences(response, TARGETS, HANDLES, 1)).toEqual(["Held by its limit: Lower jaw to the back.", "The search has not come to its end; choose a smaller target."]);
+  expect(targetSentences(response, TARGETS, HANDLES, 0.8)[0]).toBe("Held by its limit (the head lies aslant in the scan: the search goes to 80 % of the case’s limits): Lower jaw to the back.");
+});

@@ -1,0 +1,80 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <map>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/base/mutex.h"
+#include "server/access/access.h"
+#include "server/access/access_changes.h"
+#include "server/exports/export_queue.h"
+#include "server/store/postgres_store/postgres_access_store.h"
+#include "server/store/postgres_store/postgres_case_store.h"
+#include "server/store/postgres_store/postgres_pool.h"
+#include "server/store/postgres_store/postgres_prediction_store.h"
+#include "server/store/postgres_store/postgres_session_store.h"
+
+namespace tissueform {
+
+// Reads the one row that a call names and nobody here knows: another server may have made it a
+// moment ago, before its notice has come. Bounded, since anybody may name anything: at most
+// kMaxAtOnce read at a time, what was not there is not looked for again for kRemembered, and
+// nothing is while the database does not answer.
+//
+// Thread-safe. Calls block, for kPatience and as long as the pool is patient. Errors: Unavailable,
+// where nobody knows whether it is there.
+class ReadThroughLoader {
+ public:
+  static constexpr int kMaxAtOnce = 4;
+  static constexpr std::chrono::seconds kRemembered{1};
+  static constexpr std::chrono::seconds kPatience{1};  // for one of the places
+
+  // `pool` has connections for kMaxAtOnce of them; all must outlive it.
+  ReadThroughLoader(PostgresPool* pool, AccessChanges* access, ExportQueue* exports);
+
+  // Tells `access` of it where it is there.
+  absl::Status FetchIfMissing(const Access::Unknown& what);
+  // Tells `exports` to learn again where it is there.
+  absl::Status LookForExport(const std::string& id);
+
+  // Rows that were read, or were not there.
+  int64_t lookups() const;
+
+ private:
+  struct Key {
+    int kind = 0;  // of Access::Unknown, or kExport
+    std::string name = {};
+    std::string owner = {};
+
+    friend auto operator<=>(const Key&, const Key&) = default;
+  };
+
+  absl::Status Look(const Key& key, const std::function<absl::Status()>& read);
+  // A place; false where it is known not to be there. Errors: Unavailable.
+  absl::StatusOr<bool> Begin(const Key& key);
+  absl::Status Read(const Access::Unknown& what);
+  absl::Status ReadSession(const std::string& id);
+
+  AccessChanges& access_;
+  ExportQueue& exports_;
+  PostgresSessionStore sessions_;
+  PostgresPredictionStore predictions_;
+  PostgresCaseStore cases_;
+  PostgresAccessStore rows_;
+
+  mutable Mutex mutex_;
+  ConditionVariable place_;
+  int reading_ ABSL_GUARDED_BY(mutex_) = 0;
+  int64_t lookups_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::map<Key, std::chrono::steady_clock::time_point> missing_ ABSL_GUARDED_BY(mutex_);
+  std::chrono::steady_clock::time_point silent_until_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace tissueform

@@ -1,0 +1,146 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/base/mutex.h"
+#include "server/exports/export_record.h"
+#include "server/exports/export_store.h"
+#include "server/store/session_store.h"
+
+namespace tissueform {
+
+struct ExportLimits {
+  int max_waiting = 1'000;            // not done, of all principals
+  int max_waiting_of_principal = 50;  // of one who has logged in
+  int max_kept = 10'000;              // done or not
+  int retention_days = 30;            // one that has not changed for so long goes; 0: none does
+  int max_watches = 256;              // WatchExports calls open at the same time
+};
+
+// The exports of a server: all in memory, each change in the store first. Looking never blocks;
+// changing blocks on the disk, so not on the commit thread.
+//
+// Thread-safe. Those who are told are told without a lock that looking takes, one at a time.
+class ExportQueue {
+ public:
+  // All must outlive it.
+  ExportQueue(const ExportLimits& limits, ExportStore* store, UnixClock clock = SystemUnixSeconds)
+      : limits_(limits), store_(*store), clock_(std::move(clock)) {}
+
+  // Before anything else. The first is told of every export that is new or changed, the second of a
+  // prediction that has an export now, or none any more.
+  void set_on_changed(std::function<void(const ExportRecord&)> on_changed) {
+    on_changed_ = std::move(on_changed);
+  }
+  void set_on_exported(std::function<void(const std::string& prediction, bool exported)> told) {
+    on_exported_ = std::move(told);
+  }
+
+  // Where others write to the store as well: asked once for an id that is not known, without a lock
+  // held; calls ReloadRows. Errors: what Find answers where that is not possible.
+  void set_on_unknown(std::function<absl::Status(const std::string& id)> on_unknown) {
+    on_unknown_ = std::move(on_unknown);
+  }
+
+  const ExportLimits& limits() const { return limits_; }
+
+  // Reads what the store has; exports of predictions that are gone go. Before calls are served.
+  // Errors: those of ExportStore.
+  absl::Status LoadAll(const std::function<bool(const std::string& prediction)>& is_there);
+
+  // Where others write to the store as well: takes what it has in place of what was known, and
+  // tells what is new, has changed or has gone. Blocks. Errors: those of ExportStore.
+  absl::Status ReloadRows();
+
+  // `wanted` without id, state, times and version. Returns the one of the same request_key, else
+  // one of the same prediction that is not done, else a new one.
+  //
+  // Errors: InvalidArgument (REQUEST_ID_REUSED), ResourceExhausted (TOO_MANY_EXPORTS), those of
+  // ExportStore.
+  absl::StatusOr<ExportRecord> Create(ExportRecord wanted);
+
+  // Errors: NotFound, those of set_on_unknown.
+  absl::StatusOr<ExportRecord> Find(const std::string& id) const;
+
+  struct ListRequest {
+    std::optional<std::string> owner = {};        // of this one only; unset: of all
+    std::optional<std::string> prediction = {};   // of this one only; unset: of all
+    std::optional<std::string> case_sha256 = {};  // of this one only; unset: of all
+    std::string after = {};                       // ids greater than this
+    int limit = 100;                              // at least 1
+  };
+  struct Page {
+    std::vector<ExportRecord> records;
+    std::string next;  // give it as `after`; empty: that was all
+  };
+  Page List(const ListRequest& request) const;
+  // Ids of those that are not done, of this owner only where one is given.
+  std::set<std::string> Waiting(const std::optional<std::string>& owner) const;
+  int CountWaiting() const;
+
+  struct Change {
+    std::string etag = {};  // of the one that was seen; empty: any
+    ExportState state = ExportState::kWaiting;
+    std::string detail = {};
+    int32_t stored_objects = 0;
+  };
+  // Errors: NotFound, Aborted (STALE_ETAG), InvalidArgument (a state that does not follow), those
+  // of ExportStore.
+  absl::StatusOr<ExportRecord> Update(const std::string& id, const Change& change);
+
+  // Errors: NotFound, those of ExportStore.
+  absl::Status Remove(const std::string& id);
+  // All of a prediction that is gone.
+  absl::Status RemoveOf(const std::string& prediction);
+  // Those that have not changed since then, at most so many. Returns how many went.
+  absl::StatusOr<int> RemoveUnchanged(int64_t before_s, int most);
+
+  static std::string EtagOf(const ExportRecord& record);
+
+ private:
+  const ExportRecord* FindEarlier(const ExportRecord& wanted) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status CheckRoom(const std::string& owner) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::string NewId() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  absl::StatusOr<ExportRecord> FindKnown(const std::string& id) const;
+  absl::Status Refresh() ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
+  // Into memory, and told.
+  void Take(const ExportRecord& record) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
+  // Out of memory, and told.
+  void Drop(const std::vector<std::string>& ids) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
+  absl::Status Keep(const ExportRecord& record) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
+  absl::Status Erase(const std::vector<std::string>& ids) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
+
+  // Constant.
+  const ExportLimits limits_;
+  ExportStore& store_;
+  const UnixClock clock_;
+  std::function<void(const ExportRecord&)> on_changed_ = [](const ExportRecord&) {};
+  std::function<void(const std::string&, bool)> on_exported_ = [](const std::string&, bool) {};
+
+  std::function<absl::Status(const std::string&)> on_unknown_;  // empty: nobody else writes
+
+  // Held over the store and over those who are told: changes come one after the other.
+  Mutex writing_;
+
+  // After writing_, and over nothing else.
+  mutable Mutex mutex_;
+  std::map<std::string, ExportRecord> records_ ABSL_GUARDED_BY(mutex_);
+  std::map<std::string, std::set<std::string>> of_prediction_ ABSL_GUARDED_BY(mutex_);
+  std::map<std::string, std::string> of_request_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace tissueform

@@ -1,0 +1,220 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "server/exports/export_queue.h"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "core/base/error_reason.h"
+#include "server/store/in_memory_stores.h"
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform::testing {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using Code = absl::StatusCode;
+
+// A store of which every call fails when it is told to.
+class BrokenStore final : public ExportStore {
+ public:
+  explicit BrokenStore(ExportStore* store) : store_(*store) {}
+  absl::StatusOr<std::vector<ExportRecord>> Load() override { return store_.Load(); }
+  absl::Status Put(const ExportRecord& record) override {
+    return broken ? absl::ResourceExhaustedError("full") : store_.Put(record);
+  }
+  absl::Status Erase(const std::vector<std::string>& ids) override {
+    return broken ? absl::ResourceExhaustedError("full") : store_.Erase(ids);
+  }
+
+  bool broken = false;
+
+ private:
+  ExportStore& store_;
+};
+
+class ExportQueueTest : public ::testing::Test {
+ protected:
+  void Open(std::vector<std::string> gone = {}) {
+    told_.clear();
+    changes_ = 0;
+    book_ = std::make_unique<ExportQueue>(limits_, &store_, [this] { return now_s_; });
+    book_->set_on_exported(
+        [this](const std::string& prediction, bool exported) { told_[prediction] = exported; });
+    book_->set_on_changed([this](const ExportRecord& /*record*/) { ++changes_; });
+    ASSERT_THAT(book_->LoadAll([&](const std::string& prediction) {
+      return std::find(gone.begin(), gone.end(), prediction) == gone.end();
+    }),
+                IsOk());
+  }
+  void SetUp() override { Open(); }
+
+  absl::StatusOr<ExportRecord> Ask(const std::string& prediction, const std::string& owner = "ann",
+                                   const std::string& key = "") {
+    return book_->Create({.prediction = prediction,
+                          .case_sha256 = std::string(64, 'c'),
+                          .owner = owner,
+                          .request_key = key,
+                          .request_fingerprint = key.empty() ? "" : prediction});
+  }
+  std::vector<std::string> Predictions(const ExportQueue::ListRequest& request) const {
+    std::vector<std::string> names;
+    for (const ExportRecord& record : book_->List(request).records) {
+      names.push_back(record.prediction);
+    }
+    return names;
+  }
+
+  int64_t now_s_ = 1'800'000'000;
+  ExportLimits limits_ = {};
+  std::unique_ptr<Stores> stores_ = *OpenInMemoryStores();
+  std::unique_ptr<ExportStore> kept_ = OpenExportStore(stores_.get());
+  BrokenStore store_{kept_.get()};
+  std::map<std::string, bool> told_;
+  int changes_ = 0;
+  std::unique_ptr<ExportQueue> book_;
+};
+
+TEST_F(ExportQueueTest, AnotherBookOfTheStoreKnowsTheSame) {
+  ASSERT_OK_AND_ASSIGN(const ExportRecord made, Ask("p", "ann", "key"));
+  ASSERT_OK_AND_ASSIGN(const ExportRecord changed,
+                       book_->Update(made.id, {.state = ExportState::kStored}));
+  Open();
+  ASSERT_OK_AND_ASSIGN(const ExportRecord found, book_->Find(made.id));
+  EXPECT_EQ(found, changed);
+  EXPECT_TRUE(told_.at("p"));
+  ASSERT_OK_AND_ASSIGN(const ExportRecord again, Ask("p", "ann", "key"));
+  EXPECT_EQ(again.id, made.id);
+}
+
+TEST_F(ExportQueueTest, WhatLostItsPredictionWhileNobodyLookedIsGone) {
+  ASSERT_THAT(Ask("p"), IsOk());
+  ASSERT_THAT(Ask("q"), IsOk());
+  Open(/*gone=*/{"p"});
+  EXPECT_THAT(Predictions({}), ElementsAre("q"));
+  EXPECT_FALSE(told_.contains("p"));
+  Open();
+  EXPECT_THAT(Predictions({}), ElementsAre("q")) << "of the store, too";
+}
+
+TEST_F(ExportQueueTest, NothingIsTheresThatWasNotKept) {
+  store_.broken = true;
+  EXPECT_THAT(Ask("p"), StatusIs(Code::kResourceExhausted));
+  EXPECT_THAT(Predictions({}), IsEmpty());
+  EXPECT_FALSE(told_.contains("p"));
+  store_.broken = false;
+  ASSERT_OK_AND_ASSIGN(const ExportRecord made, Ask("p"));
+  store_.broken = true;
+  EXPECT_THAT(book_->Update(made.id, {.state = ExportState::kStored}),
+              StatusIs(Code::kResourceExhausted));
+  ASSERT_OK_AND_ASSIGN(const ExportRecord found, book_->Find(made.id));
+  EXPECT_EQ(found, made);
+  EXPECT_EQ(changes_, 1);
+}
+
+TEST_F(ExportQueueTest, WhatAnotherServerHasChangedIsLearntAndTold) {
+  ASSERT_OK_AND_ASSIGN(const ExportRecord made, Ask("p"));
+  ASSERT_OK_AND_ASSIGN(const ExportRecord stays, Ask("r"));
+  ExportRecord changed = made;
+  changed.state = ExportState::kStoring;
+  changed.version = 2;
+  ASSERT_THAT(kept_->Put(changed), IsOk());
+  ASSERT_THAT(kept_->Put({.id = "other", .prediction = "q", .owner = "bob"}), IsOk());
+  const int before = changes_;
+  ASSERT_THAT(book_->ReloadRows(), IsOk());
+  EXPECT_EQ(changes_, before + 2) << "what has not changed is not told";
+  EXPECT_TRUE(told_.at("q"));
+  ASSERT_OK_AND_ASSIGN(const ExportRecord found, book_->Find(made.id));
+  EXPECT_EQ(found, changed);
+  ASSERT_THAT(kept_->Erase({made.id}), IsOk());
+  ASSERT_THAT(book_->ReloadRows(), IsOk());
+  EXPECT_THAT(book_->Find(made.id), StatusIs(Code::kNotFound));
+  EXPECT_FALSE(told_.at("p"));
+  EXPECT_TRUE(told_.at("r"));
+}
+
+TEST_F(ExportQueueTest, WhatNobodyHereKnowsIsAskedForOnce) {
+  int asked = 0;
+  book_->set_on_unknown([&](const std::string& /*id*/) {
+    ++asked;
+    return book_->ReloadRows();
+  });
+  ASSERT_THAT(kept_->Put({.id = "other", .prediction = "q", .owner = "bob"}), IsOk());
+  EXPECT_THAT(book_->Find("other"), IsOk());
+  EXPECT_THAT(book_->Find("other"), IsOk());
+  EXPECT_EQ(asked, 1);
+  EXPECT_THAT(book_->Find("nowhere"), StatusIs(Code::kNotFound));
+  EXPECT_EQ(asked, 2);
+  ASSERT_OK_AND_ASSIGN(const ExportRecord same, Ask("q", "bob"));
+  EXPECT_EQ(same.id, "other") << "one that is not done is given again, whoever has made it";
+}
+
+TEST_F(ExportQueueTest, WhatIsTakenBackOpensNothingWhateverTheDiskSays) {
+  ASSERT_OK_AND_ASSIGN(const ExportRecord made, Ask("p"));
+  store_.broken = true;
+  EXPECT_THAT(book_->Remove(made.id), StatusIs(Code::kResourceExhausted));
+  EXPECT_THAT(book_->Find(made.id), StatusIs(Code::kNotFound));
+  EXPECT_FALSE(told_.at("p"));
+}
+
+TEST_F(ExportQueueTest, APredictionIsExportedAsLongAsOneIsLeft) {
+  ASSERT_OK_AND_ASSIGN(const ExportRecord first, Ask("p"));
+  ASSERT_THAT(book_->Update(first.id, {.state = ExportState::kFailed}), IsOk());
+  ASSERT_OK_AND_ASSIGN(const ExportRecord second, Ask("p"));
+  ASSERT_THAT(book_->Remove(first.id), IsOk());
+  EXPECT_TRUE(told_.at("p"));
+  ASSERT_THAT(book_->Remove(second.id), IsOk());
+  EXPECT_FALSE(told_.at("p"));
+}
+
+TEST_F(ExportQueueTest, IdsRiseThoughTheClockGoesBack) {
+  std::vector<std::string> wanted;
+  for (int i = 0; i < 20; ++i) {
+    const std::string prediction(1, static_cast<char>('a' + i));
+    ASSERT_THAT(Ask(prediction), IsOk());
+    wanted.push_back(prediction);
+    if (i == 10) now_s_ -= 3600;
+    if (i == 15) Open();
+  }
+  EXPECT_EQ(Predictions({}), wanted);
+  const ExportQueue::Page page = book_->List({.limit = 3});
+  EXPECT_EQ(Predictions({.after = page.next, .limit = 2}), std::vector<std::string>({"d", "e"}));
+}
+
+TEST_F(ExportQueueTest, OneOwnersWaitingOnesLeaveRoomForOthers) {
+  limits_ = {.max_waiting = 3, .max_waiting_of_principal = 2};
+  Open();
+  ASSERT_THAT(Ask("p"), IsOk());
+  ASSERT_THAT(Ask("q"), IsOk());
+  const auto third = Ask("r");
+  EXPECT_TRUE(HasReason(third.status(), ErrorReason::kTooManyExports)) << third.status();
+  EXPECT_THAT(Ask("s", "bob"), IsOk());
+  EXPECT_THAT(Ask("t", "cid"), StatusIs(Code::kResourceExhausted));
+  EXPECT_EQ(book_->CountWaiting(), 3);
+  EXPECT_EQ(book_->Waiting("ann").size(), 2U);
+}
+
+TEST_F(ExportQueueTest, WhatHasNotChangedForLongGoesTheOldestFirst) {
+  ASSERT_OK_AND_ASSIGN(const ExportRecord changed, Ask("p"));
+  ASSERT_THAT(Ask("q"), IsOk());
+  ASSERT_THAT(Ask("r"), IsOk());
+  now_s_ += 100;
+  ASSERT_THAT(book_->Update(changed.id, {.state = ExportState::kStored}), IsOk());
+  ASSERT_OK_AND_ASSIGN(const int none, book_->RemoveUnchanged(now_s_ - 100, 9));
+  EXPECT_EQ(none, 0);
+  ASSERT_OK_AND_ASSIGN(const int some, book_->RemoveUnchanged(now_s_, 1));
+  EXPECT_EQ(some, 1);
+  EXPECT_THAT(Predictions({}), ElementsAre("p", "r"));
+}
+
+}  // namespace
+}  // namespace tissueform::testing
