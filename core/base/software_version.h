@@ -6,7 +6,7 @@
 namespace tissueform {
 
 // Of this build. In a library of its own, so that a new commit links little again.
-const char* SoftwareVersion();  // "0.1.0"
+const char* SoftwareVersion();  // "0.2.0"
 const char* SoftwareCommit();   // of the last configuration; "unknown" outside of a checkout
 
 }  // namespace tissueform

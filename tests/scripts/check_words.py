@@ -21,8 +21,8 @@ LITERAL = re.compile(r'"((?:[^"\\\n]|\\.)*)"' + r"|`((?:[^`\\]|\\.)*)`")
 CODE_BLOCK = re.compile(r"^(```|~~~).*?^\1", re.MULTILINE | re.DOTALL)
 INLINE_CODE = re.compile(r"`[^`\n]*`")
 LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
-# A sentence ends at a period before a space and a capital, a digit or a quote; not within "e.g.".
-SENTENCE_END = re.compile(r"(?<![eE]\.g)(?<!i\.e)(?<!vs)[.!?:;](?=\s+[\"“A-Z0-9(]|\s*$)")
+# A sentence ends at a semicolon, and at another mark before a space and a capital, a digit or a quote; not within "e.g.".
+SENTENCE_END = re.compile(r";(?=\s|$)|(?<![eE]\.g)(?<!i\.e)(?<!vs)[.!?:](?=\s+[\"“A-Z0-9(*]|\s*$)")
 
 
 class Table:
@@ -32,6 +32,7 @@ class Table:
         data = tomllib.loads(text)
         self.words = [(re.compile(rf"\b(?:{pattern})\b", re.IGNORECASE), advice) for pattern, advice in data["words"].items()]
         self.max_sentence_words = data["max_sentence_words"]
+        self.formal = data.get("formal", [])
         self.files = {kind: data.get(kind, []) for kind in ("markdown", "literals", "comments")}
 
     def covers(self, kind, path):
@@ -106,7 +107,8 @@ def errors_of(table, path, text):
     if table.covers("markdown", path):
         prose = prose_of_markdown(text)
         errors += word_errors(table, enumerate(prose.splitlines(), start=1))
-        errors += sentence_errors(table, prose)
+        if path not in table.formal:
+            errors += sentence_errors(table, prose)
     elif path.endswith((".cc", ".h", ".ts", ".py")) and table.covers("literals", path):
         errors += word_errors(table, literals_of(text))
     if path.endswith((".h", ".proto")) and table.covers("comments", path):

@@ -14,7 +14,7 @@ namespace tissueform {
 // identifier: of a case only what is here is taken.
 struct MovingData {
   std::string title = {};     // empty unless somebody asked for one
-  std::string software = {};  // "tissueform 0.1.0"
+  std::string software = {};  // "tissueform 0.2.0"
   std::string model = {};     // by its name in plans
   HeadFrame head_frame = {};
   std::vector<CaseHandle> handles = {};

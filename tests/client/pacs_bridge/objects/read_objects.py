@@ -11,6 +11,7 @@ and ends with 1 when there is one; writes the models as FOLDER/KEY.stl.
 import csv
 import json
 import pathlib
+import re
 import sys
 
 import pydicom
