@@ -1,6 +1,8 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
+# shellcheck shell=bash
+#
 # Steps with a table of their times, for .ci/run and .ci/full. To be sourced.
 #
 #   step COMMAND...            runs it and adds a row to the table; `step_failed` is then 1 where it failed

@@ -9,8 +9,9 @@
 #
 # --list    prints the steps and runs none
 # --quick   without .ci/run and .ci/full
+# shellcheck disable=SC2317  # functions are called by step()
 set -uo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/.." || exit 1
 
 usage() { sed -n '5,11s/^# \{0,1\}//p' "$0"; }
 

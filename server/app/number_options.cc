@@ -51,8 +51,7 @@ constexpr Units kInfoInMilliseconds = {.info_unit = kMillisecondsPerSecond};
 template <auto... kPath>
 NumberOption Option(absl::string_view name, absl::string_view limit, int64_t min, int64_t max,
                     absl::string_view help, Units units = {}) {
-  return {name,       limit,           min,          max,         help,
-          units.unit, units.info_unit, Get<kPath...>, Set<kPath...>};
+  return {name, limit, min, max, help, units.unit, units.info_unit, Get<kPath...>, Set<kPath...>};
 }
 
 // A limit that has no option.
@@ -81,26 +80,24 @@ std::vector<NumberOption> MakeOptions() {
                                              "vertices per mesh"),
       Option<kLimits, &Limits::max_tets>("--max-tets", "max_tets", 1, kMaxCount / 4,
                                          "tetrahedra per mesh"),
-      Option<kLimits, &Limits::max_mesh_bytes>("--max-mesh-mib", "max_mesh_bytes", 1,
-                                               kMaxMebibytes, "upload size of one mesh",
-                                               kInMebibytes),
+      Option<kLimits, &Limits::max_mesh_bytes>("--max-mesh-mib", "max_mesh_bytes", 1, kMaxMebibytes,
+                                               "upload size of one mesh", kInMebibytes),
       Option<kLimits, &Limits::max_sessions>("--max-sessions", "max_sessions", 1, kMaxCount,
                                              "sessions in memory at the same time"),
       Option<kLimits, &Limits::max_stored_sessions>("--max-stored-sessions", "max_stored_sessions",
                                                     1, kMaxCount,
                                                     "sessions stored, in memory or not"),
-      Option<kLimits, &Limits::max_case_bytes>("--max-case-mib", "max_case_bytes", 1,
-                                               kMaxMebibytes, "upload size of one case",
-                                               kInMebibytes),
+      Option<kLimits, &Limits::max_case_bytes>("--max-case-mib", "max_case_bytes", 1, kMaxMebibytes,
+                                               "upload size of one case", kInMebibytes),
       Option<kLimits, &Limits::max_cases>("--max-cases", "max_cases", 1, kMaxCount,
                                           "cases stored; a file of several owners counts for each"),
       Option<kLimits, &Limits::max_streams>("--max-streams", "max_streams", 1, kMaxCount,
                                             "open drags (Deform streams)"),
       Option<kLimits, &Limits::max_watches>("--max-watches", "max_watches", 1, kMaxCount,
                                             "open watches (clients that follow a drag)"),
-      Option<kLimits, &Limits::max_watches_per_session>(
-          "--max-watches-per-session", "max_watches_per_session", 1, kMaxCount,
-          "open watches per session"),
+      Option<kLimits, &Limits::max_watches_per_session>("--max-watches-per-session",
+                                                        "max_watches_per_session", 1, kMaxCount,
+                                                        "open watches per session"),
       Option<kLimits, &Limits::session_idle_ttl>(
           "--session-idle-ttl", "session_idle_ttl_ms", 0, kMaxSeconds,
           "with --in-memory: seconds after which an unused session or mesh may be removed when "
@@ -132,22 +129,20 @@ std::vector<NumberOption> MakeOptions() {
       Option<kQuotas, &Quotas::memory_bytes>(
           "--quota-memory-mib", "quota_memory_bytes", 0, kMaxMebibytes,
           "memory of the sessions of one principal; 0: half of --memory-budget-mib", kInMebibytes),
-      Option<kQuotas, &Quotas::disk_bytes>("--quota-disk-mib", "quota_disk_bytes", 1,
-                                           kMaxMebibytes,
+      Option<kQuotas, &Quotas::disk_bytes>("--quota-disk-mib", "quota_disk_bytes", 1, kMaxMebibytes,
                                            "stored meshes, cases and predictions per principal",
                                            kInMebibytes),
       Option<kAccess, &AccessOptions::max_shares_per_resource>(
           "--max-shares-per-resource", "max_shares_per_resource", 1, kMaxCount,
           "principals with a share of one session, prediction, case or project"),
-      Option<kAccess, &AccessOptions::max_links_per_session>(
-          "--max-links-per-session", "max_links_per_session", 1, kMaxCount,
-          "active follow links per session"),
+      Option<kAccess, &AccessOptions::max_links_per_session>("--max-links-per-session",
+                                                             "max_links_per_session", 1, kMaxCount,
+                                                             "active follow links per session"),
       Option<kAccess, &AccessOptions::max_link_lifetime>(
           "--max-link-hours", "max_link_hours", 1, kMaxDays * 24,
           "hours after which every follow link expires"),
       Option<kExports, &ExportLimits::max_waiting>("--max-waiting-exports", "max_waiting_exports",
-                                                   1, kMaxCount,
-                                                   "exports to the PACS in progress"),
+                                                   1, kMaxCount, "exports to the PACS in progress"),
       Option<kExports, &ExportLimits::max_waiting_of_principal>(
           "--quota-exports", "quota_exports", 1, kMaxCount,
           "exports to the PACS in progress, per principal"),
@@ -230,8 +225,8 @@ std::string NumberOptionRows() {
     // Those of the machine have no number of their own, and their help names the default.
     const int64_t number = option.get(defaults) / option.unit;
     const bool is_of_machine = absl::StrContains(option.help, "(default: ");
-    absl::StrAppend(&rows, "| `", option.name, "` | ", is_of_machine ? "" : Grouped(number),
-                    " | `", option.limit, "` | ", option.help, " |\n");
+    absl::StrAppend(&rows, "| `", option.name, "` | ", is_of_machine ? "" : Grouped(number), " | `",
+                    option.limit, "` | ", option.help, " |\n");
   }
   return rows;
 }

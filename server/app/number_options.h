@@ -14,8 +14,8 @@
 
 namespace tissueform {
 
-// A number of ServerOptions. One table of these gives the command line, and with it the environment,
-// the file and --print-config; the limits of GetServerInfo; and the table in
+// A number of ServerOptions. One table of these gives the command line, and with it the
+// environment, the file and --print-config; the limits of GetServerInfo; and the table in
 // docs/server-options.md.
 struct NumberOption {
   absl::string_view name;   // of the option, with its dashes; empty: a fixed limit
@@ -24,7 +24,7 @@ struct NumberOption {
   int64_t max = 0;
   absl::string_view help;  // ends without a full stop; states the unit where the name does not
   int64_t unit = 1;        // how many units of the member are one unit of the option (MiB: 2^20)
-  int64_t info_unit = 1;   // how many units of GetServerInfo are one unit of the member (s: 1000 ms)
+  int64_t info_unit = 1;  // how many units of GetServerInfo are one unit of the member (s: 1000 ms)
 
   // The member, in its own unit.
   int64_t (*get)(const ServerOptions& options);

@@ -34,10 +34,12 @@ TEST(NumberOptionsTest, AnOptionSetsItsOwnMember) {
   for (const NumberOption& option : NumberOptions()) {
     if (option.name.empty()) continue;
     const ServerOptions defaults;
-    const int64_t other = option.get(defaults) / option.unit == option.min ? option.min + 1 : option.min;
+    const int64_t other =
+        option.get(defaults) / option.unit == option.min ? option.min + 1 : option.min;
     const ServerOptions options = Parsed({std::string(option.name), std::to_string(other)});
     for (const NumberOption& each : NumberOptions()) {
-      EXPECT_EQ(each.get(options), each.limit == option.limit ? other * option.unit : each.get(defaults))
+      EXPECT_EQ(each.get(options),
+                each.limit == option.limit ? other * option.unit : each.get(defaults))
           << option.name << " and " << each.limit;
     }
   }

@@ -105,8 +105,7 @@ TEST_F(StorageReceiverTest, AnObjectThatIsTooLargeIsNotToBeSentAgain) {
 }
 
 TEST(ConformanceStatement, NamesEveryStorageClassThatIsTaken) {
-  const std::string statement =
-      BytesOfFile(testing::SourcePath("docs/dicom-storage-classes.csv"));
+  const std::string statement = BytesOfFile(testing::SourcePath("docs/dicom-storage-classes.csv"));
   for (int i = 0; i < numberOfDcmAllStorageSOPClassUIDs; ++i) {
     const std::string uid = dcmAllStorageSOPClassUIDs[i];
     EXPECT_THAT(statement,

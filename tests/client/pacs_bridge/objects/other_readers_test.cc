@@ -38,9 +38,9 @@ class OtherReadersTest : public ObjectsFixture {
     std::ofstream(folder_ / "manifest.json") << json;
   }
   int ReadByPydicom() const {
-    return Run(absl::StrCat("/usr/bin/python3 ",
-                            SourcePath("tests/client/pacs_bridge/objects/read_objects.py"), " ",
-                            (folder_ / "manifest.json").string(), " ", SourcePath("docs/dicom-attributes.csv")));
+    return Run(absl::StrCat(
+        "/usr/bin/python3 ", SourcePath("tests/client/pacs_bridge/objects/read_objects.py"), " ",
+        (folder_ / "manifest.json").string(), " ", SourcePath("docs/dicom-attributes.csv")));
   }
   // Of Debian, whatever comes first on the path.
   bool HasModule(const std::string& module) const {
